@@ -1,0 +1,2 @@
+//! The wheeleg program.
+fn main() {}
