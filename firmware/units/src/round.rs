@@ -1,0 +1,102 @@
+//! Rounding and narrowing, written once.
+
+/// `value / 2^bits`, rounded to nearest, ties away from zero.
+///
+/// Odd-symmetric: `f(-v) == -f(v)`. An arithmetic shift alone would round
+/// towards minus infinity and give a controller a bias of half a step.
+/// `bits` of 63 or more gives zero. Never panics.
+#[must_use]
+pub const fn shift_right_round(value: i64, bits: u32) -> i64 {
+    if bits == 0 {
+        return value;
+    }
+    if bits > 62 {
+        return 0;
+    }
+    let half = 1_u64.wrapping_shl(bits.wrapping_sub(1));
+    let magnitude = value.unsigned_abs().saturating_add(half);
+    // At most 2^63 + 2^61 before the shift by at least one: fits an `i64`.
+    let shifted = magnitude.wrapping_shr(bits) as i64;
+    if value < 0 {
+        shifted.wrapping_neg()
+    } else {
+        shifted
+    }
+}
+
+/// Narrows to `i32`, saturating at both ends. Never panics.
+#[must_use]
+pub const fn saturate_i32(value: i64) -> i32 {
+    if value > i32::MAX as i64 {
+        i32::MAX
+    } else if value < i32::MIN as i64 {
+        i32::MIN
+    } else {
+        value as i32
+    }
+}
+
+/// Narrows to `i16`, saturating at both ends. Never panics.
+#[must_use]
+pub const fn saturate_i16(value: i64) -> i16 {
+    if value > i16::MAX as i64 {
+        i16::MAX
+    } else if value < i16::MIN as i64 {
+        i16::MIN
+    } else {
+        value as i16
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{saturate_i16, saturate_i32, shift_right_round};
+
+    #[test]
+    fn halves_round_away_from_zero_on_both_sides() {
+        // value, bits, expected: written out by hand.
+        for (value, bits, expected) in [
+            (0, 4, 0),
+            (7, 4, 0),
+            (8, 4, 1),
+            (-7, 4, 0),
+            (-8, 4, -1),
+            (-9, 4, -1),
+            (23, 4, 1),
+            (24, 4, 2),
+            (-23, 4, -1),
+            (-24, 4, -2),
+            (-24, 0, -24),
+            (1, 1, 1),
+            (-1, 1, -1),
+        ] {
+            assert_eq!(
+                shift_right_round(value, bits),
+                expected,
+                "{value} >> {bits}"
+            );
+        }
+    }
+
+    #[test]
+    fn extremes_do_not_overflow() {
+        assert_eq!(shift_right_round(i64::MAX, 1), 1 << 62);
+        assert_eq!(shift_right_round(i64::MIN, 1), -(1 << 62));
+        assert_eq!(shift_right_round(i64::MAX, 62), 2);
+        assert_eq!(shift_right_round(i64::MIN, 62), -2);
+        assert_eq!(shift_right_round(i64::MAX, 63), 0);
+        assert_eq!(shift_right_round(i64::MIN, 200), 0);
+    }
+
+    #[test]
+    fn narrowing_saturates_one_step_outside_and_not_inside() {
+        assert_eq!(saturate_i32(i64::from(i32::MAX) + 1), i32::MAX);
+        assert_eq!(saturate_i32(i64::from(i32::MIN) - 1), i32::MIN);
+        assert_eq!(saturate_i32(i64::from(i32::MAX) - 1), i32::MAX - 1);
+        assert_eq!(saturate_i32(i64::from(i32::MIN) + 1), i32::MIN + 1);
+        assert_eq!(saturate_i16(32_768), i16::MAX);
+        assert_eq!(saturate_i16(-32_769), i16::MIN);
+        assert_eq!(saturate_i16(32_766), 32_766);
+        assert_eq!(saturate_i16(-32_767), -32_767);
+    }
+}
