@@ -1,2 +1,35 @@
-//! In progress.
+//! The joint and wheel board applications, over embedded-hal traits.
+//!
+//! The same code runs on the board and on the host. A board owns one
+//! [`joint::JointNode`] or [`wheel::WheelNode`] and calls, from interrupts of
+//! falling priority:
+//!
+//! 1. `on_bus_bytes(bytes, t_end)` from the receiver (DMA idle or half/full),
+//!    with the time at which the last of the bytes ended on the line;
+//! 2. `tick(now)` from the sample timer, then `tick_done(end)` when it returns;
+//! 3. `take_transmission()` after either: bytes to send and when to start.
+//!
+//! Inputs are latched at the start of a tick. Outputs are written in every
+//! tick, also on a fault, and take effect at the next tick edge. Time is an
+//! argument: the low 32 bits of a microsecond counter, compared modulo 2^32.
+//!
+//! Nothing here panics for any input, allocates, blocks or uses floating point.
 #![no_std]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::arithmetic_side_effects,
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic
+    )
+)]
+
+pub mod debounce;
+pub mod hardware;
+pub mod mode;
+pub mod overrun;
+pub mod seal;
+pub mod sensor;
+pub mod watchdog;

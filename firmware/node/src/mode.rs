@@ -1,0 +1,195 @@
+//! Modes of a board and the one table that says how they change.
+//!
+//! The table is the whole mode logic: every (mode, event) pair has an entry,
+//! and nothing else in this crate assigns a mode. What the outputs do in a
+//! mode is said by [`Mode::may_drive`] and [`Mode::is_latched`] and carried out
+//! by the joint and wheel applications.
+//!
+//! | mode | joint outputs | wheel outputs | leaves by |
+//! |---|---|---|---|
+//! | Boot | all valves shut | drive off | self-test |
+//! | Idle | all valves shut | drive off | arm, exhaust, faults |
+//! | Armed | closed loop on the position found when arming | closed loop at standstill | set-point, disarm, faults |
+//! | Tracking | closed loop on the bus reference | closed loop on the bus reference | set-point withdrawn, disarm, faults |
+//! | Hold | all valves shut, air trapped | ramp to standstill, then drive off | clear fault, staged exhaust |
+//! | Exhaust | inlets shut, outlets open (PWM-limited when staged) | (never entered) | clear fault, emergency brake, E-stop |
+//! | Fault | all valves shut | drive off | clear fault |
+//!
+//! Hold is the answer to what comes from outside or from the axis (link,
+//! E-stop, brake, sensor, following error, a bit flip); Fault is the answer
+//! when the board itself missed its deadline or failed its self-test, so that
+//! no staging is run by a program that cannot be trusted. Both are latched.
+
+/// Mode of a board; the numbers are those of the wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Mode {
+    /// After reset: waiting for the first good sensor readings.
+    #[default]
+    Boot = 0,
+    /// Disarmed; nothing energised.
+    Idle = 1,
+    /// Closed loop on the position found when arming.
+    Armed = 2,
+    /// Closed loop on the reference of the SYNC slots.
+    Tracking = 3,
+    /// Latched stop: air trapped, or wheel ramped to standstill.
+    Hold = 4,
+    /// Outlets open, inlets shut.
+    Exhaust = 5,
+    /// Latched stop of a board that cannot trust itself.
+    Fault = 6,
+}
+
+/// What can change a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Event {
+    /// Enough good sensor readings in a row after reset.
+    SelfTestPassed = 0,
+    /// No good sensor reading within the self-test time.
+    SelfTestFailed = 1,
+    /// Request: arm.
+    Arm = 2,
+    /// Request: disarm.
+    Disarm = 3,
+    /// Request: clear latched faults.
+    ClearFault = 4,
+    /// A SYNC slot with the valid bit set was latched.
+    SetpointValid = 5,
+    /// A SYNC slot without the valid bit was latched.
+    SetpointWithdrawn = 6,
+    /// Request: emergency brake of this axis.
+    EmergencyBrake = 7,
+    /// E-stop bit in a SYNC header.
+    EmergencyStop = 8,
+    /// No fresh SYNC for the watchdog time.
+    LinkLost = 9,
+    /// Sensor, following-error or state-check fault of this axis.
+    AxisFault = 10,
+    /// A tick overran, or the outputs could not be written.
+    BoardFault = 11,
+    /// Request: open all valves (inlets shut, outlets open).
+    OpenAllValves = 12,
+    /// Request: literal blow-through (maintenance).
+    BlowThrough = 13,
+    /// The hold time is over and the gait phase allows the exhaust.
+    StageExhaust = 14,
+    /// The blow-through time is over.
+    BlowThroughOver = 15,
+}
+
+/// Why the table refuses an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Refusal {
+    /// Only possible while disarmed (Idle).
+    NotDisarmed,
+    /// A latched stop must be cleared first.
+    Latched,
+    /// The self-test has not passed.
+    NotReady,
+    /// The mode has no use for the event.
+    NotApplicable,
+    /// The cause of the latched stop is still present.
+    CausePresent,
+    /// No living link: arming would trip the watchdog at once.
+    NoLink,
+}
+
+/// All modes, in the column order of the table.
+pub const MODES: [Mode; 7] = [
+    Mode::Boot,
+    Mode::Idle,
+    Mode::Armed,
+    Mode::Tracking,
+    Mode::Hold,
+    Mode::Exhaust,
+    Mode::Fault,
+];
+
+/// All events, in the row order of the table.
+pub const EVENTS: [Event; 16] = [
+    Event::SelfTestPassed,
+    Event::SelfTestFailed,
+    Event::Arm,
+    Event::Disarm,
+    Event::ClearFault,
+    Event::SetpointValid,
+    Event::SetpointWithdrawn,
+    Event::EmergencyBrake,
+    Event::EmergencyStop,
+    Event::LinkLost,
+    Event::AxisFault,
+    Event::BoardFault,
+    Event::OpenAllValves,
+    Event::BlowThrough,
+    Event::StageExhaust,
+    Event::BlowThroughOver,
+];
+
+type Entry = Result<Mode, Refusal>;
+
+const BOOT: Entry = Ok(Mode::Boot);
+const IDLE: Entry = Ok(Mode::Idle);
+const ARMD: Entry = Ok(Mode::Armed);
+const TRCK: Entry = Ok(Mode::Tracking);
+const HOLD: Entry = Ok(Mode::Hold);
+const EXHA: Entry = Ok(Mode::Exhaust);
+const FALT: Entry = Ok(Mode::Fault);
+const NDIS: Entry = Err(Refusal::NotDisarmed);
+const LTCH: Entry = Err(Refusal::Latched);
+const NRDY: Entry = Err(Refusal::NotReady);
+const NAPP: Entry = Err(Refusal::NotApplicable);
+
+/// Row: event. Column: present mode. Entry: next mode, or why not.
+///
+/// A disarmed board does not move to Hold on link loss or axis faults (nothing
+/// is energised, and a staged exhaust would energise); the fault is latched
+/// all the same and bars arming.
+#[rustfmt::skip]
+const TABLE: [[Entry; 7]; 16] = [
+    //                       Boot  Idle  Armed Track Hold  Exha  Fault
+    /* SelfTestPassed    */ [IDLE, NAPP, NAPP, NAPP, NAPP, NAPP, NAPP],
+    /* SelfTestFailed    */ [FALT, NAPP, NAPP, NAPP, NAPP, NAPP, NAPP],
+    /* Arm               */ [NRDY, ARMD, ARMD, TRCK, LTCH, LTCH, LTCH],
+    /* Disarm            */ [BOOT, IDLE, IDLE, IDLE, LTCH, LTCH, LTCH],
+    /* ClearFault        */ [BOOT, IDLE, ARMD, TRCK, IDLE, IDLE, BOOT],
+    /* SetpointValid     */ [NAPP, NAPP, TRCK, TRCK, NAPP, NAPP, NAPP],
+    /* SetpointWithdrawn */ [NAPP, NAPP, ARMD, ARMD, NAPP, NAPP, NAPP],
+    /* EmergencyBrake    */ [BOOT, HOLD, HOLD, HOLD, HOLD, HOLD, FALT],
+    /* EmergencyStop     */ [BOOT, HOLD, HOLD, HOLD, HOLD, HOLD, FALT],
+    /* LinkLost          */ [BOOT, IDLE, HOLD, HOLD, HOLD, EXHA, FALT],
+    /* AxisFault         */ [BOOT, IDLE, HOLD, HOLD, HOLD, EXHA, FALT],
+    /* BoardFault        */ [FALT, FALT, FALT, FALT, FALT, FALT, FALT],
+    /* OpenAllValves     */ [NRDY, EXHA, EXHA, EXHA, EXHA, EXHA, LTCH],
+    /* BlowThrough       */ [NRDY, EXHA, NDIS, NDIS, NDIS, NDIS, NDIS],
+    /* StageExhaust      */ [NAPP, NAPP, NAPP, NAPP, EXHA, EXHA, NAPP],
+    /* BlowThroughOver   */ [NAPP, NAPP, NAPP, NAPP, NAPP, IDLE, NAPP],
+];
+
+impl Mode {
+    /// The mode after `event`, or why the event is refused (the mode stays).
+    pub fn after(self, event: Event) -> Result<Mode, Refusal> {
+        TABLE
+            .get(usize::from(event as u8))
+            .and_then(|row| row.get(usize::from(self as u8)))
+            .copied()
+            .unwrap_or(Err(Refusal::NotApplicable))
+    }
+
+    /// Whether the closed loop may drive outputs.
+    pub const fn may_drive(self) -> bool {
+        matches!(self, Mode::Armed | Mode::Tracking)
+    }
+
+    /// Whether the mode is left by an explicit clear only.
+    pub const fn is_latched(self) -> bool {
+        matches!(self, Mode::Hold | Mode::Exhaust | Mode::Fault)
+    }
+
+    /// Whether parameters marked "disarmed only" may be set: no output is
+    /// energised and none is about to be.
+    pub const fn is_disarmed(self) -> bool {
+        matches!(self, Mode::Boot | Mode::Idle | Mode::Fault)
+    }
+}

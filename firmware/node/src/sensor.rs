@@ -1,0 +1,233 @@
+//! From potentiometer code to stroke, with range and rate check.
+//!
+//! stroke = (code − zero) · full scale / 2^16. An open or shorted
+//! potentiometer pulls the converter input to a rail, outside the valid codes;
+//! a loose wiper makes jumps that no piston can. A rejected reading is replaced
+//! by the last good one. Two rejections in a row are a fault, so a dead sensor is
+//! acted upon in its second tick; so is a wiper that loses contact every other
+//! tick, in its third rejection (a leaky count: +2 bad, −1 good, fault at 4).
+//! A sensor that is stuck inside its range is not seen here: following error
+//! sees it.
+
+use crate::hardware::SensorError;
+use wheeleg_units::{AdcCode, PositionMm};
+
+/// Added to the leaky count by a rejected reading; a good one takes 1 off.
+const REJECTED_WEIGHT: u8 = 2;
+
+/// Leaky count that makes a fault.
+const FAULT_LEVEL: u8 = 4;
+
+/// Good readings in a row that pass the self-test after reset.
+pub const SELF_TEST_READINGS: u8 = 10;
+
+/// Calibration and limits of a position sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SensorConfig {
+    /// Code at zero stroke (U0F16 of converter full scale).
+    pub zero: AdcCode,
+    /// Travel over the whole converter range, mm.
+    pub full_scale: PositionMm,
+    /// Smallest valid code; below it the sensor is open or shorted.
+    pub code_min: AdcCode,
+    /// Largest valid code.
+    pub code_max: AdcCode,
+    /// Largest credible change between two ticks, mm.
+    pub step_max: PositionMm,
+}
+
+/// Why a reading was rejected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rejection {
+    /// The converter gave no reading.
+    Missing,
+    /// Code outside the valid range: open or short circuit.
+    Range,
+    /// Faster than a piston can move.
+    Rate,
+}
+
+/// One tick's reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// Stroke; the last good one when this tick's reading was rejected.
+    pub position: PositionMm,
+    /// Why this tick's reading was rejected.
+    pub rejected: Option<Rejection>,
+    /// Set when the sensor is faulty now: the reason of the newest rejection.
+    pub fault: Option<Rejection>,
+}
+
+/// Checks and converts the readings of one position sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SensorMonitor {
+    last: Option<PositionMm>,
+    rejected: u8,
+    good_in_row: u8,
+}
+
+impl SensorMonitor {
+    /// No reading yet.
+    pub const fn new() -> Self {
+        Self {
+            last: None,
+            rejected: 0,
+            good_in_row: 0,
+        }
+    }
+
+    /// Takes the reading of this tick.
+    pub fn sample(
+        &mut self,
+        reading: Result<AdcCode, SensorError>,
+        config: &SensorConfig,
+    ) -> Reading {
+        match self.check(reading, config) {
+            Ok(position) => {
+                self.last = Some(position);
+                self.rejected = self.rejected.saturating_sub(1);
+                self.good_in_row = self.good_in_row.saturating_add(1);
+                Reading {
+                    position,
+                    rejected: None,
+                    fault: None,
+                }
+            }
+            Err(rejection) => {
+                self.good_in_row = 0;
+                let level = self.rejected.saturating_add(REJECTED_WEIGHT);
+                self.rejected = level.min(FAULT_LEVEL);
+                let fault = (level >= FAULT_LEVEL).then_some(rejection);
+                let position = self.last.unwrap_or(PositionMm::ZERO);
+                if fault.is_some() {
+                    // Nothing to compare with any more: the wiper may have
+                    // come back anywhere.
+                    self.last = None;
+                }
+                Reading {
+                    position,
+                    rejected: Some(rejection),
+                    fault,
+                }
+            }
+        }
+    }
+
+    /// Whether enough good readings have been seen in a row.
+    pub const fn is_settled(&self) -> bool {
+        self.good_in_row >= SELF_TEST_READINGS
+    }
+
+    fn check(
+        &self,
+        reading: Result<AdcCode, SensorError>,
+        config: &SensorConfig,
+    ) -> Result<PositionMm, Rejection> {
+        let code = reading.map_err(|_| Rejection::Missing)?;
+        if code < config.code_min || code > config.code_max {
+            return Err(Rejection::Range);
+        }
+        let position = config.position(code);
+        match self.last {
+            Some(last) if position.saturating_sub(last).saturating_abs() > config.step_max => {
+                Err(Rejection::Rate)
+            }
+            _ => Ok(position),
+        }
+    }
+}
+
+impl SensorConfig {
+    /// Stroke at a code: exact product, rounded toward −∞ at 2^-16 mm, saturating.
+    pub fn position(&self, code: AdcCode) -> PositionMm {
+        let difference = i64::from(code.get()).saturating_sub(i64::from(self.zero.get()));
+        // 17 bits times 32 bits: never saturates.
+        let product = difference.saturating_mul(i64::from(self.full_scale.raw()));
+        let raw = product.wrapping_shr(16);
+        PositionMm::from_raw(i32::try_from(raw).unwrap_or(if raw < 0 { i32::MIN } else { i32::MAX }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 4096 code steps per 16 mm: 1 mm = 256 codes.
+    const CONFIG: SensorConfig = SensorConfig {
+        zero: AdcCode::new(8192),
+        full_scale: PositionMm::from_int(256),
+        code_min: AdcCode::new(4096),
+        code_max: AdcCode::new(61_440),
+        step_max: PositionMm::from_int(2),
+    };
+
+    fn code(millimetres: u16) -> Result<AdcCode, SensorError> {
+        Ok(AdcCode::new(8192 + millimetres * 256))
+    }
+
+    #[test]
+    fn conversion_is_linear_and_signed() {
+        assert_eq!(CONFIG.position(AdcCode::new(8192)), PositionMm::ZERO);
+        assert_eq!(CONFIG.position(AdcCode::new(8192 + 25_600)), PositionMm::from_int(100));
+        assert_eq!(CONFIG.position(AdcCode::new(8192 - 256)), PositionMm::from_int(-1));
+        assert_eq!(CONFIG.position(AdcCode::new(8193)).raw(), 256, "one code is 1/256 mm");
+        let steep = SensorConfig { full_scale: PositionMm::MAX, zero: AdcCode::MIN, ..CONFIG };
+        assert!(steep.position(AdcCode::MAX) < PositionMm::MAX);
+    }
+
+    #[test]
+    fn open_short_and_missing_are_faults_in_the_second_tick() {
+        let cases = [
+            (Ok(AdcCode::MIN), Rejection::Range),
+            (Ok(AdcCode::MAX), Rejection::Range),
+            (Ok(AdcCode::new(4095)), Rejection::Range),
+            (Ok(AdcCode::new(61_441)), Rejection::Range),
+            (Err(SensorError::NotReady), Rejection::Missing),
+            (Err(SensorError::Converter), Rejection::Missing),
+            (code(90), Rejection::Rate),
+        ];
+        for (bad, reason) in cases {
+            let mut monitor = SensorMonitor::new();
+            monitor.sample(code(50), &CONFIG);
+            let first = monitor.sample(bad, &CONFIG);
+            assert_eq!((first.rejected, first.fault), (Some(reason), None));
+            assert_eq!(first.position, PositionMm::from_int(50), "last good one");
+            assert_eq!(monitor.sample(bad, &CONFIG).fault, Some(reason));
+        }
+    }
+
+    #[test]
+    fn one_glitch_is_bridged_and_forgotten() {
+        let mut monitor = SensorMonitor::new();
+        for _ in 0..10 {
+            for tick in 0..4 {
+                let bad = tick == 3;
+                let reading = monitor.sample(if bad { code(99) } else { code(50) }, &CONFIG);
+                assert_eq!(reading.rejected.is_some(), bad);
+                assert_eq!(reading.fault, None);
+                assert_eq!(reading.position, PositionMm::from_int(50));
+            }
+        }
+    }
+
+    #[test]
+    fn loose_wiper_is_a_fault_in_its_third_rejection() {
+        let mut monitor = SensorMonitor::new();
+        let mut faults = 0;
+        for tick in 0..6 {
+            let reading = monitor.sample(if tick % 2 == 1 { code(99) } else { code(50) }, &CONFIG);
+            faults += usize::from(reading.fault.is_some());
+            assert_eq!(reading.fault.is_some(), tick == 5);
+        }
+        assert_eq!(faults, 1);
+    }
+
+    #[test]
+    fn fastest_credible_move_passes() {
+        let mut monitor = SensorMonitor::new();
+        for millimetres in (0..180).step_by(2) {
+            assert_eq!(monitor.sample(code(millimetres), &CONFIG).rejected, None);
+        }
+        assert!(monitor.is_settled());
+    }
+}

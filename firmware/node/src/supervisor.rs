@@ -1,0 +1,228 @@
+//! What joint and wheel boards have in common: mode, faults, link supervision,
+//! overrun detection and the staging of a stop.
+//!
+//! # Staged stop
+//!
+//! Link loss and E-stop of an armed axis put it in Hold at once. After the hold
+//! time the axis goes on to Exhaust, if the link-loss action of the newest
+//! SYNC slot allows it (the gait phase: a swing leg may go limp, a stance leg
+//! may not). An emergency brake, a sensor or state fault stays in Hold.
+
+use crate::faults::FaultLog;
+use crate::mode::{Event, Mode, Refusal};
+use crate::overrun::{OverrunDetector, elapsed};
+use crate::watchdog::{Link, LinkLoss, Watchdog};
+use wheeleg_protocol::fault::Fault;
+use wheeleg_units::Micros;
+
+/// Times of the supervision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SupervisionTimes {
+    /// Control tick.
+    pub tick: Micros,
+    /// No fresh SYNC for this long is a link loss.
+    pub watchdog: Micros,
+    /// Time in Hold before a staged exhaust.
+    pub hold: Micros,
+    /// Longest blow-through.
+    pub blow_through: Micros,
+}
+
+/// What an open-outlet mode is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ExhaustKind {
+    /// End of a staged stop: outlets pulsed, so that a loaded leg sinks slowly.
+    #[default]
+    Staged,
+    /// Commanded: outlets fully open.
+    Commanded,
+    /// Maintenance: inlets and outlets open, for a bounded time.
+    BlowThrough,
+}
+
+/// Mode, faults and supervision of one board.
+#[derive(Clone, Debug)]
+pub struct Supervisor {
+    mode: Mode,
+    /// Complement of the mode, to detect a flipped bit.
+    mode_check: u8,
+    entered_at: Micros,
+    staged: bool,
+    exhaust: ExhaustKind,
+    exhaust_allowed: bool,
+    emergency: bool,
+    faults: FaultLog,
+    watchdog: Watchdog,
+    overrun: OverrunDetector,
+}
+
+impl Default for Supervisor {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Supervisor {
+    /// In Boot, no link, no fault.
+    pub const fn new() -> Self {
+        Self {
+            mode: Mode::Boot,
+            mode_check: !(Mode::Boot as u8),
+            entered_at: Micros::ZERO,
+            staged: false,
+            exhaust: ExhaustKind::Staged,
+            exhaust_allowed: false,
+            emergency: false,
+            faults: FaultLog::new(),
+            watchdog: Watchdog::new(),
+            overrun: OverrunDetector::new(),
+        }
+    }
+
+    /// Present mode.
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Why the outlets are open; meaningful in Exhaust.
+    pub const fn exhaust(&self) -> ExhaustKind {
+        self.exhaust
+    }
+
+    /// Fault memory.
+    pub const fn faults(&self) -> &FaultLog {
+        &self.faults
+    }
+
+    /// Tick measurement.
+    pub const fn overrun(&self) -> &OverrunDetector {
+        &self.overrun
+    }
+
+    /// Whether fresh SYNC frames arrive.
+    pub fn link_alive(&self) -> bool {
+        self.watchdog.link() == Link::Alive
+    }
+
+    /// Whether the E-stop bit stood in the newest fresh SYNC of a living link,
+    /// or an E-stop is latched.
+    pub fn emergency_stop(&self) -> bool {
+        self.emergency || self.faults.latched().contains(Fault::EmergencyStop)
+    }
+
+    /// Sends an event through the mode table: the only place that changes the mode.
+    pub fn apply(&mut self, event: Event, at: Micros) -> Result<Mode, Refusal> {
+        let before = self.mode;
+        let next = before.after(event)?;
+        if next != before {
+            self.entered_at = at;
+            if next == Mode::Hold {
+                self.staged = before.may_drive()
+                    && matches!(event, Event::LinkLost | Event::EmergencyStop);
+            }
+            self.mode = next;
+            self.mode_check = !(next as u8);
+        }
+        match event {
+            Event::OpenAllValves => self.exhaust = ExhaustKind::Commanded,
+            Event::StageExhaust => self.exhaust = ExhaustKind::Staged,
+            Event::BlowThrough => self.exhaust = ExhaustKind::BlowThrough,
+            // Inlets never stay open when something goes wrong.
+            Event::LinkLost | Event::AxisFault if self.exhaust == ExhaustKind::BlowThrough => {
+                self.exhaust = ExhaustKind::Commanded;
+            }
+            _ => {}
+        }
+        Ok(next)
+    }
+
+    /// Latches a fault and applies the event it stands for.
+    pub fn fault(&mut self, fault: Fault, event: Event, at: Micros) {
+        self.faults.latch(fault, at);
+        // Every fault event has a next mode in every mode; the table test
+        // holds that, so there is no refusal to lose here.
+        let _ = self.apply(event, at);
+    }
+
+    /// Takes the header of a SYNC latched at `at`. True when it is fresh, so
+    /// that its slot may be used.
+    pub fn sync(&mut self, counter: u16, emergency: bool, at: Micros) -> bool {
+        if emergency {
+            // Even with a frozen counter: stopping needs no proof of freshness.
+            self.emergency = true;
+            self.fault(Fault::EmergencyStop, Event::EmergencyStop, at);
+        }
+        let fresh = self.watchdog.sync(counter, at);
+        if fresh {
+            self.emergency = emergency;
+        }
+        fresh
+    }
+
+    /// Takes the link-loss action of a fresh SYNC slot: whether the gait phase
+    /// allows the exhaust.
+    pub fn allow_exhaust(&mut self, allowed: bool) {
+        self.exhaust_allowed = allowed;
+    }
+
+    /// Supervision at the start of a tick: deadlines, link, own state, staging.
+    pub fn begin_tick(&mut self, now: Micros, times: &SupervisionTimes) {
+        if self.overrun.begin(now, times.tick) {
+            self.fault(Fault::TickOverrun, Event::BoardFault, now);
+        }
+        if self.mode_check != !(self.mode as u8) {
+            self.mode = Mode::Hold;
+            self.mode_check = !(Mode::Hold as u8);
+            self.staged = false;
+            self.faults.latch(Fault::StateCorrupt, now);
+        }
+        match self.watchdog.check(now, times.watchdog) {
+            Some(LinkLoss::Silent) => self.fault(Fault::LinkLost, Event::LinkLost, now),
+            Some(LinkLoss::Stale) => self.fault(Fault::StaleMaster, Event::LinkLost, now),
+            None => {}
+        }
+        let in_mode = elapsed(self.entered_at, now);
+        if self.mode == Mode::Hold
+            && self.staged
+            && self.exhaust_allowed
+            && in_mode >= times.hold
+        {
+            let _ = self.apply(Event::StageExhaust, now);
+        }
+        if self.mode == Mode::Exhaust
+            && self.exhaust == ExhaustKind::BlowThrough
+            && in_mode >= times.blow_through
+        {
+            let _ = self.apply(Event::BlowThroughOver, now);
+        }
+    }
+
+    /// The tick ended at `end`.
+    pub fn end_tick(&mut self, end: Micros, times: &SupervisionTimes) {
+        if self.overrun.end(end, times.tick) {
+            self.fault(Fault::TickOverrun, Event::BoardFault, end);
+        }
+    }
+
+    /// Clears latched faults and leaves the latched stop, unless a cause stands.
+    pub fn clear(&mut self, healthy: bool, at: Micros) -> Result<Mode, Refusal> {
+        if !healthy || (self.emergency && self.link_alive()) {
+            return Err(Refusal::CausePresent);
+        }
+        let next = self.apply(Event::ClearFault, at)?;
+        self.emergency = false;
+        self.faults.clear();
+        Ok(next)
+    }
+
+    /// Arms, when the link lives and nothing is latched.
+    pub fn arm(&mut self, at: Micros) -> Result<Mode, Refusal> {
+        if !self.faults.latched().is_empty() {
+            return Err(Refusal::Latched);
+        }
+        if !self.link_alive() {
+            return Err(Refusal::NoLink);
+        }
+        self.apply(Event::Arm, at)
+    }
+}
