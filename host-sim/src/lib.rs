@@ -1,1 +1,17 @@
-//! In progress.
+//! The `wheeleg` program as a library: scenarios and robots, the simulation
+//! loops, telemetry, analysis and reports.
+//!
+//! The data's way: a [`config::Scenario`] and a [`config::RobotConfig`] go into
+//! [`sil::run`], which writes typed samples into a [`telemetry::Recorder`].
+//! [`analysis`] compares the recording with the paper's targets and
+//! [`report`] draws it. [`cli`] is the command line on top.
+
+pub mod analysis;
+pub mod cli;
+pub mod config;
+pub mod error;
+pub mod report;
+pub mod sil;
+pub mod telemetry;
+
+pub use error::SimError;

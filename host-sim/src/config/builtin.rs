@@ -1,0 +1,84 @@
+//! Robots and scenarios that are part of the program, and files beside it.
+
+use std::path::Path;
+
+use super::error::{ConfigError, Problem};
+use super::{RobotConfig, Scenario, closest};
+
+macro_rules! embedded {
+    ($folder:literal: $($name:literal),* $(,)?) => {
+        &[$( ($name, concat!($folder, "/", $name, ".toml"),
+              include_str!(concat!("../../", $folder, "/", $name, ".toml"))), )*]
+    };
+}
+
+/// Robots: name, file name for messages, text.
+pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg-2003");
+
+/// Scenarios: name, file name for messages, text.
+pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
+    "three-step", "stand", "sinusoid", "master-lost", "estop",
+    "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
+);
+
+/// A robot by built-in name, or by path to a TOML file.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such robot or file, or if it is wrong.
+pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
+    let (file, text) = find("robot", name_or_path, ROBOTS)?;
+    RobotConfig::parse(&file, &text)
+}
+
+/// A scenario by built-in name, or by path to a TOML file.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such scenario or file, or if it is wrong.
+pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
+    let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
+    Scenario::parse(&file, &text)
+}
+
+/// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
+/// holds a path separator is a path.
+fn find(
+    kind: &str,
+    name_or_path: &str,
+    builtin: &[(&str, &str, &str)],
+) -> Result<(String, String), ConfigError> {
+    if let Some((_, file, text)) = builtin.iter().find(|(n, ..)| *n == name_or_path) {
+        return Ok(((*file).to_owned(), (*text).to_owned()));
+    }
+    let is_path = name_or_path.contains(['/', '\\'])
+        || Path::new(name_or_path)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    if is_path {
+        return std::fs::read_to_string(name_or_path)
+            .map(|text| (name_or_path.to_owned(), text))
+            .map_err(|e| {
+                let message = format!("cannot read the {kind} file: {e}");
+                ConfigError::new(
+                    format!("the {kind} file {name_or_path} is not usable"),
+                    vec![Problem::whole(name_or_path, message, None)],
+                )
+            });
+    }
+    let names: Vec<&str> = builtin.iter().map(|(n, ..)| *n).collect();
+    let list = format!(
+        "built in: {}; or give the path of a .toml file",
+        names.join(", ")
+    );
+    let help = match closest(name_or_path, names.iter().copied()) {
+        Some(word) => format!("did you mean `{word}`? {list}"),
+        None => list,
+    };
+    Err(ConfigError::new(
+        format!("unknown {kind} `{name_or_path}`"),
+        vec![Problem::whole(
+            name_or_path,
+            format!("no built-in {kind} has this name"),
+            Some(help),
+        )],
+    ))
+}

@@ -1,0 +1,154 @@
+//! What is wrong with a configuration file, and where.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+
+/// One thing that is wrong at one place of a file.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    source: Option<NamedSource<Arc<str>>>,
+    file: String,
+    line: Option<usize>,
+    message: String,
+    label: String,
+    span: Option<Range<usize>>,
+    help: Option<String>,
+}
+
+impl Problem {
+    /// A problem at a byte range of a file.
+    pub(crate) fn at(
+        file: &str,
+        text: &Arc<str>,
+        span: Range<usize>,
+        message: String,
+        label: impl Into<String>,
+        help: Option<String>,
+    ) -> Self {
+        let start = span.start.min(text.len());
+        let line = text.as_bytes()[..start]
+            .iter()
+            .filter(|b| **b == b'\n')
+            .count()
+            + 1;
+        Self {
+            source: Some(NamedSource::new(file, text.clone()).with_language("TOML")),
+            file: file.to_owned(),
+            line: Some(line),
+            message,
+            label: label.into(),
+            span: Some(span),
+            help,
+        }
+    }
+
+    /// A problem with a file as a whole.
+    pub(crate) fn whole(file: &str, message: String, help: Option<String>) -> Self {
+        Self {
+            source: None,
+            file: file.to_owned(),
+            line: None,
+            message,
+            label: String::new(),
+            span: None,
+            help,
+        }
+    }
+
+    /// One line: file, line, what is wrong.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        match self.line {
+            Some(line) => format!("{}:{line}: {}", self.file, self.message),
+            None => format!("{}: {}", self.file, self.message),
+        }
+    }
+
+    /// The advice, if there is any.
+    #[must_use]
+    pub fn help_text(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    pub(crate) fn position(&self) -> usize {
+        self.span.as_ref().map_or(usize::MAX, |s| s.start)
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.summary())
+    }
+}
+
+impl std::error::Error for Problem {}
+
+impl Diagnostic for Problem {
+    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new("wheeleg::config"))
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help
+            .as_ref()
+            .map(|h| Box::new(h) as Box<dyn fmt::Display + 'a>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.source.as_ref().map(|s| s as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = self.span.clone()?;
+        let label = LabeledSpan::new_with_span(Some(self.label.clone()), span);
+        Some(Box::new(std::iter::once(label)))
+    }
+}
+
+/// A robot or scenario file was rejected; holds every problem found in it, so
+/// that they can be mended in one go.
+#[derive(Debug, Clone)]
+pub struct ConfigError {
+    what: String,
+    problems: Vec<Problem>,
+}
+
+impl ConfigError {
+    pub(crate) fn new(what: impl Into<String>, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(Problem::position);
+        Self {
+            what: what.into(),
+            problems,
+        }
+    }
+
+    /// The problems, in the order of the file.
+    #[must_use]
+    pub fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.problems.len() {
+            1 => write!(f, "{}", self.what),
+            n => write!(f, "{} ({n} problems)", self.what),
+        }
+    }
+}
+
+impl std::error::Error for ConfigError {}
+
+impl Diagnostic for ConfigError {
+    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new("wheeleg::config"))
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        Some(Box::new(self.problems.iter().map(|p| p as &dyn Diagnostic)))
+    }
+}

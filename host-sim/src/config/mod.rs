@@ -1,0 +1,37 @@
+//! Robots and scenarios: TOML files in which every parameter has a value, a
+//! unit and a source, checked against one table of allowed units and ranges.
+
+pub mod builtin;
+mod error;
+mod params;
+mod quantity;
+mod reader;
+mod robot;
+mod scenario;
+mod suggest;
+
+pub use error::{ConfigError, Problem};
+pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
+pub use quantity::Dimension;
+pub use robot::{BusParams, GaitParams, ReferenceParams, RobotConfig};
+pub use scenario::{
+    EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet,
+};
+pub use suggest::closest;
+
+/// Commands that a scenario can give, by the names of the master's table.
+pub const COMMAND_NAMES: [&str; 13] = [
+    "JointReference",
+    "TransmitPosition",
+    "OpenAllValves",
+    "EmergencyBrake",
+    "WheelReference",
+    "Arm",
+    "Disarm",
+    "ClearFault",
+    "EmergencyStop",
+    "Stand",
+    "Hold",
+    "StartGait",
+    "StopGait",
+];

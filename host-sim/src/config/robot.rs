@@ -1,0 +1,124 @@
+//! A robot: everything about the machine that a run needs, in SI units.
+
+use super::error::ConfigError;
+use super::params::{ParameterInfo, params};
+use super::reader::Reader;
+
+params! {
+    /// Serial bus.
+    BusParams {
+        /// Line rate of the RS-485 bus.
+        baud_bit_s: f64, "baud", BitRate, 9_600.0, 12e6;
+        /// Period of the SYNC frame.
+        cycle_s: f64, "cycle", Time, 1e-3, 0.1;
+    }
+
+    /// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
+    GaitParams {
+        /// Number of steps.
+        steps: u16, "steps", Count, 1.0, 10_000.0;
+        /// Duration of one step.
+        period_s: f64, "period", Time, 0.5, 60.0;
+        /// Start of the lift: the reference of b6 jumps to 0.
+        lift_s: f64, "lift", Time, 0.0, 60.0;
+        /// Start of the reach: the reference of b5 jumps to the full stroke.
+        reach_s: f64, "reach", Time, 0.0, 60.0;
+        /// Start of the lowering: the reference of b6 jumps to the full stroke.
+        lower_s: f64, "lower", Time, 0.0, 60.0;
+        /// Start of the push: the wheels drive, b5 gives way.
+        push_s: f64, "push", Time, 0.0, 60.0;
+        /// Stroke of b5 and b6 used by a step.
+        stroke_m: f64, "stroke", Length, 1e-3, 0.18;
+        /// Stroke of b5 at which the held leg stands.
+        held_leg_s5_m: f64, "held_leg_s5", Length, 0.0, 0.18;
+        /// Stroke of b6 at which the held leg stands.
+        held_leg_s6_m: f64, "held_leg_s6", Length, 0.0, 0.18;
+        /// Stroke of both yaw cylinders; half is straight ahead.
+        yaw_s2_m: f64, "yaw_s2", Length, 0.0, 0.18;
+        /// Speed of the push.
+        push_speed_m_s: f64, "push_speed", Velocity, 1e-3, 0.4;
+        /// Acceleration of the push.
+        push_acceleration_m_s2: f64, "push_acceleration", Acceleration, 0.01, 5.0;
+        /// Stop the lowering of a foot where its switches close.
+        touchdown_reflex: bool, "touchdown_reflex", Flag, 0.0, 1.0;
+    }
+
+    /// Reference model of the paper's curves: a critically damped cylinder (model.md 6.2).
+    ReferenceParams {
+        /// Time constant of the fast strokes (b6 retracting, b5 extending).
+        tau_fast_s: f64, "tau_fast", Time, 0.01, 1.0;
+        /// Time constant of b6 extending.
+        tau_extend_s: f64, "tau_extend", Time, 0.01, 1.0;
+        /// Pure delay between model and experiment.
+        delay_s: f64, "delay", Time, 0.0, 1.0;
+        /// Time over which the foot load falls to zero before the lift.
+        unload_s: f64, "unload", Time, 0.0, 1.0;
+        /// Start of the foot load's return within a step.
+        reload_start_s: f64, "reload_start", Time, 0.0, 60.0;
+        /// End of the foot load's return within a step.
+        reload_end_s: f64, "reload_end", Time, 0.0, 60.0;
+        /// Mass on the vertical rod.
+        m6_kg: f64, "m6", Mass, 0.01, 10.0;
+        /// Viscous friction of the vertical cylinder.
+        d6_n_s_m: f64, "d6", Damping, 0.0, 1000.0;
+        /// Gravity.
+        gravity_m_s2: f64, "gravity", Acceleration, 0.0, 20.0;
+        /// Ground load of the standing foot at b5 stroke zero.
+        load_retracted_n: f64, "load_retracted", Force, 0.0, 200.0;
+        /// Ground load of the standing foot at full b5 stroke.
+        load_extended_n: f64, "load_extended", Force, 0.0, 200.0;
+    }
+}
+
+/// A robot file, checked and converted to SI.
+#[derive(Debug, Clone)]
+pub struct RobotConfig {
+    /// Name of the robot.
+    pub name: String,
+    /// One-line description.
+    pub description: String,
+    /// Serial bus.
+    pub bus: BusParams,
+    /// Gait.
+    pub gait: GaitParams,
+    /// Reference model of the paper's figures.
+    pub reference: ReferenceParams,
+    /// Every parameter as written, for listings and reports.
+    pub parameters: Vec<ParameterInfo>,
+}
+
+const SECTIONS: [&str; 5] = ["name", "description", "bus", "gait", "reference"];
+
+impl RobotConfig {
+    /// Reads a robot from TOML text; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with every problem found: file, line, field, value,
+    /// accepted units or range.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        let what = format!("the robot file {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, true)?;
+        let top = r.table("");
+        if let Some(top) = &top {
+            r.reject_unknown(top, &SECTIONS);
+        }
+        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let description = top.as_ref().and_then(|t| r.text(t, "description"));
+        let bus = r.section::<BusParams>("bus");
+        let gait = r.section::<GaitParams>("gait");
+        let reference = r.section::<ReferenceParams>("reference");
+        let robot = (|| {
+            Some(Self {
+                name: name?,
+                description: description?,
+                bus: bus?,
+                gait: gait?,
+                reference: reference?,
+                parameters: Vec::new(),
+            })
+        })();
+        let (mut robot, parameters) = r.finish(&what, robot)?;
+        robot.parameters = parameters;
+        Ok(robot)
+    }
+}
