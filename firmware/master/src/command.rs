@@ -1,0 +1,241 @@
+//! User commands and their codes. The high byte of a code names the layer that
+//! carries the command out: 0x01xx layer 0 (physical level), 0x02xx layer 1
+//! (gait level). [`TABLE`] is the single source of `COMMANDS.md`.
+
+use core::fmt;
+
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use crate::contact::Side;
+use crate::layer1::foot::FootShape;
+use crate::layer1::params::GaitParams;
+
+/// Layer that carries a command out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// Drivers, bus, reflexes.
+    Zero,
+    /// Gait and trajectory.
+    One,
+}
+
+impl Layer {
+    /// Layer named by the range of a command code; `None` outside the ranges.
+    #[must_use]
+    pub const fn of_code(code: u16) -> Option<Self> {
+        match code {
+            0x0100..=0x01FF => Some(Self::Zero),
+            0x0200..=0x02FF => Some(Self::One),
+            _ => None,
+        }
+    }
+}
+
+/// Fuzzy correction of the joint law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CorrectionKind {
+    /// Proportional-derivative type: inputs e, ė.
+    Pd,
+    /// Integral-derivative type: inputs ∫e, ė.
+    Id,
+}
+
+/// A joint, 1..=6: left yaw, horizontal, vertical, then right.
+pub type JointNumber = u8;
+
+/// A user command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Reference of one joint.
+    JointReference {
+        /// 1..=6.
+        joint: JointNumber,
+        /// Stroke, mm, 0..=180.
+        stroke_mm: PositionMm,
+    },
+    /// Ask one joint's board for its position, acknowledged with the value in an event.
+    TransmitPosition {
+        /// 1..=6.
+        joint: JointNumber,
+    },
+    /// Inlets shut, outlets open: the cylinder exhausts.
+    OpenAllValves {
+        /// 1..=6.
+        joint: JointNumber,
+    },
+    /// All valves of one joint shut: air trapped.
+    EmergencyBrake {
+        /// 1..=6.
+        joint: JointNumber,
+    },
+    /// Fuzzy correction of one joint.
+    SelectCorrection {
+        /// 1..=6.
+        joint: JointNumber,
+        /// Which correction.
+        correction: CorrectionKind,
+    },
+    /// Drive both wheels by a distance from where they are.
+    WheelReference {
+        /// Distance, mm, positive forward, −32 000..=32 000.
+        travel_mm: PositionMm,
+    },
+    /// Highest speed of a wheel move, mm/s, 1..=400.
+    WheelSpeed {
+        /// Which wheel.
+        side: Side,
+        /// Speed at the rim, mm/s.
+        speed_mm_s: VelocityMmS,
+    },
+    /// Acceleration of a wheel move.
+    WheelAcceleration {
+        /// Which wheel.
+        side: Side,
+        /// Acceleration at the rim, mm/s², 10..=5000.
+        acceleration_mm_s2: fixed::types::I16F16,
+    },
+    /// Coefficients of the wheel's lead filter D(z) = K(z − A/256)/(4(z + B/256)).
+    WheelFilter {
+        /// Which wheel.
+        side: Side,
+        /// Zero.
+        a: u8,
+        /// Pole.
+        b: u8,
+        /// Gain.
+        k: u8,
+    },
+    /// Energise all axes at their present position.
+    Arm,
+    /// Valves and motors off.
+    Disarm,
+    /// Clear latched faults of all nodes and of the master.
+    ClearFault,
+    /// HOLD everywhere and supply dump, in the next SYNC.
+    EmergencyStop,
+    /// Move to the start pose of the gait parameters.
+    Stand,
+    /// Freeze every joint where it is.
+    Hold,
+    /// Start the gait from the start pose; the gait clock starts now.
+    StartGait,
+    /// End the gait with the present step.
+    StopGait,
+    /// Replace the gait parameters.
+    SetGait(
+        /// New parameters.
+        GaitParams,
+    ),
+    /// Move one foot along the sinusoid of the paper's §6.
+    FootTrajectory {
+        /// Which leg.
+        side: Side,
+        /// Shape and size.
+        shape: FootShape,
+    },
+}
+
+macro_rules! commands {
+    ($($name:ident = $code:literal, $arguments:literal, $effect:literal, $pattern:pat => )*) => {
+        /// Numbers of the commands.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u16)]
+        pub enum CommandCode {
+            $(#[doc = $effect] $name = $code,)*
+        }
+
+        /// Every command: code, arguments, effect.
+        pub const TABLE: &[CommandInfo] = &[
+            $(CommandInfo { code: CommandCode::$name, name: stringify!($name), arguments: $arguments, effect: $effect },)*
+        ];
+
+        impl Command {
+            /// Code of this command.
+            #[must_use]
+            pub const fn code(&self) -> CommandCode {
+                match self { $($pattern => CommandCode::$name,)* }
+            }
+        }
+    };
+}
+
+/// One row of the table of commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CommandInfo {
+    /// Code.
+    pub code: CommandCode,
+    /// Name.
+    pub name: &'static str,
+    /// Arguments with units.
+    pub arguments: &'static str,
+    /// What it does.
+    pub effect: &'static str,
+}
+
+commands! {
+    JointReference = 0x0101, "joint 1-6, stroke mm", "Reference of one joint; refused while layer 1 moves the robot.", Self::JointReference { .. } =>
+    TransmitPosition = 0x0102, "joint 1-6", "Asks one joint's board for its position.", Self::TransmitPosition { .. } =>
+    OpenAllValves = 0x0103, "joint 1-6", "Exhaust: inlets shut, outlets open. Layer 1 is stopped first.", Self::OpenAllValves { .. } =>
+    EmergencyBrake = 0x0104, "joint 1-6", "HOLD of one joint: all four valves shut. Layer 1 is stopped first.", Self::EmergencyBrake { .. } =>
+    SelectCorrection = 0x0105, "joint 1-6, PD or ID", "Fuzzy correction of one joint.", Self::SelectCorrection { .. } =>
+    WheelReference = 0x0110, "travel mm", "Drives both wheels by a distance; refused while layer 1 moves the robot.", Self::WheelReference { .. } =>
+    WheelSpeed = 0x0111, "side, mm/s", "Highest speed of the wheel's own profile.", Self::WheelSpeed { .. } =>
+    WheelAcceleration = 0x0112, "side, mm/s^2", "Acceleration of the wheel's own profile.", Self::WheelAcceleration { .. } =>
+    WheelFilter = 0x0113, "side, A, B, K", "Coefficients of the wheel's lead filter.", Self::WheelFilter { .. } =>
+    Arm = 0x0120, "none", "Energises all axes where they stand; needs every node enumerated, compatible and free of faults.", Self::Arm =>
+    Disarm = 0x0121, "none", "Valves and motors off.", Self::Disarm =>
+    ClearFault = 0x0122, "none", "Clears latched faults of all nodes and the E-stop of the master.", Self::ClearFault =>
+    EmergencyStop = 0x0123, "none", "E-stop bit in every SYNC from the next on: HOLD and supply dump. Never queued, never refused for lateness.", Self::EmergencyStop =>
+    Stand = 0x0201, "none", "Slews all joints to the start pose of the gait.", Self::Stand =>
+    Hold = 0x0202, "none", "Freezes every joint at its measured stroke and stops the wheels.", Self::Hold =>
+    StartGait = 0x0203, "none", "Starts the gait from the start pose.", Self::StartGait =>
+    StopGait = 0x0204, "none", "Ends the gait with the step under way.", Self::StopGait =>
+    SetGait = 0x0205, "gait parameters", "Replaces the gait parameters; refused while a gait runs.", Self::SetGait(_) =>
+    FootTrajectory = 0x0206, "side, shape", "Moves one foot along a sinusoid through inverse kinematics.", Self::FootTrajectory { .. } =>
+}
+
+impl CommandCode {
+    /// Layer that carries the command out, from the range of the code.
+    #[must_use]
+    pub const fn layer(self) -> Layer {
+        match Layer::of_code(self as u16) {
+            Some(layer) => layer,
+            // Excluded by the assertion below.
+            None => Layer::Zero,
+        }
+    }
+}
+
+// Every code lies in a range that names a layer, and no code appears twice.
+const _: () = {
+    let mut table = TABLE;
+    let mut last = 0;
+    while let [row, rest @ ..] = table {
+        let code = row.code as u16;
+        assert!(Layer::of_code(code).is_some());
+        assert!(code > last);
+        last = code;
+        table = rest;
+    }
+};
+
+/// Writes the table of commands as Markdown (the generated part of `COMMANDS.md`).
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_markdown(out: &mut dyn fmt::Write) -> fmt::Result {
+    writeln!(out, "| code | layer | command | arguments | effect |")?;
+    writeln!(out, "|---|---|---|---|---|")?;
+    for row in TABLE {
+        let layer = match row.code.layer() {
+            Layer::Zero => 0,
+            Layer::One => 1,
+        };
+        writeln!(
+            out,
+            "| 0x{:04X} | {layer} | {} | {} | {} |",
+            row.code as u16, row.name, row.arguments, row.effect
+        )?;
+    }
+    Ok(())
+}

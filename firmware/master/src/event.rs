@@ -1,0 +1,152 @@
+//! What the master reports to its user: a bounded queue of events.
+
+use heapless::Deque;
+use wheeleg_units::PositionMm;
+
+use crate::contact::{Sector, Side};
+use crate::dispatcher::{Refusal, Ticket};
+
+/// Why all axes were told to hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HoldReason {
+    /// A node missed three cycles in a row.
+    NodeLost(
+        /// Bus address.
+        u8,
+    ),
+    /// A node reported a fault.
+    NodeFault {
+        /// Bus address.
+        node: u8,
+        /// Active fault bits, protocol's table of faults.
+        faults: u16,
+    },
+    /// The supply-pressure switch opened.
+    SupplyLost,
+    /// Layer 1 produced nothing for 100 ms.
+    LayerOneStalled,
+    /// An E-stop was commanded.
+    EmergencyStop,
+    /// The user asked for it.
+    User,
+}
+
+/// An event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// A command was carried out.
+    Done(
+        /// Its ticket.
+        Ticket,
+    ),
+    /// A command that had been queued was refused.
+    Refused {
+        /// Its ticket.
+        ticket: Ticket,
+        /// Why.
+        reason: Refusal,
+    },
+    /// A node was identified and its interface matches.
+    NodeReady(
+        /// Bus address.
+        u8,
+    ),
+    /// A node's interface differs: the robot will not arm.
+    SchemaMismatch {
+        /// Bus address.
+        node: u8,
+        /// The master's schema hash.
+        master: u64,
+        /// The node's schema hash.
+        theirs: u64,
+    },
+    /// A node answers again after it was lost.
+    NodeBack(
+        /// Bus address.
+        u8,
+    ),
+    /// All axes are armed.
+    Armed,
+    /// All axes are disarmed.
+    Disarmed,
+    /// All axes were told to hold; the gait is over.
+    Hold(
+        /// Why.
+        HoldReason,
+    ),
+    /// The start pose is reached.
+    Homed,
+    /// The start pose was not reached in time.
+    HomingFailed {
+        /// First joint (1..=6) out of tolerance.
+        joint: u8,
+    },
+    /// The gait is over.
+    GaitDone {
+        /// Steps done.
+        steps: u16,
+    },
+    /// The foot trajectory is over.
+    TrajectoryDone,
+    /// A foot's switches closed.
+    TouchDown {
+        /// Which foot.
+        side: Side,
+        /// Side of the foot that touches, in the robot's frame; `None` when flat.
+        sector: Option<Sector>,
+    },
+    /// All of a foot's switches opened.
+    LiftOff(
+        /// Which foot.
+        Side,
+    ),
+    /// Answer to `TransmitPosition`.
+    Position {
+        /// 1..=6.
+        joint: u8,
+        /// Measured stroke, mm.
+        stroke_mm: PositionMm,
+    },
+}
+
+/// Events kept for the user.
+pub const EVENT_DEPTH: usize = 32;
+
+/// Bounded queue of events; the oldest goes first when it is full.
+#[derive(Debug, Default)]
+pub struct Events {
+    queue: Deque<(u64, Event), EVENT_DEPTH>,
+    lost: u32,
+}
+
+impl Events {
+    /// An empty queue.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            queue: Deque::new(),
+            lost: 0,
+        }
+    }
+
+    /// Adds an event that happened at `time_us`.
+    pub fn push(&mut self, time_us: u64, event: Event) {
+        if self.queue.is_full() {
+            let _oldest = self.queue.pop_front();
+            self.lost = self.lost.wrapping_add(1);
+        }
+        // Cannot fail: a place was just made.
+        let _stored = self.queue.push_back((time_us, event));
+    }
+
+    /// Takes the oldest event with its time in µs.
+    pub fn pop(&mut self) -> Option<(u64, Event)> {
+        self.queue.pop_front()
+    }
+
+    /// Events lost to a full queue since start-up (wraps).
+    #[must_use]
+    pub const fn lost(&self) -> u32 {
+        self.lost
+    }
+}

@@ -1,0 +1,4 @@
+//! Layer 0.
+pub mod liveness;
+pub mod odometry;
+pub mod reflex;

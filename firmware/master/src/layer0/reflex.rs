@@ -1,0 +1,104 @@
+//! Reflexes of layer 0 on single joints: leg–wheel co-operation and touchdown.
+
+use wheeleg_units::PositionMm;
+
+use crate::contact::{FootSwitches, Side};
+use crate::layer1::params::STROKE_MM;
+use crate::layer1::um_to_mm;
+use crate::setpoint::{Cylinder, JointSetpoint, Reflex, Setpoints, WHEELS};
+
+/// Progress of the lowering of one foot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Touch {
+    /// Reflex not asked for.
+    #[default]
+    Off,
+    /// Asked for; the switches have not been seen open since. A switch that is
+    /// stuck closed stays here, and the leg goes to its reference.
+    Waiting,
+    /// The switches have been open: the next closing counts.
+    Open,
+    /// Touched: the stroke at that moment is the reference.
+    Touched(PositionMm),
+}
+
+/// Memory of the reflexes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reflexes {
+    touch: [Touch; WHEELS],
+    segment: Option<u16>,
+    travel_origin_um: i64,
+}
+
+/// What the reflexes see in a cycle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Senses {
+    /// Mean wheel travel, µm.
+    pub travel_um: i64,
+    /// Foot switches, left and right.
+    pub feet: [Option<FootSwitches>; WHEELS],
+    /// Measured strokes of the two vertical joints, left and right.
+    pub vertical_mm: [Option<PositionMm>; WHEELS],
+}
+
+impl Reflexes {
+    /// Takes note of a cycle; to be called once per cycle before [`Self::apply`].
+    pub fn observe(&mut self, setpoints: &Setpoints, senses: &Senses) {
+        let segment = setpoints.travel.map(|travel| travel.segment);
+        if segment != self.segment {
+            self.segment = segment;
+            self.travel_origin_um = senses.travel_um;
+        }
+        for side in [Side::Left, Side::Right] {
+            let asked = setpoints
+                .joints
+                .get(side.joint(Cylinder::Vertical))
+                .copied()
+                .flatten()
+                .is_some_and(|joint| joint.reflex == Reflex::StopOnTouch);
+            let foot = senses.feet.get(side.index()).copied().flatten();
+            let stroke = senses.vertical_mm.get(side.index()).copied().flatten();
+            if let Some(touch) = self.touch.get_mut(side.index()) {
+                *touch = touch.next(asked, foot.map(FootSwitches::any), stroke);
+            }
+        }
+    }
+
+    /// The set-point of joint index 0..6 after its reflex.
+    #[must_use]
+    pub fn apply(&self, joint: usize, setpoint: JointSetpoint, senses: &Senses) -> JointSetpoint {
+        let mut out = setpoint;
+        match setpoint.reflex {
+            Reflex::None => {}
+            Reflex::FollowTravel => {
+                let travelled = senses.travel_um.saturating_sub(self.travel_origin_um);
+                out.reference_mm = setpoint
+                    .reference_mm
+                    .saturating_sub(um_to_mm(travelled))
+                    .limit(PositionMm::ZERO, STROKE_MM);
+            }
+            Reflex::StopOnTouch => {
+                let side = usize::from(joint >= Side::Right.joint(Cylinder::Yaw));
+                if let Some(Touch::Touched(stroke)) = self.touch.get(side) {
+                    out.reference_mm = *stroke;
+                    out.ahead = None;
+                }
+            }
+        }
+        out
+    }
+}
+
+impl Touch {
+    fn next(self, asked: bool, closed: Option<bool>, stroke: Option<PositionMm>) -> Self {
+        if !asked {
+            return Self::Off;
+        }
+        match (self, closed) {
+            (Self::Off | Self::Waiting, Some(false)) => Self::Open,
+            (Self::Off, _) => Self::Waiting,
+            (Self::Open, Some(true)) => stroke.map_or(Self::Open, Self::Touched),
+            (state, _) => state,
+        }
+    }
+}

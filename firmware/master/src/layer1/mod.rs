@@ -1,0 +1,342 @@
+//! Layer 1: gaits and foot trajectories. One call per bus cycle.
+//!
+//! Takes commands and measurements from its RT-FIFOs, gives one set of
+//! references per cycle to layer 0's, and touches nothing else: it can run in
+//! a thread of its own, and layer 0 notices when it stops ([`Layer1::cycle`]
+//! not called for 100 ms).
+
+pub mod foot;
+pub mod homing;
+pub mod params;
+pub mod profile;
+pub mod square;
+
+use heapless::spsc::{Consumer, Producer};
+use wheeleg_units::PositionMm;
+
+use crate::command::Command;
+use crate::contact::Side;
+use crate::dispatcher::{Accepted, Refusal, Ticket};
+use crate::event::{Event, Events};
+use crate::setpoint::{Feedback, JOINTS, JointSetpoint, Phase, Setpoints, TravelSetpoint};
+use foot::FootTrajectory;
+use homing::{Homing, HomingConfig, HomingStep};
+use params::GaitParams;
+use square::SquareGait;
+
+/// What layer 1 is doing.
+#[derive(Clone, Copy, Debug)]
+enum Mode {
+    /// No references.
+    Idle,
+    /// Slewing to the start pose.
+    Homing(Homing),
+    /// In the start pose.
+    Ready(Setpoints),
+    /// Stepping.
+    Gait(SquareGait),
+    /// One foot on a sinusoid.
+    Foot(FootTrajectory),
+    /// Last references held.
+    Done(Setpoints),
+}
+
+/// State of layer 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer1 {
+    params: GaitParams,
+    homing: HomingConfig,
+    mode: Mode,
+    feedback: Feedback,
+    /// Command whose end is still to be reported.
+    active: Option<Ticket>,
+    segment: u16,
+    lost_setpoints: u32,
+}
+
+impl Layer1 {
+    /// Idle, with the given parameters.
+    ///
+    /// # Errors
+    /// The first limit that the gait parameters violate.
+    pub fn new(params: GaitParams, homing: HomingConfig) -> Result<Self, params::ParamError> {
+        params.validate()?;
+        Ok(Self {
+            params,
+            homing,
+            mode: Mode::Idle,
+            feedback: Feedback::default(),
+            active: None,
+            segment: 0,
+            lost_setpoints: 0,
+        })
+    }
+
+    /// Gait parameters in use.
+    #[must_use]
+    pub const fn params(&self) -> &GaitParams {
+        &self.params
+    }
+
+    /// Set-point sets that found their queue full, since start-up (wraps).
+    #[must_use]
+    pub const fn lost_setpoints(&self) -> u32 {
+        self.lost_setpoints
+    }
+
+    /// Runs one cycle: newest feedback, all waiting commands (at most as many
+    /// as the queue holds), one set of references.
+    pub fn cycle(
+        &mut self,
+        now_us: u64,
+        commands: &mut Consumer<'_, Accepted>,
+        feedback: &mut Consumer<'_, Feedback>,
+        setpoints: &mut Producer<'_, Setpoints>,
+        events: &mut Events,
+    ) {
+        for _ in 0..feedback.capacity() {
+            match feedback.dequeue() {
+                Some(newest) => self.feedback = newest,
+                None => break,
+            }
+        }
+        if !self.feedback.motion_allowed {
+            self.interrupt(now_us, events);
+        }
+        for _ in 0..commands.capacity() {
+            let Some(accepted) = commands.dequeue() else {
+                break;
+            };
+            let stop = matches!(accepted.command, Command::Hold);
+            if stop && self.feedback.motion_allowed && !accepted.expired(now_us) {
+                self.interrupt(now_us, events);
+            }
+            let answer = if accepted.expired(now_us) {
+                Err(Refusal::Expired)
+            } else {
+                self.execute(&accepted, now_us)
+            };
+            match answer {
+                Ok(true) => events.push(now_us, Event::Done(accepted.ticket)),
+                Ok(false) => {}
+                Err(reason) => events.push(
+                    now_us,
+                    Event::Refused {
+                        ticket: accepted.ticket,
+                        reason,
+                    },
+                ),
+            }
+        }
+        let out = self.advance(now_us, events);
+        if setpoints.enqueue(out).is_err() {
+            self.lost_setpoints = self.lost_setpoints.wrapping_add(1);
+        }
+    }
+
+    /// Drops every motion, because layer 0 reports that none is allowed.
+    fn interrupt(&mut self, now_us: u64, events: &mut Events) {
+        self.mode = Mode::Idle;
+        if let Some(ticket) = self.active.take() {
+            let reason = Refusal::Interrupted;
+            events.push(now_us, Event::Refused { ticket, reason });
+        }
+    }
+
+    /// Starts a command. `Ok(true)` if it is done at once, `Ok(false)` if its
+    /// end is reported later.
+    fn execute(&mut self, accepted: &Accepted, now_us: u64) -> Result<bool, Refusal> {
+        let moving = matches!(self.mode, Mode::Homing(_) | Mode::Gait(_) | Mode::Foot(_));
+        let allowed = self.feedback.motion_allowed;
+        match accepted.command {
+            Command::SetGait(params) => {
+                if moving {
+                    return Err(Refusal::Moving);
+                }
+                params.validate().map_err(Refusal::Parameter)?;
+                let moved = self.pose(&params) != self.pose(&self.params);
+                self.params = params;
+                if let (true, Mode::Ready(last)) = (moved, self.mode) {
+                    self.mode = Mode::Done(last);
+                }
+                return Ok(true);
+            }
+            _ if !allowed => return Err(Refusal::NotArmed),
+            Command::Hold => {
+                let frozen = self.frozen(now_us);
+                self.mode = Mode::Done(frozen);
+                return Ok(true);
+            }
+            Command::StopGait => {
+                let Mode::Gait(gait) = &mut self.mode else {
+                    return Err(Refusal::NotMoving);
+                };
+                gait.stop_after_step(now_us);
+                return Ok(true);
+            }
+            _ if moving => return Err(Refusal::Moving),
+            Command::Stand => {
+                let target = self.pose(&self.params);
+                let homing = Homing::new(self.homing, target, &self.feedback).ok_or(
+                    Refusal::NodeMissing {
+                        node: self.unheard(),
+                    },
+                )?;
+                self.mode = Mode::Homing(homing);
+            }
+            Command::StartGait => {
+                if !matches!(self.mode, Mode::Ready(_)) {
+                    return Err(Refusal::NotAtStart);
+                }
+                let gait = SquareGait::new(self.params, now_us, self.segment.wrapping_add(1))
+                    .map_err(Refusal::Parameter)?;
+                self.mode = Mode::Gait(gait);
+            }
+            Command::FootTrajectory { side, shape } => {
+                let Mode::Ready(start) = self.mode else {
+                    return Err(Refusal::NotAtStart);
+                };
+                if side != self.params.stepping_leg(0) {
+                    return Err(Refusal::NotAtStart);
+                }
+                let trajectory =
+                    FootTrajectory::new(shape, side, start, now_us).map_err(Refusal::Parameter)?;
+                self.mode = Mode::Foot(trajectory);
+            }
+            // Commands of layer 0 are never routed here.
+            _ => return Err(Refusal::NotMoving),
+        }
+        self.active = Some(accepted.ticket);
+        Ok(false)
+    }
+
+    /// Bus address of the first joint that was not heard in the last cycle.
+    fn unheard(&self) -> u8 {
+        let index = self.feedback.strokes_mm.iter().position(Option::is_none);
+        index
+            .and_then(|i| u8::try_from(i.saturating_add(1)).ok())
+            .unwrap_or(0)
+    }
+
+    fn pose(&self, params: &GaitParams) -> [PositionMm; JOINTS] {
+        let [l2, l5, l6] = params.start_pose(Side::Left);
+        let [r2, r5, r6] = params.start_pose(Side::Right);
+        [l2, l5, l6, r2, r5, r6]
+    }
+
+    /// References equal to the measured strokes; joints not heard are withdrawn.
+    fn frozen(&self, now_us: u64) -> Setpoints {
+        let mut out = Setpoints::idle(now_us);
+        out.phase = Phase::Hold;
+        for (slot, stroke) in out.joints.iter_mut().zip(self.feedback.strokes_mm) {
+            *slot = stroke.map(|reference_mm| JointSetpoint {
+                reference_mm,
+                ..JointSetpoint::default()
+            });
+        }
+        out
+    }
+
+    fn standing_wheels(&self) -> TravelSetpoint {
+        TravelSetpoint {
+            segment: self.segment,
+            ..TravelSetpoint::default()
+        }
+    }
+
+    fn finish(&mut self, now_us: u64, event: Event, events: &mut Events) {
+        events.push(now_us, event);
+        if let Some(ticket) = self.active.take() {
+            events.push(now_us, Event::Done(ticket));
+        }
+    }
+
+    fn advance(&mut self, now_us: u64, events: &mut Events) -> Setpoints {
+        let wheels = self.standing_wheels();
+        match &mut self.mode {
+            Mode::Idle => Setpoints::idle(now_us),
+            Mode::Ready(held) | Mode::Done(held) => Setpoints {
+                time_us: now_us,
+                ..*held
+            },
+            Mode::Homing(homing) => {
+                let (joints, step) = homing.cycle(&self.feedback);
+                let mut out = Setpoints::idle(now_us);
+                out.phase = Phase::Homing;
+                out.joints = joints;
+                out.travel = Some(wheels);
+                match step {
+                    HomingStep::Moving => {}
+                    HomingStep::Settled => {
+                        out.phase = Phase::Ready;
+                        self.mode = Mode::Ready(out);
+                        self.finish(now_us, Event::Homed, events);
+                    }
+                    HomingStep::TimedOut { joint } => {
+                        out.phase = Phase::Done;
+                        self.mode = Mode::Done(out);
+                        let joint = joint.saturating_add(1);
+                        events.push(now_us, Event::HomingFailed { joint });
+                        if let Some(ticket) = self.active.take() {
+                            let reason = Refusal::NotSettled { joint };
+                            events.push(now_us, Event::Refused { ticket, reason });
+                        }
+                    }
+                }
+                out
+            }
+            Mode::Gait(gait) => {
+                let out = gait.setpoints(now_us, &self.feedback);
+                self.segment = gait.segment();
+                let steps = gait.steps();
+                if out.phase == Phase::Done {
+                    self.mode = Mode::Done(out);
+                    self.finish(now_us, Event::GaitDone { steps }, events);
+                }
+                out
+            }
+            Mode::Foot(trajectory) => {
+                let out = trajectory.setpoints(now_us);
+                if out.phase == Phase::Done {
+                    self.mode = Mode::Done(out);
+                    self.finish(now_us, Event::TrajectoryDone, events);
+                }
+                out
+            }
+        }
+    }
+}
+
+/// Seconds to whole µs, saturating; not-a-number gives 0.
+#[must_use]
+pub(crate) fn seconds_to_us(seconds: f32) -> u32 {
+    // A float to integer `as` saturates and maps NaN to 0.
+    (seconds * 1.0e6) as u32
+}
+
+/// Whole µs to seconds, exact to 24 bits.
+#[must_use]
+pub(crate) fn us_to_seconds(us: u64) -> f32 {
+    us as f32 * 1.0e-6
+}
+
+/// Bus cycle, µs.
+pub(crate) const CYCLE_US: u64 = 10_000;
+
+/// Distance in µm to mm in I16F16, to the nearest LSB (15 nm); saturates at ±32 m.
+#[must_use]
+pub(crate) fn um_to_mm(um: i64) -> PositionMm {
+    // × 65 536 / 1000 = × 8192 / 125, rounded, ties away from zero.
+    let scaled = um.saturating_mul(8192);
+    let half = if um < 0 { -62 } else { 62 };
+    let raw = scaled.saturating_add(half).checked_div(125).unwrap_or(0);
+    PositionMm::from_raw(i32::try_from(raw).unwrap_or(if raw < 0 { i32::MIN } else { i32::MAX }))
+}
+
+/// Stroke or distance in mm to µm, to the nearest µm.
+#[must_use]
+pub(crate) fn mm_to_um(mm: PositionMm) -> i64 {
+    let scaled = i64::from(mm.raw()).saturating_mul(125);
+    let half = if scaled < 0 { -4096 } else { 4096 };
+    scaled.saturating_add(half).checked_div(8192).unwrap_or(0)
+}

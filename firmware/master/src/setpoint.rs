@@ -1,0 +1,196 @@
+//! What layers 0 and 1 tell each other once per bus cycle.
+
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use crate::contact::{FootSwitches, Side};
+
+/// Number of cylinder joints.
+pub const JOINTS: usize = 6;
+/// Number of wheels.
+pub const WHEELS: usize = 2;
+/// Number of nodes on the bus: joints 1–6, wheels 7 (left) and 8 (right).
+pub const NODES: usize = 8;
+
+/// Cylinder within a leg.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cylinder {
+    /// b2: joints 1 and 4.
+    Yaw,
+    /// b5: joints 2 and 5.
+    Horizontal,
+    /// b6: joints 3 and 6.
+    Vertical,
+}
+
+impl Side {
+    /// The opposite side.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+
+    /// Index of this side's wheel in arrays of wheels.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Left => 0,
+            Self::Right => 1,
+        }
+    }
+
+    /// Index (0..6) of a joint of this side's leg in arrays of joints.
+    #[must_use]
+    pub const fn joint(self, cylinder: Cylinder) -> usize {
+        let first: usize = match self {
+            Self::Left => 0,
+            Self::Right => 3,
+        };
+        first.saturating_add(match cylinder {
+            Cylinder::Yaw => 0,
+            Cylinder::Horizontal => 1,
+            Cylinder::Vertical => 2,
+        })
+    }
+}
+
+/// Where the robot is in its motion; logged, and the reason for the link-loss action.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Phase {
+    /// Layer 1 sends no references.
+    #[default]
+    Idle = 0,
+    /// Slewing to the start pose.
+    Homing = 1,
+    /// At the start pose, settled.
+    Ready = 2,
+    /// Step: weight leaves the stepping foot, references unchanged.
+    Unload = 3,
+    /// Step: foot rises, b5 drawn back.
+    Lift = 4,
+    /// Step: foot in the air, b5 reaches ahead.
+    Reach = 5,
+    /// Step: foot goes down.
+    Lower = 6,
+    /// Step: wheels push, b5 of the standing leg gives way.
+    Push = 7,
+    /// Step: push over, waiting for the next step.
+    Rest = 8,
+    /// Last reference of a finished motion held.
+    Done = 9,
+    /// Foot trajectory (model.md §6.1).
+    Trajectory = 10,
+    /// All references frozen at the measured position.
+    Hold = 11,
+}
+
+/// Coming change of a reference, for control ahead of a known move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ahead {
+    /// Reference the next move leads to, mm.
+    pub reference_mm: PositionMm,
+    /// Bus cycles until that move begins, 1..=254.
+    pub cycles: u8,
+}
+
+/// What a node does when the bus falls silent in this phase, product.md §5.2.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnLinkLoss {
+    /// Valves shut, air trapped: a loaded leg must not collapse.
+    #[default]
+    Hold,
+    /// HOLD first, then exhaust at limited speed: the leg carries nothing.
+    HoldThenExhaust,
+}
+
+/// Leg–wheel co-operation and touchdown reflexes of layer 0 on one joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reflex {
+    /// The reference goes out as it is.
+    #[default]
+    None,
+    /// The reference goes out minus the measured wheel travel since layer 1
+    /// asked for this reflex: a standing foot stays where it is on the ground.
+    FollowTravel,
+    /// The reference becomes the measured stroke once the foot's switches close.
+    StopOnTouch,
+}
+
+/// Reference of one joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JointSetpoint {
+    /// Stroke in mm, 0..=180.
+    pub reference_mm: PositionMm,
+    /// Speed of the reference in mm/s (feed-forward; 0 for a square wave).
+    pub velocity_mm_s: VelocityMmS,
+    /// Next change of the reference, if within the horizon.
+    pub ahead: Option<Ahead>,
+    /// Action on link loss.
+    pub on_link_loss: OnLinkLoss,
+    /// Reflex of layer 0.
+    pub reflex: Reflex,
+}
+
+/// Reference of both wheels' common travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TravelSetpoint {
+    /// Distance in mm from where the motion began, now.
+    pub travel_mm: PositionMm,
+    /// Distance in mm at the end of the motion.
+    pub target_mm: PositionMm,
+    /// Speed of the reference, mm/s.
+    pub velocity_mm_s: VelocityMmS,
+    /// Changes whenever a new motion begins: layer 0 then takes the wheels'
+    /// present reference as the new origin.
+    pub segment: u16,
+}
+
+/// One cycle's references, layer 1 to layer 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Setpoints {
+    /// Time for which they were computed, µs.
+    pub time_us: u64,
+    /// Phase of the motion.
+    pub phase: Phase,
+    /// Step of the gait, from 0.
+    pub step: u16,
+    /// Leg that steps, if any.
+    pub stepping: Option<Side>,
+    /// References of the joints; `None` withdraws the joint.
+    pub joints: [Option<JointSetpoint>; JOINTS],
+    /// Reference of the wheels; `None` withdraws them.
+    pub travel: Option<TravelSetpoint>,
+}
+
+impl Setpoints {
+    /// No references at all.
+    #[must_use]
+    pub const fn idle(time_us: u64) -> Self {
+        Self {
+            time_us,
+            phase: Phase::Idle,
+            step: 0,
+            stepping: None,
+            joints: [None; JOINTS],
+            travel: None,
+        }
+    }
+}
+
+/// One cycle's measurements, layer 0 to layer 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Feedback {
+    /// Start of the cycle the replies belong to, µs.
+    pub time_us: u64,
+    /// Measured strokes, mm; `None` if the node did not answer in this cycle.
+    pub strokes_mm: [Option<PositionMm>; JOINTS],
+    /// Foot switches of the left and right foot; `None` if not heard.
+    pub feet: [Option<FootSwitches>; WHEELS],
+    /// Mean wheel travel since start-up, µm (positive forward).
+    pub travel_um: i64,
+    /// All nodes armed, alive and free of faults: motion may go on.
+    pub motion_allowed: bool,
+}

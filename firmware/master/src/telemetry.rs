@@ -1,0 +1,4 @@
+//! Telemetry records.
+/// x
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Record;
