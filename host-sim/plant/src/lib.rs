@@ -1,1 +1,28 @@
-//! In progress.
+//! The simulated robot: pneumatics, motors, sensors, leg and body dynamics, contact.
+//!
+//! SI units throughout, in `f64`, with the unit in each name. The model (built once
+//! from parameters) is separate from the state, which can be cloned,
+//! serialised and hashed. Nothing here knows of fixed point, ticks of a
+//! controller or frames of a bus: the crossing to machine units happens in the
+//! simulator's board models.
+//!
+//! Determinism: no wall clock, no threads, no iteration over unordered maps, one random
+//! stream per signal. The same binary, parameters, seed and inputs give the
+//! same bytes.
+
+pub mod assembly;
+pub mod axis;
+pub mod chamber;
+pub mod cylinder;
+pub mod endstop;
+pub mod error;
+pub mod flow;
+pub mod friction;
+pub mod hash;
+pub mod motor;
+pub mod sensors;
+pub mod supply;
+pub mod testing;
+pub mod valve;
+
+pub use error::PlantError;

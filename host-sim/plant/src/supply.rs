@@ -1,0 +1,222 @@
+//! Air supply shared by the cylinders: source, regulator, reservoir, dump valve, switch.
+//!
+//! ```text
+//! source ──► regulator ──► [dump valve] ──► reservoir ──► fill valves
+//! ```
+//!
+//! The dump valve is a 3/2 valve: while it dumps, the source is cut off and
+//! the reservoir is open to the atmosphere. The reservoir is isothermal (its
+//! wall is large against its gas). Mass is the only state of the gas.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{PlantError, check, check_state};
+use crate::flow::{GasParams, Iso6358, Restrictor};
+use crate::hash::StateHasher;
+use crate::valve::{ValveParams, ValveState, ValveTiming};
+
+/// The supply.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SupplyParams {
+    /// Pressure before the regulator \[Pa absolute\], 1e5..3e7; 0 flow below the reservoir's.
+    pub source_pressure_pa: f64,
+    /// Regulator set pressure \[Pa absolute\], 1e5..2e6: what it holds at no flow.
+    pub set_pressure_pa: f64,
+    /// Pressure drop below the set point at which the regulator is fully open \[Pa\],
+    /// 100..1e6 (its droop).
+    pub droop_pa: f64,
+    /// Flow path of the fully open regulator.
+    pub regulator_flow: Iso6358,
+    /// Reservoir and manifold volume \[m³\], 1e-6..1.
+    pub reservoir_m3: f64,
+    /// Reservoir pressure at the start \[Pa absolute\], 5e4..2e6.
+    pub initial_pressure_pa: f64,
+    /// Dump valve: its flow to the atmosphere and its switching times.
+    pub dump_valve: ValveParams,
+    /// Pressure switch closes above this \[Pa absolute\], 1e4..2e6.
+    pub switch_on_pa: f64,
+    /// Pressure switch opens below this \[Pa absolute\], 1e4..switch_on.
+    pub switch_off_pa: f64,
+}
+
+impl SupplyParams {
+    /// Checks every field against its valid range.
+    ///
+    /// # Errors
+    /// [`PlantError::Parameter`] names the first field outside its range.
+    pub fn validate(&self) -> Result<(), PlantError> {
+        check(
+            "supply.source_pressure_pa",
+            self.source_pressure_pa,
+            1e4,
+            3e7,
+        )?;
+        check("supply.set_pressure_pa", self.set_pressure_pa, 1e5, 2e6)?;
+        check("supply.droop_pa", self.droop_pa, 100.0, 1e6)?;
+        check("supply.reservoir_m3", self.reservoir_m3, 1e-6, 1.0)?;
+        check(
+            "supply.initial_pressure_pa",
+            self.initial_pressure_pa,
+            5e4,
+            2e6,
+        )?;
+        check("supply.switch_on_pa", self.switch_on_pa, 1e4, 2e6)?;
+        check(
+            "supply.switch_off_pa",
+            self.switch_off_pa,
+            1e4,
+            self.switch_on_pa,
+        )?;
+        self.regulator_flow.validate()?;
+        self.dump_valve.validate()
+    }
+}
+
+/// State of the supply.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SupplyState {
+    /// Gas in the reservoir \[kg\].
+    pub mass_kg: f64,
+    /// Drawn from the source so far \[kg\].
+    pub source_mass_kg: f64,
+    /// Dumped to the atmosphere so far \[kg\].
+    pub dumped_mass_kg: f64,
+    /// Dump valve; open means dumping.
+    pub dump: ValveState,
+    /// Pressure switch contact.
+    pub pressure_switch: bool,
+    /// Pressure before the regulator \[Pa absolute\]; starts at the parameter's
+    /// value, may be lowered to inject a lost supply.
+    pub source_pressure_pa: f64,
+}
+
+impl SupplyState {
+    /// Adds the state to a hash in declaration order.
+    pub fn feed(&self, hasher: &mut StateHasher) {
+        hasher.f64(self.mass_kg);
+        hasher.f64(self.source_mass_kg);
+        hasher.f64(self.dumped_mass_kg);
+        self.dump.feed(hasher);
+        hasher.bytes(&[u8::from(self.pressure_switch)]);
+        hasher.f64(self.source_pressure_pa);
+    }
+}
+
+/// Flows of the supply, without what the cylinders take \[kg/s\].
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SupplyRates {
+    pub(crate) source_kg_s: f64,
+    pub(crate) dump_kg_s: f64,
+}
+
+/// The supply with everything a step needs precomputed.
+#[derive(Debug, Clone)]
+pub struct SupplyModel {
+    params: SupplyParams,
+    regulator: Restrictor,
+    dump: Restrictor,
+    pub(crate) dump_timing: ValveTiming,
+    ambient_pressure_pa: f64,
+    sqrt_t: f64,
+    /// R T / V \[Pa/kg\].
+    pascal_per_kg: f64,
+}
+
+impl SupplyModel {
+    /// Precomputes a supply.
+    ///
+    /// # Errors
+    /// [`PlantError::Parameter`] if a parameter is outside its range.
+    pub fn new(params: &SupplyParams, gas: &GasParams) -> Result<Self, PlantError> {
+        params.validate()?;
+        Ok(Self {
+            params: *params,
+            regulator: Restrictor::new(&params.regulator_flow, gas),
+            dump: Restrictor::new(&params.dump_valve.flow, gas),
+            dump_timing: ValveTiming::new(&params.dump_valve, 1.0, 0.0),
+            ambient_pressure_pa: gas.ambient_pressure_pa,
+            sqrt_t: gas.ambient_temperature_k.sqrt(),
+            pascal_per_kg: gas.gas_constant_j_kg_k * gas.ambient_temperature_k
+                / params.reservoir_m3,
+        })
+    }
+
+    /// Supply at its starting pressure, not dumping.
+    #[must_use]
+    pub fn initial_state(&self) -> SupplyState {
+        let p = self.params.initial_pressure_pa;
+        SupplyState {
+            mass_kg: p / self.pascal_per_kg,
+            source_mass_kg: 0.0,
+            dumped_mass_kg: 0.0,
+            dump: ValveState::default(),
+            pressure_switch: p >= self.params.switch_on_pa,
+            source_pressure_pa: self.params.source_pressure_pa,
+        }
+    }
+
+    /// Reservoir pressure \[Pa absolute\] for a gas mass.
+    #[must_use]
+    #[inline]
+    pub fn pressure_pa(&self, mass_kg: f64) -> f64 {
+        mass_kg * self.pascal_per_kg
+    }
+
+    #[inline]
+    pub(crate) fn rates(&self, state: &SupplyState, mass_kg: f64) -> SupplyRates {
+        let p = self.pressure_pa(mass_kg);
+        if state.dump.is_open() {
+            return SupplyRates {
+                source_kg_s: 0.0,
+                dump_kg_s: self.dump.mass_flow_kg_s(
+                    p,
+                    self.sqrt_t,
+                    self.ambient_pressure_pa,
+                    self.sqrt_t,
+                ),
+            };
+        }
+        let opening = ((self.params.set_pressure_pa - p) / self.params.droop_pa).clamp(0.0, 1.0);
+        // A regulator has a check function: nothing runs back to a lost source.
+        let source_kg_s = if opening > 0.0 && state.source_pressure_pa > p {
+            opening
+                * self.regulator.mass_flow_kg_s(
+                    state.source_pressure_pa,
+                    self.sqrt_t,
+                    p,
+                    self.sqrt_t,
+                )
+        } else {
+            0.0
+        };
+        SupplyRates {
+            source_kg_s,
+            dump_kg_s: 0.0,
+        }
+    }
+
+    /// Updates the pressure switch from the reservoir pressure.
+    #[inline]
+    pub(crate) fn update_switch(&self, state: &mut SupplyState) {
+        let p = self.pressure_pa(state.mass_kg);
+        if p >= self.params.switch_on_pa {
+            state.pressure_switch = true;
+        } else if p < self.params.switch_off_pa {
+            state.pressure_switch = false;
+        }
+    }
+
+    /// Refuses a state that is not finite or has left the model's range.
+    ///
+    /// # Errors
+    /// [`PlantError::NonFinite`] or [`PlantError::OutOfBounds`] with the name.
+    pub fn check(&self, state: &SupplyState) -> Result<(), PlantError> {
+        check_state(
+            "supply_pressure_pa",
+            0,
+            self.pressure_pa(state.mass_kg),
+            1e3,
+            1e8,
+        )
+    }
+}

@@ -1,0 +1,177 @@
+//! Parameter sets for tests and examples, each value with unit and source.
+//!
+//! `robots/wheeleg-2003.toml` mirrors [`wheeleg_2003_cylinder`] and its
+//! companions; this file is the copy that needs no file system.
+//! Tags: PAPER, DATASHEET, ASSUMED (chosen here), DERIVED (computed from others).
+
+use crate::axis::AxisParams;
+use crate::chamber::GasModel;
+use crate::cylinder::CylinderParams;
+use crate::endstop::EndStopParams;
+use crate::flow::{GasParams, Iso6358};
+use crate::friction::FrictionParams;
+use crate::motor::MotorParams;
+use crate::sensors::{AdcNoise, AdcParams, PotentiometerParams};
+use crate::supply::SupplyParams;
+use crate::valve::ValveParams;
+
+/// dm³/(s·bar) in m³/(s·Pa).
+pub const DM3_S_BAR: f64 = 1e-8;
+
+/// Dry air at sea level.
+#[must_use]
+pub fn air() -> GasParams {
+    GasParams {
+        gas_constant_j_kg_k: 287.05,      // J/(kg K) DATASHEET ISO 2533
+        heat_capacity_ratio: 1.4,         // - DATASHEET ISO 2533
+        reference_density_kg_m3: 1.185,   // kg/m3 DATASHEET ISO 8778 (ANR)
+        reference_temperature_k: 293.15,  // K DATASHEET ISO 8778 (ANR)
+        reference_pressure_pa: 100_000.0, // Pa DATASHEET ISO 8778 (ANR)
+        ambient_pressure_pa: 101_325.0,   // Pa ASSUMED sea level
+        ambient_temperature_k: 293.15,    // K ASSUMED
+    }
+}
+
+/// Seal friction of a Ø20 cylinder.
+///
+/// The force bound is a catalogue's minimum operating pressure of 0.05 MPa
+/// on Ø20 (16 N); stiffness and Stribeck speed are usual for small cylinders.
+#[must_use]
+pub fn seal_friction() -> FrictionParams {
+    FrictionParams {
+        coulomb_n: 10.0,              // N ASSUMED
+        static_n: 15.0,               // N ASSUMED (catalogue bound 16 N)
+        stribeck_m_s: 0.02,           // m/s ASSUMED (0.01-0.03 usual)
+        viscous_n_s_m: 40.0,          // N s/m ASSUMED
+        bristle_stiffness_n_m: 1e5,   // N/m ASSUMED
+        bristle_damping_n_s_m: 500.0, // N s/m ASSUMED
+        elastic_share: 0.7,           // - ASSUMED (Dupont et al. 2002)
+    }
+}
+
+/// Metal stop with an elastic cushion disc.
+#[must_use]
+pub fn end_stop() -> EndStopParams {
+    EndStopParams {
+        stiffness_n_m: 1e6,           // N/m ASSUMED (0.2 mm at 200 N)
+        damping_s_m: 5.0,             // s/m ASSUMED
+        cushion_length_m: 0.006,      // m ASSUMED
+        cushion_damping_n_s_m: 150.0, // N s/m ASSUMED
+    }
+}
+
+/// 16 W brush motor, 260:1.
+#[must_use]
+pub fn wheel_motor() -> MotorParams {
+    MotorParams {
+        supply_v: 12.0,                // V ASSUMED
+        resistance_ohm: 1.2,           // ohm ASSUMED (winding, brushes, bridge)
+        inductance_h: 0.6e-3,          // H ASSUMED (L/R = 0.5 ms)
+        torque_constant_n_m_a: 0.0232, // N m/A ASSUMED (no load 4940 rpm at 12 V)
+        reduction: 260.0,              // - PAPER 130:1 and 2:1
+        efficiency: 0.70,              // - ASSUMED (three-stage planetary and chain)
+        efficiency_blend_rad_s: 1.0,   // rad/s ASSUMED, numerical
+        friction_n_m: 1.0e-3,          // N m ASSUMED
+        friction_blend_rad_s: 1.0,     // rad/s ASSUMED, numerical
+        encoder_lines: 100,            // lines ASSUMED (24 bit cover 161 wheel turns)
+    }
+}
+
+/// Conductive-plastic potentiometer, 200 mm.
+#[must_use]
+pub fn potentiometer() -> PotentiometerParams {
+    PotentiometerParams {
+        electrical_stroke_m: 0.200, // m ASSUMED
+        offset_m: 0.010,            // m ASSUMED (centred: open and short are visible)
+        gain: 1.0,                  // - ASSUMED
+        nonlinearity: 0.0005,       // - ASSUMED (±0.05 %)
+    }
+}
+
+/// 12-bit converter, 16 conversions a reading.
+#[must_use]
+pub fn adc() -> AdcParams {
+    AdcParams {
+        bits: 12,                                     // bit DATASHEET STM32G431
+        oversampling: 16,                             // - ASSUMED
+        noise: AdcNoise::Gaussian { sigma_lsb: 1.0 }, // LSB ASSUMED
+    }
+}
+
+/// Sonic conductance of each valve of `wheeleg-2003` \[m³/(s Pa)\].
+///
+/// DERIVED: fitted so that a full stroke of the vertical cylinder takes
+/// 1.0 s open loop (see `examples/fit_conductance.rs`), never to the start delay.
+pub const WHEELEG_2003_C_M3_S_PA: f64 = 0.075 * DM3_S_BAR;
+
+/// Small direct-acting valve of about 2000, with its flow set by the throttles in its ports.
+#[must_use]
+pub fn wheeleg_2003_valve() -> ValveParams {
+    ValveParams {
+        flow: Iso6358::new(WHEELEG_2003_C_M3_S_PA, 0.3), // C DERIVED fit; b ASSUMED
+        t_on_s: 5e-3, // s ASSUMED: era 5-20 ms; 5 keeps 25..80 % of a 50 Hz period usable
+        t_off_s: 4e-3, // s ASSUMED
+    }
+}
+
+/// Cylinder Ø20/8 × 180 with 1 m of 4 mm tube to each chamber.
+#[must_use]
+pub fn wheeleg_2003_cylinder() -> CylinderParams {
+    CylinderParams {
+        bore_m: 0.020,                                         // m ASSUMED
+        rod_m: 0.008,                                          // m DATASHEET (usual rod of a Ø20)
+        stroke_m: 0.180,                                       // m PAPER Figs. 12-13 (0..180 mm)
+        dead_volume_a_m3: 2.5e-6,                              // m3 ASSUMED
+        dead_volume_b_m3: 2.5e-6,                              // m3 ASSUMED
+        line_volume_m3: 12.6e-6,                               // m3 DERIVED 1 m of 4 mm bore
+        line_flow: Some(Iso6358::new(1.20 * DM3_S_BAR, 0.35)), // DERIVED Eckersten, 4 mm x 1 m
+        line_delay_s: 2.9e-3,                                  // s DERIVED 1 m at 343 m/s
+        dead_wall_area_m2: 0.0135,                             // m2 DERIVED tube wall and port
+        piston_leak_m3_s_pa: 5e-14, // m3/(s Pa) ASSUMED: about 70 mm3/s ANR at 6 bar g
+        rod_leak_m3_s_pa: 2e-14,    // m3/(s Pa) ASSUMED
+        fill_valve: wheeleg_2003_valve(),
+        vent_valve: wheeleg_2003_valve(),
+        timing_spread: [1.0; 4],                           // - ASSUMED
+        gas_model: GasModel::Polytropic { exponent: 1.2 }, // - ASSUMED
+        friction: seal_friction(),
+        end_stop: end_stop(),
+        initial_pressure_a_pa: 101_325.0, // Pa ASSUMED vented
+        initial_pressure_b_pa: 101_325.0, // Pa ASSUMED vented
+    }
+}
+
+/// 6 bar gauge from a bottle through a regulator, 2 dm³ reservoir.
+#[must_use]
+pub fn wheeleg_2003_supply() -> SupplyParams {
+    SupplyParams {
+        source_pressure_pa: 1_101_325.0, // Pa ASSUMED 10 bar g
+        set_pressure_pa: 701_325.0,      // Pa ASSUMED 6 bar g
+        droop_pa: 30_000.0,              // Pa ASSUMED
+        regulator_flow: Iso6358::new(1.0 * DM3_S_BAR, 0.3), // ASSUMED
+        reservoir_m3: 2.0e-3,            // m3 ASSUMED
+        initial_pressure_pa: 701_325.0,  // Pa ASSUMED
+        dump_valve: ValveParams {
+            flow: Iso6358::new(5.0 * DM3_S_BAR, 0.3), // ASSUMED
+            t_on_s: 0.020,                            // s ASSUMED
+            t_off_s: 0.020,                           // s ASSUMED
+        },
+        switch_on_pa: 551_325.0,  // Pa ASSUMED 4.5 bar g
+        switch_off_pa: 501_325.0, // Pa ASSUMED 4.0 bar g
+    }
+}
+
+/// Bench with the robot's cylinder and 1.5 kg, horizontal, retracted and vented.
+#[must_use]
+pub fn wheeleg_2003_axis() -> AxisParams {
+    AxisParams {
+        gas: air(),
+        supply: wheeleg_2003_supply(),
+        cylinder: wheeleg_2003_cylinder(),
+        moving_mass_kg: 1.5,   // kg ASSUMED
+        load_n: 0.0,           // N
+        initial_stroke_m: 0.0, // m
+        potentiometer: potentiometer(),
+        adc: adc(),
+        step_ns: 100_000, // ns design decision
+    }
+}
