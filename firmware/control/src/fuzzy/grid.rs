@@ -1,0 +1,134 @@
+//! Two inputs and a full table of rules.
+
+use super::partition::Partition;
+use super::{FuzzyError, mean_i32, mean_i64};
+
+/// A rule base of two inputs: `consequents[i][j]` is the singleton of the rule
+/// "first input is set i AND second input is set j".
+///
+/// Full scale of a consequent is the table's own; the joint law reads
+/// ±32 767 as ±1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct GridRules<const FIRST: usize, const SECOND: usize> {
+    first: Partition<FIRST>,
+    second: Partition<SECOND>,
+    consequents: [[i16; SECOND]; FIRST],
+}
+
+impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
+    /// A rule base; both partitions must use all their sets and the same
+    /// number of membership levels.
+    ///
+    /// # Errors
+    /// [`FuzzyError::Levels`], [`FuzzyError::SetCount`].
+    pub const fn new(
+        first: Partition<FIRST>,
+        second: Partition<SECOND>,
+        consequents: [[i16; SECOND]; FIRST],
+    ) -> Result<Self, FuzzyError> {
+        if first.levels() != second.levels() {
+            return Err(FuzzyError::Levels);
+        }
+        if first.len() != FIRST || second.len() != SECOND {
+            return Err(FuzzyError::SetCount);
+        }
+        Ok(Self {
+            first,
+            second,
+            consequents,
+        })
+    }
+
+    /// The sets of the first input.
+    #[must_use]
+    pub const fn first(&self) -> &Partition<FIRST> {
+        &self.first
+    }
+
+    /// The sets of the second input.
+    #[must_use]
+    pub const fn second(&self) -> &Partition<SECOND> {
+        &self.second
+    }
+
+    /// The weighted mean of the singletons at a point, between the least and the
+    /// greatest consequent. Inputs are limited to the domains. Never panics.
+    #[inline]
+    #[must_use]
+    pub fn infer(&self, first: i16, second: i16) -> i16 {
+        if self.first.is_fan() && self.second.is_fan() {
+            self.infer_fan(first, second)
+        } else {
+            self.infer_all(first, second)
+        }
+    }
+
+    /// The four rules around the point.
+    #[inline]
+    fn infer_fan(&self, first: i16, second: i16) -> i16 {
+        let a = self.first.pair(first);
+        let b = self.second.pair(second);
+        let rows = (
+            self.consequents.get(a.index),
+            self.consequents.get(a.index.wrapping_add(1)),
+        );
+        let (Some(low_row), Some(high_row)) = rows else {
+            return 0;
+        };
+        let next = b.index.wrapping_add(1);
+        let singletons = (
+            low_row.get(b.index),
+            low_row.get(next),
+            high_row.get(b.index),
+            high_row.get(next),
+        );
+        let (Some(&y00), Some(&y01), Some(&y10), Some(&y11)) = singletons else {
+            return 0;
+        };
+        let weights = [
+            a.lower.min(b.lower),
+            a.lower.min(b.upper),
+            a.upper.min(b.lower),
+            a.upper.min(b.upper),
+        ];
+        let mut numerator = 0_i32;
+        let mut denominator = 0_i32;
+        // Neighbours in a fan add up to at most levels + 1, so the four weights
+        // to at most 2 × levels + 4, and the sum to below 2^31.
+        for (weight, y) in weights.into_iter().zip([y00, y01, y10, y11]) {
+            let weight = weight as i32;
+            numerator = numerator.wrapping_add(weight.wrapping_mul(i32::from(y)));
+            denominator = denominator.wrapping_add(weight);
+        }
+        mean_i32(numerator, denominator)
+    }
+
+    /// All rules: for sets that overlap more than their neighbours.
+    #[inline(never)]
+    fn infer_all(&self, first: i16, second: i16) -> i16 {
+        let mut second_levels = [0_u16; SECOND];
+        for (j, level) in second_levels.iter_mut().enumerate() {
+            *level = self.second.membership(j, second);
+        }
+        let mut numerator = 0_i64;
+        let mut denominator = 0_i64;
+        for (i, row) in self.consequents.iter().enumerate() {
+            let level = self.first.membership(i, first);
+            if level == 0 {
+                continue;
+            }
+            for (&other, &y) in second_levels.iter().zip(row) {
+                let weight = i64::from(level.min(other));
+                numerator = numerator.wrapping_add(weight.wrapping_mul(i64::from(y)));
+                denominator = denominator.wrapping_add(weight);
+            }
+        }
+        mean_i64(numerator, denominator)
+    }
+
+    /// The reference path, for the test that both paths agree.
+    #[cfg(test)]
+    pub(crate) fn infer_all_for_test(&self, first: i16, second: i16) -> i16 {
+        self.infer_all(first, second)
+    }
+}

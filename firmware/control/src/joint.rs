@@ -1,0 +1,35 @@
+//! The joint law: u = Kp·e + fuzzy correction.
+//!
+//! ```text
+//! e = reference − measured              ė = reference velocity − velocity
+//! u = Kp e + C · rules(e, ė)  [PD]   or   Kp e + C · rules(∫e, ė)  [ID]
+//!     + Kf · reference velocity + fade
+//! duty = 0                                   settled, or |u| < minimum
+//!      = limit(u + sign(u) · dead zone)      otherwise
+//! ```
+//!
+//! * **Velocity** is a regression over a window ([`crate::velocity`]).
+//! * **Anti-windup**: the integral advances only inside the integral zone, not
+//!   while the duty is limited and the error pushes further, and it is bounded by
+//!   its own scale. It is zero under the PD correction.
+//! * **Bumpless**: after a change of correction or gains the output continues
+//!   from its last value, and the difference fades out linearly.
+//! * **Settled** shuts all valves after a dwell inside the settle band and opens
+//!   none until the error has left the wider release band, or the reference
+//!   moves. At rest nothing switches.
+//! * **Limits** that shaped an output are reported with it.
+//!
+//! The law is odd: inputs of opposite sign give exactly the opposite duty.
+//! A tick makes one 32-bit division (the weighted mean), and one of 64 bits in
+//! the tick of a change of law alone. It reads no clock and never panics; every
+//! intermediate value is bounded as said beside it. The [`JointInput::announced`] reference
+//! does not enter this law.
+
+mod config;
+mod controller;
+mod settle;
+mod types;
+
+pub use config::{ConfigError, Gain, JointConfig, JointGains, JointParameter, JointRules};
+pub use controller::JointController;
+pub use types::{Announced, Correction, JointInput, JointLimits, JointOutput};

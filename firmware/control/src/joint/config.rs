@@ -1,0 +1,386 @@
+//! Gains in physical units, and the validated configuration made of them.
+
+use crate::fuzzy::GridRules;
+use crate::rules;
+use crate::velocity::VelocityWindow;
+use fixed::FixedI32;
+use fixed::types::extra::U24;
+use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS};
+
+/// Gain format: I8F24, ±128, step 6.0e-8.
+pub type Gain = FixedI32<U24>;
+
+/// Rule base of a joint correction: seven by seven sets.
+pub type JointRules = GridRules<7, 7>;
+
+/// Parameters of a joint controller in physical units.
+///
+/// [`JointGains::default`] is a cautious start for a bore 20 mm, stroke 180 mm
+/// cylinder with throttled valves; each field says what it does and
+/// where it is sensible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointGains {
+    /// Kp, duty per millimetre of error. Range 0…4; sensible 0.005…0.1. Larger is
+    /// faster and stiffer, until the pressure lag makes it overshoot.
+    pub proportional: Gain,
+    /// Duty at full output of the PD rule base. Range 0…2; sensible 0.2…1. This is
+    /// where the damping comes from: raise it with Kp.
+    pub correction_pd: Gain,
+    /// Duty at full output of the ID rule base. Range 0…2; sensible 0.2…1.
+    pub correction_id: Gain,
+    /// Duty per mm/s of reference velocity. Range 0…0.1; sensible 1/(top speed),
+    /// 0.002…0.004 for 250…500 mm/s. Removes the lag behind a moving reference.
+    pub feed_forward: Gain,
+    /// Error that stands at the edge of the rule base. 0.25…1000 mm; sensible 10…60.
+    pub error_scale: PositionMm,
+    /// Velocity error at the edge of the rule base. 1…5000 mm/s; sensible 200…500.
+    pub velocity_scale: VelocityMmS,
+    /// Time integral of the error at the edge of the rule base, in mm·s (the
+    /// number of a `PositionMm` is read as mm·s), and its anti-windup bound.
+    /// 0.05…1000; sensible 0.5…10.
+    pub integral_scale: PositionMm,
+    /// The integral advances only while |error| is at most this. 0…1000 mm;
+    /// sensible 5…30: outside it, the proportional term does the work.
+    pub integral_zone: PositionMm,
+    /// Largest |duty|. 0…1, above `minimum_duty`.
+    pub duty_limit: Duty,
+    /// Duty added, with its sign, to every acting duty: bridges the static
+    /// friction and the shortest opening that a valve can make. 0…0.5; sensible
+    /// t_off / PWM period, 0.05…0.25.
+    pub dead_zone_duty: Duty,
+    /// |duty| of the law below which the valves stay shut. 0…0.5; sensible
+    /// 0.005…0.03. Must exceed what measurement noise makes of Kp.
+    pub minimum_duty: Duty,
+    /// Settled when |error| is at most this … 0…100 mm; sensible 0.3…1.
+    pub settle_band: PositionMm,
+    /// … and |velocity| is at most this … 0.1…1000 mm/s; sensible 5…20, above the
+    /// noise of the velocity estimate.
+    pub settle_velocity: VelocityMmS,
+    /// … for this long. 0…10 s; sensible 20…100 ms.
+    pub settle_dwell: Micros,
+    /// Released when |error| exceeds this; larger than `settle_band` by more
+    /// than the measurement noise. Sensible 2…3 times the settle band.
+    pub release_band: PositionMm,
+    /// … for this long: one noisy sample does not move a valve. 0…1 s; sensible 3 ms.
+    pub release_dwell: Micros,
+    /// Time over which the step of a change of law is faded out. 0…10 s;
+    /// sensible 50…200 ms.
+    pub bumpless_time: Micros,
+    /// Window of the velocity estimate, in ticks: 2…64; sensible 10…32. Its delay
+    /// is (N − 1)/2 ticks; its noise falls with N^1.5.
+    pub velocity_window: u8,
+    /// Lower end of the stroke that the reference is limited to.
+    pub stroke_min: PositionMm,
+    /// Upper end of the stroke that the reference is limited to.
+    pub stroke_max: PositionMm,
+    /// Valve PWM period: 10…20 ms for 50…100 Hz (ASSUMED); any whole number of
+    /// ticks in 1 ms…1 s.
+    pub pwm_period: Micros,
+}
+
+impl Default for JointGains {
+    fn default() -> Self {
+        Self {
+            proportional: const { Gain::lit("0.02") },
+            correction_pd: const { Gain::lit("0.6") },
+            correction_id: const { Gain::lit("0.6") },
+            feed_forward: Gain::ZERO,
+            error_scale: PositionMm::from_int(40),
+            velocity_scale: VelocityMmS::from_int(400),
+            integral_scale: PositionMm::from_int(4),
+            integral_zone: PositionMm::from_int(15),
+            duty_limit: Duty::ONE,
+            dead_zone_duty: Duty::from_per_mille(100),
+            minimum_duty: Duty::from_per_mille(10),
+            settle_band: PositionMm::from_raw(52_429),
+            settle_velocity: VelocityMmS::from_int(10),
+            settle_dwell: Micros::from_millis(40),
+            release_band: PositionMm::from_int(2),
+            release_dwell: Micros::from_millis(3),
+            bumpless_time: Micros::from_millis(100),
+            velocity_window: 16,
+            stroke_min: PositionMm::ZERO,
+            stroke_max: PositionMm::from_int(180),
+            pwm_period: Micros::from_millis(20),
+        }
+    }
+}
+
+/// Name of a rejected parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum JointParameter {
+    /// The control tick given to the builder.
+    Tick,
+    /// [`JointGains::proportional`].
+    Proportional,
+    /// [`JointGains::correction_pd`].
+    CorrectionPd,
+    /// [`JointGains::correction_id`].
+    CorrectionId,
+    /// [`JointGains::feed_forward`].
+    FeedForward,
+    /// [`JointGains::error_scale`].
+    ErrorScale,
+    /// [`JointGains::velocity_scale`].
+    VelocityScale,
+    /// [`JointGains::integral_scale`].
+    IntegralScale,
+    /// [`JointGains::integral_zone`].
+    IntegralZone,
+    /// [`JointGains::duty_limit`].
+    DutyLimit,
+    /// [`JointGains::dead_zone_duty`].
+    DeadZoneDuty,
+    /// [`JointGains::minimum_duty`].
+    MinimumDuty,
+    /// [`JointGains::settle_band`].
+    SettleBand,
+    /// [`JointGains::settle_velocity`].
+    SettleVelocity,
+    /// [`JointGains::settle_dwell`].
+    SettleDwell,
+    /// [`JointGains::release_band`].
+    ReleaseBand,
+    /// [`JointGains::release_dwell`].
+    ReleaseDwell,
+    /// [`JointGains::bumpless_time`].
+    BumplessTime,
+    /// [`JointGains::velocity_window`].
+    VelocityWindow,
+    /// [`JointGains::stroke_min`] and [`JointGains::stroke_max`].
+    Stroke,
+    /// [`JointGains::pwm_period`].
+    PwmPeriod,
+}
+
+/// A parameter outside its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The parameter is outside the range of its documentation.
+    OutOfRange(JointParameter),
+    /// The parameter contradicts another one: the release band does not exceed
+    /// the settle band, the minimum duty is not below the limit, the stroke is
+    /// empty, or the PWM period is not a whole number of ticks.
+    Inconsistent(JointParameter),
+}
+
+/// A validated configuration: raw coefficients for one tick length.
+#[derive(Clone, Copy, Debug)]
+pub struct JointConfig {
+    gains: JointGains,
+    tick: Micros,
+    pub(super) rules_pd: &'static JointRules,
+    pub(super) rules_id: &'static JointRules,
+    /// Fuzzy input per raw error, × 2^28.
+    pub(super) error_to_input: i64,
+    /// Fuzzy input per raw velocity, × 2^28.
+    pub(super) velocity_to_input: i64,
+    /// Fuzzy input per unit of the error sum, × 2^40.
+    pub(super) integral_to_input: i64,
+    /// Bound of the error sum: raw mm × ticks.
+    pub(super) integral_limit: i64,
+    pub(super) window: VelocityWindow,
+    pub(super) settle_ticks: u32,
+    pub(super) release_ticks: u32,
+    pub(super) bumpless_ticks: u32,
+}
+
+/// Fractional bits of the factors from error and velocity to a fuzzy input.
+pub(super) const INPUT_SHIFT: u32 = 28;
+/// Fractional bits of the factor from the error sum to a fuzzy input.
+pub(super) const INTEGRAL_SHIFT: u32 = 40;
+/// Full scale of a fuzzy input and output of the joint rules.
+const FULL_SCALE: i64 = 32_767;
+
+impl JointConfig {
+    /// Checks the gains and works out the coefficients for a control tick of
+    /// `tick` (100 µs…2 ms), with the shipped rule bases.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first parameter that is out of its range.
+    pub fn new(gains: &JointGains, tick: Micros) -> Result<Self, ConfigError> {
+        Self::with_rules(gains, tick, &rules::PD, &rules::ID)
+    }
+
+    /// As [`JointConfig::new`], with rule bases of the user's own. Their inputs
+    /// and outputs have full scale ±32 767.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first parameter that is out of its range.
+    pub fn with_rules(
+        gains: &JointGains,
+        tick: Micros,
+        rules_pd: &'static JointRules,
+        rules_id: &'static JointRules,
+    ) -> Result<Self, ConfigError> {
+        use JointParameter as P;
+        check(P::Tick, tick.get(), 100, 2000)?;
+        let window = VelocityWindow::new(gains.velocity_window, tick.get())
+            .ok_or(ConfigError::OutOfRange(P::VelocityWindow))?;
+        check_ranges(gains)?;
+        check_relations(gains, tick)?;
+
+        let integral_limit = i64::from(gains.integral_scale.raw())
+            .saturating_mul(1_000_000)
+            .checked_div(i64::from(tick.get()))
+            .unwrap_or(1);
+        Ok(Self {
+            gains: *gains,
+            tick,
+            rules_pd,
+            rules_id,
+            error_to_input: factor(INPUT_SHIFT, i64::from(gains.error_scale.raw())),
+            velocity_to_input: factor(INPUT_SHIFT, i64::from(gains.velocity_scale.raw())),
+            integral_to_input: factor(INTEGRAL_SHIFT, integral_limit),
+            integral_limit,
+            window,
+            settle_ticks: gains.settle_dwell.to_ticks_ceil(tick).get(),
+            release_ticks: gains.release_dwell.to_ticks_ceil(tick).get(),
+            bumpless_ticks: gains.bumpless_time.to_ticks_ceil(tick).get(),
+        })
+    }
+
+    /// The gains this configuration was made of.
+    #[must_use]
+    pub const fn gains(&self) -> &JointGains {
+        &self.gains
+    }
+
+    /// The control tick this configuration was made for.
+    #[must_use]
+    pub const fn tick(&self) -> Micros {
+        self.tick
+    }
+}
+
+/// Full scale / `scale`, × 2^bits.
+fn factor(bits: u32, scale: i64) -> i64 {
+    FULL_SCALE
+        .wrapping_shl(bits)
+        .checked_div(scale)
+        .unwrap_or(0)
+}
+
+fn check<T: PartialOrd>(
+    parameter: JointParameter,
+    value: T,
+    low: T,
+    high: T,
+) -> Result<(), ConfigError> {
+    if value >= low && value <= high {
+        Ok(())
+    } else {
+        Err(ConfigError::OutOfRange(parameter))
+    }
+}
+
+fn check_ranges(gains: &JointGains) -> Result<(), ConfigError> {
+    use JointParameter as P;
+    let zero = Gain::ZERO;
+    let mm = PositionMm::from_int;
+    let half = Duty::from_per_mille(500);
+    check(
+        P::Proportional,
+        gains.proportional,
+        zero,
+        const { Gain::lit("4") },
+    )?;
+    check(
+        P::CorrectionPd,
+        gains.correction_pd,
+        zero,
+        const { Gain::lit("2") },
+    )?;
+    check(
+        P::CorrectionId,
+        gains.correction_id,
+        zero,
+        const { Gain::lit("2") },
+    )?;
+    check(
+        P::FeedForward,
+        gains.feed_forward,
+        zero,
+        const { Gain::lit("0.1") },
+    )?;
+    check(
+        P::ErrorScale,
+        gains.error_scale,
+        PositionMm::from_raw(16_384),
+        mm(1000),
+    )?;
+    let (low, high) = (VelocityMmS::from_int(1), VelocityMmS::from_int(5000));
+    check(P::VelocityScale, gains.velocity_scale, low, high)?;
+    check(
+        P::IntegralScale,
+        gains.integral_scale,
+        PositionMm::from_raw(3277),
+        mm(1000),
+    )?;
+    check(
+        P::IntegralZone,
+        gains.integral_zone,
+        PositionMm::ZERO,
+        mm(1000),
+    )?;
+    check(P::DutyLimit, gains.duty_limit, Duty::ZERO, Duty::ONE)?;
+    check(P::DeadZoneDuty, gains.dead_zone_duty, Duty::ZERO, half)?;
+    check(P::MinimumDuty, gains.minimum_duty, Duty::ZERO, half)?;
+    check(P::SettleBand, gains.settle_band, PositionMm::ZERO, mm(100))?;
+    let (low, high) = (VelocityMmS::from_raw(6554), VelocityMmS::from_int(1000));
+    check(P::SettleVelocity, gains.settle_velocity, low, high)?;
+    check(
+        P::SettleDwell,
+        gains.settle_dwell,
+        Micros::ZERO,
+        Micros::from_millis(10_000),
+    )?;
+    check(
+        P::ReleaseBand,
+        gains.release_band,
+        PositionMm::ZERO,
+        mm(200),
+    )?;
+    check(
+        P::ReleaseDwell,
+        gains.release_dwell,
+        Micros::ZERO,
+        Micros::from_millis(1000),
+    )?;
+    check(
+        P::BumplessTime,
+        gains.bumpless_time,
+        Micros::ZERO,
+        Micros::from_millis(10_000),
+    )?;
+    check(P::Stroke, gains.stroke_min, mm(-1000), mm(1000))?;
+    check(P::Stroke, gains.stroke_max, mm(-1000), mm(1000))?;
+    check(
+        P::PwmPeriod,
+        gains.pwm_period,
+        Micros::from_millis(1),
+        Micros::from_millis(1000),
+    )
+}
+
+fn check_relations(gains: &JointGains, tick: Micros) -> Result<(), ConfigError> {
+    use JointParameter as P;
+    let relations = [
+        (P::ReleaseBand, gains.release_band > gains.settle_band),
+        (P::MinimumDuty, gains.minimum_duty < gains.duty_limit),
+        (P::DeadZoneDuty, gains.dead_zone_duty < gains.duty_limit),
+        (P::Stroke, gains.stroke_min < gains.stroke_max),
+        (
+            P::PwmPeriod,
+            gains.pwm_period.get().checked_rem(tick.get()) == Some(0),
+        ),
+    ];
+    for (parameter, holds) in relations {
+        if !holds {
+            return Err(ConfigError::Inconsistent(parameter));
+        }
+    }
+    Ok(())
+}

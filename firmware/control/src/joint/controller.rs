@@ -1,0 +1,281 @@
+//! The joint tick.
+
+use super::config::{INPUT_SHIFT, INTEGRAL_SHIFT, JointConfig};
+use super::settle::Settle;
+use super::types::{Correction, JointInput, JointLimits, JointOutput};
+use crate::valve::{ValveOpenings, allocate};
+use crate::velocity::VelocityEstimator;
+use wheeleg_units::{Duty, PositionMm, VelocityMmS, saturate_i16, shift_right_round};
+
+/// From gain (24) × position or velocity (16) fractional bits to duty (30).
+const PHYSICAL_SHIFT: u32 = 24 + 16 - 30;
+/// From gain (24) × rule output (15) fractional bits to duty (30).
+const RULE_SHIFT: u32 = 24 + 15 - 30;
+/// The fade offset is at most ±4, so that its arithmetic can not overflow.
+const FADE_LIMIT: i64 = 4 << 30;
+
+/// Controller of one joint: configuration and state.
+///
+/// Call [`JointController::step`] once per control tick while the joint tracks,
+/// and [`JointController::observe`] once per tick while it does not.
+#[derive(Clone, Debug)]
+pub struct JointController {
+    config: JointConfig,
+    correction: Correction,
+    velocity: VelocityEstimator,
+    settle: Settle,
+    /// Σ e in raw mm × ticks, within the configured bound.
+    integral: i64,
+    /// u before the limit, × 2^30, of the last tick.
+    last_law: i64,
+    /// Set by a change of law: the next tick continues from `last_law`.
+    changed: bool,
+    /// What is still added to the law after a change, × 2^30, and its decay.
+    fade: i64,
+    fade_step: i64,
+}
+
+impl JointController {
+    /// A controller at rest with an empty history.
+    #[must_use]
+    pub const fn new(config: JointConfig) -> Self {
+        Self {
+            config,
+            correction: Correction::Pd,
+            velocity: VelocityEstimator::new(),
+            settle: Settle::new(),
+            integral: 0,
+            last_law: 0,
+            changed: false,
+            fade: 0,
+            fade_step: 0,
+        }
+    }
+
+    /// The configuration in use.
+    #[must_use]
+    pub const fn config(&self) -> &JointConfig {
+        &self.config
+    }
+
+    /// The correction in use.
+    #[must_use]
+    pub const fn correction(&self) -> Correction {
+        self.correction
+    }
+
+    /// Whether all valves are held shut because the joint is at rest.
+    #[must_use]
+    pub const fn is_settled(&self) -> bool {
+        self.settle.is_settled()
+    }
+
+    /// Selects the correction, without a bump. The integral starts from zero.
+    pub fn set_correction(&mut self, correction: Correction) {
+        if correction != self.correction {
+            self.correction = correction;
+            self.integral = 0;
+            self.changed = true;
+        }
+    }
+
+    /// Changes the configuration, without a bump. The integral keeps its share
+    /// of the new bound at most; the velocity window starts anew if its length
+    /// or the tick differ.
+    pub fn retune(&mut self, config: JointConfig) {
+        if config.window != self.config.window {
+            self.velocity.reset();
+        }
+        self.integral = within(self.integral, config.integral_limit);
+        self.config = config;
+        self.changed = true;
+    }
+
+    /// Forgets everything but configuration and correction: as after
+    /// [`JointController::new`].
+    pub fn reset(&mut self) {
+        let correction = self.correction;
+        *self = Self::new(self.config);
+        self.correction = correction;
+    }
+
+    /// A tick in which the joint does not track (idle, hold, exhaust): follows the
+    /// measured position, and forgets the integral and the rest state, so that the
+    /// next [`JointController::step`] starts afresh with a valid velocity.
+    pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
+        self.settle = Settle::new();
+        self.integral = 0;
+        self.last_law = 0;
+        self.changed = false;
+        self.fade = 0;
+        self.velocity.update(&self.config.window, measured)
+    }
+
+    /// One control tick. Never panics.
+    pub fn step(&mut self, input: &JointInput) -> JointOutput {
+        let mut limits = JointLimits::default();
+        let gains = self.config.gains();
+        let reference = input.reference.limit(gains.stroke_min, gains.stroke_max);
+        limits.reference = reference != input.reference;
+        let error = reference.saturating_sub(input.measured);
+        let velocity = self.velocity.update(&self.config.window, input.measured);
+        let error_rate = input.reference_velocity.saturating_sub(velocity);
+
+        let law = self.law(error, error_rate, input.reference_velocity, &mut limits);
+        let law = self.faded(law);
+        self.last_law = law;
+
+        let settled = self
+            .settle
+            .update(&self.config, error, velocity, input.reference_velocity);
+        let duty = if settled {
+            self.fade = 0;
+            Duty::ZERO
+        } else {
+            self.shaped(law, &mut limits)
+        };
+        self.integrate(error, settled, duty, &mut limits);
+        JointOutput {
+            duty,
+            openings: if duty == Duty::ZERO {
+                ValveOpenings::SHUT
+            } else {
+                allocate(duty, self.config.gains().pwm_period)
+            },
+            error,
+            velocity,
+            limits,
+            settled,
+        }
+    }
+
+    /// Kp·e + correction + feed-forward, × 2^30. |result| < 2^50.
+    #[inline]
+    fn law(
+        &self,
+        error: PositionMm,
+        error_rate: VelocityMmS,
+        reference_velocity: VelocityMmS,
+        limits: &mut JointLimits,
+    ) -> i64 {
+        let config = &self.config;
+        let gains = config.gains();
+        let (rate, rate_limited) = to_input(
+            error_rate.raw(),
+            gains.velocity_scale.raw(),
+            config.velocity_to_input,
+        );
+        limits.velocity = rate_limited;
+        let (gain, output) = match self.correction {
+            Correction::Pd => {
+                let (input, limited) =
+                    to_input(error.raw(), gains.error_scale.raw(), config.error_to_input);
+                limits.error = limited;
+                (gains.correction_pd, config.rules_pd.infer(input, rate))
+            }
+            Correction::Id => {
+                // |integral| <= bound, and bound × factor = 32 767 × 2^40 < 2^55.
+                let scaled = self.integral.wrapping_mul(config.integral_to_input);
+                let input = saturate_i16(shift_right_round(scaled, INTEGRAL_SHIFT));
+                (gains.correction_id, config.rules_id.infer(input, rate))
+            }
+        };
+        // |gain| <= 4 × 2^24 and |raw| <= 2^31: products stay below 2^58.
+        let proportional = product(gains.proportional.to_bits(), error.raw());
+        let feed_forward = product(gains.feed_forward.to_bits(), reference_velocity.raw());
+        let correction = product(gain.to_bits(), i32::from(output));
+        shift_right_round(proportional.wrapping_add(feed_forward), PHYSICAL_SHIFT)
+            .wrapping_add(shift_right_round(correction, RULE_SHIFT))
+    }
+
+    /// Adds what is left of the last change of law.
+    #[inline]
+    fn faded(&mut self, law: i64) -> i64 {
+        if self.changed {
+            self.changed = false;
+            let ticks = i64::from(self.config.bumpless_ticks);
+            if ticks == 0 {
+                self.fade = 0;
+            } else {
+                let bump = self.last_law.wrapping_sub(law);
+                self.fade = within(bump, FADE_LIMIT);
+                // Rounded up: the fade ends within the configured time.
+                let step = self.fade.wrapping_abs().checked_div(ticks).unwrap_or(0);
+                self.fade_step = step.wrapping_add(1);
+            }
+        } else if self.fade > 0 {
+            self.fade = self.fade.wrapping_sub(self.fade_step).max(0);
+        } else {
+            self.fade = self.fade.wrapping_add(self.fade_step).min(0);
+        }
+        law.wrapping_add(self.fade)
+    }
+
+    /// Minimum, dead-zone compensation and limit.
+    #[inline]
+    fn shaped(&self, law: i64, limits: &mut JointLimits) -> Duty {
+        let gains = self.config.gains();
+        let magnitude = law.wrapping_abs();
+        if magnitude == 0 {
+            return Duty::ZERO;
+        }
+        if magnitude < i64::from(gains.minimum_duty.raw()) {
+            limits.below_minimum = true;
+            return Duty::ZERO;
+        }
+        let bridged = magnitude.wrapping_add(i64::from(gains.dead_zone_duty.raw()));
+        let limit = i64::from(gains.duty_limit.raw());
+        limits.duty = bridged > limit;
+        let cut = bridged.min(limit);
+        Duty::from_raw_wide(if law < 0 { cut.wrapping_neg() } else { cut })
+    }
+
+    /// Conditional, bounded integration; what it adds acts from the next tick on.
+    #[inline]
+    fn integrate(
+        &mut self,
+        error: PositionMm,
+        settled: bool,
+        duty: Duty,
+        limits: &mut JointLimits,
+    ) {
+        if self.correction == Correction::Pd {
+            return;
+        }
+        let outside = error.saturating_abs() > self.config.gains().integral_zone;
+        let pushes = limits.duty && (error.raw() > 0) == (duty.raw() > 0);
+        if settled || outside || pushes {
+            limits.integral_frozen = true;
+        } else {
+            let limit = self.config.integral_limit;
+            let sum = self.integral.wrapping_add(i64::from(error.raw()));
+            self.integral = within(sum, limit);
+        }
+        limits.integral_clamped = self.integral.wrapping_abs() == self.config.integral_limit;
+    }
+}
+
+/// `value` limited to ±`bound`. Not `clamp`, which panics if its bounds are
+/// swapped: the compiler can not see that a bound is never negative.
+#[inline]
+fn within(value: i64, bound: i64) -> i64 {
+    value.max(bound.wrapping_neg()).min(bound)
+}
+
+/// Exact product of two raw numbers.
+#[inline]
+fn product(a: i32, b: i32) -> i64 {
+    i64::from(a).wrapping_mul(i64::from(b))
+}
+
+/// A raw error or velocity as fuzzy input, and whether it was cut to `scale`.
+#[inline]
+fn to_input(raw: i32, scale: i32, factor: i64) -> (i16, bool) {
+    let cut = raw.max(scale.wrapping_neg()).min(scale);
+    // |cut| × factor <= 32 767 × 2^28 < 2^43.
+    let scaled = i64::from(cut).wrapping_mul(factor);
+    (
+        saturate_i16(shift_right_round(scaled, INPUT_SHIFT)),
+        cut != raw,
+    )
+}

@@ -1,0 +1,83 @@
+//! What goes into and comes out of a joint controller each tick.
+
+use crate::valve::ValveOpenings;
+use wheeleg_units::{Duty, PositionMm, Ticks, VelocityMmS};
+
+/// Which fuzzy correction is added to the proportional term (PAPER §8: chosen
+/// according to the trajectory).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Correction {
+    /// Inputs e, ė: for fast moves.
+    #[default]
+    Pd,
+    /// Inputs ∫e, ė: for accurate, slower positioning.
+    Id,
+}
+
+/// Inputs of one joint tick, latched at its start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JointInput {
+    /// Measured stroke.
+    pub measured: PositionMm,
+    /// Reference stroke.
+    pub reference: PositionMm,
+    /// Velocity of the reference; zero for a step.
+    pub reference_velocity: VelocityMmS,
+    /// The reference announced for later, and when it becomes the reference.
+    pub announced: Option<Announced>,
+}
+
+/// A reference known ahead of time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Announced {
+    /// The reference to come.
+    pub reference: PositionMm,
+    /// Control ticks until it becomes the reference.
+    pub after: Ticks,
+}
+
+/// What shaped the output of this tick: indications, not faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct JointLimits {
+    /// The duty was cut to the configured limit.
+    pub duty: bool,
+    /// The integral was not advanced: the output is saturated and the error
+    /// pushes further, or the error is outside the integral zone.
+    pub integral_frozen: bool,
+    /// The integral stands at its bound.
+    pub integral_clamped: bool,
+    /// The error was beyond the domain of the rule base, which saw its edge.
+    pub error: bool,
+    /// The velocity error was beyond the domain of the rule base.
+    pub velocity: bool,
+    /// The duty was below the smallest one that is acted upon; valves shut.
+    pub below_minimum: bool,
+    /// The reference was outside the stroke limits and was cut to them.
+    pub reference: bool,
+}
+
+impl JointLimits {
+    /// Whether any limit was active.
+    #[must_use]
+    pub fn any(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+/// Result of one joint tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JointOutput {
+    /// Signed duty after limit and dead-zone compensation; positive extends.
+    pub duty: Duty,
+    /// The duty allocated to the valves: effective openings per PWM period.
+    pub openings: ValveOpenings,
+    /// Error, reference − measured.
+    pub error: PositionMm,
+    /// Velocity estimate, positive extending.
+    pub velocity: VelocityMmS,
+    /// Which limits shaped this output.
+    pub limits: JointLimits,
+    /// At rest in the settle band: all valves shut until the error leaves the
+    /// release band.
+    pub settled: bool,
+}

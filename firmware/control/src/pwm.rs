@@ -1,0 +1,251 @@
+//! Valve PWM, sliced into control ticks.
+//!
+//! A hardware timer runs with a period of one control tick (1000 µs), and its
+//! compare values take effect at the next tick edge. The pulse of the slower
+//! valve period (10…20 ms) is spread over ticks here: 7350 µs are seven full
+//! ticks and one of 350 µs, always starting at the tick edge.
+//!
+//! **Switching delays.** A valve opens t_on after its coil is energised and shuts
+//! t_off after it is released, so it is open for `pulse − t_on + t_off`. For an
+//! opening `d` the coil is energised for `p = d + t_on − t_off`, except that
+//!
+//! * a pulse below `t_on + margin` may not open the valve at all: it is not sent;
+//! * a gap below `t_off + margin` may not shut it: the pulse becomes full.
+//!
+//! So the openings that can be had are 0, more than `t_off + margin`, up to
+//! about `period − t_on − margin`, and the whole period. The law bridges the first gap with
+//! [`crate::joint::JointGains::dead_zone_duty`].
+//!
+//! **Phase.** There is no free-running period. The period of a valve starts with
+//! its pulse, so a command to an idle valve acts at the next tick edge. While a
+//! pulse lasts, its length follows the command (natural sampling): it may grow, or
+//! end early, but not below the shortest that acts; once ended it does not begin
+//! again within the period. A valve switches at most twice per period, and a
+//! valve with nothing to do not at all.
+
+use crate::valve::{VALVE_COUNT, ValveOpenings};
+use wheeleg_units::Micros;
+
+/// On-time of each valve in the next tick, µs from the tick edge:
+/// 0…tick, order `[fill A, vent A, fill B, vent B]`.
+pub type OnTimes = [u16; VALVE_COUNT];
+
+/// Why a PWM timing was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum PwmError {
+    /// The tick is not in 100…2000 µs.
+    Tick,
+    /// The period is not a whole number of 2 or more ticks, or is above 1 s.
+    Period,
+    /// t_on + margin or t_off + margin exceeds half the period: no pulse would
+    /// be left between the two.
+    Delay,
+}
+
+/// Timing of the valves: what it takes to turn an opening into a pulse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PwmTiming {
+    period: u32,
+    tick: u32,
+    on_delay: u32,
+    off_delay: u32,
+    shortest_pulse: u32,
+    shortest_gap: u32,
+}
+
+impl PwmTiming {
+    /// A timing with period, control tick, opening delay t_on, shutting delay
+    /// t_off, and the margin by which pulses and gaps must exceed them.
+    ///
+    /// # Errors
+    /// See [`PwmError`].
+    pub const fn new(
+        period: Micros,
+        tick: Micros,
+        on_delay: Micros,
+        off_delay: Micros,
+        margin: Micros,
+    ) -> Result<Self, PwmError> {
+        if tick.get() < 100 || tick.get() > 2000 {
+            return Err(PwmError::Tick);
+        }
+        let whole = matches!(period.get().checked_rem(tick.get()), Some(0));
+        if !whole || period.get() <= tick.get() || period.get() > 1_000_000 {
+            return Err(PwmError::Period);
+        }
+        let half = period.get().wrapping_shr(1);
+        let shortest_pulse = on_delay.saturating_add(margin).get();
+        let shortest_gap = off_delay.saturating_add(margin).get();
+        if shortest_pulse > half || shortest_gap > half {
+            return Err(PwmError::Delay);
+        }
+        Ok(Self {
+            period: period.get(),
+            tick: tick.get(),
+            on_delay: on_delay.get(),
+            off_delay: off_delay.get(),
+            shortest_pulse,
+            shortest_gap,
+        })
+    }
+
+    /// PWM period.
+    #[must_use]
+    pub const fn period(&self) -> Micros {
+        Micros(self.period)
+    }
+
+    /// Time for which the coil is energised to get `opening`: 0 when it can not
+    /// act, the period when the valve could not shut in between.
+    #[must_use]
+    pub const fn pulse(&self, opening: Micros) -> Micros {
+        if opening.get() >= self.period {
+            return Micros(self.period);
+        }
+        // Below 10^6 + 10^6 and saturating at zero.
+        let wanted = opening
+            .get()
+            .saturating_add(self.on_delay)
+            .saturating_sub(self.off_delay);
+        if opening.get() == 0 || wanted < self.shortest_pulse {
+            Micros::ZERO
+        } else if wanted > self.period.saturating_sub(self.shortest_gap) {
+            Micros(self.period)
+        } else {
+            Micros(wanted)
+        }
+    }
+}
+
+/// One valve: where it is in its period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Channel {
+    /// In a period: from the start of a pulse until a new one may begin.
+    running: bool,
+    /// The pulse has not ended yet.
+    energised: bool,
+    /// Time since the pulse began, at the next tick edge.
+    elapsed: u32,
+    /// Length of the pulse that ended.
+    ended_at: u32,
+    /// Pulses begun since power-on, wrapping.
+    pulses: u32,
+}
+
+impl Channel {
+    const IDLE: Self = Self {
+        running: false,
+        energised: false,
+        elapsed: 0,
+        ended_at: 0,
+        pulses: 0,
+    };
+
+    #[inline]
+    fn tick(&mut self, timing: &PwmTiming, opening: Micros) -> u16 {
+        let target = timing.pulse(opening).get();
+        self.end_period(timing);
+        if !self.running {
+            if target == 0 {
+                return 0;
+            }
+            self.pulses = self.pulses.wrapping_add(u32::from(!self.energised));
+            self.running = true;
+            self.energised = true;
+            self.elapsed = 0;
+        }
+        let mut on = 0;
+        if self.energised {
+            let length = target.max(timing.shortest_pulse);
+            on = length.saturating_sub(self.elapsed).min(timing.tick);
+            if on < timing.tick {
+                self.energised = false;
+                self.ended_at = self.elapsed.saturating_add(on);
+            }
+        }
+        self.elapsed = self.elapsed.saturating_add(timing.tick);
+        // At most the tick, 2000.
+        on as u16
+    }
+
+    /// Releases the coil at the next edge, whatever the pulse.
+    #[inline]
+    fn shut(&mut self, timing: &PwmTiming) {
+        self.end_period(timing);
+        if self.energised {
+            self.energised = false;
+            self.ended_at = self.elapsed;
+        }
+        if self.running {
+            self.elapsed = self.elapsed.saturating_add(timing.tick);
+        }
+    }
+
+    /// A new pulse may begin when the period is over and, if the coil was released
+    /// in it, has been off long enough for the valve to have shut.
+    #[inline]
+    fn end_period(&mut self, timing: &PwmTiming) {
+        let off = self.elapsed.saturating_sub(self.ended_at);
+        if self.elapsed >= timing.period && (self.energised || off >= timing.shortest_gap) {
+            self.running = false;
+        }
+    }
+}
+
+/// The sliced PWM of the four valves of a cylinder.
+#[derive(Clone, Debug)]
+pub struct ValvePwm {
+    timing: PwmTiming,
+    channels: [Channel; VALVE_COUNT],
+}
+
+impl ValvePwm {
+    /// All valves shut and idle.
+    #[must_use]
+    pub const fn new(timing: PwmTiming) -> Self {
+        Self {
+            timing,
+            channels: [Channel::IDLE; VALVE_COUNT],
+        }
+    }
+
+    /// The timing in use.
+    #[must_use]
+    pub const fn timing(&self) -> &PwmTiming {
+        &self.timing
+    }
+
+    /// Changes the timing; running periods end by the new one.
+    pub const fn set_timing(&mut self, timing: PwmTiming) {
+        self.timing = timing;
+    }
+
+    /// On-times of the next tick for the wanted openings per period. Openings
+    /// of a whole period or more keep a valve open without a gap. Never panics.
+    #[must_use]
+    pub fn tick(&mut self, openings: &ValveOpenings) -> OnTimes {
+        let mut on = [0; VALVE_COUNT];
+        for ((on, channel), &opening) in on.iter_mut().zip(&mut self.channels).zip(&openings.0) {
+            *on = channel.tick(&self.timing, opening);
+        }
+        on
+    }
+
+    /// All valves shut at the next tick edge: hold, brake, settled, fault. A
+    /// pulse that was running is cut, however short.
+    #[must_use]
+    pub fn shut(&mut self) -> OnTimes {
+        for channel in &mut self.channels {
+            channel.shut(&self.timing);
+        }
+        [0; VALVE_COUNT]
+    }
+
+    /// Pulses begun per valve since power-on, wrapping: the switching count.
+    /// Periods that follow one another without a gap count as one pulse.
+    #[must_use]
+    pub fn pulses(&self) -> [u32; VALVE_COUNT] {
+        self.channels.map(|channel| channel.pulses)
+    }
+}

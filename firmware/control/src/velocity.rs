@@ -1,0 +1,185 @@
+//! Velocity from positions, by linear regression over a long window.
+//!
+//! One step of a 12-bit converter over 180 mm is 0.044 mm: its backward
+//! difference at 1 kHz jumps by 44 mm/s. The slope of the least-squares line
+//! through the last N samples,
+//!
+//! ```text
+//! v = 6 fs Σ (2k − (N − 1)) y_k / (N (N² − 1)),  k = 0 (oldest) … N − 1 (newest)
+//! ```
+//!
+//! is the estimate with the least noise among all windows of N samples.
+//! Two sums of integers are carried from tick to tick, exactly: there is no
+//! drift, and the cost does not depend on N.
+//!
+//! | N | delay at 1 kHz | noise, mm/s per mm of white position noise |
+//! |---|---|---|
+//! | 8 | 3.5 ms | 154 |
+//! | 16 | 7.5 ms | 54 |
+//! | 32 | 15.5 ms | 19 |
+//! | 64 | 31.5 ms | 6.8 |
+//!
+//! Delay is (N − 1)/2 ticks: on a ramp the estimate is exact once the window is
+//! full, on a parabola it is the true velocity of that much earlier. Noise gain
+//! is √(12 / (N (N² − 1))) × fs. A step of one converter step gives a transient
+//! of at most 1.5 × step × fs / N.
+//!
+//! Not modelled: unequal sample spacing. A missed tick is a fault of the board.
+
+use wheeleg_units::{PositionMm, VelocityMmS, saturate_i32, shift_right_round};
+
+/// Largest window, in samples.
+pub const MAX_WINDOW: u8 = 64;
+
+const CAPACITY: usize = MAX_WINDOW as usize;
+
+/// Fractional bits of the scale factor are chosen so that it has this many
+/// significant bits: a relative error of at most 2^-24.
+const SCALE_BITS: u32 = 24;
+
+/// The window: its length and the factor from the sum to raw mm/s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VelocityWindow {
+    length: u8,
+    scale: u32,
+    shift: u32,
+    /// Largest |sum| that still fits; beyond it the velocity saturates.
+    sum_limit: i64,
+}
+
+impl VelocityWindow {
+    /// A window of `length` samples (2…[`MAX_WINDOW`]) taken every `tick_us`
+    /// microseconds (100…2000). `None` outside these ranges.
+    #[must_use]
+    pub const fn new(length: u8, tick_us: u32) -> Option<Self> {
+        if length < 2 || length > MAX_WINDOW || tick_us < 100 || tick_us > 2000 {
+            return None;
+        }
+        let n = length as u64;
+        // v = sum × numerator / denominator, sum = Σ (2k − (N − 1)) y_k.
+        let numerator = 6_000_000_u64;
+        let denominator = n
+            .wrapping_mul(n.wrapping_mul(n).wrapping_sub(1))
+            .wrapping_mul(tick_us as u64);
+        // Normalise to SCALE_BITS significant bits. The denominator is below 2^29,
+        // so the shift ends at 30 or less and no product passes 2^62.
+        let mut shift = 0_u32;
+        let mut scaled = numerator;
+        while quotient(scaled, denominator) < (1 << (SCALE_BITS - 1)) && shift < 31 {
+            scaled = scaled.wrapping_shl(1);
+            shift = shift.wrapping_add(1);
+        }
+        let half = denominator.wrapping_shr(1);
+        let scale = quotient(scaled.wrapping_add(half), denominator);
+        // |sum| × scale >> shift saturates at 2^31 = (2^31 << shift) / scale.
+        let limit = quotient((1_u64 << 31).wrapping_shl(shift), scale).wrapping_add(2);
+        Some(Self {
+            length,
+            scale: scale as u32,
+            shift,
+            sum_limit: limit as i64,
+        })
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub const fn length(&self) -> u8 {
+        self.length
+    }
+
+    /// Raw velocity of a regression sum, saturating.
+    #[inline]
+    fn velocity(&self, sum: i64) -> VelocityMmS {
+        let limited = sum.max(self.sum_limit.wrapping_neg()).min(self.sum_limit);
+        let product = limited.wrapping_mul(i64::from(self.scale));
+        VelocityMmS::from_raw(saturate_i32(shift_right_round(product, self.shift)))
+    }
+}
+
+/// Quotient, rounded down; 0 for a divisor of 0.
+const fn quotient(dividend: u64, divisor: u64) -> u64 {
+    match dividend.checked_div(divisor) {
+        Some(quotient) => quotient,
+        None => 0,
+    }
+}
+
+/// The last positions and their sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VelocityEstimator {
+    samples: [i32; CAPACITY],
+    newest: u8,
+    primed: bool,
+    /// Σ y.
+    total: i64,
+    /// Σ k y, k = 0 for the oldest.
+    moment: i64,
+}
+
+impl Default for VelocityEstimator {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl VelocityEstimator {
+    /// Empty: the first sample fills the whole window, so the first velocity is 0.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            samples: [0; CAPACITY],
+            newest: 0,
+            primed: false,
+            total: 0,
+            moment: 0,
+        }
+    }
+
+    /// Forgets everything: the next sample fills the window.
+    pub fn reset(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Takes the position of this tick and gives the velocity, saturating.
+    ///
+    /// `window` must be the same from call to call; after another one, call
+    /// [`VelocityEstimator::reset`]. Never panics.
+    #[inline]
+    pub fn update(&mut self, window: &VelocityWindow, position: PositionMm) -> VelocityMmS {
+        let sample = position.raw();
+        let newest = i64::from(sample);
+        let length = i64::from(window.length);
+        let last = length.wrapping_sub(1);
+        if !self.primed {
+            self.primed = true;
+            self.samples = [sample; CAPACITY];
+            self.total = newest.wrapping_mul(length);
+            self.moment = newest.wrapping_mul(length.wrapping_mul(last).wrapping_shr(1));
+            return VelocityMmS::ZERO;
+        }
+        // The ring has 64 places, a power of two; the oldest sample of the
+        // window is `length` places behind the one about to be written.
+        let place = self.newest.wrapping_add(1) & (MAX_WINDOW - 1);
+        let oldest_place = place.wrapping_sub(window.length) & (MAX_WINDOW - 1);
+        let oldest = self
+            .samples
+            .get(usize::from(oldest_place))
+            .map_or(0, |&sample| i64::from(sample));
+        if let Some(slot) = self.samples.get_mut(usize::from(place)) {
+            *slot = sample;
+        }
+        self.newest = place;
+        // Every k falls by one, the oldest leaves with k = 0, the newest comes
+        // with k = N − 1. |total| < 2^37, |moment| < 2^43.
+        self.moment = self
+            .moment
+            .wrapping_sub(self.total.wrapping_sub(oldest))
+            .wrapping_add(newest.wrapping_mul(last));
+        self.total = self.total.wrapping_add(newest).wrapping_sub(oldest);
+        let sum = self
+            .moment
+            .wrapping_mul(2)
+            .wrapping_sub(self.total.wrapping_mul(last));
+        window.velocity(sum)
+    }
+}

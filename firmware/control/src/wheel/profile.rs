@@ -1,0 +1,191 @@
+//! Trapezoidal profile and velocity ramp.
+//!
+//! Positions in 1/256 count, velocities in 1/256 count per sample,
+//! accelerations in 1/256 count per sample².
+
+use wheeleg_units::WheelCount;
+
+/// Fractional bits of positions, velocities and accelerations.
+const FRACTION: u32 = 8;
+
+/// A trapezoidal move, sample by sample.
+///
+/// From rest at the start, velocity rises by at most the acceleration per
+/// sample, stays at the maximum, and falls so as to end exactly on the final
+/// position: a triangle when the way is too short for the maximum. In each
+/// sample the profile goes as fast as it can and still stop: it takes v + a if
+/// the rest of the way then still allows a stop in steps of a, else v, else v − a.
+/// The last step is what is left, at most a. The chip's own sequence of points is
+/// not in its data sheet; shape, limits and end agree with it.
+///
+/// The way is the shorter one around the 24-bit circle, at most 7FFFFFH counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Profile {
+    /// Where the next point is measured from.
+    target: WheelCount,
+    forward: bool,
+    /// Way left, 1/256 count.
+    remaining: u32,
+    velocity: u32,
+    maximum: u32,
+    acceleration: u32,
+}
+
+impl Profile {
+    /// A move from `start` to `target` with the maximum velocity in counts per
+    /// sample (1…127) and the acceleration in 1/256 count per sample² (1…32 767);
+    /// values outside are taken as the nearest.
+    #[must_use]
+    pub const fn new(
+        start: WheelCount,
+        target: WheelCount,
+        maximum: u8,
+        acceleration_raw: u16,
+    ) -> Self {
+        let way = target.wrapping_difference(start);
+        let maximum = if maximum == 0 {
+            1
+        } else if maximum > 127 {
+            127
+        } else {
+            maximum
+        };
+        let acceleration = if acceleration_raw == 0 {
+            1
+        } else if acceleration_raw > 32_767 {
+            32_767
+        } else {
+            acceleration_raw
+        };
+        Self {
+            target,
+            forward: way >= 0,
+            // |way| <= 2^23: the shift fits 31 bits.
+            remaining: way.unsigned_abs().wrapping_shl(FRACTION),
+            velocity: 0,
+            maximum: (maximum as u32).wrapping_shl(FRACTION),
+            acceleration: acceleration as u32,
+        }
+    }
+
+    /// Whether the last point has been generated.
+    #[must_use]
+    pub const fn is_finished(&self) -> bool {
+        self.remaining == 0
+    }
+
+    /// Velocity of the last step, 1/256 count per sample, with its sign.
+    #[must_use]
+    pub const fn velocity_raw(&self) -> i32 {
+        if self.forward {
+            self.velocity as i32
+        } else {
+            (self.velocity as i32).wrapping_neg()
+        }
+    }
+
+    /// The next point, to whole counts: the way left is rounded to nearest.
+    /// Stays on the final position once there. Never panics.
+    #[inline]
+    pub fn advance(&mut self) -> WheelCount {
+        self.velocity = self.choose().min(self.remaining);
+        self.remaining = self.remaining.saturating_sub(self.velocity);
+        // remaining <= 2^31: half a count more still fits a `u32`.
+        let left = self
+            .remaining
+            .wrapping_add(1 << (FRACTION - 1))
+            .wrapping_shr(FRACTION) as i32;
+        self.target.wrapping_add(if self.forward {
+            left.wrapping_neg()
+        } else {
+            left
+        })
+    }
+
+    /// The largest admissible velocity for this sample.
+    #[inline]
+    fn choose(&self) -> u32 {
+        let up = self
+            .velocity
+            .wrapping_add(self.acceleration)
+            .min(self.maximum);
+        if self.can_stop_after(up) {
+            return up;
+        }
+        if self.can_stop_after(self.velocity) && self.velocity > 0 {
+            return self.velocity;
+        }
+        let down = self.velocity.saturating_sub(self.acceleration);
+        if down > 0 {
+            down
+        } else {
+            // Less than one step of the acceleration is left.
+            self.remaining
+        }
+    }
+
+    /// Whether the way left allows one sample at `velocity` and then a stop in
+    /// steps of the acceleration: v + (v − a) + (v − 2a) + … while positive.
+    #[inline]
+    fn can_stop_after(&self, velocity: u32) -> bool {
+        // v < 2^15, so both terms stay below 2^31; a >= 1.
+        let steps = velocity.checked_div(self.acceleration).unwrap_or(0);
+        let all = velocity.wrapping_mul(steps.wrapping_add(1));
+        let fall = self
+            .acceleration
+            .wrapping_mul(steps.wrapping_mul(steps.wrapping_add(1)).wrapping_shr(1));
+        all.wrapping_sub(fall) <= self.remaining
+    }
+}
+
+/// A velocity that follows its command at a bounded acceleration, and the
+/// position that it generates (integral velocity mode).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ramp {
+    position: WheelCount,
+    /// 0…255: 1/256 count.
+    fraction: u8,
+    /// 1/256 count per sample.
+    velocity: i32,
+}
+
+impl Ramp {
+    /// At rest at a position.
+    #[must_use]
+    pub const fn new(position: WheelCount) -> Self {
+        Self {
+            position,
+            fraction: 0,
+            velocity: 0,
+        }
+    }
+
+    /// The position generated so far, rounded down to whole counts.
+    #[must_use]
+    pub const fn position(&self) -> WheelCount {
+        self.position
+    }
+
+    /// Velocity, 1/256 count per sample.
+    #[must_use]
+    pub const fn velocity_raw(&self) -> i32 {
+        self.velocity
+    }
+
+    /// One sample towards `command` counts per sample at
+    /// `acceleration_raw`/256 counts per sample². Gives the next position, which
+    /// wraps. Never panics.
+    #[inline]
+    pub fn advance(&mut self, command: i8, acceleration_raw: u16) -> WheelCount {
+        let target = i32::from(command).wrapping_shl(FRACTION);
+        let step = i32::from(acceleration_raw);
+        let low = self.velocity.wrapping_sub(step);
+        let high = self.velocity.wrapping_add(step);
+        // Not `clamp`: the compiler can not see that low <= high.
+        self.velocity = target.max(low).min(high);
+        let sum = i32::from(self.fraction).wrapping_add(self.velocity);
+        self.fraction = (sum & 0xFF) as u8;
+        self.position = self.position.wrapping_add(sum.wrapping_shr(FRACTION));
+        self.position
+    }
+}
