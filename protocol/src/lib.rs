@@ -1,2 +1,51 @@
-//! In progress.
+//! The board bus: frames, messages, link state machines and their tables.
+//!
+//! Bytes become checked frames ([`Decoder`]), frames become typed messages
+//! ([`Message::parse`]), and only messages reach logic. `SPEC.md` beside this
+//! crate describes every byte; a test compares it with the code.
+//!
+//! # Never-panic contract
+//!
+//! No public function of this crate panics, allocates, recurses or loops more
+//! often than its input is long, whatever the input. Everything that can go
+//! wrong is a value: [`FrameError`], [`ParseError`], [`EncodeError`],
+//! [`NackReason`].
 #![no_std]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::arithmetic_side_effects,
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic
+    )
+)]
+
+pub mod address;
+pub mod fault;
+pub mod fields;
+pub mod frame;
+pub mod message;
+pub mod param;
+pub mod sync;
+pub mod wire;
+
+pub use address::{Address, NODES};
+pub use fault::{
+    FAULTS, Fault, FaultBits, FaultClass, FaultCode, FaultSchema, LIMITS, Limit, LimitBits,
+};
+pub use fields::{
+    Acceleration8p8, BoardKind, Correction, Count24, DisarmReason, InputBits, NackReason, NodeMode,
+    OpenMode, OutOfRange, Speed7, WheelControlMode,
+};
+pub use frame::{
+    CRC_LEN, DELIMITER, Decoder, EncodeError, Frame, FrameError, HEADER_LEN, Header, LinkQuality,
+    MAX_DECODED, MAX_ENCODED, MAX_PAYLOAD, VERSION, checksum, encode, encoded_len,
+};
+pub use message::*;
+pub use sync::{
+    BadSlot, JointSetpoint, LinkLossAction, NextReference, SyncFlags, SyncSlot, SyncSlots,
+    WheelSetpoint,
+};
+pub use wire::{EnumSchema, FieldSchema, MessageSchema, UnknownValue, ValueSchema};

@@ -1,0 +1,464 @@
+//! Frames: `00 · COBS(header · payload · CRC-32C) · 00`.
+//!
+//! | offset | bytes | header field |
+//! |---|---|---|
+//! | 0 | 1 | protocol version, [`VERSION`] |
+//! | 1 | 1 | message type |
+//! | 2 | 1 | source address |
+//! | 3 | 1 | destination address |
+//! | 4 | 2 | sequence, little-endian |
+//! | 6 | 2 | payload length, little-endian |
+//!
+//! The CRC-32C (polynomial 0x1EDC6F41, reflected, initial value and final xor
+//! of ones, check value 0xE3069283) covers header and payload and is sent
+//! little-endian. The decoded length must be exactly header + length field +
+//! CRC: together with the complemented CRC this closes the one-bit hole of
+//! COBS with a plain CRC.
+//!
+//! # Never-panic contract
+//!
+//! No function here panics, allocates or recurses, for any input. [`Decoder::push`]
+//! does constant work for a byte inside a frame and at most [`MAX_DECODED`]
+//! steps at a delimiter. After any garbage, the first valid frame behind a
+//! delimiter is delivered; frames do not depend on how the bytes were chunked.
+
+use crate::address::Address;
+use crate::message::MessageType;
+use crc::{CRC_32_ISCSI, Crc, Table};
+
+/// Protocol version in byte 0 of the header.
+///
+/// The header layout, and the messages Identify, Identity and Nack, keep their
+/// layout in every version, so that boards of different versions can name
+/// each other's version instead of looking dead.
+pub const VERSION: u8 = 1;
+/// Header bytes.
+pub const HEADER_LEN: usize = 8;
+/// Checksum bytes.
+pub const CRC_LEN: usize = 4;
+/// Hard maximum of an encoded frame, both delimiters included.
+pub const MAX_ENCODED: usize = 200;
+/// Longest decoded frame: without two delimiters and one COBS code byte.
+pub const MAX_DECODED: usize = MAX_ENCODED - 3;
+/// Longest payload.
+pub const MAX_PAYLOAD: usize = MAX_DECODED - HEADER_LEN - CRC_LEN;
+/// The byte between frames.
+pub const DELIMITER: u8 = 0;
+
+// One COBS block holds 254 bytes: the overhead is one byte for every frame, and
+// the encoded length depends on the message type alone, never on the content.
+const _: () = assert!(MAX_DECODED < 254);
+
+/// Bytes on the line of a frame with this payload length, delimiters included.
+#[must_use]
+pub const fn encoded_len(payload_len: usize) -> usize {
+    payload_len.saturating_add(HEADER_LEN + CRC_LEN + 3)
+}
+
+/// CRC-32C with one 256-entry table: 1 KiB of flash, one look-up per byte.
+///
+/// The crate offers no table (eight steps per byte: too slow for a 1 MBd line on
+/// a small core), one, or sixteen (16 KiB: a third of a joint image).
+static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
+
+/// CRC-32C of a byte string.
+#[must_use]
+pub fn checksum(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
+/// What the header says, without the length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// Protocol version of the sender.
+    pub version: u8,
+    /// Message type, known or not.
+    pub message_type: u8,
+    /// Sender; never broadcast.
+    pub source: Address,
+    /// Receiver or broadcast.
+    pub destination: Address,
+    /// Sequence of a request and of its answer; 0 in SYNC, slot index in replies is not needed.
+    pub sequence: u16,
+}
+
+/// A frame that passed every check of this layer.
+///
+/// Holds no other value than a correct one: known version (or one of the
+/// version-independent messages), existing addresses, exact length, right CRC.
+/// The payload still has to pass [`crate::Message::parse`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// The header.
+    pub header: Header,
+    /// The payload, of the length in the header.
+    pub payload: &'a [u8],
+}
+
+/// Why a stretch of bytes between two delimiters is not a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FrameError {
+    /// Longer than any frame; everything up to the delimiter was discarded.
+    Overflow,
+    /// The delimiter came inside a COBS block.
+    Truncated,
+    /// Shorter than header and CRC.
+    Short,
+    /// The checksum does not match.
+    Crc,
+    /// Sound frame of another protocol version.
+    Version {
+        /// Version of the sender.
+        found: u8,
+    },
+    /// The length field does not match the number of bytes.
+    Length,
+    /// Source or destination is not an address of this bus.
+    Address,
+}
+
+impl FrameError {
+    /// One sentence for a person.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Overflow => "more bytes than a frame can have before the delimiter",
+            Self::Truncated => "the delimiter came too early",
+            Self::Short => "too few bytes for a frame",
+            Self::Crc => "the checksum does not match",
+            Self::Version { .. } => "the sender speaks another protocol version",
+            Self::Length => "the length field does not match the number of bytes",
+            Self::Address => "an address that does not exist on this bus",
+        }
+    }
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.text())?;
+        if let Self::Version { found } = self {
+            write!(f, ": theirs is {found}, ours is {VERSION}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Why a frame could not be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EncodeError {
+    /// The payload is longer than [`MAX_PAYLOAD`].
+    PayloadTooLong,
+    /// The buffer is too small; [`MAX_ENCODED`] bytes are always enough.
+    BufferTooSmall,
+    /// The source is the broadcast address.
+    Source,
+}
+
+impl core::fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::PayloadTooLong => "the payload is longer than a frame can carry",
+            Self::BufferTooSmall => "the buffer is too small for the frame",
+            Self::Source => "the broadcast address cannot be a source",
+        })
+    }
+}
+
+/// Writes one frame into `out` and returns the bytes to send.
+///
+/// # Errors
+/// [`EncodeError`]; `out` then holds nothing of use. Never panics.
+pub fn encode<'a>(
+    header: &Header,
+    payload: &[u8],
+    out: &'a mut [u8],
+) -> Result<&'a [u8], EncodeError> {
+    if payload.len() > MAX_PAYLOAD {
+        return Err(EncodeError::PayloadTooLong);
+    }
+    if header.source == Address::BROADCAST {
+        return Err(EncodeError::Source);
+    }
+    // MAX_PAYLOAD is far below 2^16: the cast keeps the value.
+    let [len_low, len_high] = (payload.len() as u16).to_le_bytes();
+    let [seq_low, seq_high] = header.sequence.to_le_bytes();
+    let head: [u8; HEADER_LEN] = [
+        header.version,
+        header.message_type,
+        header.source.raw(),
+        header.destination.raw(),
+        seq_low,
+        seq_high,
+        len_low,
+        len_high,
+    ];
+    let mut digest = CRC.digest();
+    digest.update(&head);
+    digest.update(payload);
+    let crc = digest.finalize().to_le_bytes();
+
+    let total = encoded_len(payload.len());
+    let out = out.get_mut(..total).ok_or(EncodeError::BufferTooSmall)?;
+    let bytes = head.iter().chain(payload).chain(&crc);
+    cobs_into(bytes, out);
+    Ok(out)
+}
+
+/// Writes delimiter, COBS and delimiter. `out` has room for exactly that, and
+/// the input is shorter than one COBS block (const assertion above).
+fn cobs_into<'a>(bytes: impl Iterator<Item = &'a u8>, out: &mut [u8]) {
+    let mut code_at = 1_usize;
+    let mut code = 1_u8;
+    let mut at = 2_usize;
+    let mut put = |index: usize, value: u8| {
+        if let Some(place) = out.get_mut(index) {
+            *place = value;
+        }
+    };
+    put(0, DELIMITER);
+    for &byte in bytes {
+        if byte == 0 {
+            put(code_at, code);
+            code_at = at;
+            code = 1;
+        } else {
+            put(at, byte);
+            code = code.wrapping_add(1);
+        }
+        at = at.saturating_add(1);
+    }
+    put(code_at, code);
+    put(at, DELIMITER);
+}
+
+impl<'a> Frame<'a> {
+    /// Checks the decoded bytes of one frame: length, CRC, version, addresses.
+    ///
+    /// # Errors
+    /// [`FrameError`], in that order. Never panics.
+    pub fn check(decoded: &'a [u8]) -> Result<Self, FrameError> {
+        let (body, crc) = decoded
+            .split_last_chunk::<CRC_LEN>()
+            .ok_or(FrameError::Short)?;
+        let (head, payload) = body
+            .split_first_chunk::<HEADER_LEN>()
+            .ok_or(FrameError::Short)?;
+        if checksum(body) != u32::from_le_bytes(*crc) {
+            return Err(FrameError::Crc);
+        }
+        let &[
+            version,
+            message_type,
+            source,
+            destination,
+            seq_low,
+            seq_high,
+            len_low,
+            len_high,
+        ] = head;
+        if version != VERSION && !MessageType::is_version_independent(message_type) {
+            return Err(FrameError::Version { found: version });
+        }
+        if usize::from(u16::from_le_bytes([len_low, len_high])) != payload.len() {
+            return Err(FrameError::Length);
+        }
+        let source = Address::new(source).ok_or(FrameError::Address)?;
+        let destination = Address::new(destination).ok_or(FrameError::Address)?;
+        if source == Address::BROADCAST {
+            return Err(FrameError::Address);
+        }
+        Ok(Self {
+            header: Header {
+                version,
+                message_type,
+                source,
+                destination,
+                sequence: u16::from_le_bytes([seq_low, seq_high]),
+            },
+            payload,
+        })
+    }
+}
+
+/// Link quality: frames and errors by kind. Counters stop at their maximum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkQuality {
+    /// Valid frames.
+    pub frames: u32,
+    /// [`FrameError::Overflow`].
+    pub overflow: u32,
+    /// [`FrameError::Truncated`].
+    pub truncated: u32,
+    /// [`FrameError::Short`].
+    pub short: u32,
+    /// [`FrameError::Crc`].
+    pub crc: u32,
+    /// [`FrameError::Version`].
+    pub version: u32,
+    /// [`FrameError::Length`].
+    pub length: u32,
+    /// [`FrameError::Address`].
+    pub address: u32,
+}
+
+impl LinkQuality {
+    fn count(&mut self, result: &Result<Frame<'_>, FrameError>) {
+        let counter = match result {
+            Ok(_) => &mut self.frames,
+            Err(FrameError::Overflow) => &mut self.overflow,
+            Err(FrameError::Truncated) => &mut self.truncated,
+            Err(FrameError::Short) => &mut self.short,
+            Err(FrameError::Crc) => &mut self.crc,
+            Err(FrameError::Version { .. }) => &mut self.version,
+            Err(FrameError::Length) => &mut self.length,
+            Err(FrameError::Address) => &mut self.address,
+        };
+        *counter = counter.saturating_add(1);
+    }
+
+    /// All errors together.
+    #[must_use]
+    pub const fn errors(&self) -> u32 {
+        self.overflow
+            .saturating_add(self.truncated)
+            .saturating_add(self.short)
+            .saturating_add(self.crc)
+            .saturating_add(self.version)
+            .saturating_add(self.length)
+            .saturating_add(self.address)
+    }
+}
+
+/// Streaming decoder: bytes in, checked frames out.
+///
+/// Undoes COBS as the bytes come, so one buffer of [`MAX_DECODED`] bytes is all
+/// it needs. After an overflow everything up to the next delimiter is discarded,
+/// so the tail of a broken frame is never taken for a frame.
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    buffer: [u8; MAX_DECODED],
+    len: usize,
+    /// Data bytes that the present COBS block still owes.
+    owed: usize,
+    /// Whether a byte came since the last delimiter.
+    started: bool,
+    /// Whether the rest up to the delimiter is thrown away.
+    discarding: bool,
+    quality: LinkQuality,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Decoder {
+    /// A decoder that has seen nothing. The first bytes of a stream may belong to
+    /// a frame whose start was missed; they are discarded like any broken frame.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            buffer: [0; MAX_DECODED],
+            len: 0,
+            owed: 0,
+            started: false,
+            discarding: false,
+            quality: LinkQuality {
+                frames: 0,
+                overflow: 0,
+                truncated: 0,
+                short: 0,
+                crc: 0,
+                version: 0,
+                length: 0,
+                address: 0,
+            },
+        }
+    }
+
+    /// Takes one byte; gives a frame or an error at the delimiter behind it.
+    ///
+    /// Delimiters without anything between them are idle line and give `None`.
+    pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
+        if byte == DELIMITER {
+            return self.finish();
+        }
+        if self.discarding {
+            return None;
+        }
+        if self.owed > 0 {
+            self.owed = self.owed.saturating_sub(1);
+            self.store(byte);
+            return None;
+        }
+        // A code byte. The zero it stands for belongs between two blocks. (Only a
+        // block of 254 bytes has none, and that is longer than any frame.)
+        if self.started {
+            self.store(0);
+        }
+        self.started = true;
+        self.owed = usize::from(byte).saturating_sub(1);
+        None
+    }
+
+    /// Takes any number of bytes and shows every frame and error to `visit`, in
+    /// order. Same result as [`Self::push`] byte by byte, for any chunking.
+    pub fn push_slice(
+        &mut self,
+        bytes: &[u8],
+        mut visit: impl FnMut(Result<Frame<'_>, FrameError>),
+    ) {
+        for &byte in bytes {
+            if let Some(result) = self.push(byte) {
+                visit(result);
+            }
+        }
+    }
+
+    /// Frames and errors seen so far.
+    #[must_use]
+    pub const fn quality(&self) -> &LinkQuality {
+        &self.quality
+    }
+
+    /// Sets the counters to zero.
+    pub fn clear_quality(&mut self) {
+        self.quality = LinkQuality::default();
+    }
+
+    /// Forgets a partial frame, as after a change of baud rate; counters stay.
+    pub fn reset(&mut self) {
+        self.len = 0;
+        self.owed = 0;
+        self.started = false;
+        self.discarding = false;
+    }
+
+    fn store(&mut self, byte: u8) {
+        match self.buffer.get_mut(self.len) {
+            Some(place) => {
+                *place = byte;
+                self.len = self.len.saturating_add(1);
+            }
+            None => self.discarding = true,
+        }
+    }
+
+    fn finish(&mut self) -> Option<Result<Frame<'_>, FrameError>> {
+        let (len, owed, started, discarding) = (self.len, self.owed, self.started, self.discarding);
+        self.reset();
+        if !started {
+            return None;
+        }
+        let result = if discarding {
+            Err(FrameError::Overflow)
+        } else if owed > 0 {
+            Err(FrameError::Truncated)
+        } else {
+            Frame::check(self.buffer.get(..len).unwrap_or_default())
+        };
+        self.quality.count(&result);
+        Some(result)
+    }
+}

@@ -1,0 +1,477 @@
+//! Messages: typed structs, one exact payload size each.
+//!
+//! Bytes become a checked [`Frame`](crate::Frame), a frame becomes a
+//! [`Message`]; only messages reach logic. [`Message::parse`] can fail for an
+//! unknown type, a wrong size or a value outside its range, and says which, so
+//! that a node can answer with the matching [`NackReason`]. After a successful
+//! parse every accessor is total. Nothing here panics.
+
+use crate::address::Address;
+use crate::fault::{FaultBits, FaultCode, LimitBits};
+use crate::fields::{
+    Acceleration8p8, BoardKind, Correction, Count24, DisarmReason, InputBits, NackReason, NodeMode,
+    OpenMode, Speed7, WheelControlMode,
+};
+use crate::frame::{self, EncodeError, Frame, Header, MAX_PAYLOAD, VERSION};
+use crate::sync::{SyncFlags, SyncSlots};
+use crate::wire::{FieldSchema, MessageSchema, WireSize};
+use postcard::fixint::le;
+use serde::{Deserialize, Serialize};
+use wheeleg_units::{Duty, PositionMm, VelocityMmS, WheelCount, WireDuty, WireVelocity};
+
+/// What a message type is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// Part of every bus cycle; never acknowledged.
+    Cyclic,
+    /// From the master to one node; answered.
+    Request,
+    /// From a node to the master, with the sequence of the request.
+    Answer,
+}
+
+macro_rules! messages {
+    ($(
+        $(#[$meta:meta])*
+        $name:ident = $id:literal, $class:ident $(-> $answer:ident)? {
+            $( $(#[$fmeta:meta])* $field:ident: $ty:ty = $format:literal; )*
+        }
+    )*) => {
+        /// Message types: the second byte of the header.
+        ///
+        /// 0x01–0x0F cyclic, 0x10–0x7F requests (0x10 general, 0x20 joint,
+        /// 0x30 wheel, 0x40 parameters), 0x80–0xFF answers. Numbers are never
+        /// used again for something else.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum MessageType { $( $(#[$meta])* $name = $id, )* }
+
+        impl MessageType {
+            /// All types, in ascending order.
+            pub const ALL: &'static [Self] = &[ $( Self::$name ),* ];
+
+            /// From the number in the header.
+            #[must_use]
+            pub const fn from_code(code: u8) -> Option<Self> {
+                match code { $( $id => Some(Self::$name), )* _ => None }
+            }
+
+            /// Name as in the interface definition.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $( Self::$name => stringify!($name) ),* }
+            }
+
+            /// What it is for.
+            #[must_use]
+            pub const fn class(self) -> Class {
+                match self { $( Self::$name => Class::$class ),* }
+            }
+
+            /// Exact payload size in bytes.
+            #[must_use]
+            pub const fn payload_len(self) -> usize {
+                match self { $( Self::$name => $name::SIZE ),* }
+            }
+
+            /// The answer of success to this request; `None` if it is no request.
+            /// Every request can also be answered by Nack.
+            #[must_use]
+            pub const fn answer(self) -> Option<Self> {
+                match self {
+                    $( Self::$name => messages!(@answer $class $($answer)?), )*
+                }
+            }
+        }
+
+        $(
+            $(#[$meta])*
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+            pub struct $name { $( $(#[$fmeta])* #[doc = $format] pub $field: $ty, )* }
+
+            impl $name {
+                /// Exact payload size in bytes.
+                pub const SIZE: usize = {
+                    let size: usize = 0;
+                    $( let size = size.saturating_add(<$ty as WireSize>::SIZE); )*
+                    size
+                };
+            }
+
+            impl From<$name> for Message {
+                fn from(message: $name) -> Self {
+                    Self::$name(message)
+                }
+            }
+
+            const _: () = assert!($name::SIZE <= MAX_PAYLOAD);
+        )*
+
+        /// Any message of the bus.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Message { $( $(#[$meta])* $name($name), )* }
+
+        impl Message {
+            /// Its type.
+            #[must_use]
+            pub const fn message_type(&self) -> MessageType {
+                match self { $( Self::$name(_) => MessageType::$name ),* }
+            }
+
+            fn write_payload<'a>(&self, out: &'a mut [u8]) -> postcard::Result<&'a mut [u8]> {
+                match self { $( Self::$name(message) => postcard::to_slice(message, out) ),* }
+            }
+
+            fn read_payload(message_type: MessageType, payload: &[u8]) -> postcard::Result<(Self, &[u8])> {
+                match message_type { $(
+                    MessageType::$name => postcard::take_from_bytes::<$name>(payload)
+                        .map(|(message, rest)| (Self::$name(message), rest)),
+                )* }
+            }
+        }
+
+        /// The message part of the interface definition, in ascending order of type.
+        pub const MESSAGES: &[MessageSchema] = &[ $( MessageSchema {
+            id: $id,
+            name: stringify!($name),
+            class: stringify!($class),
+            fields: &[ $( FieldSchema {
+                name: stringify!($field),
+                ty: stringify!($ty),
+                size: <$ty as WireSize>::SIZE,
+                format: $format,
+            } ),* ],
+        } ),* ];
+    };
+    (@answer Request) => { Some(Self::Ack) };
+    (@answer Request $answer:ident) => { Some(Self::$answer) };
+    (@answer $class:ident) => { None };
+}
+
+messages! {
+    /// Broadcast once per bus cycle: time, E-stop and the set-points of all nodes.
+    Sync = 0x01, Cyclic {
+        #[serde(with = "le")] cycle: u16 = "bus cycle counter, advances by one per cycle, wraps";
+        #[serde(with = "le")] master_time_us: u32 = "master time at the start of this frame, us, wraps after 71 min";
+        flags: SyncFlags = "bit 0 emergency stop, others 0";
+        slots: SyncSlots = "eight set-point slots, joints 1-6 then wheels 7-8";
+    }
+    /// A node's reply in its own slot after SYNC; same layout for joints and wheels.
+    SlotReply = 0x02, Cyclic {
+        #[serde(with = "le")] position_raw: i32 = "joint: stroke, I16F16 mm; wheel: 24-bit counts, sign-extended";
+        #[serde(with = "le")] velocity_raw: i16 = "joint: I12F4 mm/s; wheel: 12.4 counts per sample";
+        #[serde(with = "le")] effort_raw: i16 = "joint: drive duty, Q1.14; wheel: motor command, -100..100";
+        active_faults: FaultBits = "latched faults, one bit each";
+        mode: NodeMode = "mode of the board";
+        limits: LimitBits = "limits that shaped the output (indications)";
+        inputs: InputBits = "digital inputs";
+        sync_echo: u8 = "low byte of the cycle counter that was latched";
+    }
+    /// Who are you? Keeps its layout in every protocol version.
+    Identify = 0x10, Request -> Identity {}
+    /// Close the loop on the present position. Refused unless the schema hash is the board's own.
+    Arm = 0x11, Request {
+        #[serde(with = "le")] schema_hash: u64 = "hash of the master's interface definition";
+    }
+    /// Open the loop: valves shut, motor off.
+    Disarm = 0x12, Request {}
+    /// Clear latched faults and the link supervision latch.
+    ClearFault = 0x13, Request {}
+    /// Ask for the fault record.
+    FaultReport = 0x14, Request -> FaultRecord {}
+    /// Board command: all valves shut (joint), ramp to standstill (wheel). Latched.
+    EmergencyBrake = 0x15, Request {}
+    /// Board command: transmit the actual position.
+    TransmitPosition = 0x16, Request -> Position {}
+    /// Board command: receive a position reference.
+    PositionReference = 0x20, Request {
+        #[serde(with = "le")] reference_raw: i32 = "stroke, I16F16 mm";
+        #[serde(with = "le")] deadline_cycle: u16 = "last bus cycle in which the command may take effect";
+    }
+    /// Board command: open all valves.
+    OpenAllValves = 0x21, Request {
+        mode: OpenMode = "exhaust, or literal blow-through";
+    }
+    /// Choose the fuzzy correction.
+    SelectCorrection = 0x22, Request {
+        correction: Correction = "PD or ID type";
+    }
+    /// Final position of the wheel.
+    WheelReference = 0x30, Request {
+        position: Count24 = "24-bit counts, sign-extended";
+        #[serde(with = "le")] deadline_cycle: u16 = "last bus cycle in which the command may take effect";
+    }
+    /// Velocity of the wheel.
+    WheelVelocity = 0x31, Request {
+        #[serde(with = "le")] velocity_raw: i16 = "12.4 counts per sample; integral velocity mode takes whole counts -128..127 only";
+        #[serde(with = "le")] deadline_cycle: u16 = "last bus cycle in which the command may take effect";
+    }
+    /// Largest speed of the trapezoidal profile.
+    WheelMaxSpeed = 0x32, Request {
+        speed: Speed7 = "counts per sample, 0..127";
+    }
+    /// Acceleration of the trapezoidal and integral velocity profile.
+    WheelAcceleration = 0x33, Request {
+        acceleration: Acceleration8p8 = "8.8 counts per sample^2, 0..0x7FFF raw";
+    }
+    /// Digital filter D(z) = K (z - A/256) / (4 (z + B/256)).
+    WheelFilter = 0x34, Request {
+        zero: u8 = "A, 0..255";
+        pole: u8 = "B, 0..255";
+        gain: u8 = "K, 0..255";
+    }
+    /// Sample timer: period = 16 (T + 1) / clock.
+    WheelSampleTimer = 0x35, Request {
+        timer: u8 = "T, minimum by mode";
+    }
+    /// Mode of the wheel controller.
+    WheelMode = 0x36, Request {
+        mode: WheelControlMode = "controller mode";
+    }
+    /// Read a parameter.
+    ParamGet = 0x40, Request -> ParamValue {
+        #[serde(with = "le")] id: u16 = "parameter number";
+    }
+    /// Write a parameter; answered with the value now in force.
+    ParamSet = 0x41, Request -> ParamValue {
+        #[serde(with = "le")] id: u16 = "parameter number";
+        #[serde(with = "le")] value: i32 = "raw value in the parameter's format";
+    }
+    /// The request was carried out or accepted.
+    Ack = 0x80, Answer {
+        request: u8 = "message type of the request";
+    }
+    /// The request was refused. Keeps its layout in every protocol version.
+    Nack = 0x81, Answer {
+        request: u8 = "message type of the request";
+        reason: NackReason = "why";
+    }
+    /// Answer to Identify. Keeps its layout in every protocol version.
+    Identity = 0x82, Answer {
+        board: BoardKind = "kind of board";
+        address: Address = "address read from the straps";
+        firmware: [u8; 3] = "firmware version: major, minor, patch";
+        #[serde(with = "le")] schema_hash: u64 = "hash of the board's interface definition";
+        unique_id: [u8; 12] = "96-bit unique id of the processor";
+    }
+    /// Answer to TransmitPosition.
+    Position = 0x83, Answer {
+        #[serde(with = "le")] position_raw: i32 = "joint: stroke, I16F16 mm; wheel: 24-bit counts, sign-extended";
+        #[serde(with = "le")] velocity_raw: i16 = "joint: I12F4 mm/s; wheel: 12.4 counts per sample";
+        #[serde(with = "le")] cycle: u16 = "bus cycle in which the sample was taken";
+        #[serde(with = "le")] age_us: u16 = "time from the latch of that cycle to the sample, us, saturating";
+    }
+    /// Answer to ParamGet and ParamSet.
+    ParamValue = 0x84, Answer {
+        #[serde(with = "le")] id: u16 = "parameter number";
+        #[serde(with = "le")] value: i32 = "raw value in the parameter's format";
+    }
+    /// Answer to FaultReport.
+    FaultRecord = 0x85, Answer {
+        active: FaultBits = "latched faults, one bit each";
+        sticky: FaultBits = "faults since start-up, not cleared by ClearFault";
+        first_fault: FaultCode = "number of the first fault since the last clear, 0 = none";
+        #[serde(with = "le")] first_time_us: u32 = "board time of the first fault, us, wraps; 0 if none";
+        disarm_reason: DisarmReason = "why it was last disarmed or stopped";
+        limits: LimitBits = "limits that shape the output now";
+    }
+}
+
+impl MessageType {
+    /// The number in the header.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Whether the type keeps number and layout in every protocol version.
+    #[must_use]
+    pub const fn is_version_independent(code: u8) -> bool {
+        code == Self::Identify.code() || code == Self::Identity.code() || code == Self::Nack.code()
+    }
+}
+
+/// Who sends a message to whom, and its sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Envelope {
+    /// Sender; never broadcast.
+    pub source: Address,
+    /// Receiver.
+    pub destination: Address,
+    /// Sequence of the request; answers repeat it; 0 in cyclic messages.
+    pub sequence: u16,
+}
+
+impl Envelope {
+    /// The envelope of the answer: source and destination swapped.
+    #[must_use]
+    pub const fn reply(self, own: Address) -> Self {
+        Self {
+            source: own,
+            destination: self.source,
+            sequence: self.sequence,
+        }
+    }
+}
+
+impl From<Header> for Envelope {
+    fn from(header: Header) -> Self {
+        Self {
+            source: header.source,
+            destination: header.destination,
+            sequence: header.sequence,
+        }
+    }
+}
+
+/// Why the payload of a sound frame is not a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ParseError {
+    /// No such message type in this version.
+    UnknownType {
+        /// The number in the header.
+        code: u8,
+    },
+    /// The payload does not have the exact size of its type.
+    Length {
+        /// The type.
+        message_type: MessageType,
+        /// Bytes found.
+        found: usize,
+    },
+    /// A field is outside its range, or a reserved bit is set.
+    Value {
+        /// The type.
+        message_type: MessageType,
+    },
+}
+
+impl ParseError {
+    /// The reason with which a node refuses such a request.
+    #[must_use]
+    pub const fn nack_reason(self) -> NackReason {
+        match self {
+            Self::UnknownType { .. } => NackReason::UnknownMessage,
+            Self::Length { .. } => NackReason::BadLength,
+            Self::Value { .. } => NackReason::OutOfRange,
+        }
+    }
+}
+
+impl core::fmt::Display for ParseError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::UnknownType { code } => write!(f, "message type 0x{code:02X} does not exist"),
+            Self::Length {
+                message_type,
+                found,
+            } => write!(
+                f,
+                "{} has {} payload bytes, found {found}",
+                message_type.name(),
+                message_type.payload_len()
+            ),
+            Self::Value { message_type } => {
+                write!(f, "{} holds a value outside its range", message_type.name())
+            }
+        }
+    }
+}
+
+impl Message {
+    /// The message in a checked frame.
+    ///
+    /// # Errors
+    /// [`ParseError`]: unknown type, wrong size, or a value outside its range.
+    /// Never panics, for any payload.
+    pub fn parse(frame: &Frame<'_>) -> Result<Self, ParseError> {
+        let code = frame.header.message_type;
+        let message_type = MessageType::from_code(code).ok_or(ParseError::UnknownType { code })?;
+        if frame.payload.len() != message_type.payload_len() {
+            return Err(ParseError::Length {
+                message_type,
+                found: frame.payload.len(),
+            });
+        }
+        match Self::read_payload(message_type, frame.payload) {
+            Ok((message, [])) => Ok(message),
+            _ => Err(ParseError::Value { message_type }),
+        }
+    }
+
+    /// Writes the message as a frame into `out`; returns the bytes to send.
+    ///
+    /// [`crate::MAX_ENCODED`] bytes are always enough.
+    ///
+    /// # Errors
+    /// [`EncodeError`]: buffer too small, or broadcast as the source. Never panics.
+    pub fn emit<'a>(&self, envelope: Envelope, out: &'a mut [u8]) -> Result<&'a [u8], EncodeError> {
+        self.emit_as(VERSION, envelope, out)
+    }
+
+    /// As [`Self::emit`], with another protocol version in the header. For tests
+    /// and tools that play a board of another version.
+    ///
+    /// # Errors
+    /// As [`Self::emit`].
+    pub fn emit_as<'a>(
+        &self,
+        version: u8,
+        envelope: Envelope,
+        out: &'a mut [u8],
+    ) -> Result<&'a [u8], EncodeError> {
+        let mut scratch = [0_u8; MAX_PAYLOAD];
+        // Every payload fits (const assertions above): the error cannot occur.
+        let payload = self
+            .write_payload(&mut scratch)
+            .map_err(|_| EncodeError::PayloadTooLong)?;
+        let header = Header {
+            version,
+            message_type: self.message_type().code(),
+            source: envelope.source,
+            destination: envelope.destination,
+            sequence: envelope.sequence,
+        };
+        frame::encode(&header, payload, out)
+    }
+
+    /// Bytes on the line of a message of this type, delimiters included.
+    #[must_use]
+    pub const fn encoded_len(message_type: MessageType) -> usize {
+        frame::encoded_len(message_type.payload_len())
+    }
+}
+
+impl SlotReply {
+    /// A joint's position, I16F16 mm.
+    #[must_use]
+    pub const fn joint_position(&self) -> PositionMm {
+        PositionMm::from_raw(self.position_raw)
+    }
+
+    /// A joint's velocity, mm/s.
+    #[must_use]
+    pub const fn joint_velocity(&self) -> VelocityMmS {
+        VelocityMmS::from_wire(WireVelocity::from_bits(self.velocity_raw))
+    }
+
+    /// A joint's drive duty, limited to ±1.
+    #[must_use]
+    pub const fn joint_duty(&self) -> Duty {
+        Duty::from_wire(WireDuty::from_bits(self.effort_raw))
+    }
+
+    /// A wheel's position; `None` if it does not fit 24 bits.
+    #[must_use]
+    pub const fn wheel_position(&self) -> Option<WheelCount> {
+        WheelCount::checked_new(self.position_raw)
+    }
+}
+
+impl PositionReference {
+    /// The reference, I16F16 mm.
+    #[must_use]
+    pub const fn reference(&self) -> PositionMm {
+        PositionMm::from_raw(self.reference_raw)
+    }
+}
