@@ -1,0 +1,191 @@
+//! The half-duplex RS-485 line, at byte time.
+//!
+//! A transmission occupies the line from its start for ten bit times a byte
+//! (start bit, eight data bits, stop bit). Everybody but the sender receives
+//! it, whole, at the end of its last byte; the instant of that end is what a
+//! board's receiver time-stamps. Two drivers active at once corrupt each
+//! other's overlapping bytes (a wired AND of the two bytes) and are counted.
+//!
+//! Not modelled here: propagation (10 ns on two metres of cable, a thousandth
+//! of a byte), reflections, noise.
+
+use std::collections::VecDeque;
+
+/// Bits on the line for one byte: start, eight data, stop.
+const BITS_PER_BYTE: u64 = 10;
+
+/// Who drives the line: a bus address (0 master, 1–8 nodes).
+pub type Driver = u8;
+
+/// One stretch of bytes by one driver.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Delivery {
+    /// Sender's address.
+    pub from: Driver,
+    /// First bit on the line \[ns\].
+    pub start_ns: u64,
+    /// End of the last byte \[ns\]; the instant of delivery.
+    pub end_ns: u64,
+    /// The bytes as received, after any collision.
+    pub bytes: Vec<u8>,
+}
+
+/// Counters of the line, for telemetry and for the bandwidth budget.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct BusCounters {
+    /// Bytes put on the line by all drivers.
+    pub bytes: u64,
+    /// Transmissions.
+    pub frames: u64,
+    /// Transmissions that overlapped another one.
+    pub collisions: u64,
+    /// Time the line was driven \[ns\], overlaps counted once per driver.
+    pub busy_ns: u64,
+}
+
+/// The line: transmissions under way, in order of their end.
+#[derive(Debug)]
+pub struct Bus {
+    byte_ns: u64,
+    under_way: VecDeque<Delivery>,
+    counters: BusCounters,
+}
+
+impl Bus {
+    /// A line at `baud` bit/s. The byte time is rounded to whole nanoseconds
+    /// (exact for 1 Mbit/s and every divisor of it).
+    #[must_use]
+    pub fn new(baud: u32) -> Self {
+        Self {
+            byte_ns: BITS_PER_BYTE * 1_000_000_000 / u64::from(baud.max(1)),
+            under_way: VecDeque::new(),
+            counters: BusCounters::default(),
+        }
+    }
+
+    /// Duration of `bytes` bytes on the line \[ns\].
+    #[must_use]
+    pub fn duration_ns(&self, bytes: usize) -> u64 {
+        self.byte_ns * bytes as u64
+    }
+
+    /// Puts `bytes` on the line from `start_ns` on.
+    pub fn transmit(&mut self, from: Driver, start_ns: u64, mut bytes: Vec<u8>) {
+        if bytes.is_empty() {
+            return;
+        }
+        let end_ns = start_ns + self.duration_ns(bytes.len());
+        self.counters.bytes += bytes.len() as u64;
+        self.counters.frames += 1;
+        self.counters.busy_ns += end_ns - start_ns;
+        let mut collided = false;
+        for other in &mut self.under_way {
+            if other.start_ns < end_ns && start_ns < other.end_ns {
+                collided = true;
+                corrupt_overlap(self.byte_ns, other, start_ns, &mut bytes);
+            }
+        }
+        self.counters.collisions += u64::from(collided);
+        let at = self.under_way.partition_point(|d| d.end_ns <= end_ns);
+        self.under_way.insert(
+            at,
+            Delivery {
+                from,
+                start_ns,
+                end_ns,
+                bytes,
+            },
+        );
+    }
+
+    /// Instant of the next delivery \[ns\].
+    #[must_use]
+    pub fn next_delivery_ns(&self) -> Option<u64> {
+        self.under_way.front().map(|d| d.end_ns)
+    }
+
+    /// Takes the delivery due at or before `now_ns`, earliest first.
+    pub fn take_due(&mut self, now_ns: u64) -> Option<Delivery> {
+        if self.next_delivery_ns()? <= now_ns {
+            self.under_way.pop_front()
+        } else {
+            None
+        }
+    }
+
+    /// True while nobody drives the line at `now_ns`.
+    #[must_use]
+    pub fn is_idle(&self, now_ns: u64) -> bool {
+        self.under_way
+            .iter()
+            .all(|d| now_ns < d.start_ns || d.end_ns <= now_ns)
+    }
+
+    /// Counters since the start.
+    #[must_use]
+    pub fn counters(&self) -> BusCounters {
+        self.counters
+    }
+}
+
+/// Wired AND of every pair of bytes that share line time.
+fn corrupt_overlap(byte_ns: u64, earlier: &mut Delivery, start_ns: u64, bytes: &mut [u8]) {
+    for (i, a) in earlier.bytes.iter_mut().enumerate() {
+        let a_start = earlier.start_ns + i as u64 * byte_ns;
+        for (j, b) in bytes.iter_mut().enumerate() {
+            let b_start = start_ns + j as u64 * byte_ns;
+            if a_start < b_start + byte_ns && b_start < a_start + byte_ns {
+                let both = *a & *b;
+                *a = both;
+                *b = both;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_takes_ten_bits() {
+        let mut bus = Bus::new(1_000_000);
+        bus.transmit(0, 5_000, vec![1, 2, 3]);
+        assert_eq!(bus.next_delivery_ns(), Some(5_000 + 30_000));
+        assert!(bus.take_due(34_999).is_none());
+        let d = bus.take_due(35_000).expect("due");
+        assert_eq!((d.from, d.bytes.as_slice()), (0, &[1u8, 2, 3][..]));
+    }
+
+    #[test]
+    fn deliveries_come_in_order_of_their_end() {
+        let mut bus = Bus::new(1_000_000);
+        bus.transmit(1, 100_000, vec![0xAA; 10]);
+        bus.transmit(2, 10_000, vec![0xBB; 2]);
+        assert_eq!(bus.take_due(u64::MAX).map(|d| d.from), Some(2));
+        assert_eq!(bus.take_due(u64::MAX).map(|d| d.from), Some(1));
+        assert_eq!(bus.counters().collisions, 0);
+    }
+
+    #[test]
+    fn overlapping_drivers_corrupt_only_what_overlaps() {
+        let mut bus = Bus::new(1_000_000);
+        bus.transmit(1, 0, vec![0xF0; 3]);
+        bus.transmit(2, 20_000, vec![0x0F; 3]);
+        assert_eq!(bus.counters().collisions, 1);
+        let a = bus.take_due(u64::MAX).expect("first");
+        let b = bus.take_due(u64::MAX).expect("second");
+        assert_eq!(a.bytes, vec![0xF0, 0xF0, 0x00]);
+        assert_eq!(b.bytes, vec![0x00, 0x0F, 0x0F]);
+    }
+
+    #[test]
+    fn back_to_back_is_no_collision() {
+        let mut bus = Bus::new(1_000_000);
+        bus.transmit(1, 0, vec![0x11; 4]);
+        bus.transmit(2, 40_000, vec![0x22; 4]);
+        assert_eq!(bus.counters().collisions, 0);
+        assert!(!bus.is_idle(39_999));
+        assert!(bus.is_idle(80_000));
+    }
+}
