@@ -1,2 +1,102 @@
-//! Developer tasks.
-fn main() {}
+//! The one door for developers: `cargo xtask <command>`.
+//!
+//! `cargo xtask test` is the whole test suite; the other commands are its
+//! parts, so that what fails in one place can be repeated alone. A step either
+//! passed, failed, or was NOT RUN because a tool is missing; the last two both
+//! end the program with a non-zero status.
+
+mod main_job;
+mod mcap;
+mod no_std;
+mod process;
+mod report;
+mod rust;
+mod tools;
+mod vectors;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::report::Report;
+
+#[derive(Parser)]
+#[command(
+    name = "cargo xtask",
+    bin_name = "cargo xtask",
+    about = "Developer tasks of the Wheeleg workspace"
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Set up all tools, then run the whole test suite.
+    Test,
+    /// What continuous integration runs: the same as `test`.
+    Ci,
+    /// Format, lints and bare-metal checks; no tests.
+    Check,
+    /// Check every `no_std` crate for a bare-metal target.
+    NoStd,
+    /// Rerun the reference generators; their output must equal the checked-in vectors.
+    Vectors,
+    /// Release build, then the main job twice in different folders: the hashes must be equal.
+    MainJob,
+    /// Open the MCAP log of a run with the Python reader and check every channel.
+    McapCheck {
+        /// The run's output folder.
+        run_dir: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let mut report = Report::new();
+    match cli.command {
+        Command::Test | Command::Ci => test(&mut report),
+        Command::Check => {
+            tools_for_lints(&mut report);
+            lints(&mut report);
+            no_std::steps(&mut report);
+        }
+        Command::NoStd => no_std::steps(&mut report),
+        Command::Vectors => vectors::steps(&mut report),
+        Command::MainJob => {
+            main_job::steps(&mut report);
+        }
+        Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
+    }
+    print!("{report}");
+    if report.all_passed() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+/// The whole suite. Every step is run, whatever the ones before it did, so
+/// that one run shows everything that is wrong.
+fn test(report: &mut Report) {
+    tools_for_lints(report);
+    report.step("set-up: Python environment", || tools::python().map(drop));
+    lints(report);
+    report.step("cargo test --workspace", rust::test);
+    no_std::steps(report);
+    vectors::steps(report);
+    let run = main_job::steps(report);
+    mcap::steps(report, run.as_deref());
+}
+
+fn tools_for_lints(report: &mut Report) {
+    report.step("set-up: rustfmt", || tools::cargo_component("fmt"));
+    report.step("set-up: clippy", || tools::cargo_component("clippy"));
+}
+
+fn lints(report: &mut Report) {
+    report.step("cargo fmt --check", rust::fmt);
+    report.step("cargo clippy -D warnings", rust::clippy);
+}

@@ -1,0 +1,209 @@
+//! Every `no_std` crate is checked for a target without an operating system,
+//! where no `std` exists to lean on by mistake.
+//!
+//! Two ways, tried in this order:
+//! 1. the target's `core` from rustup, with the toolchain in use;
+//! 2. Debian's compiler with its packaged library source, which builds `core`
+//!    itself (`-Zbuild-std`), for machines whose rustup cannot reach its server.
+//!
+//! Each crate is checked alone (`-p`), so that no other member can switch on a
+//! `std` feature of a shared dependency.
+
+use std::env;
+use std::path::Path;
+use std::process::Command;
+
+use crate::process::{ask, cargo, command, run, succeeds, target_dir};
+use crate::report::{Report, StepError, StepResult};
+use crate::tools::{apt_install, have, may_apt};
+
+/// The `no_std` crates.
+const CRATES: [&str; 6] = [
+    "wheeleg-units",
+    "wheeleg-control",
+    "wheeleg-kinematics",
+    "wheeleg-protocol",
+    "wheeleg-node",
+    "wheeleg-master",
+];
+
+/// Cortex-M4 is the part on the boards; Cortex-M0+ is the poorest core that
+/// the crates are kept fit for (no atomic swap, no hardware division).
+const TARGETS: [&str; 2] = ["thumbv7em-none-eabi", "thumbv6m-none-eabi"];
+
+/// Debian's compiler and what `-Zbuild-std` needs with it.
+const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+
+/// Set to anything to take the second way although the first would work.
+const FORCE_BUILD_STD: &str = "WHEELEG_BUILD_STD";
+
+/// How a target is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Rustup,
+    DebianBuildStd,
+}
+
+/// One step per target.
+pub(crate) fn steps(report: &mut Report) {
+    for target in TARGETS {
+        report.step(format!("no_std check, {target}"), || check(target));
+    }
+}
+
+fn check(target: &str) -> StepResult {
+    let way = set_up(target)?;
+    match way {
+        Way::Rustup => println!("    way: rustup's {target}"),
+        Way::DebianBuildStd => println!("    way: Debian's rustc, core built from source"),
+    }
+    let mut wrong = Vec::new();
+    for package in CRATES {
+        let mut command = cargo_for(way);
+        command.args([
+            "--locked",
+            "--lib",
+            "--package",
+            package,
+            "--target",
+            target,
+        ]);
+        if run(&mut command).is_err() {
+            wrong.push(package);
+        }
+    }
+    if wrong.is_empty() {
+        Ok(())
+    } else {
+        Err(anyhow::anyhow!("does not compile for {target}: {}", wrong.join(", ")).into())
+    }
+}
+
+/// Finds a way to compile for the target, installing what may be installed.
+fn set_up(target: &str) -> StepResult<Way> {
+    if env::var_os(FORCE_BUILD_STD).is_none() {
+        if has_core(target) {
+            return Ok(Way::Rustup);
+        }
+        if have("rustup") {
+            let _ = run(command("rustup").args(["target", "add", target]));
+            if has_core(target) {
+                return Ok(Way::Rustup);
+            }
+        }
+    }
+    if has_debian() {
+        return Ok(Way::DebianBuildStd);
+    }
+    if may_apt() && apt_install(&DEBIAN_PACKAGES) && has_debian() {
+        return Ok(Way::DebianBuildStd);
+    }
+    let install = if have("rustup") {
+        format!("rustup target add {target}")
+    } else {
+        format!("apt-get install -y {}", DEBIAN_PACKAGES.join(" "))
+    };
+    Err(StepError::missing(
+        format!("the Rust target {target}"),
+        install,
+    ))
+}
+
+/// True if the compiler in use has a ready-made `core` for the target.
+fn has_core(target: &str) -> bool {
+    let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    ask(command(rustc).args(["--print", "target-libdir", "--target", target])).is_some_and(
+        |folder| {
+            std::fs::read_dir(folder).is_ok_and(|entries| {
+                entries
+                    .flatten()
+                    .any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
+            })
+        },
+    )
+}
+
+/// True if Debian's compiler, cargo and library source are there.
+fn has_debian() -> bool {
+    succeeds(command(DEBIAN_CARGO).arg("--version"))
+        && ask(command(DEBIAN_RUSTC).args(["--print", "sysroot"])).is_some_and(|sysroot| {
+            Path::new(&sysroot)
+                .join("lib/rustlib/src/rust/library/core")
+                .is_dir()
+        })
+}
+
+/// `cargo check`, as the way wants it.
+fn cargo_for(way: Way) -> Command {
+    match way {
+        Way::Rustup => {
+            let mut command = cargo();
+            command.arg("check");
+            command
+        }
+        Way::DebianBuildStd => {
+            let mut command = command(DEBIAN_CARGO);
+            command
+                .args(["check", "-Zbuild-std=core"])
+                .env("RUSTC", DEBIAN_RUSTC)
+                .env("RUSTC_BOOTSTRAP", "1")
+                .env_remove("RUSTUP_TOOLCHAIN")
+                // Two compilers must not share one folder of products.
+                .env("CARGO_TARGET_DIR", target_dir().join("debian"));
+            command
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CRATES, Way, cargo_for};
+    use crate::process::root;
+
+    /// The list above is the list of crates that say `#![no_std]`: neither can
+    /// grow without the other.
+    #[test]
+    fn the_checked_crates_are_the_no_std_crates() {
+        let members = ["protocol", "firmware/units", "firmware/control"]
+            .into_iter()
+            .chain(["firmware/kinematics", "firmware/node", "firmware/master"])
+            .chain(["host-sim", "host-sim/plant", "tests", "xtask"]);
+        let mut found = Vec::new();
+        for member in members {
+            let folder = root().join(member);
+            let Ok(source) = std::fs::read_to_string(folder.join("src/lib.rs")) else {
+                continue;
+            };
+            if source.lines().any(|line| {
+                let line = line.trim();
+                line.starts_with("#![") && line.contains("no_std")
+            }) {
+                let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).expect(member);
+                let name = manifest
+                    .lines()
+                    .find_map(|line| line.strip_prefix("name = "))
+                    .expect("name")
+                    .trim_matches('"')
+                    .to_owned();
+                found.push(name);
+            }
+        }
+        let mut listed: Vec<String> = CRATES.map(str::to_owned).to_vec();
+        listed.sort();
+        found.sort();
+        assert_eq!(found, listed);
+    }
+
+    #[test]
+    fn the_second_way_does_not_share_products_with_the_first() {
+        let command = cargo_for(Way::DebianBuildStd);
+        let folder = command
+            .get_envs()
+            .find(|(name, _)| *name == "CARGO_TARGET_DIR")
+            .and_then(|(_, value)| value)
+            .expect("own target folder");
+        assert!(std::path::Path::new(folder).ends_with("debian"));
+    }
+}
