@@ -96,15 +96,16 @@ mod tests {
     #[test]
     fn a_hit_loses_energy() {
         let e = end_stop();
-        let (mut x, mut v, h, m) = (0.17, 0.4, 1e-5, 0.8);
+        let (mut x, mut v, h, m) = (0.17, 1.2, 1e-5, 0.8);
         for _ in 0..20_000 {
             v += h * e.force_n(x, 0.18, v) / m;
             x += h * v;
-            assert!(x < 0.1805, "{x}");
+            assert!(x < 0.181, "{x}");
             if v < 0.0 && x < 0.18 {
                 break;
             }
         }
-        assert!(v < 0.0 && v > -0.3, "{v}");
+        // The cushion takes 0.56 m/s on the way in, the stop some more; it does bounce.
+        assert!(v < -0.1 && v > -0.6, "{v}");
     }
 }

@@ -12,6 +12,7 @@
 
 pub mod assembly;
 pub mod axis;
+pub mod body;
 pub mod chamber;
 pub mod cylinder;
 pub mod endstop;
@@ -20,9 +21,11 @@ pub mod flow;
 pub mod friction;
 pub mod hash;
 pub mod motor;
+pub mod robot;
 pub mod sensors;
 pub mod supply;
 pub mod testing;
 pub mod valve;
 
 pub use error::PlantError;
+pub use robot::{Inputs, Outputs, Plant, PlantParams, PlantState};

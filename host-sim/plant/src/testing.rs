@@ -11,6 +11,7 @@ use crate::endstop::EndStopParams;
 use crate::flow::{GasParams, Iso6358};
 use crate::friction::FrictionParams;
 use crate::motor::MotorParams;
+use crate::robot::PlantParams;
 use crate::sensors::{AdcNoise, AdcParams, PotentiometerParams};
 use crate::supply::SupplyParams;
 use crate::valve::ValveParams;
@@ -100,9 +101,11 @@ pub fn adc() -> AdcParams {
 
 /// Sonic conductance of each valve of `wheeleg-2003` \[m³/(s Pa)\].
 ///
-/// DERIVED: fitted so that a full stroke of the vertical cylinder takes
-/// 1.0 s open loop (see `examples/fit_conductance.rs`), never to the start delay.
-pub const WHEELEG_2003_C_M3_S_PA: f64 = 0.075 * DM3_S_BAR;
+/// DERIVED: fitted so that the vertical cylinder's lift from home, the motion the
+/// paper times (0 to 1 s), takes 1.0 s open loop (`examples/fit_conductance.rs`; the
+/// fit gives 0.086, taken as 0.085, the upper end of the band 0.060 to 0.085 that all
+/// strokes and loads span). Never fitted to the start delay, which comes out at 0.22 s.
+pub const WHEELEG_2003_C_M3_S_PA: f64 = 0.085 * DM3_S_BAR;
 
 /// Small direct-acting valve of about 2000, with its flow set by the throttles in its ports.
 #[must_use]
@@ -171,6 +174,40 @@ pub fn wheeleg_2003_axis() -> AxisParams {
         load_n: 0.0,           // N
         initial_stroke_m: 0.0, // m
         potentiometer: potentiometer(),
+        adc: adc(),
+        step_ns: 100_000, // ns design decision
+    }
+}
+
+/// The whole robot at home: yaw in the middle, horizontal retracted, vertical extended.
+///
+/// Vertical cylinders start as a controller that kept pushing leaves them (A at the
+/// supply, B vented), the others with trapped, balanced pressures.
+#[must_use]
+pub fn wheeleg_2003() -> PlantParams {
+    let gas = air();
+    let atmosphere = gas.ambient_pressure_pa;
+    let supply = wheeleg_2003_supply();
+    let base = wheeleg_2003_cylinder();
+    let (bore2, rod2) = (base.bore_m * base.bore_m, base.rod_m * base.rod_m);
+    let mut balanced = base.clone();
+    balanced.initial_pressure_a_pa = 401_325.0; // Pa ASSUMED 3 bar g
+    balanced.initial_pressure_b_pa = // Pa DERIVED: no net force
+        (balanced.initial_pressure_a_pa * bore2 - atmosphere * rod2) / (bore2 - rod2);
+    let mut pushing = base;
+    pushing.initial_pressure_a_pa = supply.initial_pressure_pa; // Pa DERIVED
+    pushing.initial_pressure_b_pa = atmosphere; // Pa DERIVED
+    let leg = [balanced.clone(), balanced, pushing];
+    let [yaw, horizontal, vertical] = leg.clone();
+    let [yaw_r, horizontal_r, vertical_r] = leg;
+    PlantParams {
+        gas,
+        supply,
+        cylinders: [yaw, horizontal, vertical, yaw_r, horizontal_r, vertical_r],
+        // m: b2 = 0.40 (PAPER Table 2 closure), b5 and b6 as the step test starts
+        initial_stroke_m: [0.09, 0.0, 0.18, 0.09, 0.0, 0.18],
+        motors: [wheel_motor(); 2],
+        potentiometers: [potentiometer(); 6],
         adc: adc(),
         step_ns: 100_000, // ns design decision
     }

@@ -1,0 +1,323 @@
+//! The whole robot: six cylinders, supply, two wheel drives, mechanism, sensors.
+
+use serde::{Deserialize, Serialize};
+
+use crate::assembly::{Assembly, AssemblyState, CylinderOutputs};
+use crate::axis::{TICK_NS, TICK_US};
+use crate::body::{BodyMechanics, BodyMotion};
+use crate::cylinder::{CylinderModel, CylinderParams};
+use crate::error::{PlantError, check};
+use crate::flow::GasParams;
+use crate::hash::StateHasher;
+use crate::motor::{MotorParams, MotorState};
+use crate::sensors::{AdcParams, AdcState, PotentiometerParams};
+use crate::supply::{SupplyModel, SupplyParams};
+
+/// Every parameter of the plant. No other constant enters.
+///
+/// Joint order: left yaw, horizontal, vertical, right yaw, horizontal, vertical.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlantParams {
+    /// Gas and atmosphere.
+    pub gas: GasParams,
+    /// Air supply.
+    pub supply: SupplyParams,
+    /// The six cylinders.
+    pub cylinders: [CylinderParams; 6],
+    /// Stroke of each joint at the start \[m\].
+    pub initial_stroke_m: [f64; 6],
+    /// Wheel drives, left and right.
+    pub motors: [MotorParams; 2],
+    /// Position sensors.
+    pub potentiometers: [PotentiometerParams; 6],
+    /// Their converters.
+    pub adc: AdcParams,
+    /// Plant step \[ns\], 1 000..1 000 000; 100 000 by design.
+    pub step_ns: u64,
+}
+
+/// Inputs of one tick, latched at its edge.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Inputs {
+    /// On-time of each valve driver from the tick edge \[µs\], 0..=1000, per
+    /// joint `[fill A, vent A, fill B, vent B]`. 1000 stays on into the next tick.
+    pub valve_on_us: [[u16; 4]; 6],
+    /// H-bridge duty of the wheels, −1..=1 (−100..100 %), positive forward.
+    pub bridge_duty: [f64; 2],
+    /// H-bridges enabled; false lets the wheel coast.
+    pub bridge_enabled: [bool; 2],
+    /// True dumps the supply.
+    pub dump: bool,
+}
+
+/// Model of the robot: built once, never changes.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    params: PlantParams,
+    /// Cylinders, supply and mechanism.
+    pub assembly: Assembly<BodyMechanics, 6>,
+}
+
+/// State of the robot; clone or serialise it to save it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlantState {
+    /// Gas, valves and motion.
+    pub core: AssemblyState<BodyMotion>,
+    /// Converters of the position sensors, joints 1..6.
+    pub adc: [AdcState; 6],
+}
+
+/// What can be seen of the plant at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outputs {
+    /// Time \[ns\].
+    pub time_ns: u64,
+    /// The six cylinders.
+    pub cylinders: [CylinderOutputs; 6],
+    /// Chassis travel \[m\] and pitch \[rad\], nose up positive.
+    pub travel_m: f64,
+    /// Chassis speed \[m/s\].
+    pub speed_m_s: f64,
+    /// Pitch about the axle \[rad\], nose up positive.
+    pub pitch_rad: f64,
+    /// Pitch rate \[rad/s\].
+    pub pitch_rate_rad_s: f64,
+    /// Ground force on each foot \[N\], world axes x forward, y left, z up.
+    pub foot_force_n: [[f64; 3]; 2],
+    /// The four optical switches of each foot.
+    pub foot_switches: [[bool; 4]; 2],
+    /// Reservoir pressure \[Pa absolute\].
+    pub supply_pressure_pa: f64,
+    /// Supply pressure switch.
+    pub pressure_switch: bool,
+    /// Dump valve open.
+    pub dumping: bool,
+    /// Winding currents \[A\].
+    pub motor_current_a: [f64; 2],
+    /// Torque on the wheels \[N m\].
+    pub wheel_torque_n_m: [f64; 2],
+    /// Wheel angle against the chassis \[rad\].
+    pub wheel_angle_rad: [f64; 2],
+    /// Wheel speed against the chassis \[rad/s\].
+    pub wheel_rate_rad_s: [f64; 2],
+    /// Encoder edges counted since angle 0 (four per line), not wrapped.
+    pub encoder_edges: [i64; 2],
+    /// Air drawn from the supply by all cylinders so far \[kg\].
+    pub air_used_kg: f64,
+}
+
+fn input_error(name: &'static str, index: usize, value: f64, min: f64, max: f64) -> PlantError {
+    PlantError::Input {
+        name,
+        index,
+        value,
+        min,
+        max,
+    }
+}
+
+impl Plant {
+    /// Builds the robot.
+    ///
+    /// # Errors
+    /// [`PlantError::Parameter`] names a parameter outside its range.
+    pub fn new(params: &PlantParams) -> Result<Self, PlantError> {
+        params.gas.validate()?;
+        params.adc.validate()?;
+        params
+            .potentiometers
+            .iter()
+            .try_for_each(PotentiometerParams::validate)?;
+        params.motors.iter().try_for_each(MotorParams::validate)?;
+        #[allow(clippy::cast_precision_loss)]
+        check("step_ns", params.step_ns as f64, 1e3, 1e6)?;
+        for (stroke, cylinder) in params.initial_stroke_m.iter().zip(&params.cylinders) {
+            check("initial_stroke_m", *stroke, 0.0, cylinder.stroke_m)?;
+        }
+        let c = &params.cylinders;
+        let cylinder = |i: usize| CylinderModel::new(&c[i], &params.gas);
+        Ok(Self {
+            params: params.clone(),
+            assembly: Assembly {
+                cylinders: [
+                    cylinder(0)?,
+                    cylinder(1)?,
+                    cylinder(2)?,
+                    cylinder(3)?,
+                    cylinder(4)?,
+                    cylinder(5)?,
+                ],
+                supply: SupplyModel::new(&params.supply, &params.gas)?,
+                mechanics: BodyMechanics {
+                    stroke_zero_m: [0.31, 0.01, 0.01, 0.31, 0.01, 0.01],
+                    wheel_radius_m: 0.15,
+                    motors: params.motors,
+                },
+                step_ns: params.step_ns,
+            },
+        })
+    }
+
+    /// Parameters the robot was built from.
+    #[must_use]
+    pub fn params(&self) -> &PlantParams {
+        &self.params
+    }
+
+    /// Robot at rest at time 0, valves shut, bridges off. The seed belongs to
+    /// the sensors' noise.
+    ///
+    /// # Errors
+    /// [`PlantError::Mechanics`] if the mechanism cannot stand in that pose.
+    pub fn initial_state(&self, seed: u64) -> Result<PlantState, PlantError> {
+        let mechanics = &self.assembly.mechanics;
+        let mut position = [0.0; 8];
+        for i in 0..6 {
+            position[i + 2] = mechanics.stroke_zero_m[i] + self.params.initial_stroke_m[i];
+        }
+        Ok(PlantState {
+            core: AssemblyState {
+                time_ns: 0,
+                cylinders: (0..6)
+                    .map(|i| {
+                        self.assembly.cylinders[i].initial_state(self.params.initial_stroke_m[i])
+                    })
+                    .collect(),
+                supply: self.assembly.supply.initial_state(),
+                motion: BodyMotion {
+                    position,
+                    velocity: [0.0; 8],
+                    acceleration: [0.0; 8],
+                    motors: [MotorState::default(); 2],
+                },
+            },
+            adc: [1, 2, 3, 4, 5, 6]
+                .map(|joint| AdcState::new(seed, &format!("joint.{joint}.potentiometer"))),
+        })
+    }
+
+    /// Latches one tick's inputs at the state's time.
+    ///
+    /// # Errors
+    /// [`PlantError::Input`] names an input outside its range; nothing is latched then.
+    pub fn apply(&self, state: &mut PlantState, inputs: &Inputs) -> Result<(), PlantError> {
+        for (joint, on_us) in inputs.valve_on_us.iter().enumerate() {
+            for us in on_us {
+                if *us > TICK_US {
+                    let max = f64::from(TICK_US);
+                    return Err(input_error("valve_on_us", joint, f64::from(*us), 0.0, max));
+                }
+            }
+        }
+        for (wheel, duty) in inputs.bridge_duty.iter().enumerate() {
+            if !(-1.0..=1.0).contains(duty) {
+                return Err(input_error("bridge_duty", wheel, *duty, -1.0, 1.0));
+            }
+        }
+        let core = &mut state.core;
+        let now = core.time_ns;
+        for (i, on_us) in inputs.valve_on_us.iter().enumerate() {
+            self.assembly.cylinders[i].command(&mut core.cylinders[i], now, *on_us, TICK_US);
+        }
+        core.supply
+            .dump
+            .command(inputs.dump, now, &self.assembly.supply.dump_timing);
+        for (i, motor) in core.motion.motors.iter_mut().enumerate() {
+            motor.duty = inputs.bridge_duty[i];
+            motor.enabled = inputs.bridge_enabled[i];
+        }
+        Ok(())
+    }
+
+    /// Advances to `to_ns` with the inputs latched last.
+    ///
+    /// # Errors
+    /// Any [`PlantError`]; after one the state is not usable any more.
+    pub fn advance_to(&self, state: &mut PlantState, to_ns: u64) -> Result<(), PlantError> {
+        self.assembly.advance_to(&mut state.core, to_ns)
+    }
+
+    /// Latches `inputs` at `from_ns` and advances to `to_ns`.
+    ///
+    /// # Errors
+    /// [`PlantError::Time`] if the state does not stand at `from_ns`; otherwise as
+    /// [`Self::apply`] and [`Self::advance_to`].
+    pub fn advance(
+        &self,
+        state: &mut PlantState,
+        from_ns: u64,
+        to_ns: u64,
+        inputs: &Inputs,
+    ) -> Result<(), PlantError> {
+        if state.core.time_ns != from_ns || to_ns < from_ns {
+            return Err(PlantError::Time {
+                state_ns: state.core.time_ns,
+                from_ns,
+                to_ns,
+            });
+        }
+        self.apply(state, inputs)?;
+        self.advance_to(state, to_ns)
+    }
+
+    /// One tick of 1 ms from the state's time.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn tick(&self, state: &mut PlantState, inputs: &Inputs) -> Result<(), PlantError> {
+        let now = state.core.time_ns;
+        self.advance(state, now, now + TICK_NS, inputs)
+    }
+
+    /// Position reading of a joint (0..=5), 16 bits left-aligned; draws from
+    /// that sensor's random stream.
+    #[must_use]
+    pub fn read_position(&self, state: &mut PlantState, joint: usize) -> u16 {
+        let stroke = {
+            use crate::assembly::Mechanics;
+            self.assembly.mechanics.strokes_m(&state.core.motion)[joint]
+        };
+        let ratio = self.params.potentiometers[joint].ratio(stroke);
+        state.adc[joint].read(&self.params.adc, ratio)
+    }
+
+    /// Everything that can be seen of the robot.
+    #[must_use]
+    pub fn outputs(&self, state: &PlantState) -> Outputs {
+        let core = &state.core;
+        let mechanics = &self.assembly.mechanics;
+        let angle = mechanics.wheel_angle_rad(&core.motion);
+        let rate = mechanics.wheel_rate_rad_s(&core.motion, 0.0);
+        Outputs {
+            time_ns: core.time_ns,
+            cylinders: self.assembly.outputs(core),
+            travel_m: core.motion.position[0],
+            speed_m_s: core.motion.velocity[0],
+            pitch_rad: core.motion.position[1],
+            pitch_rate_rad_s: core.motion.velocity[1],
+            foot_force_n: [[0.0; 3]; 2],
+            foot_switches: [[false; 4]; 2],
+            supply_pressure_pa: self.assembly.supply.pressure_pa(core.supply.mass_kg),
+            pressure_switch: core.supply.pressure_switch,
+            dumping: core.supply.dump.is_open(),
+            motor_current_a: std::array::from_fn(|i| core.motion.motors[i].current_a),
+            wheel_torque_n_m: std::array::from_fn(|i| {
+                mechanics.motors[i].wheel_torque_n_m(core.motion.motors[i].current_a, rate)
+            }),
+            wheel_angle_rad: [angle; 2],
+            wheel_rate_rad_s: [rate; 2],
+            encoder_edges: std::array::from_fn(|i| mechanics.motors[i].encoder_edges(angle)),
+            air_used_kg: core.cylinders.iter().map(|c| c.supply_mass_kg).sum(),
+        }
+    }
+
+    /// BLAKE3 of the whole state.
+    #[must_use]
+    pub fn state_hash(&self, state: &PlantState) -> [u8; 32] {
+        let mut hasher = StateHasher::new();
+        self.assembly.feed(&state.core, &mut hasher);
+        state.core.motion.feed(&mut hasher);
+        state.adc.iter().for_each(|adc| adc.feed(&mut hasher));
+        hasher.finish()
+    }
+}
