@@ -46,7 +46,8 @@ pub struct JointGains {
     pub duty_limit: Duty,
     /// Duty added, with its sign, to every acting duty: bridges the static
     /// friction and the shortest opening that a valve can make. 0…0.5; sensible
-    /// t_off / PWM period, 0.05…0.25.
+    /// (t_off + margin) / PWM period, 0.05…0.25; below it, small duties give
+    /// pulses that [`crate::pwm`] can not send.
     pub dead_zone_duty: Duty,
     /// |duty| of the law below which the valves stay shut. 0…0.5; sensible
     /// 0.005…0.03. Must exceed what measurement noise makes of Kp.
@@ -90,7 +91,7 @@ impl Default for JointGains {
             integral_scale: PositionMm::from_int(4),
             integral_zone: PositionMm::from_int(15),
             duty_limit: Duty::ONE,
-            dead_zone_duty: Duty::from_per_mille(100),
+            dead_zone_duty: Duty::from_per_mille(230),
             minimum_duty: Duty::from_per_mille(10),
             settle_band: PositionMm::from_raw(52_429),
             settle_velocity: VelocityMmS::from_int(10),
