@@ -78,7 +78,7 @@ pub struct Header {
     pub source: Address,
     /// Receiver or broadcast.
     pub destination: Address,
-    /// Sequence of a request and of its answer; 0 in SYNC, slot index in replies is not needed.
+    /// Sequence of a request, repeated by its answer; 0 in cyclic messages.
     pub sequence: u16,
 }
 

@@ -26,8 +26,10 @@ pub mod address;
 pub mod fault;
 pub mod fields;
 pub mod frame;
+pub mod link;
 pub mod message;
 pub mod param;
+pub mod schema;
 pub mod sync;
 pub mod wire;
 
@@ -44,8 +46,9 @@ pub use frame::{
     MAX_DECODED, MAX_ENCODED, MAX_PAYLOAD, VERSION, checksum, encode, encoded_len,
 };
 pub use message::*;
+pub use schema::{INTERFACE, Interface, SCHEMA_HASH};
 pub use sync::{
-    BadSlot, JointSetpoint, LinkLossAction, NextReference, SyncFlags, SyncSlot, SyncSlots,
-    WheelSetpoint,
+    BadSlot, JointSetpoint, LinkLossAction, NextReference, SYNC_SLOT_FIELDS, SyncFlags, SyncSlot,
+    SyncSlots, WheelSetpoint,
 };
 pub use wire::{EnumSchema, FieldSchema, MessageSchema, UnknownValue, ValueSchema};

@@ -1,6 +1,6 @@
 //! The set-point slot of SYNC: ten bytes per node, with a joint and a wheel view.
 
-use crate::wire::{WireSize, wire_bits, wire_enum};
+use crate::wire::{FieldSchema, WireSize, wire_bits, wire_enum};
 use core::num::NonZeroU8;
 use postcard::fixint::le;
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,40 @@ struct RawSlot {
     cycles_to_next: u8,
     flags: u8,
 }
+
+/// The slot's part of the interface definition.
+pub const SYNC_SLOT_FIELDS: &[FieldSchema] = &[
+    FieldSchema {
+        name: "reference",
+        ty: "i32",
+        size: 4,
+        format: "joint: stroke, I16F16 mm; wheel: 24-bit counts, sign-extended",
+    },
+    FieldSchema {
+        name: "velocity",
+        ty: "i16",
+        size: 2,
+        format: "joint: I12F4 mm/s; wheel: 12.4 counts per sample",
+    },
+    FieldSchema {
+        name: "next_reference",
+        ty: "i16",
+        size: 2,
+        format: "joint: stroke, I10F6 mm; wheel: 0",
+    },
+    FieldSchema {
+        name: "cycles_to_next",
+        ty: "u8",
+        size: 1,
+        format: "joint: bus cycles until the next reference, 0 = none known; wheel: 0",
+    },
+    FieldSchema {
+        name: "flags",
+        ty: "u8",
+        size: 1,
+        format: "bit 0 valid, bits 1-2 link-loss action (joint), bit 3 track, others 0",
+    },
+];
 
 const VALID: u8 = 1;
 const ACTION_SHIFT: u32 = 1;
@@ -224,7 +258,6 @@ impl WireSize for SyncSlot {
     const SIZE: usize = 10;
 }
 
-/// Velocity of a joint set-point in the control format.
 impl JointSetpoint {
     /// Velocity of the reference, I16F16 mm/s.
     #[must_use]
