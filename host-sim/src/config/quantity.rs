@@ -29,6 +29,8 @@ pub enum Dimension {
     Acceleration,
     /// Mass.
     Mass,
+    /// First moment of mass.
+    MassMoment,
     /// Moment of inertia.
     Inertia,
     /// Force.
@@ -105,6 +107,7 @@ impl Dimension {
             Self::Velocity => &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)],
             Self::Acceleration => &[("m/s2", 1.0), ("mm/s2", 1e-3)],
             Self::Mass => &[("kg", 1.0), ("g", 1e-3)],
+            Self::MassMoment => &[("kg m", 1.0)],
             Self::Inertia => &[("kg m2", 1.0), ("g cm2", 1e-7)],
             Self::Force => &[("N", 1.0), ("kN", 1e3)],
             Self::Torque => &[("N m", 1.0), ("mN m", 1e-3)],

@@ -63,10 +63,12 @@ params! {
         d6_n_s_m: f64, "d6", Damping, 0.0, 1000.0;
         /// Gravity.
         gravity_m_s2: f64, "gravity", Acceleration, 0.0, 20.0;
-        /// Ground load of the standing foot at b5 stroke zero.
-        load_retracted_n: f64, "load_retracted", Force, 0.0, 200.0;
-        /// Ground load of the standing foot at full b5 stroke.
-        load_extended_n: f64, "load_extended", Force, 0.0, 200.0;
+        /// First moment of the robot's mass about the wheel axle, stepping leg drawn back, other leg at mid stroke.
+        load_moment_kg_m: f64, "load_moment", MassMoment, 0.0, 100.0;
+        /// Mass that moves forward with b5.
+        slide_mass_kg: f64, "slide_mass", Mass, 0.0, 100.0;
+        /// Distance of the drawn-back foot ahead of the axle.
+        load_arm_m: f64, "load_arm", Length, 0.01, 5.0;
     }
 }
 

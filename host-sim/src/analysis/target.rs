@@ -1,0 +1,107 @@
+//! One target with its measured value and verdict.
+
+use serde::Serialize;
+
+/// A target: what was measured, what was asked, and whether it holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Target {
+    /// Identifier, from model.md §11 where there is one.
+    pub id: String,
+    /// What is measured and how.
+    pub description: String,
+    /// Measured value; null when it could not be measured.
+    pub value: Option<f64>,
+    /// Unit of value and band.
+    pub unit: &'static str,
+    /// Lower end of the band, if there is one.
+    pub min: Option<f64>,
+    /// Upper end of the band, if there is one.
+    pub max: Option<f64>,
+    /// Whether the value lies in the band (both ends included).
+    pub pass: bool,
+    /// Whether the run counts as failed if this is not met; the others inform.
+    pub required: bool,
+}
+
+impl Target {
+    /// A required target. A value that could not be measured, or is not a
+    /// number, fails.
+    pub(crate) fn new(
+        id: impl Into<String>,
+        description: impl Into<String>,
+        value: Option<f64>,
+        unit: &'static str,
+        min: Option<f64>,
+        max: Option<f64>,
+    ) -> Self {
+        let value = value.filter(|v| v.is_finite());
+        let pass = value.is_some_and(|v| min.is_none_or(|m| v >= m) && max.is_none_or(|m| v <= m));
+        Self {
+            id: id.into(),
+            description: description.into(),
+            value,
+            unit,
+            min,
+            max,
+            pass,
+            required: true,
+        }
+    }
+
+    /// The same, for information only.
+    pub(crate) fn info(self) -> Self {
+        Self {
+            required: false,
+            ..self
+        }
+    }
+
+    /// The band as text.
+    #[must_use]
+    pub fn band_text(&self) -> String {
+        match (self.min, self.max) {
+            (Some(a), Some(b)) if a == b => format!("= {a}"),
+            (Some(a), Some(b)) => format!("{a} … {b}"),
+            (Some(a), None) => format!("≥ {a}"),
+            (None, Some(b)) => format!("≤ {b}"),
+            (None, None) => "–".into(),
+        }
+    }
+
+    /// The value as text, four significant digits.
+    #[must_use]
+    pub fn value_text(&self) -> String {
+        let Some(v) = self.value else {
+            return "not measured".into();
+        };
+        if v.fract() == 0.0 && v.abs() < 1e6 {
+            return format!("{v:.0}");
+        }
+        let decimals = (3 - v.abs().log10().floor() as i32).clamp(0, 4) as usize;
+        format!("{v:.decimals$}")
+    }
+
+    /// `PASS`, `FAIL`, or `info` for a value without a verdict or one that
+    /// only informs and lies outside its band.
+    #[must_use]
+    pub fn verdict(&self) -> &'static str {
+        match (self.pass, self.required) {
+            _ if self.min.is_none() && self.max.is_none() => "info",
+            (true, _) => "PASS",
+            (false, true) => "FAIL",
+            (false, false) => "info: outside",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_include_their_ends_and_an_unmeasured_value_fails() {
+        let t = |v: Option<f64>| Target::new("X", "x", v, "mm", Some(1.0), Some(2.0)).pass;
+        assert!(t(Some(1.0)) && t(Some(2.0)));
+        assert!(!t(Some(0.999)) && !t(Some(2.001)) && !t(None) && !t(Some(f64::NAN)));
+    }
+}
