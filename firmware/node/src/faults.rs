@@ -1,6 +1,6 @@
 //! Fault memory of a board: what is latched, what was first, and when.
 
-use wheeleg_protocol::fault::{Fault, FaultBits};
+use wheeleg_protocol::{Fault, FaultBits};
 use wheeleg_units::Micros;
 
 /// First fault since the last clear.
@@ -80,6 +80,8 @@ mod tests {
         assert_eq!((first.fault, first.at), (Fault::SensorRange, Micros(10)));
         log.clear();
         assert!(log.latched().is_empty() && log.first().is_none());
-        assert!(log.sticky().contains(Fault::SensorRange) && log.sticky().contains(Fault::LinkLost));
+        assert!(
+            log.sticky().contains(Fault::SensorRange) && log.sticky().contains(Fault::LinkLost)
+        );
     }
 }

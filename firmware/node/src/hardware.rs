@@ -180,9 +180,7 @@ pub struct DumpPin<P>(pub P);
 
 impl<P: OutputPin> DumpValve for DumpPin<P> {
     fn set_open(&mut self, open: bool) -> Result<(), PinError> {
-        self.0
-            .set_state(PinState::from(open))
-            .map_err(|_| PinError)
+        self.0.set_state(PinState::from(open)).map_err(|_| PinError)
     }
 }
 

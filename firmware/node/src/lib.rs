@@ -26,10 +26,44 @@
     )
 )]
 
+mod board;
 pub mod debounce;
+pub mod faults;
 pub mod hardware;
+pub mod joint;
 pub mod mode;
 pub mod overrun;
+pub mod parameters;
+pub mod port;
 pub mod seal;
 pub mod sensor;
-pub mod watchdog;
+pub mod snapshot;
+pub mod supervisor;
+mod transmission;
+
+pub use board::NodeIdentity;
+pub use transmission::Transmission;
+
+use wheeleg_units::{Micros, Ticks};
+
+/// Control tick of a joint board: 1 kHz.
+pub const JOINT_TICK: Micros = Micros(1000);
+
+/// Version of this firmware: major, minor, patch.
+pub const FIRMWARE_VERSION: [u8; 3] = [0, 1, 0];
+
+/// Samples for which a switch must be stable (ASSUMED: optical switches chatter
+/// for less than 2 ms at a passing edge).
+const SWITCH_TICKS: u8 = 3;
+
+/// Joint ticks after which a self-test without good readings has failed.
+const SELF_TEST_TICKS: Ticks = Ticks(500);
+
+/// Why a board could not be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigError {
+    /// The address straps do not name a board of this kind.
+    Address,
+    /// The parameters contradict each other.
+    Parameters,
+}

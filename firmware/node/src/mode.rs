@@ -2,7 +2,7 @@
 //!
 //! The table is the whole mode logic: every (mode, event) pair has an entry,
 //! and nothing else in this crate assigns a mode. What the outputs do in a
-//! mode is said by [`Mode::may_drive`] and [`Mode::is_latched`] and carried out
+//! mode is said by [`ModeRules::may_drive`] and [`ModeRules::is_latched`] and carried out
 //! by the joint and wheel applications.
 //!
 //! | mode | joint outputs | wheel outputs | leaves by |
@@ -20,26 +20,7 @@
 //! when the board itself missed its deadline or failed its self-test, so that
 //! no staging is run by a program that cannot be trusted. Both are latched.
 
-/// Mode of a board; the numbers are those of the wire.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum Mode {
-    /// After reset: waiting for the first good sensor readings.
-    #[default]
-    Boot = 0,
-    /// Disarmed; nothing energised.
-    Idle = 1,
-    /// Closed loop on the position found when arming.
-    Armed = 2,
-    /// Closed loop on the reference of the SYNC slots.
-    Tracking = 3,
-    /// Latched stop: air trapped, or wheel ramped to standstill.
-    Hold = 4,
-    /// Outlets open, inlets shut.
-    Exhaust = 5,
-    /// Latched stop of a board that cannot trust itself.
-    Fault = 6,
-}
+pub use wheeleg_protocol::NodeMode as Mode;
 
 /// What can change a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -95,17 +76,6 @@ pub enum Refusal {
     /// No living link: arming would trip the watchdog at once.
     NoLink,
 }
-
-/// All modes, in the column order of the table.
-pub const MODES: [Mode; 7] = [
-    Mode::Boot,
-    Mode::Idle,
-    Mode::Armed,
-    Mode::Tracking,
-    Mode::Hold,
-    Mode::Exhaust,
-    Mode::Fault,
-];
 
 /// All events, in the row order of the table.
 pub const EVENTS: [Event; 16] = [
@@ -167,9 +137,24 @@ const TABLE: [[Entry; 7]; 16] = [
     /* BlowThroughOver   */ [NAPP, NAPP, NAPP, NAPP, NAPP, IDLE, NAPP],
 ];
 
-impl Mode {
+/// What the mode table says of a mode.
+pub trait ModeRules: Sized {
     /// The mode after `event`, or why the event is refused (the mode stays).
-    pub fn after(self, event: Event) -> Result<Mode, Refusal> {
+    fn after(self, event: Event) -> Result<Mode, Refusal>;
+
+    /// Whether the closed loop may drive outputs.
+    fn may_drive(self) -> bool;
+
+    /// Whether the mode is left by an explicit clear only.
+    fn is_latched(self) -> bool;
+
+    /// Whether nothing is energised and nothing is about to be: parameters
+    /// marked "disarmed only" may be set, maintenance may run.
+    fn is_disarmed(self) -> bool;
+}
+
+impl ModeRules for Mode {
+    fn after(self, event: Event) -> Result<Mode, Refusal> {
         TABLE
             .get(usize::from(event as u8))
             .and_then(|row| row.get(usize::from(self as u8)))
@@ -177,19 +162,15 @@ impl Mode {
             .unwrap_or(Err(Refusal::NotApplicable))
     }
 
-    /// Whether the closed loop may drive outputs.
-    pub const fn may_drive(self) -> bool {
+    fn may_drive(self) -> bool {
         matches!(self, Mode::Armed | Mode::Tracking)
     }
 
-    /// Whether the mode is left by an explicit clear only.
-    pub const fn is_latched(self) -> bool {
+    fn is_latched(self) -> bool {
         matches!(self, Mode::Hold | Mode::Exhaust | Mode::Fault)
     }
 
-    /// Whether parameters marked "disarmed only" may be set: no output is
-    /// energised and none is about to be.
-    pub const fn is_disarmed(self) -> bool {
+    fn is_disarmed(self) -> bool {
         matches!(self, Mode::Boot | Mode::Idle | Mode::Fault)
     }
 }

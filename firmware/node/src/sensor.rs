@@ -22,7 +22,7 @@ const FAULT_LEVEL: u8 = 4;
 pub const SELF_TEST_READINGS: u8 = 10;
 
 /// Calibration and limits of a position sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SensorConfig {
     /// Code at zero stroke (U0F16 of converter full scale).
     pub zero: AdcCode,
@@ -32,6 +32,10 @@ pub struct SensorConfig {
     pub code_min: AdcCode,
     /// Largest valid code.
     pub code_max: AdcCode,
+    /// Smallest stroke of the allowed travel, mm.
+    pub travel_min: PositionMm,
+    /// Largest stroke of the allowed travel, mm.
+    pub travel_max: PositionMm,
     /// Largest credible change between two ticks, mm.
     pub step_max: PositionMm,
 }
@@ -43,6 +47,8 @@ pub enum Rejection {
     Missing,
     /// Code outside the valid range: open or short circuit.
     Range,
+    /// A sound code, but outside the allowed travel.
+    Travel,
     /// Faster than a piston can move.
     Rate,
 }
@@ -59,7 +65,7 @@ pub struct Reading {
 }
 
 /// Checks and converts the readings of one position sensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SensorMonitor {
     last: Option<PositionMm>,
     rejected: u8,
@@ -128,6 +134,9 @@ impl SensorMonitor {
             return Err(Rejection::Range);
         }
         let position = config.position(code);
+        if position < config.travel_min || position > config.travel_max {
+            return Err(Rejection::Travel);
+        }
         match self.last {
             Some(last) if position.saturating_sub(last).saturating_abs() > config.step_max => {
                 Err(Rejection::Rate)
@@ -144,7 +153,11 @@ impl SensorConfig {
         // 17 bits times 32 bits: never saturates.
         let product = difference.saturating_mul(i64::from(self.full_scale.raw()));
         let raw = product.wrapping_shr(16);
-        PositionMm::from_raw(i32::try_from(raw).unwrap_or(if raw < 0 { i32::MIN } else { i32::MAX }))
+        PositionMm::from_raw(i32::try_from(raw).unwrap_or(if raw < 0 {
+            i32::MIN
+        } else {
+            i32::MAX
+        }))
     }
 }
 
@@ -158,6 +171,8 @@ mod tests {
         full_scale: PositionMm::from_int(256),
         code_min: AdcCode::new(4096),
         code_max: AdcCode::new(61_440),
+        travel_min: PositionMm::from_int(-5),
+        travel_max: PositionMm::from_int(185),
         step_max: PositionMm::from_int(2),
     };
 
@@ -168,10 +183,24 @@ mod tests {
     #[test]
     fn conversion_is_linear_and_signed() {
         assert_eq!(CONFIG.position(AdcCode::new(8192)), PositionMm::ZERO);
-        assert_eq!(CONFIG.position(AdcCode::new(8192 + 25_600)), PositionMm::from_int(100));
-        assert_eq!(CONFIG.position(AdcCode::new(8192 - 256)), PositionMm::from_int(-1));
-        assert_eq!(CONFIG.position(AdcCode::new(8193)).raw(), 256, "one code is 1/256 mm");
-        let steep = SensorConfig { full_scale: PositionMm::MAX, zero: AdcCode::MIN, ..CONFIG };
+        assert_eq!(
+            CONFIG.position(AdcCode::new(8192 + 25_600)),
+            PositionMm::from_int(100)
+        );
+        assert_eq!(
+            CONFIG.position(AdcCode::new(8192 - 256)),
+            PositionMm::from_int(-1)
+        );
+        assert_eq!(
+            CONFIG.position(AdcCode::new(8193)).raw(),
+            256,
+            "one code is 1/256 mm"
+        );
+        let steep = SensorConfig {
+            full_scale: PositionMm::MAX,
+            zero: AdcCode::MIN,
+            ..CONFIG
+        };
         assert!(steep.position(AdcCode::MAX) < PositionMm::MAX);
     }
 
@@ -185,6 +214,8 @@ mod tests {
             (Err(SensorError::NotReady), Rejection::Missing),
             (Err(SensorError::Converter), Rejection::Missing),
             (code(90), Rejection::Rate),
+            (code(186), Rejection::Travel),
+            (Ok(AdcCode::new(8192 - 6 * 256)), Rejection::Travel),
         ];
         for (bad, reason) in cases {
             let mut monitor = SensorMonitor::new();

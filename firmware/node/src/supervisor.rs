@@ -9,10 +9,10 @@
 //! may not). An emergency brake, a sensor or state fault stays in Hold.
 
 use crate::faults::FaultLog;
-use crate::mode::{Event, Mode, Refusal};
+use crate::mode::{Event, Mode, ModeRules, Refusal};
 use crate::overrun::{OverrunDetector, elapsed};
-use crate::watchdog::{Link, LinkLoss, Watchdog};
-use wheeleg_protocol::fault::Fault;
+use wheeleg_protocol::link::{LinkState, LinkSupervisor, WatchdogCycles};
+use wheeleg_protocol::{DisarmReason, Fault, NackReason};
 use wheeleg_units::Micros;
 
 /// Times of the supervision.
@@ -20,12 +20,20 @@ use wheeleg_units::Micros;
 pub struct SupervisionTimes {
     /// Control tick.
     pub tick: Micros,
-    /// No fresh SYNC for this long is a link loss.
-    pub watchdog: Micros,
+    /// Missed SYNC cycles that are a link loss.
+    pub watchdog: WatchdogCycles,
     /// Time in Hold before a staged exhaust.
     pub hold: Micros,
     /// Longest blow-through.
     pub blow_through: Micros,
+}
+
+/// The watchdog of a parameter; the default where the number is none.
+pub(crate) fn watchdog(cycles: i32) -> WatchdogCycles {
+    u8::try_from(cycles)
+        .ok()
+        .and_then(WatchdogCycles::new)
+        .unwrap_or_default()
 }
 
 /// What an open-outlet mode is for.
@@ -40,6 +48,24 @@ pub enum ExhaustKind {
     BlowThrough,
 }
 
+/// Unwraps the 32-bit microsecond counter; must be asked at least every 35 min.
+#[derive(Clone, Copy, Debug, Default)]
+struct Clock {
+    time_us: u64,
+}
+
+impl Clock {
+    fn unwrap(&mut self, now: Micros) -> u64 {
+        // Low word of the newest time; the shorter way round is taken, so an
+        // instant slightly in the past is in the past.
+        let low = (self.time_us & 0xFFFF_FFFF) as u32;
+        let step = now.get().wrapping_sub(low) as i32;
+        let time = self.time_us.saturating_add_signed(i64::from(step));
+        self.time_us = self.time_us.max(time);
+        time
+    }
+}
+
 /// Mode, faults and supervision of one board.
 #[derive(Clone, Debug)]
 pub struct Supervisor {
@@ -51,9 +77,36 @@ pub struct Supervisor {
     exhaust: ExhaustKind,
     exhaust_allowed: bool,
     emergency: bool,
+    disarm_reason: DisarmReason,
     faults: FaultLog,
-    watchdog: Watchdog,
+    link: LinkSupervisor,
+    clock: Clock,
     overrun: OverrunDetector,
+}
+
+/// The reason with which a refused request is answered.
+impl From<Refusal> for NackReason {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::NotDisarmed => Self::Armed,
+            Refusal::Latched | Refusal::CausePresent => Self::FaultLatched,
+            Refusal::NotReady => Self::NotReady,
+            Refusal::NotApplicable => Self::WrongMode,
+            Refusal::NoLink => Self::LinkDown,
+        }
+    }
+}
+
+/// Why a board that drove does so no longer.
+const fn disarm_reason(event: Event) -> DisarmReason {
+    match event {
+        Event::LinkLost => DisarmReason::LinkLost,
+        Event::EmergencyStop => DisarmReason::EmergencyStop,
+        Event::EmergencyBrake => DisarmReason::EmergencyBrake,
+        Event::OpenAllValves => DisarmReason::OpenAllValves,
+        Event::Disarm => DisarmReason::Command,
+        _ => DisarmReason::Fault,
+    }
 }
 
 impl Default for Supervisor {
@@ -64,7 +117,7 @@ impl Default for Supervisor {
 
 impl Supervisor {
     /// In Boot, no link, no fault.
-    pub const fn new() -> Self {
+    pub fn new() -> Self {
         Self {
             mode: Mode::Boot,
             mode_check: !(Mode::Boot as u8),
@@ -73,8 +126,10 @@ impl Supervisor {
             exhaust: ExhaustKind::Staged,
             exhaust_allowed: false,
             emergency: false,
+            disarm_reason: DisarmReason::Reset,
             faults: FaultLog::new(),
-            watchdog: Watchdog::new(),
+            link: LinkSupervisor::default(),
+            clock: Clock::default(),
             overrun: OverrunDetector::new(),
         }
     }
@@ -89,6 +144,16 @@ impl Supervisor {
         self.exhaust
     }
 
+    /// Why the board is, or was last, not driving.
+    pub const fn disarm_reason(&self) -> DisarmReason {
+        self.disarm_reason
+    }
+
+    /// Time since the present mode was entered (modulo 2^32 µs).
+    pub const fn time_in_mode(&self, now: Micros) -> Micros {
+        elapsed(self.entered_at, now)
+    }
+
     /// Fault memory.
     pub const fn faults(&self) -> &FaultLog {
         &self.faults
@@ -99,9 +164,14 @@ impl Supervisor {
         &self.overrun
     }
 
-    /// Whether fresh SYNC frames arrive.
+    /// Whether SYNC frames with an advancing counter arrive, and no loss is latched.
     pub fn link_alive(&self) -> bool {
-        self.watchdog.link() == Link::Alive
+        self.link.state() == LinkState::Up
+    }
+
+    /// The unwrapped time of `now`, µs since reset.
+    pub fn time_us(&mut self, now: Micros) -> u64 {
+        self.clock.unwrap(now)
     }
 
     /// Whether the E-stop bit stood in the newest fresh SYNC of a living link,
@@ -116,9 +186,12 @@ impl Supervisor {
         let next = before.after(event)?;
         if next != before {
             self.entered_at = at;
+            if before.may_drive() && !next.may_drive() {
+                self.disarm_reason = disarm_reason(event);
+            }
             if next == Mode::Hold {
-                self.staged = before.may_drive()
-                    && matches!(event, Event::LinkLost | Event::EmergencyStop);
+                self.staged =
+                    before.may_drive() && matches!(event, Event::LinkLost | Event::EmergencyStop);
             }
             self.mode = next;
             self.mode_check = !(next as u8);
@@ -152,7 +225,8 @@ impl Supervisor {
             self.emergency = true;
             self.fault(Fault::EmergencyStop, Event::EmergencyStop, at);
         }
-        let fresh = self.watchdog.sync(counter, at);
+        let at_us = self.clock.unwrap(at);
+        let fresh = self.link.on_sync(counter, at_us);
         if fresh {
             self.emergency = emergency;
         }
@@ -176,17 +250,13 @@ impl Supervisor {
             self.staged = false;
             self.faults.latch(Fault::StateCorrupt, now);
         }
-        match self.watchdog.check(now, times.watchdog) {
-            Some(LinkLoss::Silent) => self.fault(Fault::LinkLost, Event::LinkLost, now),
-            Some(LinkLoss::Stale) => self.fault(Fault::StaleMaster, Event::LinkLost, now),
-            None => {}
+        self.link.set_watchdog(times.watchdog);
+        let now_us = self.clock.unwrap(now);
+        if let Some(loss) = self.link.poll(now_us) {
+            self.fault(loss.fault(), Event::LinkLost, now);
         }
         let in_mode = elapsed(self.entered_at, now);
-        if self.mode == Mode::Hold
-            && self.staged
-            && self.exhaust_allowed
-            && in_mode >= times.hold
-        {
+        if self.mode == Mode::Hold && self.staged && self.exhaust_allowed && in_mode >= times.hold {
             let _ = self.apply(Event::StageExhaust, now);
         }
         if self.mode == Mode::Exhaust
@@ -206,11 +276,12 @@ impl Supervisor {
 
     /// Clears latched faults and leaves the latched stop, unless a cause stands.
     pub fn clear(&mut self, healthy: bool, at: Micros) -> Result<Mode, Refusal> {
-        if !healthy || (self.emergency && self.link_alive()) {
+        if !healthy || self.emergency {
             return Err(Refusal::CausePresent);
         }
+        let now_us = self.clock.unwrap(at);
+        self.link.clear(now_us).map_err(|_| Refusal::NoLink)?;
         let next = self.apply(Event::ClearFault, at)?;
-        self.emergency = false;
         self.faults.clear();
         Ok(next)
     }

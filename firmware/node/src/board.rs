@@ -1,0 +1,262 @@
+//! The part of a board application that joints and wheels share: bus, mode,
+//! requests that every board answers, slot timing.
+
+use crate::FIRMWARE_VERSION;
+use crate::mode::{Event, Mode, ModeRules};
+use crate::overrun::elapsed;
+use crate::port::{BusPort, Incoming};
+use crate::supervisor::{SupervisionTimes, Supervisor};
+use wheeleg_protocol::link::{
+    DuplicateFilter, SlotTiming, TURNAROUND_US, Verdict, deadline_is_live,
+};
+use wheeleg_protocol::{
+    Ack, Address, BoardKind, Envelope, Fault, FaultRecord, Identity, LimitBits, Message, Nack,
+    NackReason, ParseError, SCHEMA_HASH, SlotReply, Sync, SyncFlags,
+};
+use wheeleg_units::Micros;
+
+/// Time of one byte on the line, µs.
+const BYTE_US: u32 = SlotTiming::DEFAULT.bytes_us(1);
+
+/// Who a board is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeIdentity {
+    /// Address read from the straps.
+    pub address: Address,
+    /// 96-bit unique id of the processor.
+    pub unique_id: [u8; 12],
+}
+
+/// Mode, bus and clock of one board.
+#[derive(Clone, Debug)]
+pub(crate) struct BoardCore {
+    pub(crate) identity: NodeIdentity,
+    pub(crate) port: BusPort,
+    pub(crate) supervisor: Supervisor,
+    pub(crate) times: SupervisionTimes,
+    /// Counter of the newest fresh SYNC, and when its last delimiter ended.
+    pub(crate) cycle: u16,
+    pub(crate) cycle_at: Micros,
+    kind: BoardKind,
+    duplicates: DuplicateFilter,
+}
+
+/// What a joint or wheel adds to the core.
+pub(crate) trait Application {
+    /// The shared part.
+    fn core(&mut self) -> &mut BoardCore;
+
+    /// Whether what could have latched a fault is gone, so that it may be
+    /// cleared, and the board may arm.
+    fn is_healthy(&self) -> bool;
+
+    /// Called once when the board has armed: reference := actual.
+    fn armed(&mut self);
+
+    /// A fresh SYNC was latched.
+    fn sync(&mut self, sync: &Sync, at: Micros);
+
+    /// Reply for the own slot, from the state of the last tick.
+    fn slot_reply(&self) -> SlotReply;
+
+    /// A request that is not common to all boards.
+    fn request(&mut self, request: &Message, at: Micros) -> Result<Message, NackReason>;
+
+    /// Limits that shape the output now.
+    fn limits(&self) -> LimitBits;
+}
+
+impl BoardCore {
+    pub(crate) fn new(kind: BoardKind, identity: NodeIdentity, times: SupervisionTimes) -> Self {
+        Self {
+            identity,
+            port: BusPort::new(identity.address),
+            supervisor: Supervisor::new(),
+            times,
+            cycle: 0,
+            cycle_at: Micros::ZERO,
+            kind,
+            duplicates: DuplicateFilter::new(),
+        }
+    }
+
+    pub(crate) const fn mode(&self) -> Mode {
+        self.supervisor.mode()
+    }
+
+    /// Whether a command that ends with bus cycle `deadline` may still act.
+    pub(crate) fn in_time(&self, deadline: u16) -> bool {
+        self.supervisor.link_alive() && deadline_is_live(deadline, self.cycle)
+    }
+
+    /// Time from the latch of the newest SYNC to `at`, saturating at 65 535 µs.
+    pub(crate) fn age_us(&self, at: Micros) -> u16 {
+        u16::try_from(elapsed(self.cycle_at, at).get()).unwrap_or(u16::MAX)
+    }
+
+    fn identity_message(&self) -> Message {
+        Identity {
+            board: self.kind,
+            address: self.identity.address,
+            firmware: FIRMWARE_VERSION,
+            schema_hash: SCHEMA_HASH,
+            unique_id: self.identity.unique_id,
+        }
+        .into()
+    }
+
+    fn fault_record(&self, limits: LimitBits) -> Message {
+        let log = self.supervisor.faults();
+        let first = log.first();
+        FaultRecord {
+            active: log.latched(),
+            sticky: log.sticky(),
+            first_fault: first.map(|first| first.fault).into(),
+            first_time_us: first.map_or(0, |first| first.at.get()),
+            disarm_reason: self.supervisor.disarm_reason(),
+            limits,
+        }
+        .into()
+    }
+}
+
+/// Takes bytes of the bus; the last of them ended at `t_end`.
+pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: Micros) {
+    let mut rest = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+    for byte in bytes {
+        rest = rest.saturating_sub(1);
+        let Some(incoming) = application.core().port.receive(*byte) else {
+            continue;
+        };
+        // The bytes behind this one came later: any chunking gives the same time.
+        let later = BYTE_US.wrapping_mul(rest);
+        let at = Micros(t_end.get().wrapping_sub(later));
+        match incoming {
+            Incoming::Sync(sync) => take_sync(application, &sync, at),
+            Incoming::Addressed(envelope, code, message) => {
+                take_request(application, envelope, code, &message, at);
+            }
+            Incoming::Impostor => {
+                application
+                    .core()
+                    .supervisor
+                    .fault(Fault::DuplicateAddress, Event::AxisFault, at)
+            }
+        }
+    }
+}
+
+/// Latches a SYNC and queues the reply for the own slot. A stale SYNC is
+/// answered too, so that the master sees who still listens.
+fn take_sync<A: Application>(application: &mut A, sync: &Sync, at: Micros) {
+    let core = application.core();
+    let emergency = sync.flags.contains(SyncFlags::ESTOP);
+    if core.supervisor.sync(sync.cycle, emergency, at) {
+        core.cycle = sync.cycle;
+        core.cycle_at = at;
+        application.sync(sync, at);
+    }
+    let [echo, _] = sync.cycle.to_le_bytes();
+    let reply = SlotReply {
+        sync_echo: echo,
+        ..application.slot_reply()
+    };
+    let core = application.core();
+    // The address is a node's (checked when the board was made): it has a slot.
+    if let Some(offset) = SlotTiming::DEFAULT.slot_start_us(core.identity.address) {
+        let start_at = Micros(at.get().wrapping_add(offset));
+        core.port.queue_slot_reply(&reply.into(), start_at);
+    }
+}
+
+/// Answers a frame addressed to this board, once: a repeated request gets the
+/// same answer again without being carried out again.
+fn take_request<A: Application>(
+    application: &mut A,
+    envelope: Envelope,
+    code: u8,
+    message: &Result<Message, ParseError>,
+    at: Micros,
+) {
+    let nack = |reason| -> Message {
+        Nack {
+            request: code,
+            reason,
+        }
+        .into()
+    };
+    let at_us = application.core().supervisor.time_us(at);
+    let answer = match message {
+        _ if envelope.source != Address::MASTER => nack(NackReason::NotMaster),
+        Err(error) => nack(error.nack_reason()),
+        Ok(request) if request.message_type().answer().is_none() => {
+            nack(NackReason::UnknownMessage)
+        }
+        Ok(request) => match application
+            .core()
+            .duplicates
+            .judge(envelope, request, at_us)
+        {
+            Verdict::Resend(answer) | Verdict::Refuse(answer) => answer,
+            Verdict::Execute => {
+                let answer = common_request(application, request, at).unwrap_or_else(nack);
+                let duplicates = &mut application.core().duplicates;
+                duplicates.store(envelope, *request, answer, at_us);
+                answer
+            }
+        },
+    };
+    let start_at = Micros(at.get().wrapping_add(TURNAROUND_US));
+    application
+        .core()
+        .port
+        .queue_answer(&answer, envelope, start_at);
+}
+
+/// Requests that every board answers in the same way; the rest goes on.
+fn common_request<A: Application>(
+    application: &mut A,
+    request: &Message,
+    at: Micros,
+) -> Result<Message, NackReason> {
+    let ack = ack(request);
+    let healthy = application.is_healthy();
+    let limits = application.limits();
+    let core = application.core();
+    match request {
+        Message::Identify(_) => return Ok(core.identity_message()),
+        Message::FaultReport(_) => return Ok(core.fault_record(limits)),
+        Message::Arm(arm) => {
+            if arm.schema_hash != SCHEMA_HASH {
+                return Err(NackReason::VersionMismatch);
+            }
+            let before = core.mode();
+            if !healthy && !before.may_drive() {
+                return Err(NackReason::NotReady);
+            }
+            core.supervisor.arm(at)?;
+            if !before.may_drive() {
+                application.armed();
+            }
+        }
+        Message::Disarm(_) => {
+            core.supervisor.apply(Event::Disarm, at)?;
+        }
+        Message::ClearFault(_) => {
+            core.supervisor.clear(healthy, at)?;
+        }
+        Message::EmergencyBrake(_) => {
+            core.supervisor.apply(Event::EmergencyBrake, at)?;
+        }
+        _ => return application.request(request, at),
+    }
+    Ok(ack)
+}
+
+/// "Carried out."
+pub(crate) fn ack(request: &Message) -> Message {
+    Ack {
+        request: request.message_type().code(),
+    }
+    .into()
+}

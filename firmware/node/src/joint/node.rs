@@ -1,0 +1,331 @@
+//! The joint board application.
+
+use super::reference::{Target, TickReference, advance};
+use super::settings::JointSettings;
+use crate::board::{BoardCore, NodeIdentity, receive};
+use crate::debounce::Debounce;
+use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
+use crate::mode::{Event, Mode, ModeRules};
+use crate::parameters::JointParameters;
+use crate::seal::Seal;
+use crate::sensor::{Reading, Rejection, SensorMonitor};
+use crate::snapshot::{JointSnapshot, TickReport};
+use crate::supervisor::ExhaustKind;
+use crate::transmission::Transmission;
+use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
+use wheeleg_control::joint::{JointController, JointInput, JointLimits};
+use wheeleg_control::pwm::{OnTimes, ValvePwm};
+use wheeleg_control::valve::{ValveMode, ValveOpenings};
+use wheeleg_protocol::{BoardKind, Fault, FaultBits, Limit, LimitBits};
+use wheeleg_units::{Duty, Micros, PositionMm, Ticks, VelocityMmS};
+
+/// State that only a tick changes, sealed between two ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct TickState {
+    pub(super) reference: PositionMm,
+    pub(super) measured: PositionMm,
+    following: Ticks,
+    boot_ticks: Ticks,
+}
+
+/// Application of one joint board: sense, control, valves.
+///
+/// `V` are the four valve outputs, `S` the position sensor, `W` the switches
+/// (four on the vertical joints' boards, [`crate::hardware::NoSwitches`] on
+/// the others).
+#[derive(Debug)]
+pub struct JointNode<V, S, W> {
+    pub(super) core: BoardCore,
+    pub(super) parameters: JointParameters,
+    pub(super) settings: JointSettings,
+    pub(super) controller: JointController,
+    pub(super) pwm: ValvePwm,
+    pub(super) monitor: SensorMonitor,
+    pub(super) target: Target,
+    pub(super) state: TickState,
+    pub(super) seal: Seal,
+    pub(super) snapshot: JointSnapshot,
+    switches: Debounce,
+    valves: V,
+    sensor: S,
+    switch_pins: W,
+}
+
+impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
+    /// Control tick: 1 ms.
+    pub const TICK: Micros = JOINT_TICK;
+
+    /// A board in Boot with all valves shut.
+    ///
+    /// # Errors
+    /// [`ConfigError::Address`] when the straps do not name a joint,
+    /// [`ConfigError::Parameters`] when the parameters contradict each other.
+    pub fn new(
+        identity: NodeIdentity,
+        parameters: JointParameters,
+        valves: V,
+        sensor: S,
+        switches: W,
+    ) -> Result<Self, ConfigError> {
+        if !identity.address.is_joint() {
+            return Err(ConfigError::Address);
+        }
+        let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
+        let mut controller = JointController::new(settings.control);
+        controller.set_correction(settings.correction);
+        let mut node = Self {
+            core: BoardCore::new(BoardKind::Joint, identity, settings.times),
+            controller,
+            pwm: ValvePwm::new(settings.timing),
+            monitor: SensorMonitor::new(),
+            target: Target::default(),
+            state: TickState {
+                reference: PositionMm::ZERO,
+                measured: PositionMm::ZERO,
+                following: Ticks::ZERO,
+                boot_ticks: Ticks::ZERO,
+            },
+            seal: Seal::default(),
+            snapshot: JointSnapshot::at_boot(),
+            switches: Debounce::new(SWITCH_TICKS),
+            parameters,
+            settings,
+            valves,
+            sensor,
+            switch_pins: switches,
+        };
+        node.reseal();
+        Ok(node)
+    }
+
+    /// Takes bytes of the bus, in any chunking; the last of them ended at
+    /// `t_end`. Never panics, for any bytes.
+    pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+        receive(self, bytes, t_end);
+    }
+
+    /// The next frame to send and when to start; call until `None`.
+    pub fn take_transmission(&mut self) -> Option<Transmission> {
+        self.core.port.take()
+    }
+
+    /// One control tick that starts at `now`: latches the inputs, controls,
+    /// writes all four outputs. They act from the next tick edge on.
+    pub fn tick(&mut self, now: Micros) -> TickReport {
+        let reading = self.sensor.read();
+        let switches = self.switch_pins.read();
+        let overruns = self.core.supervisor.overrun().overruns();
+
+        self.core.supervisor.begin_tick(now, &self.core.times);
+        if !self.seal.holds(&self.sealed()) {
+            self.axis_fault(Fault::StateCorrupt, now);
+        }
+        // A pin that cannot be read keeps its last debounced level.
+        if let Ok(raw) = switches {
+            self.switches.sample(raw);
+        }
+        let reading = self.monitor.sample(reading, &self.settings.sensor);
+        self.state.measured = reading.position;
+        self.supervise_sensor(&reading, now);
+
+        let on_times = if self.core.mode().may_drive() {
+            self.drive(now)
+        } else {
+            self.rest(now)
+        };
+        if self.write(on_times).is_err() {
+            // An output that does not obey: release all coils and give up.
+            self.core
+                .supervisor
+                .fault(Fault::StateCorrupt, Event::BoardFault, now);
+            let _ = self.write([0; 4]);
+        }
+        self.reseal();
+        TickReport {
+            mode: self.core.mode(),
+            faults: self.core.supervisor.faults().latched(),
+            overran: self.core.supervisor.overrun().overruns() != overruns,
+        }
+    }
+
+    /// The tick's work ended at `end`; a tick longer than its period is a
+    /// latched fault.
+    pub fn tick_done(&mut self, end: Micros) {
+        self.core.supervisor.end_tick(end, &self.core.times);
+    }
+
+    /// Internals after the last tick.
+    pub const fn snapshot(&self) -> &JointSnapshot {
+        &self.snapshot
+    }
+
+    /// Present mode.
+    pub const fn mode(&self) -> Mode {
+        self.core.mode()
+    }
+
+    /// Latched faults.
+    pub const fn faults(&self) -> FaultBits {
+        self.core.supervisor.faults().latched()
+    }
+
+    /// Parameters in force.
+    pub const fn parameters(&self) -> &JointParameters {
+        &self.parameters
+    }
+
+    /// Pulses begun per valve since reset, wrapping.
+    pub fn pulse_counts(&self) -> [u32; 4] {
+        self.pwm.pulses()
+    }
+
+    fn sealed(&self) -> (&JointParameters, &TickState, &SensorMonitor) {
+        (&self.parameters, &self.state, &self.monitor)
+    }
+
+    pub(super) fn reseal(&mut self) {
+        self.seal = Seal::of(&self.sealed());
+    }
+
+    fn axis_fault(&mut self, fault: Fault, now: Micros) {
+        self.core.supervisor.fault(fault, Event::AxisFault, now);
+    }
+
+    /// Self-test in Boot, faults of the sensor in every other mode.
+    fn supervise_sensor(&mut self, reading: &Reading, now: Micros) {
+        let fault = match reading.fault {
+            Some(Rejection::Missing | Rejection::Range) => Some(Fault::SensorRange),
+            Some(Rejection::Rate) => Some(Fault::SensorRate),
+            Some(Rejection::Travel) => Some(Fault::OverTravel),
+            None => None,
+        };
+        if self.core.mode() != Mode::Boot {
+            self.state.boot_ticks = Ticks::ZERO;
+            if let Some(fault) = fault {
+                self.axis_fault(fault, now);
+            }
+            return;
+        }
+        self.state.boot_ticks = self.state.boot_ticks.next();
+        if self.monitor.is_settled() {
+            let _ = self.core.supervisor.apply(Event::SelfTestPassed, now);
+        } else if self.state.boot_ticks >= SELF_TEST_TICKS {
+            let fault = fault.unwrap_or(Fault::SensorRange);
+            self.core
+                .supervisor
+                .fault(fault, Event::SelfTestFailed, now);
+        }
+    }
+
+    /// Closed loop on the reference of this tick.
+    fn drive(&mut self, now: Micros) -> OnTimes {
+        let TickReference {
+            reference,
+            velocity,
+            announced,
+            slew_limited,
+        } = advance(self.state.reference, &mut self.target, &self.settings);
+        self.state.reference = reference;
+        let output = self.controller.step(&JointInput {
+            measured: self.state.measured,
+            reference,
+            reference_velocity: velocity,
+            announced,
+        });
+        let beyond = output.error.saturating_abs() > self.settings.following_error;
+        self.state.following = if beyond {
+            self.state.following.next()
+        } else {
+            Ticks::ZERO
+        };
+        if self.state.following >= self.settings.following_ticks {
+            self.axis_fault(Fault::FollowingError, now);
+        }
+        // At rest, and in the very tick of a fault, no pulse goes on.
+        let on_times = if output.settled || !self.core.mode().may_drive() {
+            self.pwm.shut()
+        } else {
+            self.pwm.tick(&output.openings)
+        };
+        let mut limits = limit_bits(&output.limits, output.settled);
+        if slew_limited {
+            limits.insert(Limit::SlewLimited);
+        }
+        self.record(now, output.velocity, output.duty, on_times);
+        self.snapshot.limits = limits;
+        self.snapshot.settled = output.settled;
+        on_times
+    }
+
+    /// No control: the valves do what the mode says, the reference follows the
+    /// measured stroke.
+    fn rest(&mut self, now: Micros) -> OnTimes {
+        self.state.reference = self.state.measured;
+        self.state.following = Ticks::ZERO;
+        self.target = Target::at(self.state.measured);
+        let velocity = self.controller.observe(self.state.measured);
+        let on_times = if self.core.mode() == Mode::Exhaust {
+            let openings = self.exhaust_openings();
+            self.pwm.tick(&openings)
+        } else {
+            self.pwm.shut()
+        };
+        self.record(now, velocity, Duty::ZERO, on_times);
+        self.snapshot.limits = LimitBits::NONE;
+        self.snapshot.settled = false;
+        on_times
+    }
+
+    fn exhaust_openings(&self) -> ValveOpenings {
+        match self.core.supervisor.exhaust() {
+            ExhaustKind::Staged => self.settings.staged_exhaust,
+            ExhaustKind::Commanded => ValveMode::Exhaust.openings(self.settings.full_period),
+            ExhaustKind::BlowThrough => ValveMode::BlowThrough.openings(self.settings.full_period),
+        }
+    }
+
+    fn record(&mut self, now: Micros, velocity: VelocityMmS, duty: Duty, on_times: OnTimes) {
+        self.snapshot = JointSnapshot {
+            at: now,
+            mode: self.core.mode(),
+            measured: self.state.measured,
+            reference: self.state.reference,
+            commanded: self.target.reference(),
+            velocity,
+            duty,
+            pulses: on_times.map(|on| Micros(u32::from(on))),
+            switches: self.switches.state(),
+            faults: self.core.supervisor.faults().latched(),
+            ..self.snapshot
+        };
+    }
+
+    /// Scales on-times in µs to the counts of the PWM channels and writes them.
+    fn write(&mut self, on_times: OnTimes) -> Result<(), crate::hardware::PinError> {
+        let max = u32::from(self.valves.max_duty());
+        let duty = on_times.map(|on| {
+            let scaled = u32::from(on)
+                .saturating_mul(max)
+                .checked_div(JOINT_TICK.get());
+            // At most `max`, because an on-time is at most one tick.
+            u16::try_from(scaled.unwrap_or(0).min(max)).unwrap_or(0)
+        });
+        self.valves.write(duty)
+    }
+}
+
+fn limit_bits(limits: &JointLimits, settled: bool) -> LimitBits {
+    [
+        (limits.duty, Limit::DutySaturated),
+        (limits.reference, Limit::TravelLimited),
+        (
+            limits.integral_frozen || limits.integral_clamped,
+            Limit::IntegralLimited,
+        ),
+        (limits.below_minimum, Limit::PulseTooShort),
+        (settled, Limit::SettledShut),
+    ]
+    .into_iter()
+    .filter(|(active, _)| *active)
+    .fold(LimitBits::NONE, |bits, (_, limit)| bits.with(limit))
+}

@@ -1,0 +1,121 @@
+//! From the set-points of the bus to the reference of every tick.
+//!
+//! ```text
+//! wanted(k) = reference + velocity · k · tick      k = ticks since the SYNC, at most one bus cycle
+//! reference(k) = reference(k−1) + limit(wanted(k) − reference(k−1), ± slew step)
+//! ```
+//!
+//! When a SYNC is missed, the wanted reference stands still at the end of the
+//! cycle until the watchdog decides. While the joint does not drive, the
+//! reference follows the measured stroke; so the first reference after arming
+//! is the actual position, and from there the slew limit holds: no jump after
+//! an arm, wherever the set-point is.
+
+use super::settings::JointSettings;
+use crate::JOINT_TICK;
+use wheeleg_control::joint::Announced;
+use wheeleg_protocol::JointSetpoint;
+use wheeleg_protocol::link::CYCLE_US;
+use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
+
+/// Ticks of one bus cycle.
+const CYCLE_TICKS: u32 = CYCLE_US / JOINT_TICK.get();
+
+/// What the bus wants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Target {
+    reference: PositionMm,
+    velocity: VelocityMmS,
+    next: Option<Announced>,
+    age: u32,
+}
+
+impl Target {
+    /// Stand still at `position`.
+    pub(super) fn at(position: PositionMm) -> Self {
+        Self {
+            reference: position,
+            ..Self::default()
+        }
+    }
+
+    /// The set-point of a SYNC latched before this tick.
+    pub(super) fn from_setpoint(setpoint: &JointSetpoint) -> Self {
+        Self {
+            reference: setpoint.reference,
+            velocity: setpoint.velocity_mm_s(),
+            next: setpoint.next.map(|next| Announced {
+                reference: PositionMm::from_wire(next.reference),
+                after: Ticks(u32::from(next.cycles.get()).saturating_mul(CYCLE_TICKS)),
+            }),
+            age: 0,
+        }
+    }
+
+    /// Reference of the SYNC slot.
+    pub(super) const fn reference(&self) -> PositionMm {
+        self.reference
+    }
+
+    /// Wanted reference and velocity of this tick, then one tick older.
+    fn advance(&mut self) -> (PositionMm, VelocityMmS) {
+        let moving = self.age < CYCLE_TICKS;
+        let ticks = self.age.min(CYCLE_TICKS);
+        let micros = i64::from(ticks).saturating_mul(i64::from(JOINT_TICK.get()));
+        let travel = i64::from(self.velocity.raw())
+            .saturating_mul(micros)
+            .checked_div(1_000_000)
+            .unwrap_or(0);
+        let travel = PositionMm::from_raw(i32::try_from(travel).unwrap_or(0));
+        self.age = self.age.saturating_add(1);
+        let velocity = if moving {
+            self.velocity
+        } else {
+            VelocityMmS::ZERO
+        };
+        (self.reference.saturating_add(travel), velocity)
+    }
+
+    /// The announced reference, counted from this tick.
+    fn announced(&self) -> Option<Announced> {
+        self.next.map(|next| Announced {
+            reference: next.reference,
+            after: Ticks(next.after.get().saturating_sub(self.age)),
+        })
+    }
+}
+
+/// Reference of one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct TickReference {
+    pub(super) reference: PositionMm,
+    pub(super) velocity: VelocityMmS,
+    pub(super) announced: Option<Announced>,
+    pub(super) slew_limited: bool,
+}
+
+/// Next reference on the way from `last` to the target.
+pub(super) fn advance(
+    last: PositionMm,
+    target: &mut Target,
+    settings: &JointSettings,
+) -> TickReference {
+    let announced = target.announced();
+    let (wanted, velocity) = target.advance();
+    let step = settings.slew_step;
+    let down = PositionMm::ZERO.saturating_sub(step);
+    let difference = wanted.saturating_sub(last);
+    let change = difference.limit(down, step);
+    let slew_limited = change != difference;
+    let velocity = match (slew_limited, change.raw() > 0) {
+        (false, _) => velocity,
+        (true, true) => settings.slew_rate,
+        (true, false) => VelocityMmS::ZERO.saturating_sub(settings.slew_rate),
+    };
+    TickReference {
+        reference: last.saturating_add(change),
+        velocity,
+        announced,
+        slew_limited,
+    }
+}

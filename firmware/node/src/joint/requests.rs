@@ -1,0 +1,154 @@
+//! What a joint board does with SYNC and with its own requests.
+
+use super::node::JointNode;
+use super::reference::Target;
+use super::settings::JointSettings;
+use crate::board::{Application, BoardCore, ack};
+use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
+use crate::mode::{Event, Mode, ModeRules};
+use wheeleg_control::joint::Correction;
+use wheeleg_protocol::{
+    Correction as WireCorrection, InputBits, LimitBits, LinkLossAction, Message, NackReason,
+    OpenMode, ParamValue, Position, PositionReference, SlotReply, Sync,
+};
+use wheeleg_units::Micros;
+
+impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V, S, W> {
+    fn core(&mut self) -> &mut BoardCore {
+        &mut self.core
+    }
+
+    fn is_healthy(&self) -> bool {
+        self.monitor.is_settled()
+    }
+
+    fn armed(&mut self) {
+        self.target = Target::at(self.state.measured);
+    }
+
+    fn sync(&mut self, sync: &Sync, at: Micros) {
+        let setpoint = sync.slots.joint(self.core.identity.address);
+        let exhaust =
+            setpoint.is_some_and(|slot| slot.on_link_loss == LinkLossAction::HoldThenExhaust);
+        self.core.supervisor.allow_exhaust(exhaust);
+        let was_tracking = self.core.mode() == Mode::Tracking;
+        match setpoint.filter(|slot| slot.track) {
+            Some(setpoint) => {
+                // Refused unless armed: a set-point moves nothing by itself.
+                if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
+                    self.target = Target::from_setpoint(&setpoint);
+                }
+            }
+            None => {
+                let withdrawn = self.core.supervisor.apply(Event::SetpointWithdrawn, at);
+                if withdrawn.is_ok() && was_tracking {
+                    self.target = Target::at(self.state.reference);
+                }
+            }
+        }
+    }
+
+    fn slot_reply(&self) -> SlotReply {
+        let snapshot = &self.snapshot;
+        SlotReply {
+            position_raw: snapshot.measured.raw(),
+            velocity_raw: snapshot.velocity.to_wire().to_bits(),
+            effort_raw: snapshot.duty.to_wire().to_bits(),
+            active_faults: self.core.supervisor.faults().latched(),
+            mode: self.core.mode(),
+            limits: snapshot.limits,
+            inputs: InputBits::from_raw(snapshot.switches & InputBits::FOOT.raw())
+                .unwrap_or(InputBits::NONE),
+            sync_echo: 0,
+        }
+    }
+
+    fn request(&mut self, request: &Message, at: Micros) -> Result<Message, NackReason> {
+        match request {
+            Message::TransmitPosition(_) => return Ok(self.position().into()),
+            Message::PositionReference(command) => self.position_reference(command)?,
+            Message::OpenAllValves(command) => {
+                let event = match command.mode {
+                    OpenMode::Exhaust => Event::OpenAllValves,
+                    OpenMode::BlowThrough => Event::BlowThrough,
+                };
+                self.core.supervisor.apply(event, at)?;
+            }
+            Message::SelectCorrection(command) => {
+                self.controller.set_correction(match command.correction {
+                    WireCorrection::Pd => Correction::Pd,
+                    WireCorrection::Id => Correction::Id,
+                });
+            }
+            Message::ParamGet(command) => {
+                return Ok(ParamValue {
+                    id: command.id,
+                    value: self.parameters.by_id(command.id)?,
+                }
+                .into());
+            }
+            Message::ParamSet(command) => {
+                self.set_parameter(command.id, command.value)?;
+                return Ok(ParamValue {
+                    id: command.id,
+                    value: command.value,
+                }
+                .into());
+            }
+            _ => return Err(NackReason::WrongBoard),
+        }
+        Ok(ack(request))
+    }
+
+    fn limits(&self) -> LimitBits {
+        self.snapshot.limits
+    }
+}
+
+impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
+    fn position(&self) -> Position {
+        Position {
+            position_raw: self.snapshot.measured.raw(),
+            velocity_raw: self.snapshot.velocity.to_wire().to_bits(),
+            cycle: self.core.cycle,
+            age_us: self.core.age_us(self.snapshot.at),
+        }
+    }
+
+    /// The board command of the paper: a reference outside the SYNC slots, for
+    /// an armed axis that does not track.
+    fn position_reference(&mut self, command: &PositionReference) -> Result<(), NackReason> {
+        match self.core.mode() {
+            Mode::Armed => {}
+            Mode::Tracking => return Err(NackReason::WrongMode),
+            _ => return Err(NackReason::NotArmed),
+        }
+        if !self.core.in_time(command.deadline_cycle) {
+            return Err(NackReason::Expired);
+        }
+        let gains = self.settings.control.gains();
+        let reference = command.reference();
+        if reference < gains.stroke_min || reference > gains.stroke_max {
+            return Err(NackReason::OutOfRange);
+        }
+        self.target = Target::at(reference);
+        Ok(())
+    }
+
+    /// Sets one parameter, or changes nothing.
+    fn set_parameter(&mut self, id: u16, raw: i32) -> Result<(), NackReason> {
+        let disarmed = self.core.mode().is_disarmed();
+        let trial = self.parameters.with(id, raw, disarmed)?;
+        let settings = JointSettings::new(&trial).ok_or(NackReason::OutOfRange)?;
+        if settings.correction != self.settings.correction {
+            self.controller.set_correction(settings.correction);
+        }
+        self.controller.retune(settings.control);
+        self.pwm.set_timing(settings.timing);
+        self.core.times = settings.times;
+        self.settings = settings;
+        self.parameters = trial;
+        self.reseal();
+        Ok(())
+    }
+}

@@ -1,0 +1,155 @@
+//! Parameters of a joint board as the application uses them.
+
+use crate::JOINT_TICK;
+use crate::parameters::JointParameters;
+use crate::sensor::SensorConfig;
+use crate::supervisor::{SupervisionTimes, watchdog};
+use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains};
+use wheeleg_control::pwm::PwmTiming;
+use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
+use wheeleg_protocol::param::JointParam;
+use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS};
+
+/// Margin by which a valve pulse must exceed the switching delay, µs (ASSUMED:
+/// a tenth of the VQ110's 3.5 ms).
+const PULSE_MARGIN: Micros = Micros(350);
+
+/// Longest literal blow-through (ASSUMED: empties a 2 l reservoir).
+const BLOW_THROUGH_TIME: Micros = Micros::from_millis(5000);
+
+/// Everything that follows from the parameters, worked out when they change.
+#[derive(Clone, Debug)]
+pub struct JointSettings {
+    /// Control law.
+    pub control: JointConfig,
+    /// Valve timing.
+    pub timing: PwmTiming,
+    /// Position sensor.
+    pub sensor: SensorConfig,
+    /// Watchdog and staging.
+    pub times: SupervisionTimes,
+    /// Correction after start-up.
+    pub correction: Correction,
+    /// Largest change of the reference per tick.
+    pub slew_step: PositionMm,
+    /// Velocity of a reference at the slew limit.
+    pub slew_rate: VelocityMmS,
+    /// Following error that is a fault when it lasts …
+    pub following_error: PositionMm,
+    /// … for this many ticks.
+    pub following_ticks: Ticks,
+    /// Outlet openings of a staged exhaust.
+    pub staged_exhaust: ValveOpenings,
+    /// Openings of a valve that stays open.
+    pub full_period: Micros,
+}
+
+impl JointSettings {
+    /// Works out the settings; `None` when parameters contradict each other.
+    pub fn new(parameters: &JointParameters) -> Option<Self> {
+        use JointParam as P;
+        let raw = |parameter| parameters.get(parameter);
+        let micros = |parameter| Micros(u32::try_from(raw(parameter)).unwrap_or(0));
+        let millis = |parameter| Micros::from_millis(u32::try_from(raw(parameter)).unwrap_or(0));
+        let code = |parameter| AdcCode::new(u16::try_from(raw(parameter)).unwrap_or(0));
+        let position = |parameter| PositionMm::from_raw(raw(parameter));
+
+        let gains = gains(parameters);
+        let control = JointConfig::new(&gains, JOINT_TICK).ok()?;
+        let timing = PwmTiming::new(
+            gains.pwm_period,
+            JOINT_TICK,
+            micros(P::ValveOn),
+            micros(P::ValveOff),
+            PULSE_MARGIN,
+        )
+        .ok()?;
+        let sensor = SensorConfig {
+            zero: code(P::SensorZero),
+            full_scale: position(P::SensorFullScale),
+            code_min: code(P::SensorCodeMin),
+            code_max: code(P::SensorCodeMax),
+            travel_min: position(P::SensorMin),
+            travel_max: position(P::SensorMax),
+            step_max: per_tick(raw(P::SensorRate)),
+        };
+        if sensor.code_min >= sensor.code_max || sensor.travel_min >= sensor.travel_max {
+            return None;
+        }
+        let exhaust_duty = Duty::from_raw(raw(P::ExhaustDuty));
+        let [opening, ..] = allocate(exhaust_duty, gains.pwm_period).0;
+        // A pulse too short for the valve would never exhaust at all.
+        let opening = opening.max(shortest_opening(&timing, gains.pwm_period));
+        Some(Self {
+            control,
+            timing,
+            sensor,
+            times: SupervisionTimes {
+                tick: JOINT_TICK,
+                watchdog: watchdog(raw(P::WatchdogCycles)),
+                hold: millis(P::HoldTime),
+                blow_through: BLOW_THROUGH_TIME,
+            },
+            correction: if raw(P::Correction) == 0 {
+                Correction::Pd
+            } else {
+                Correction::Id
+            },
+            slew_step: per_tick(raw(P::SlewRate)),
+            slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
+            following_error: position(P::FollowingError),
+            following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
+            staged_exhaust: ValveMode::Exhaust.openings(opening),
+            full_period: gains.pwm_period,
+        })
+    }
+}
+
+/// The gains of the control crate from raw parameters; formats agree row by row.
+fn gains(parameters: &JointParameters) -> JointGains {
+    use JointParam as P;
+    let gain = |parameter| Gain::from_bits(parameters.get(parameter));
+    let position = |parameter| PositionMm::from_raw(parameters.get(parameter));
+    let velocity = |parameter| VelocityMmS::from_raw(parameters.get(parameter));
+    let duty = |parameter| Duty::from_raw(parameters.get(parameter));
+    let micros = |parameter| Micros(u32::try_from(parameters.get(parameter)).unwrap_or(0));
+    JointGains {
+        proportional: gain(P::Proportional),
+        correction_pd: gain(P::CorrectionPd),
+        correction_id: gain(P::CorrectionId),
+        feed_forward: gain(P::FeedForward),
+        error_scale: position(P::ErrorScale),
+        velocity_scale: velocity(P::VelocityScale),
+        integral_scale: position(P::IntegralScale),
+        integral_zone: position(P::IntegralZone),
+        duty_limit: duty(P::DutyLimit),
+        dead_zone_duty: duty(P::DeadZoneDuty),
+        minimum_duty: duty(P::MinimumDuty),
+        settle_band: position(P::SettleBand),
+        settle_velocity: velocity(P::SettleVelocity),
+        settle_dwell: micros(P::SettleDwell),
+        release_band: position(P::ReleaseBand),
+        release_dwell: micros(P::ReleaseDwell),
+        bumpless_time: micros(P::BumplessTime),
+        velocity_window: u8::try_from(parameters.get(P::VelocityWindow)).unwrap_or(0),
+        stroke_min: position(P::StrokeMin),
+        stroke_max: position(P::StrokeMax),
+        pwm_period: micros(P::PwmPeriod),
+    }
+}
+
+/// A rate in raw mm/s as raw mm per joint tick, rounded down, at least one step.
+fn per_tick(rate_raw: i32) -> PositionMm {
+    let product = i64::from(rate_raw).saturating_mul(i64::from(JOINT_TICK.get()));
+    let step = product.checked_div(1_000_000).unwrap_or(0);
+    PositionMm::from_raw(i32::try_from(step).unwrap_or(i32::MAX).max(1))
+}
+
+/// Smallest opening, in steps of 100 µs, that gives a pulse at all.
+fn shortest_opening(timing: &PwmTiming, period: Micros) -> Micros {
+    let mut opening = Micros(100);
+    while opening < period && timing.pulse(opening) == Micros::ZERO {
+        opening = opening.saturating_add(Micros(100));
+    }
+    opening
+}

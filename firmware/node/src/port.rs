@@ -1,0 +1,120 @@
+//! The bus side of a board: bytes in, messages out, answers queued.
+//!
+//! The receiver is off while the board's own driver is on, so the board never
+//! hears itself: a frame with its own address as the source comes from another
+//! board that has the same straps.
+
+use crate::transmission::Transmission;
+use heapless::Vec;
+use wheeleg_protocol::{
+    Address, Decoder, Envelope, LinkQuality, MAX_ENCODED, Message, ParseError, Sync,
+};
+use wheeleg_units::Micros;
+
+/// What a frame means to this board.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Incoming {
+    /// The set-points of all nodes.
+    Sync(Sync),
+    /// A frame addressed to this board, whatever its payload.
+    Addressed(Envelope, u8, Result<Message, ParseError>),
+    /// A frame that claims to come from this board.
+    Impostor,
+}
+
+/// Decoder and transmit queue of one board.
+#[derive(Clone, Debug)]
+pub struct BusPort {
+    address: Address,
+    decoder: Decoder,
+    slot_reply: Option<Transmission>,
+    answer: Option<Transmission>,
+    unsent: u32,
+}
+
+impl BusPort {
+    /// The port of the board at `address`.
+    pub const fn new(address: Address) -> Self {
+        Self {
+            address,
+            decoder: Decoder::new(),
+            slot_reply: None,
+            answer: None,
+            unsent: 0,
+        }
+    }
+
+    /// Takes one byte; gives what a complete frame means to this board.
+    pub fn receive(&mut self, byte: u8) -> Option<Incoming> {
+        let frame = self.decoder.push(byte)?.ok()?;
+        let envelope = Envelope::from(frame.header);
+        if envelope.source == self.address {
+            return Some(Incoming::Impostor);
+        }
+        if envelope.destination == self.address {
+            let message = Message::parse(&frame);
+            return Some(Incoming::Addressed(
+                envelope,
+                frame.header.message_type,
+                message,
+            ));
+        }
+        if envelope.destination == Address::BROADCAST && envelope.source == Address::MASTER {
+            if let Ok(Message::Sync(sync)) = Message::parse(&frame) {
+                return Some(Incoming::Sync(sync));
+            }
+        }
+        None
+    }
+
+    /// Queues the slot reply of this cycle; an unsent older one is dropped and
+    /// counted.
+    pub fn queue_slot_reply(&mut self, message: &Message, start_at: Micros) {
+        let envelope = Envelope {
+            source: self.address,
+            destination: Address::MASTER,
+            sequence: 0,
+        };
+        let replaced = self.slot_reply.take().is_some();
+        self.unsent = self.unsent.saturating_add(u32::from(replaced));
+        self.slot_reply = encode(message, envelope, start_at);
+    }
+
+    /// Queues the answer to a request; the bus has one requester, so an unsent
+    /// older one is dropped and counted.
+    pub fn queue_answer(&mut self, message: &Message, request: Envelope, start_at: Micros) {
+        let replaced = self.answer.take().is_some();
+        self.unsent = self.unsent.saturating_add(u32::from(replaced));
+        self.answer = encode(message, request.reply(self.address), start_at);
+    }
+
+    /// The next frame to send: an answer before a slot reply, because it is due
+    /// at once.
+    pub fn take(&mut self) -> Option<Transmission> {
+        self.answer.take().or_else(|| self.slot_reply.take())
+    }
+
+    /// Own address.
+    pub const fn address(&self) -> Address {
+        self.address
+    }
+
+    /// Frames and errors seen so far.
+    pub const fn quality(&self) -> &LinkQuality {
+        self.decoder.quality()
+    }
+
+    /// Frames that were replaced before the board took them.
+    pub const fn unsent(&self) -> u32 {
+        self.unsent
+    }
+}
+
+fn encode(message: &Message, envelope: Envelope, start_at: Micros) -> Option<Transmission> {
+    let mut buffer = [0; MAX_ENCODED];
+    let encoded = message.emit(envelope, &mut buffer).ok()?;
+    Some(Transmission {
+        start_at,
+        bytes: Vec::from_slice(encoded).ok()?,
+    })
+}

@@ -1,0 +1,14 @@
+//! What a board hands to its transmitter.
+
+use heapless::Vec;
+use wheeleg_protocol::MAX_ENCODED;
+use wheeleg_units::Micros;
+
+/// One encoded frame and when its first bit goes on the line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Transmission {
+    /// Start, in the board's microseconds (modulo 2^32).
+    pub start_at: Micros,
+    /// The frame with both delimiters.
+    pub bytes: Vec<u8, MAX_ENCODED>,
+}
