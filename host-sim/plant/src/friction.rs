@@ -123,7 +123,8 @@ impl FrictionParams {
         // Elastic motion in one long step could overshoot the largest
         // deflection the bristle can carry.
         let limit = z_ss.max(z_m.abs());
-        next.clamp(-limit, limit)
+        // Not `clamp`, which panics on NaN; the state check names it instead.
+        next.max(-limit).min(limit)
     }
 
     /// Friction force on the piston, against its motion \[N\].

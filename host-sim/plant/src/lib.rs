@@ -8,7 +8,8 @@
 //!
 //! Determinism: no wall clock, no threads, no iteration over unordered maps, one random
 //! stream per signal. The same binary, parameters, seed and inputs give the
-//! same bytes.
+//! same bytes. A state saved as JSON comes back bit for bit only with a parser that
+//! rounds correctly (`serde_json` feature `float_roundtrip`).
 
 pub mod assembly;
 pub mod axis;
