@@ -236,8 +236,8 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
     pub fn check(&self, state: &AssemblyState<M::State>) -> Result<(), PlantError> {
         self.mechanics.check(&state.motion)?;
         let strokes = self.mechanics.strokes_m(&state.motion);
-        for i in 0..C {
-            self.cylinders[i].check(&state.cylinders[i], i, strokes[i])?;
+        for (i, (model, stroke)) in self.cylinders.iter().zip(strokes).enumerate() {
+            model.check(&state.cylinders[i], i, stroke)?;
         }
         self.supply.check(&state.supply)
     }

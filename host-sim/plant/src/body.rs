@@ -110,9 +110,7 @@ impl Mechanics<6> for BodyMechanics {
             .map(|i| self.motors[i].wheel_torque_n_m(state.motors[i].current_a, wheel))
             .sum();
         let _ = torque;
-        for i in 0..6 {
-            state.acceleration[i + 2] = piston_n[i];
-        }
+        state.acceleration[2..].copy_from_slice(piston_n);
         Ok(())
     }
 

@@ -68,7 +68,6 @@ impl EndStopParams {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::testing::end_stop;
     use proptest::prelude::*;
 
