@@ -27,7 +27,7 @@ pub enum WheelDrive {
 }
 
 /// Everything that can be set before the master starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MasterConfig {
     /// Gait parameters.
     pub gait: GaitParams,
@@ -35,8 +35,28 @@ pub struct MasterConfig {
     pub homing: HomingConfig,
     /// Wheels and encoders.
     pub wheels: WheelGeometry,
+    /// Sample time of the wheel controllers, µs, 128..=2048 (520 is the chip's
+    /// reset value at 2 MHz).
+    pub wheel_sample_us: u32,
     /// How the wheels are led.
     pub wheel_drive: WheelDrive,
     /// Frame of the right foot's switches.
     pub switch_frame: SwitchFrame,
+    /// Sequence of the first acyclic request; one that differs from run to run
+    /// keeps nodes from taking it for a repetition.
+    pub first_sequence: u16,
+}
+
+impl Default for MasterConfig {
+    fn default() -> Self {
+        Self {
+            gait: GaitParams::default(),
+            homing: HomingConfig::default(),
+            wheels: WheelGeometry::default(),
+            wheel_sample_us: 520,
+            wheel_drive: WheelDrive::default(),
+            switch_frame: SwitchFrame::default(),
+            first_sequence: 1,
+        }
+    }
 }

@@ -118,8 +118,13 @@ pub enum Refusal {
     NodeRefused {
         /// Bus address.
         node: u8,
-        /// Reason code of the protocol.
-        reason: u8,
+        /// Its reason.
+        reason: wheeleg_protocol::NackReason,
+    },
+    /// A node stayed busy through all retries.
+    NodeBusy {
+        /// Bus address.
+        node: u8,
     },
     /// A node did not answer after all retries.
     NoAnswer {

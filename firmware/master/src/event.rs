@@ -9,6 +9,11 @@ use crate::dispatcher::{Refusal, Ticket};
 /// Why all axes were told to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HoldReason {
+    /// A node is not the kind of board its address stands for.
+    WrongRole(
+        /// Bus address.
+        u8,
+    ),
     /// A node missed three cycles in a row.
     NodeLost(
         /// Bus address.
@@ -60,7 +65,17 @@ pub enum Event {
         /// The node's schema hash.
         theirs: u64,
     },
-    /// A node answers again after it was lost.
+    /// A node is not the kind of board its address stands for.
+    WrongRole(
+        /// Bus address.
+        u8,
+    ),
+    /// A node missed three cycles in a row.
+    NodeLost(
+        /// Bus address.
+        u8,
+    ),
+    /// A node answers, for the first time or after it was lost.
     NodeBack(
         /// Bus address.
         u8,

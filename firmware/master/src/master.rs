@@ -1,20 +1,49 @@
 //! The whole master: dispatcher, layers and FIFOs composed for one thread.
 
 use heapless::Vec;
+use wheeleg_protocol::MAX_ENCODED;
 
 use crate::command::Command;
 use crate::config::MasterConfig;
-use crate::dispatcher::{Reject, Request, Ticket};
-use crate::event::Event;
+use crate::dispatcher::{Dispatcher, Reject, Request, Ticket};
+use crate::event::{Event, Events};
+use crate::fifo::{
+    CommandFifo, FeedbackFifo, FifoLosses, SetpointFifo, TelemetryFifo, push_drop_oldest,
+    take_newest,
+};
+use crate::layer0::Layer0;
+use crate::layer1::Layer1;
 use crate::layer1::params::ParamError;
 use crate::telemetry::Record;
 
 /// Bytes to send, delimiters included; empty means nothing to send.
-pub type TxBytes = Vec<u8, 200>;
+pub type TxBytes = Vec<u8, MAX_ENCODED>;
+
+/// Client number of [`Master::submit`].
+pub const LOCAL_CLIENT: u8 = 0;
+/// Deadline that [`Master::submit`] gives a command, µs from now.
+pub const LOCAL_DEADLINE_US: u64 = 1_000_000;
 
 /// The master.
+///
+/// Call [`Self::cycle`] every 10 ms and send its bytes at once; give every
+/// byte heard to [`Self::on_bus_bytes`]; ask [`Self::next_acyclic`] after the last
+/// slot and after every answer.
 #[derive(Debug)]
-pub struct Master {}
+pub struct Master {
+    dispatcher: Dispatcher,
+    layer0: Layer0,
+    layer1: Layer1,
+    layer1_enabled: bool,
+    commands0: CommandFifo,
+    commands1: CommandFifo,
+    setpoints: SetpointFifo,
+    feedback: FeedbackFifo,
+    telemetry: TelemetryFifo,
+    losses: FifoLosses,
+    events: Events,
+    next_id: u32,
+}
 
 impl Master {
     /// A disarmed master that has heard no node.
@@ -22,60 +51,145 @@ impl Master {
     /// # Errors
     /// The first limit that the gait parameters violate.
     pub fn new(config: MasterConfig) -> Result<Self, ParamError> {
-        config.gait.validate()?;
-        Ok(Self {})
+        Ok(Self {
+            dispatcher: Dispatcher::new(),
+            layer0: Layer0::new(config),
+            layer1: Layer1::new(config.gait, config.homing)?,
+            layer1_enabled: true,
+            commands0: CommandFifo::new(),
+            commands1: CommandFifo::new(),
+            setpoints: SetpointFifo::new(),
+            feedback: FeedbackFifo::new(),
+            telemetry: TelemetryFifo::new(),
+            losses: FifoLosses::default(),
+            events: Events::new(),
+            next_id: 0,
+        })
     }
 
-    /// Submits a command of the local user with a deadline of one second.
+    /// Submits a command of the local user ([`LOCAL_CLIENT`]) with the next
+    /// number and a deadline of [`LOCAL_DEADLINE_US`].
     ///
     /// # Errors
     /// See [`Reject`].
     pub fn submit(&mut self, command: Command, now_us: u64) -> Result<Ticket, Reject> {
-        let _ = (command, now_us);
-        Err(Reject::UnknownClient)
+        self.next_id = self.next_id.wrapping_add(1);
+        let request = Request {
+            client: LOCAL_CLIENT,
+            id: self.next_id,
+            deadline_us: now_us.saturating_add(LOCAL_DEADLINE_US),
+            command,
+        };
+        self.submit_request(request, now_us)
     }
 
-    /// Submits a numbered command with a deadline.
+    /// Submits a numbered command with a deadline. The ticket says that it is on
+    /// its way; [`Event::Done`] or [`Event::Refused`] with the same ticket follows.
     ///
     /// # Errors
     /// See [`Reject`].
     pub fn submit_request(&mut self, request: Request, now_us: u64) -> Result<Ticket, Reject> {
-        let _ = (request, now_us);
-        Err(Reject::UnknownClient)
+        let accepted = self.dispatcher.admit(&request, now_us)?;
+        if matches!(request.command, Command::EmergencyStop) {
+            // A stop does not queue.
+            self.layer0.execute(&accepted, now_us, &mut self.events);
+            return Ok(accepted.ticket);
+        }
+        let (mut to_layer0, _) = self.commands0.split();
+        let (mut to_layer1, _) = self.commands1.split();
+        Dispatcher::route(accepted, &mut to_layer0, &mut to_layer1)
     }
 
-    /// Runs one bus cycle (every 10 ms): ends the last one (liveness, odometry,
-    /// telemetry, feedback), runs layer 1, and returns the SYNC to send now.
+    /// Forgets the command numbers of a client that connects anew.
+    pub fn open_session(&mut self, client: u8) {
+        self.dispatcher.open_session(client);
+    }
+
+    /// Runs one bus cycle (every 10 ms): ends the last one (supervision,
+    /// odometry, telemetry, feedback), carries out commands, runs layer 1, and
+    /// returns the SYNC to send now.
     pub fn cycle(&mut self, now_us: u64) -> TxBytes {
-        let _ = now_us;
-        TxBytes::new()
+        let (mut record, feedback) = self.layer0.finish_cycle(now_us, &mut self.events);
+        if record.cycle > 0 {
+            record.counters.lost_setpoints = self.layer1.lost_setpoints();
+            record.counters.lost_feedback = self.losses.feedback;
+            record.counters.lost_records = self.losses.telemetry;
+            record.counters.lost_events = self.events.lost();
+            let lost = push_drop_oldest(&mut self.telemetry, record);
+            self.losses.telemetry = self.losses.telemetry.wrapping_add(lost);
+        }
+        let lost = push_drop_oldest(&mut self.feedback, feedback);
+        self.losses.feedback = self.losses.feedback.wrapping_add(lost);
+        for _ in 0..self.commands0.capacity() {
+            match self.commands0.dequeue() {
+                Some(accepted) => self.layer0.execute(&accepted, now_us, &mut self.events),
+                None => break,
+            }
+        }
+        if self.layer1_enabled {
+            let (_, mut commands) = self.commands1.split();
+            let (_, mut feedback) = self.feedback.split();
+            let (mut setpoints, _) = self.setpoints.split();
+            self.layer1.cycle(
+                now_us,
+                &mut commands,
+                &mut feedback,
+                &mut setpoints,
+                &mut self.events,
+            );
+        }
+        let newest = take_newest(&mut self.setpoints);
+        self.layer0.start_cycle(now_us, newest)
     }
 
     /// Takes bytes received from the bus; `t_end_us` is the end of the last byte.
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end_us: u64) {
-        let _ = (bytes, t_end_us);
+        self.layer0.on_bus_bytes(bytes, t_end_us, &mut self.events);
     }
 
-    /// The next acyclic request to send at `now_us`, if one is due and fits the
-    /// window. To be asked when the bus is silent after the last slot, and
-    /// again when the answer came or timed out.
+    /// The next acyclic request to send at `now_us`, if one is due and its
+    /// answer fits before the next SYNC. To be asked when the line is silent
+    /// after the last slot, and again after each answer.
     pub fn next_acyclic(&mut self, now_us: u64) -> Option<TxBytes> {
-        let _ = now_us;
-        None
+        self.layer0.next_acyclic(now_us, &mut self.events)
     }
 
     /// Takes the oldest telemetry record.
     pub fn take_telemetry(&mut self) -> Option<Record> {
-        None
+        self.telemetry.dequeue()
     }
 
     /// Takes the oldest event with its time in µs.
     pub fn take_event(&mut self) -> Option<(u64, Event)> {
-        None
+        self.events.pop()
     }
 
-    /// Stops or resumes layer 1 (test hook: a stalled layer 1).
+    /// Stops or resumes layer 1 (a stalled layer 1, for tests and fault campaigns).
     pub fn set_layer1_enabled(&mut self, enabled: bool) {
-        let _ = enabled;
+        self.layer1_enabled = enabled;
+    }
+
+    /// All axes are armed and no stop is latched.
+    #[must_use]
+    pub fn is_armed(&self) -> bool {
+        self.layer0.is_armed()
+    }
+
+    /// Every node is identified, compatible, present and free of faults.
+    #[must_use]
+    pub fn is_ready(&self) -> bool {
+        self.layer0.is_ready()
+    }
+
+    /// Layer 0, to look at.
+    #[must_use]
+    pub const fn layer0(&self) -> &Layer0 {
+        &self.layer0
+    }
+
+    /// Layer 1, to look at.
+    #[must_use]
+    pub const fn layer1(&self) -> &Layer1 {
+        &self.layer1
     }
 }

@@ -1,11 +1,19 @@
 //! The one place where left and right differ.
 //!
 //! Both legs have the same model; the right one lives in a frame mirrored in Y
-//! (model.md §1). Foot positions in the robot's axes (X forward, Y left, Z up)
-//! change the sign of Y on their way into and out of the right leg's frame;
-//! strokes are equal on both sides.
+//! (model.md §1). Foot positions in the robot's axes (X forward, Y left, Z up,
+//! from the leg's yaw axis O4) change the sign of Y on their way into and out
+//! of the right leg's frame; strokes are equal on both sides.
+
+use nalgebra::Vector3;
+use wheeleg_kinematics::{FootState, LegGeometry, LegParameters};
 
 use crate::contact::Side;
+
+/// Largest excess over the stroke that still counts as inside, m: rounding of
+/// `f32` at the ends of the stroke, well below the 15 µm of the potentiometer's
+/// converter.
+const ROUNDING_M: f32 = 5.0e-6;
 
 /// Y of the robot's axes to Y of the leg's own frame, and back.
 #[must_use]
@@ -15,11 +23,49 @@ pub fn leg_y(side: Side, y: f32) -> f32 {
         Side::Right => -y,
     }
 }
-/// TEMP
-pub fn foot_of_strokes(_s: Side, _x: [f32; 3]) -> Option<[f32; 3]> {
-    None
+
+/// The leg in `f32`. The foot may be as close to the yaw axis as the
+/// drawn-back horizontal cylinder puts it (0.01 m), less rounding.
+fn geometry() -> Option<LegGeometry<f32>> {
+    let mut parameters = LegParameters::<f32>::wheeleg_2003();
+    parameters.min_foot_radius_m -= ROUNDING_M;
+    LegGeometry::new(parameters).ok()
 }
-/// TEMP
-pub fn strokes_of_foot(_s: Side, _x: [f32; 3], _v: [f32; 3]) -> Option<([f32; 3], [f32; 3])> {
-    None
+
+/// Foot from strokes (s2, s5, s6) in m: position in the robot's axes from O4, m.
+/// `None` if the loop of the yaw cylinder does not close.
+#[must_use]
+pub fn foot_of_strokes(side: Side, strokes_m: [f32; 3]) -> Option<[f32; 3]> {
+    let geometry = geometry()?;
+    let posture = geometry
+        .posture(&geometry.lengths_from_strokes(strokes_m))
+        .ok()?;
+    let foot = posture.foot();
+    Some([foot.x, leg_y(side, foot.y), foot.z])
+}
+
+/// Strokes (m) and their rates (m/s) for a foot at `position` (m) moving with
+/// `velocity` (m/s), both in the robot's axes from O4. `None` if a stroke is out
+/// of its range or the foot on the yaw axis.
+#[must_use]
+pub fn strokes_of_foot(
+    side: Side,
+    position: [f32; 3],
+    velocity: [f32; 3],
+) -> Option<([f32; 3], [f32; 3])> {
+    let geometry = geometry()?;
+    let own = |[x, y, z]: [f32; 3]| Vector3::new(x, leg_y(side, y), z);
+    let state = FootState {
+        position: own(position),
+        velocity: own(velocity),
+        acceleration: Vector3::zeros(),
+    };
+    let leg = geometry.inverse_motion(&state).ok()?;
+    let strokes = geometry.strokes_from_lengths(&leg.lengths);
+    let inside = strokes
+        .iter()
+        .zip(geometry.parameters().stroke_m)
+        .all(|(stroke, full)| *stroke >= -ROUNDING_M && *stroke <= full + ROUNDING_M);
+    let [b2, b5, b6] = [leg.rates.x, leg.rates.y, leg.rates.z];
+    inside.then_some((strokes, [b2, b5, b6]))
 }

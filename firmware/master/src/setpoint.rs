@@ -87,6 +87,14 @@ pub enum Phase {
     Hold = 11,
 }
 
+impl Phase {
+    /// Whether layer 1 changes references in this phase.
+    #[must_use]
+    pub const fn is_moving(self) -> bool {
+        !matches!(self, Self::Idle | Self::Ready | Self::Done | Self::Hold)
+    }
+}
+
 /// Coming change of a reference, for control ahead of a known move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ahead {

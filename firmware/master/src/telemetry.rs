@@ -1,4 +1,65 @@
-//! Telemetry records.
-/// x
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Record;
+//! Telemetry of the master: one record of fixed size per bus cycle.
+
+use wheeleg_protocol::{LinkQuality, NODES, SlotReply, SyncSlots};
+
+use crate::contact::FootSwitches;
+use crate::event::HoldReason;
+use crate::setpoint::{Phase, WHEELS};
+
+/// What is counted, since start-up. Counters wrap, those of the protocol
+/// crate stop at their maximum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Cycles in which each node did not answer.
+    pub missed: [u32; NODES],
+    /// Replies to another cycle than the running one.
+    pub stale_replies: u32,
+    /// Sound frames that fit nothing the master waits for.
+    pub unexpected: u32,
+    /// Acyclic requests sent, repeats included.
+    pub requests: u32,
+    /// Acyclic requests that were never answered.
+    pub unanswered: u32,
+    /// Set-point sets lost between layers 1 and 0.
+    pub lost_setpoints: u32,
+    /// Feedback sets lost between layers 0 and 1.
+    pub lost_feedback: u32,
+    /// Telemetry records lost before this one.
+    pub lost_records: u32,
+    /// Events lost.
+    pub lost_events: u32,
+    /// Frames and frame errors seen on the bus.
+    pub link: LinkQuality,
+}
+
+/// One bus cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// Cycle number since start-up; its low 16 bits are those of SYNC.
+    pub cycle: u32,
+    /// Start of the cycle, µs.
+    pub time_us: u64,
+    /// Phase of the motion.
+    pub phase: Phase,
+    /// Step of the gait, from 0.
+    pub step: u16,
+    /// Whether all axes are armed.
+    pub armed: bool,
+    /// Whether the E-stop bit was sent.
+    pub emergency_stop: bool,
+    /// Why all axes hold, if they do.
+    pub hold: Option<HoldReason>,
+    /// Set-points sent in this cycle, raw as on the wire.
+    pub slots: SyncSlots,
+    /// Reply of each node in this cycle; `None` if it did not come.
+    pub replies: [Option<SlotReply>; NODES],
+    /// Switches of the left and right foot, in each leg's frame.
+    pub feet: [Option<FootSwitches>; WHEELS],
+    /// Bearing of the touching side of each foot in the robot's frame, rad
+    /// (see [`crate::contact`]).
+    pub bearing_rad: [Option<f32>; WHEELS],
+    /// Mean wheel travel since start-up, µm.
+    pub travel_um: i64,
+    /// Counters at the end of the cycle.
+    pub counters: Counters,
+}

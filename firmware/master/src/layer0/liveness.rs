@@ -1,9 +1,8 @@
 //! Which nodes answer: three missed cycles in a row make a node lost.
 
-use crate::setpoint::NODES;
+use wheeleg_protocol::link::NodeMonitor;
 
-/// Missed cycles in a row after which a node counts as lost.
-pub const MISSED_LIMIT: u8 = 3;
+use crate::setpoint::NODES;
 
 /// Change of a node's state at the end of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,69 +13,46 @@ pub enum Change {
     Back,
 }
 
-/// Presence of all nodes.
-#[derive(Clone, Copy, Debug)]
-pub struct Liveness {
-    heard: [bool; NODES],
-    missed: [u8; NODES],
-    alive: [bool; NODES],
-    total_missed: [u32; NODES],
+/// One node: the protocol's count of misses, and whether it was ever there.
+#[derive(Clone, Copy, Debug, Default)]
+struct Presence {
+    monitor: NodeMonitor,
+    heard: bool,
+    alive: bool,
 }
 
-impl Default for Liveness {
-    fn default() -> Self {
-        Self::new()
-    }
+/// Presence of all nodes. A node that was never heard is not alive, and cannot
+/// be lost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Liveness {
+    nodes: [Presence; NODES],
 }
 
 impl Liveness {
-    /// No node heard yet: none is alive, and none can be lost.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            heard: [false; NODES],
-            missed: [0; NODES],
-            alive: [false; NODES],
-            total_missed: [0; NODES],
-        }
-    }
-
-    /// A valid slot reply of the running cycle came from node index 0..8.
-    pub fn heard(&mut self, index: usize) {
-        if let Some(heard) = self.heard.get_mut(index) {
-            *heard = true;
-        }
-    }
-
-    /// Whether node index 0..8 has answered in the running cycle.
-    #[must_use]
-    pub fn in_this_cycle(&self, index: usize) -> bool {
-        self.heard.get(index).copied().unwrap_or(false)
+    /// A reply of node index 0..8. `false` if it echoes another cycle: a node
+    /// that repeats itself does not count as alive.
+    pub fn on_reply(&mut self, index: usize, sync_echo: u8, cycle: u16) -> bool {
+        let Some(node) = self.nodes.get_mut(index) else {
+            return false;
+        };
+        let [low, _] = cycle.to_le_bytes();
+        node.monitor.on_reply(sync_echo, cycle);
+        node.heard |= sync_echo == low;
+        sync_echo == low
     }
 
     /// Ends a cycle: counts misses, calls `report` for each change.
     pub fn end_cycle(&mut self, mut report: impl FnMut(usize, Change)) {
-        let state = self
-            .heard
-            .iter_mut()
-            .zip(self.missed.iter_mut())
-            .zip(self.alive.iter_mut().zip(self.total_missed.iter_mut()));
-        for (index, ((heard, missed), (alive, total))) in state.enumerate() {
-            if core::mem::take(heard) {
-                *missed = 0;
-                if !*alive {
-                    *alive = true;
+        for (index, node) in self.nodes.iter_mut().enumerate() {
+            node.monitor.end_cycle();
+            if core::mem::take(&mut node.heard) {
+                if !node.alive {
+                    node.alive = true;
                     report(index, Change::Back);
                 }
-            } else {
-                *missed = missed.saturating_add(1);
-                if *alive {
-                    *total = total.wrapping_add(1);
-                    if *missed >= MISSED_LIMIT {
-                        *alive = false;
-                        report(index, Change::Lost);
-                    }
-                }
+            } else if node.alive && node.monitor.is_absent() {
+                node.alive = false;
+                report(index, Change::Lost);
             }
         }
     }
@@ -84,18 +60,12 @@ impl Liveness {
     /// Whether node index 0..8 counts as present.
     #[must_use]
     pub fn alive(&self, index: usize) -> bool {
-        self.alive.get(index).copied().unwrap_or(false)
+        self.nodes.get(index).is_some_and(|node| node.alive)
     }
 
-    /// First node index that is not present.
+    /// Cycles in which each node did not answer, since start-up.
     #[must_use]
-    pub fn first_missing(&self) -> Option<usize> {
-        self.alive.iter().position(|alive| !alive)
-    }
-
-    /// Cycles in which each present node did not answer, since start-up (wraps).
-    #[must_use]
-    pub const fn total_missed(&self) -> [u32; NODES] {
-        self.total_missed
+    pub fn total_missed(&self) -> [u32; NODES] {
+        self.nodes.map(|node| node.monitor.missed_total())
     }
 }

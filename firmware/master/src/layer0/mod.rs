@@ -1,4 +1,178 @@
-//! Layer 0.
+//! Layer 0: bus cycle, node supervision, arming, reflexes. Knows nothing of
+//! gaits; keeps the robot safe when layer 1 stops.
+//!
+//! One bus cycle of 10 ms:
+//!
+//! 1. [`Layer0::finish_cycle`]: which nodes answered, odometry, feet, faults;
+//!    gives the telemetry record and the feedback for layer 1.
+//! 2. [`Layer0::start_cycle`]: builds SYNC from the newest set-points.
+//! 3. [`Layer0::on_bus_bytes`]: collects slot replies and answers.
+//! 4. [`Layer0::next_acyclic`]: requests in the rest of the cycle.
+
+pub mod acyclic;
+mod commands;
+mod cycle;
 pub mod liveness;
+pub mod nodes;
 pub mod odometry;
 pub mod reflex;
+mod requests;
+mod safety;
+pub mod wheels;
+
+use wheeleg_protocol::link::{Requester, RequesterConfig};
+use wheeleg_protocol::{Decoder, SCHEMA_HASH, SyncSlots};
+use wheeleg_units::PositionMm;
+
+use crate::config::MasterConfig;
+use crate::contact::FootSwitches;
+use crate::dispatcher::{Refusal, Ticket};
+use crate::event::HoldReason;
+use crate::setpoint::{JOINTS, Setpoints, TravelSetpoint, WHEELS};
+use crate::telemetry::Counters;
+use acyclic::{Job, Jobs};
+use liveness::Liveness;
+use nodes::Nodes;
+use odometry::Odometry;
+use reflex::Reflexes;
+use wheels::{WheelUnits, Wheels};
+
+/// Cycles without set-points from layer 1 after which all axes hold: 100 ms.
+pub const STALL_CYCLES: u16 = 10;
+
+/// Whether the axes are energised, as far as the master knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Power {
+    Disarmed,
+    Arming,
+    Armed,
+}
+
+/// What a group of requests to all nodes is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum GroupKind {
+    Arm,
+    Disarm,
+    Clear,
+}
+
+/// A group of requests to all nodes under way.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    ticket: Ticket,
+    kind: GroupKind,
+    left: u8,
+    failed: Option<Refusal>,
+}
+
+/// State of layer 0.
+#[derive(Debug)]
+pub struct Layer0 {
+    config: MasterConfig,
+    units: WheelUnits,
+    schema_hash: u64,
+    cycle: u32,
+    cycle_start_us: u64,
+    decoder: Decoder,
+    nodes: Nodes,
+    liveness: Liveness,
+    odometry: Odometry,
+    wheels: Wheels,
+    reflexes: Reflexes,
+    jobs: Jobs,
+    requester: Requester,
+    in_flight: Option<Job>,
+    ask_from: usize,
+    power: Power,
+    hold: Option<HoldReason>,
+    emergency_stop: bool,
+    group: Option<Group>,
+    setpoints: Setpoints,
+    stale_cycles: u16,
+    /// Strokes at which all joints are kept after a stop.
+    frozen: Option<[Option<PositionMm>; JOINTS]>,
+    /// References of the user, one joint at a time.
+    direct: [Option<PositionMm>; JOINTS],
+    direct_travel: Option<TravelSetpoint>,
+    direct_segment: u16,
+    feet: [Option<FootSwitches>; WHEELS],
+    slots: SyncSlots,
+    counters: Counters,
+}
+
+impl Layer0 {
+    /// Disarmed; no node heard.
+    #[must_use]
+    pub fn new(config: MasterConfig) -> Self {
+        Self {
+            config,
+            units: WheelUnits {
+                geometry: config.wheels,
+                sample_us: config.wheel_sample_us,
+            },
+            schema_hash: SCHEMA_HASH,
+            cycle: 0,
+            cycle_start_us: 0,
+            decoder: Decoder::new(),
+            nodes: Nodes::default(),
+            liveness: Liveness::default(),
+            odometry: Odometry::new(config.wheels),
+            wheels: Wheels::default(),
+            reflexes: Reflexes::default(),
+            jobs: Jobs::new(),
+            requester: Requester::new(RequesterConfig::DEFAULT, config.first_sequence),
+            in_flight: None,
+            ask_from: 0,
+            power: Power::Disarmed,
+            hold: None,
+            emergency_stop: false,
+            group: None,
+            setpoints: Setpoints::idle(0),
+            stale_cycles: 0,
+            frozen: None,
+            direct: [None; JOINTS],
+            direct_travel: None,
+            direct_segment: 0x8000,
+            feet: [None; WHEELS],
+            slots: SyncSlots::NONE,
+            counters: Counters::default(),
+        }
+    }
+
+    /// All axes armed and no stop latched.
+    #[must_use]
+    pub fn is_armed(&self) -> bool {
+        self.power == Power::Armed && self.hold.is_none() && !self.emergency_stop
+    }
+
+    /// Every node is identified, compatible and answers.
+    #[must_use]
+    pub fn is_ready(&self) -> bool {
+        self.nodes
+            .bar_to_arming(|index| self.liveness.alive(index), self.schema_hash)
+            .is_none()
+    }
+
+    /// Why all axes hold, if they do.
+    #[must_use]
+    pub const fn hold(&self) -> Option<HoldReason> {
+        self.hold
+    }
+
+    /// What is known of each node.
+    #[must_use]
+    pub const fn nodes(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    /// Wheel odometry.
+    #[must_use]
+    pub const fn odometry(&self) -> &Odometry {
+        &self.odometry
+    }
+
+    /// Whether layer 1 may move the robot.
+    fn motion_allowed(&self) -> bool {
+        self.is_armed() && self.frozen.is_none() && self.nodes.all_armed()
+    }
+}

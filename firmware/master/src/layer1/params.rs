@@ -221,7 +221,7 @@ impl GaitParams {
     /// Leg that steps in step `k`.
     #[must_use]
     pub const fn stepping_leg(&self, k: u16) -> Side {
-        match (self.pattern, k % 2 == 0) {
+        match (self.pattern, k.is_multiple_of(2)) {
             (Pattern::Single(side), _) => side,
             (Pattern::Alternate { first }, true) => first,
             (Pattern::Alternate { first }, false) => first.other(),

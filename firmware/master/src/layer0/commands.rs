@@ -1,0 +1,288 @@
+//! Commands of the physical level.
+
+use wheeleg_protocol as proto;
+use wheeleg_protocol::{Address, Correction, Message, OpenMode, WheelControlMode};
+use wheeleg_units::PositionMm;
+
+use super::acyclic::{Job, Purpose};
+use super::wheels::Wheels;
+use super::{Group, GroupKind, Layer0, Power};
+use crate::command::{Command, CorrectionKind};
+use crate::config::WheelDrive;
+use crate::contact::Side;
+use crate::dispatcher::{Accepted, Refusal};
+use crate::event::{Event, Events};
+use crate::layer1::params::{STROKE_MM, in_range};
+
+impl Layer0 {
+    /// Carries out a command or starts to; reports to `events`.
+    pub fn execute(&mut self, accepted: &Accepted, now_us: u64, events: &mut Events) {
+        let ticket = accepted.ticket;
+        let result = if accepted.expired(now_us) {
+            Err(Refusal::Expired)
+        } else {
+            self.begin(accepted, now_us, events)
+        };
+        match result {
+            Ok(true) => events.push(now_us, Event::Done(ticket)),
+            Ok(false) => {}
+            Err(reason) => events.push(now_us, Event::Refused { ticket, reason }),
+        }
+    }
+
+    /// `Ok(true)`: done; `Ok(false)`: the answer comes with that of the nodes.
+    fn begin(
+        &mut self,
+        accepted: &Accepted,
+        now_us: u64,
+        events: &mut Events,
+    ) -> Result<bool, Refusal> {
+        match accepted.command {
+            Command::Arm => self.begin_arming(accepted),
+            Command::Disarm => {
+                self.power = Power::Disarmed;
+                self.release();
+                self.fail_group(Refusal::Interrupted, now_us, events);
+                self.begin_group(accepted, GroupKind::Disarm, &[proto::Disarm {}.into()])
+            }
+            Command::ClearFault => {
+                self.fail_group(Refusal::Interrupted, now_us, events);
+                self.emergency_stop = false;
+                self.hold = None;
+                self.frozen = None;
+                self.power = Power::Disarmed;
+                self.release();
+                // A node that had not stopped is still armed after the clear.
+                let requests = [proto::ClearFault {}.into(), proto::Disarm {}.into()];
+                self.begin_group(accepted, GroupKind::Clear, &requests)
+            }
+            Command::EmergencyStop => {
+                self.emergency_stop(now_us, events);
+                Ok(true)
+            }
+            Command::JointReference { joint, stroke_mm } => {
+                self.may_lead()?;
+                let _exists = joint_address(joint)?;
+                in_range(
+                    "stroke_mm",
+                    stroke_mm.get(),
+                    PositionMm::ZERO.get(),
+                    STROKE_MM.get(),
+                )
+                .map_err(Refusal::Parameter)?;
+                let index = usize::from(joint).saturating_sub(1);
+                if let Some(slot) = self.direct.get_mut(index) {
+                    *slot = Some(stroke_mm);
+                }
+                Ok(true)
+            }
+            Command::WheelReference { travel_mm } => {
+                self.may_lead()?;
+                let limit = const { fixed::types::I16F16::lit("32000") };
+                let least = const { fixed::types::I16F16::lit("-32000") };
+                in_range("travel_mm", travel_mm.get(), least, limit).map_err(Refusal::Parameter)?;
+                self.direct_segment = self.direct_segment.wrapping_add(1) | 0x8000;
+                self.direct_travel = Some(Wheels::direct(travel_mm, self.direct_segment));
+                Ok(true)
+            }
+            Command::OpenAllValves { joint } => {
+                let mode = OpenMode::Exhaust;
+                let to = joint_address(joint)?;
+                self.freeze_if_armed();
+                self.ask(accepted, to, proto::OpenAllValves { mode }.into())
+            }
+            Command::EmergencyBrake { joint } => {
+                let to = joint_address(joint)?;
+                self.freeze_if_armed();
+                self.ask(accepted, to, proto::EmergencyBrake {}.into())
+            }
+            Command::TransmitPosition { joint } => {
+                let to = joint_address(joint)?;
+                self.ask(accepted, to, proto::TransmitPosition {}.into())
+            }
+            Command::SelectCorrection { joint, correction } => {
+                let correction = match correction {
+                    CorrectionKind::Pd => Correction::Pd,
+                    CorrectionKind::Id => Correction::Id,
+                };
+                let to = joint_address(joint)?;
+                self.ask(accepted, to, proto::SelectCorrection { correction }.into())
+            }
+            Command::WheelSpeed { side, speed_mm_s } => {
+                let one = const { fixed::types::I16F16::lit("1") };
+                let limit = const { fixed::types::I16F16::lit("400") };
+                in_range("speed_mm_s", speed_mm_s.get(), one, limit).map_err(Refusal::Parameter)?;
+                let speed = self.units.speed(speed_mm_s);
+                self.ask(
+                    accepted,
+                    wheel_address(side)?,
+                    proto::WheelMaxSpeed { speed }.into(),
+                )
+            }
+            Command::WheelAcceleration {
+                side,
+                acceleration_mm_s2,
+            } => {
+                let least = const { fixed::types::I16F16::lit("10") };
+                let limit = const { fixed::types::I16F16::lit("5000") };
+                in_range("acceleration_mm_s2", acceleration_mm_s2, least, limit)
+                    .map_err(Refusal::Parameter)?;
+                let acceleration = self.units.acceleration(acceleration_mm_s2);
+                let message = proto::WheelAcceleration { acceleration };
+                self.ask(accepted, wheel_address(side)?, message.into())
+            }
+            Command::WheelFilter { side, a, b, k } => {
+                let message = proto::WheelFilter {
+                    zero: a,
+                    pole: b,
+                    gain: k,
+                };
+                self.ask(accepted, wheel_address(side)?, message.into())
+            }
+            // Commands of layer 1 are never routed here.
+            _ => Err(Refusal::NotMoving),
+        }
+    }
+
+    /// Whether the user may lead single axes.
+    fn may_lead(&self) -> Result<(), Refusal> {
+        if self.hold.is_some() || self.frozen.is_some() {
+            Err(Refusal::Latched)
+        } else if self.power != Power::Armed {
+            Err(Refusal::NotArmed)
+        } else if self.setpoints.phase.is_moving() {
+            Err(Refusal::Moving)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// A stop of one axis ends every motion; the others keep their place.
+    fn freeze_if_armed(&mut self) {
+        if self.power == Power::Armed && self.frozen.is_none() {
+            self.freeze();
+        }
+    }
+
+    fn ask(&mut self, accepted: &Accepted, to: Address, message: Message) -> Result<bool, Refusal> {
+        let job = Job {
+            to,
+            message,
+            purpose: Purpose::User(accepted.ticket),
+        };
+        if self.jobs.push(job) {
+            Ok(false)
+        } else {
+            Err(Refusal::Busy)
+        }
+    }
+
+    fn begin_arming(&mut self, accepted: &Accepted) -> Result<bool, Refusal> {
+        if self.group.is_some() {
+            return Err(Refusal::Busy);
+        }
+        if self.hold.is_some() || self.emergency_stop {
+            return Err(Refusal::Latched);
+        }
+        if self.power != Power::Disarmed {
+            return Err(Refusal::NotDisarmed);
+        }
+        let alive = |index| self.liveness.alive(index);
+        if let Some(bar) = self.nodes.bar_to_arming(alive, self.schema_hash) {
+            return Err(bar);
+        }
+        let gait = &self.config.gait;
+        let mode = match self.config.wheel_drive {
+            WheelDrive::Profile => WheelControlMode::Trapezoidal,
+            WheelDrive::Stream => WheelControlMode::Position,
+        };
+        let wheel_setup: [Message; 3] = [
+            proto::WheelMaxSpeed {
+                speed: self.units.speed(gait.push_speed_mm_s),
+            }
+            .into(),
+            proto::WheelAcceleration {
+                acceleration: self.units.acceleration(gait.push_acceleration_mm_s2),
+            }
+            .into(),
+            proto::WheelMode { mode }.into(),
+        ];
+        let arm = Message::from(proto::Arm {
+            schema_hash: self.schema_hash,
+        });
+        self.frozen = None;
+        self.release();
+        let mut left = 0_u8;
+        for to in Address::nodes() {
+            let setup = wheel_setup.iter().filter(|_| to.is_wheel());
+            for message in setup.chain(core::iter::once(&arm)) {
+                left = left.saturating_add(1);
+                let job = Job {
+                    to,
+                    message: *message,
+                    purpose: Purpose::Group,
+                };
+                if !self.jobs.push(job) {
+                    return Err(Refusal::Busy);
+                }
+            }
+        }
+        self.power = Power::Arming;
+        self.group = Some(Group {
+            ticket: accepted.ticket,
+            kind: GroupKind::Arm,
+            left,
+            failed: None,
+        });
+        Ok(false)
+    }
+
+    fn begin_group(
+        &mut self,
+        accepted: &Accepted,
+        kind: GroupKind,
+        requests: &[Message],
+    ) -> Result<bool, Refusal> {
+        // Whatever waited is overtaken: these requests make every node safe.
+        self.jobs = super::acyclic::Jobs::new();
+        let mut left = 0_u8;
+        for message in requests {
+            for to in Address::nodes() {
+                // A node that was never heard cannot be asked.
+                if to.slot().is_none_or(|index| !self.liveness.alive(index)) {
+                    continue;
+                }
+                let job = Job {
+                    to,
+                    message: *message,
+                    purpose: Purpose::Group,
+                };
+                if self.jobs.push(job) {
+                    left = left.saturating_add(1);
+                }
+            }
+        }
+        if left == 0 {
+            return Ok(true);
+        }
+        self.group = Some(Group {
+            ticket: accepted.ticket,
+            kind,
+            left,
+            failed: None,
+        });
+        Ok(false)
+    }
+}
+
+fn joint_address(joint: u8) -> Result<Address, Refusal> {
+    Address::joint(joint).ok_or(Refusal::NoSuchJoint { joint })
+}
+
+fn wheel_address(side: Side) -> Result<Address, Refusal> {
+    let number = match side {
+        Side::Left => 7,
+        Side::Right => 8,
+    };
+    Address::wheel(number).ok_or(Refusal::NoSuchJoint { joint: number })
+}

@@ -1,0 +1,274 @@
+//! The bus cycle: what ends one, what SYNC says, what the slots bring.
+
+use core::num::NonZeroU8;
+
+use wheeleg_protocol::{
+    Address, Envelope, InputBits, JointSetpoint as WireJoint, LinkLossAction, MAX_ENCODED, Message,
+    NextReference, SlotReply, Sync, SyncFlags, SyncSlots,
+};
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use super::reflex::Senses;
+use super::{Layer0, Power};
+use crate::TxBytes;
+use crate::config::SwitchFrame;
+use crate::contact::{FootSwitches, INNER, OUTER, Side};
+use crate::event::{Event, Events};
+use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Setpoints};
+use crate::telemetry::Record;
+
+impl Layer0 {
+    /// Ends the running cycle at `now_us`: supervision, odometry, feet. Gives its
+    /// record and the feedback for layer 1.
+    pub fn finish_cycle(&mut self, now_us: u64, events: &mut Events) -> (Record, Feedback) {
+        self.supervise(now_us, events);
+        self.sense_feet(now_us, events);
+        let mut replies = [None; crate::setpoint::NODES];
+        for (slot, (_, node)) in replies.iter_mut().zip(self.nodes.iter()) {
+            *slot = node.reply;
+        }
+        let mut feedback = Feedback {
+            time_us: self.cycle_start_us,
+            strokes_mm: [None; JOINTS],
+            feet: self.feet,
+            travel_um: self.odometry.travel_um(),
+            motion_allowed: self.motion_allowed(),
+        };
+        for (stroke, reply) in feedback.strokes_mm.iter_mut().zip(replies) {
+            *stroke = reply.map(|reply| reply.joint_position());
+        }
+        self.counters.missed = self.liveness.total_missed();
+        self.counters.link = *self.decoder.quality();
+        let bearing = |side: Side| self.foot(side)?.bearing_rad(side);
+        let record = Record {
+            cycle: self.cycle,
+            time_us: self.cycle_start_us,
+            phase: self.setpoints.phase,
+            step: self.setpoints.step,
+            armed: self.is_armed(),
+            emergency_stop: self.emergency_stop,
+            hold: self.hold,
+            slots: self.slots,
+            replies,
+            feet: self.feet,
+            bearing_rad: [bearing(Side::Left), bearing(Side::Right)],
+            travel_um: feedback.travel_um,
+            counters: self.counters,
+        };
+        (record, feedback)
+    }
+
+    /// Starts a cycle at `now_us` with the newest set-points of layer 1, if there
+    /// are any, and gives the bytes of SYNC.
+    pub fn start_cycle(&mut self, now_us: u64, setpoints: Option<Setpoints>) -> TxBytes {
+        match setpoints {
+            Some(setpoints) => {
+                self.stale_cycles = 0;
+                self.take(setpoints);
+            }
+            None => self.stale_cycles = self.stale_cycles.saturating_add(1),
+        }
+        self.cycle = self.cycle.wrapping_add(1);
+        self.cycle_start_us = now_us;
+        self.slots = self.build_slots();
+        self.nodes.begin_cycle();
+        let flags = if self.emergency_stop {
+            SyncFlags::ESTOP
+        } else {
+            SyncFlags::NONE
+        };
+        // Both counters wrap by design; the casts keep their low bits.
+        let sync = Message::from(Sync {
+            cycle: self.cycle as u16,
+            master_time_us: now_us as u32,
+            flags,
+            slots: self.slots,
+        });
+        frame_of(&sync, Address::BROADCAST, 0)
+    }
+
+    fn take(&mut self, setpoints: Setpoints) {
+        // A motion of layer 1 ends the user's references of single axes.
+        if setpoints.phase.is_moving() {
+            self.direct = [None; JOINTS];
+            self.direct_travel = None;
+        }
+        if self.frozen.is_none() {
+            self.setpoints = setpoints;
+        }
+    }
+
+    fn build_slots(&mut self) -> SyncSlots {
+        let mut slots = SyncSlots::NONE;
+        if self.power != Power::Armed {
+            return slots;
+        }
+        let senses = self.senses();
+        let setpoints = self.setpoints;
+        self.reflexes.observe(&setpoints, &senses);
+        for (index, address) in Address::nodes().enumerate().take(JOINTS) {
+            let joint = self.joint_reference(index, &senses);
+            let measured = self.nodes.get(index).and_then(|node| node.last);
+            let slot = match (joint, measured) {
+                (Some(joint), _) => self.wire_joint(joint),
+                // No reference: the axis keeps its position.
+                (None, Some(reply)) => WireJoint {
+                    reference: reply.joint_position(),
+                    velocity: VelocityMmS::ZERO.to_wire(),
+                    next: None,
+                    on_link_loss: LinkLossAction::Hold,
+                    track: false,
+                },
+                (None, None) => continue,
+            };
+            let _is_joint = slots.set_joint(address, slot);
+        }
+        if let Some(travel) = self.direct_travel.or(setpoints.travel) {
+            for (side, number) in [(Side::Left, 7), (Side::Right, 8)] {
+                let slot = self.wheels.setpoint(
+                    side,
+                    &travel,
+                    self.config.wheel_drive,
+                    &self.odometry,
+                    &self.units,
+                );
+                if let (Some(slot), Some(address)) = (slot, Address::wheel(number)) {
+                    let _is_wheel = slots.set_wheel(address, slot);
+                }
+            }
+        }
+        slots
+    }
+
+    /// Reference of joint index 0..6: frozen, the user's, or layer 1's.
+    fn joint_reference(&self, index: usize, senses: &Senses) -> Option<JointSetpoint> {
+        let plain = |reference_mm| JointSetpoint {
+            reference_mm,
+            ..JointSetpoint::default()
+        };
+        if let Some(frozen) = &self.frozen {
+            return frozen.get(index).copied().flatten().map(plain);
+        }
+        if let Some(direct) = self.direct.get(index).copied().flatten() {
+            return Some(plain(direct));
+        }
+        let setpoint = self.setpoints.joints.get(index).copied().flatten()?;
+        let mut setpoint = self.reflexes.apply(index, setpoint, senses);
+        if self.stale_cycles > 0 {
+            // Layer 1 is late: its last reference is held, not extrapolated.
+            setpoint.velocity_mm_s = VelocityMmS::ZERO;
+            setpoint.ahead = None;
+        }
+        Some(setpoint)
+    }
+
+    fn wire_joint(&self, joint: JointSetpoint) -> WireJoint {
+        let next = joint.ahead.and_then(|ahead| {
+            Some(NextReference {
+                reference: ahead.reference_mm.to_wire(),
+                cycles: NonZeroU8::new(ahead.cycles)?,
+            })
+        });
+        WireJoint {
+            reference: joint.reference_mm,
+            velocity: joint.velocity_mm_s.to_wire(),
+            next,
+            on_link_loss: match joint.on_link_loss {
+                OnLinkLoss::Hold => LinkLossAction::Hold,
+                OnLinkLoss::HoldThenExhaust => LinkLossAction::HoldThenExhaust,
+            },
+            track: true,
+        }
+    }
+
+    fn senses(&self) -> Senses {
+        let vertical = |side: Side| -> Option<PositionMm> {
+            let node = self.nodes.get(side.joint(Cylinder::Vertical))?;
+            node.last.map(|reply| reply.joint_position())
+        };
+        Senses {
+            travel_um: self.odometry.travel_um(),
+            feet: self.feet,
+            vertical_mm: [vertical(Side::Left), vertical(Side::Right)],
+        }
+    }
+
+    /// Switches of a foot in the leg's own frame.
+    #[must_use]
+    pub fn foot(&self, side: Side) -> Option<FootSwitches> {
+        self.feet.get(side.index()).copied().flatten()
+    }
+
+    fn sense_feet(&mut self, now_us: u64, events: &mut Events) {
+        for side in [Side::Left, Side::Right] {
+            let node = self.nodes.get(side.joint(Cylinder::Vertical));
+            let Some(reply) = node.and_then(|node| node.reply) else {
+                // Not heard in this cycle: the last state stands until the node is lost.
+                continue;
+            };
+            let now = self.switches(side, reply.inputs);
+            let before = self.foot(side);
+            if let Some(foot) = self.feet.get_mut(side.index()) {
+                *foot = Some(now);
+            }
+            match (before.is_some_and(FootSwitches::any), now.any()) {
+                (false, true) => {
+                    let sector = now.sector(side);
+                    events.push(now_us, Event::TouchDown { side, sector });
+                }
+                (true, false) => events.push(now_us, Event::LiftOff(side)),
+                _ => {}
+            }
+        }
+    }
+
+    /// Board inputs to switches in the leg's frame.
+    fn switches(&self, side: Side, inputs: InputBits) -> FootSwitches {
+        let raw = inputs.raw() & InputBits::FOOT.raw();
+        if side == Side::Right && self.config.switch_frame == SwitchFrame::Robot {
+            let other = raw & !(OUTER | INNER);
+            let outer = if raw & INNER != 0 { OUTER } else { 0 };
+            let inner = if raw & OUTER != 0 { INNER } else { 0 };
+            return FootSwitches(other | outer | inner);
+        }
+        FootSwitches(raw)
+    }
+
+    /// Takes the reply of one node's slot.
+    pub(super) fn on_reply(&mut self, from: Address, reply: SlotReply) {
+        let Some(index) = from.slot() else {
+            return;
+        };
+        // SYNC carries the low 16 bits of the cycle.
+        if !self
+            .liveness
+            .on_reply(index, reply.sync_echo, self.cycle as u16)
+        {
+            self.counters.stale_replies = self.counters.stale_replies.wrapping_add(1);
+            return;
+        }
+        self.nodes.store(from, reply);
+        if let Some(count) = reply.wheel_position() {
+            match from.raw() {
+                7 => self.odometry.update(Side::Left, count),
+                8 => self.odometry.update(Side::Right, count),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Bytes of a message from the master. Empty only if it could not be encoded,
+/// which the sizes of all messages exclude.
+pub(super) fn frame_of(message: &Message, destination: Address, sequence: u16) -> TxBytes {
+    let mut out = [0_u8; MAX_ENCODED];
+    let envelope = Envelope {
+        source: Address::MASTER,
+        destination,
+        sequence,
+    };
+    match message.emit(envelope, &mut out) {
+        Ok(bytes) => TxBytes::from_slice(bytes).unwrap_or_default(),
+        Err(_) => TxBytes::new(),
+    }
+}

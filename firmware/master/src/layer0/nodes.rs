@@ -1,0 +1,153 @@
+//! What layer 0 knows about each node: identity and last reply.
+
+use wheeleg_protocol::{Address, BoardKind, Identity, NodeMode, SlotReply};
+
+use crate::dispatcher::Refusal;
+use crate::setpoint::NODES;
+
+/// Result of asking a node who it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Enumerated {
+    /// Not answered yet.
+    #[default]
+    Unknown,
+    /// Fits.
+    Ready(Identity),
+    /// Speaks another version of the interface.
+    Schema(Identity),
+    /// Not the kind of board its address stands for, or the straps say otherwise.
+    Role(Identity),
+}
+
+/// One node.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Node {
+    /// Who it is.
+    pub enumerated: Enumerated,
+    /// Its reply in the last cycle, if it answered.
+    pub reply: Option<SlotReply>,
+    /// Its last reply ever.
+    pub last: Option<SlotReply>,
+}
+
+/// All nodes, index 0..8 for addresses 1..=8.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Nodes {
+    nodes: [Node; NODES],
+}
+
+impl Nodes {
+    /// Node index 0..8.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<&Node> {
+        self.nodes.get(index)
+    }
+
+    /// All nodes with their addresses.
+    pub fn iter(&self) -> impl Iterator<Item = (Address, &Node)> {
+        Address::nodes().zip(&self.nodes)
+    }
+
+    /// Forgets the replies of the last cycle.
+    pub fn begin_cycle(&mut self) {
+        for node in &mut self.nodes {
+            node.reply = None;
+        }
+    }
+
+    /// Stores a reply; nothing if the address is no node's.
+    pub fn store(&mut self, from: Address, reply: SlotReply) {
+        if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
+            node.reply = Some(reply);
+            node.last = Some(reply);
+        }
+    }
+
+    /// Stores an identity after checking it against the master's schema hash.
+    pub fn identify(&mut self, from: Address, identity: Identity, schema_hash: u64) -> Enumerated {
+        let kind = if from.is_joint() {
+            BoardKind::Joint
+        } else {
+            BoardKind::Wheel
+        };
+        let result = if identity.schema_hash != schema_hash {
+            Enumerated::Schema(identity)
+        } else if identity.board != kind || identity.address != from {
+            Enumerated::Role(identity)
+        } else {
+            Enumerated::Ready(identity)
+        };
+        if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
+            node.enumerated = result;
+        }
+        result
+    }
+
+    /// Forgets who a node is (it was lost and may have been replaced or reset).
+    pub fn forget(&mut self, index: usize) {
+        if let Some(node) = self.nodes.get_mut(index) {
+            *node = Node::default();
+        }
+    }
+
+    /// First node at or after index `from` (cyclically) that has not said who it is.
+    #[must_use]
+    pub fn next_unknown(&self, from: usize) -> Option<Address> {
+        let unknown = |(address, node): (Address, &Node)| {
+            (node.enumerated == Enumerated::Unknown).then_some(address)
+        };
+        let later = self.iter().skip(from).find_map(unknown);
+        later.or_else(|| self.iter().find_map(unknown))
+    }
+
+    /// Why the robot cannot be armed, if it cannot: the first node that is
+    /// missing, incompatible, misplaced or faulty.
+    #[must_use]
+    pub fn bar_to_arming(&self, alive: impl Fn(usize) -> bool, master: u64) -> Option<Refusal> {
+        self.iter()
+            .enumerate()
+            .find_map(|(index, (address, node))| {
+                let address = address.raw();
+                match node.enumerated {
+                    Enumerated::Schema(identity) => Some(Refusal::SchemaMismatch {
+                        node: address,
+                        master,
+                        theirs: identity.schema_hash,
+                    }),
+                    Enumerated::Role(_) => Some(Refusal::WrongRole { node: address }),
+                    Enumerated::Unknown => Some(Refusal::NodeMissing { node: address }),
+                    Enumerated::Ready(_) if !alive(index) => {
+                        Some(Refusal::NodeMissing { node: address })
+                    }
+                    Enumerated::Ready(_) => self.fault_of(index),
+                }
+            })
+    }
+
+    fn fault_of(&self, index: usize) -> Option<Refusal> {
+        let (node, address) = self.get(index).zip(Address::of_slot(index))?;
+        let faults = node.last?.active_faults;
+        (!faults.is_empty()).then_some(Refusal::NodeFault {
+            node: address.raw(),
+            faults: faults.raw(),
+        })
+    }
+
+    /// First node with an active fault: address and fault bits.
+    #[must_use]
+    pub fn first_fault(&self) -> Option<(u8, u16)> {
+        self.iter().find_map(|(address, node)| {
+            let faults = node.last?.active_faults;
+            (!faults.is_empty()).then_some((address.raw(), faults.raw()))
+        })
+    }
+
+    /// Whether every node's last reply shows a closed loop.
+    #[must_use]
+    pub fn all_armed(&self) -> bool {
+        self.nodes.iter().all(|node| {
+            node.last
+                .is_some_and(|reply| matches!(reply.mode, NodeMode::Armed | NodeMode::Tracking))
+        })
+    }
+}

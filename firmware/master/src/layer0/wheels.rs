@@ -1,0 +1,119 @@
+//! References of the two wheels, and wheel units.
+
+use wheeleg_protocol::{Acceleration8p8, Speed7, WheelSetpoint};
+use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
+
+use super::odometry::{Odometry, WheelGeometry};
+use crate::config::WheelDrive;
+use crate::contact::Side;
+use crate::layer1::mm_to_um;
+use crate::setpoint::{TravelSetpoint, WHEELS};
+
+/// Conversions between distance and the wheel controller's counts and samples.
+#[derive(Clone, Copy, Debug)]
+pub struct WheelUnits {
+    /// Wheels and encoders.
+    pub geometry: WheelGeometry,
+    /// Sample time of the wheel controller, µs.
+    pub sample_us: u32,
+}
+
+impl WheelUnits {
+    /// Counts per sample of a speed at the rim.
+    fn per_sample(&self, speed: VelocityMmS) -> f32 {
+        let g = self.geometry;
+        let counts_per_um = g.counts_per_revolution as f32 / (g.circumference_um as f32).max(1.0);
+        // mm/s × 1000 µm/mm × counts/µm × s per sample
+        speed.get().to_num::<f32>() * 1.0e-3 * counts_per_um * self.sample_us as f32
+    }
+
+    /// Largest speed of a profile: nearest whole count per sample, 1..=127.
+    #[must_use]
+    pub fn speed(&self, speed: VelocityMmS) -> Speed7 {
+        let counts = libm::roundf(self.per_sample(speed)).clamp(1.0, 127.0);
+        Speed7::new(counts as u8).unwrap_or_default()
+    }
+
+    /// Acceleration of a profile: nearest 1/256 count per sample², at least one.
+    #[must_use]
+    pub fn acceleration(&self, mm_s2: fixed::types::I16F16) -> Acceleration8p8 {
+        let per_s = self.per_sample(VelocityMmS::new(mm_s2));
+        let raw = per_s * self.sample_us as f32 * 1.0e-6 * 256.0;
+        Acceleration8p8::new(libm::roundf(raw).clamp(1.0, 32767.0) as u16).unwrap_or_default()
+    }
+
+    /// Velocity in 12.4 counts per sample, nearest, saturating.
+    #[must_use]
+    pub fn velocity_raw(&self, speed: VelocityMmS) -> i16 {
+        libm::roundf(self.per_sample(speed) * 16.0) as i16
+    }
+}
+
+/// References sent to the wheels.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wheels {
+    /// Where the motion under way began, per wheel.
+    origin: [Option<WheelCount>; WHEELS],
+    /// Last reference sent, per wheel.
+    sent: [Option<WheelCount>; WHEELS],
+    segment: Option<u16>,
+}
+
+impl Wheels {
+    /// Forgets everything: the next motion begins where the wheels are.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The slot of one wheel for this cycle; `None` while its count is unknown.
+    ///
+    /// A new segment begins at the last reference sent, so that errors do not
+    /// add up; the very first at the measured count.
+    pub fn setpoint(
+        &mut self,
+        side: Side,
+        travel: &TravelSetpoint,
+        drive: WheelDrive,
+        odometry: &Odometry,
+        units: &WheelUnits,
+    ) -> Option<WheelSetpoint> {
+        if self.segment != Some(travel.segment) {
+            self.segment = Some(travel.segment);
+            self.origin = [None; WHEELS];
+        }
+        let measured = odometry.raw(side);
+        let origin = self.origin.get_mut(side.index())?;
+        let sent = self.sent.get_mut(side.index())?;
+        let begin = match *origin {
+            Some(begin) => begin,
+            None => {
+                let begin = sent.or(measured)?;
+                *origin = Some(begin);
+                begin
+            }
+        };
+        let (distance, velocity_raw) = match drive {
+            WheelDrive::Profile => (travel.target_mm, 0),
+            WheelDrive::Stream => (travel.travel_mm, units.velocity_raw(travel.velocity_mm_s)),
+        };
+        let counts = units.geometry.um_to_counts(mm_to_um(distance));
+        let reference = begin.wrapping_add(i32::try_from(counts).unwrap_or(0));
+        *sent = Some(reference);
+        Some(WheelSetpoint {
+            reference,
+            velocity_raw,
+            track: true,
+        })
+    }
+
+    /// Distance of a motion of `travel_mm` in its own segment.
+    #[must_use]
+    pub const fn direct(travel_mm: PositionMm, segment: u16) -> TravelSetpoint {
+        TravelSetpoint {
+            travel_mm,
+            target_mm: travel_mm,
+            velocity_mm_s: VelocityMmS::ZERO,
+            segment,
+        }
+    }
+}
