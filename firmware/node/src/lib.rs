@@ -14,7 +14,7 @@
 //! argument: the low 32 bits of a microsecond counter, compared modulo 2^32.
 //!
 //! Nothing here panics for any input, allocates, blocks or uses floating point.
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),
     deny(
@@ -40,6 +40,7 @@ pub mod sensor;
 pub mod snapshot;
 pub mod supervisor;
 mod transmission;
+pub mod wheel;
 
 pub use board::NodeIdentity;
 pub use transmission::Transmission;

@@ -146,11 +146,11 @@ pub trait ModeRules: Sized {
     fn may_drive(self) -> bool;
 
     /// Whether the mode is left by an explicit clear only.
-    fn is_latched(self) -> bool;
+    fn is_latched(&self) -> bool;
 
     /// Whether nothing is energised and nothing is about to be: parameters
     /// marked "disarmed only" may be set, maintenance may run.
-    fn is_disarmed(self) -> bool;
+    fn is_disarmed(&self) -> bool;
 }
 
 impl ModeRules for Mode {
@@ -166,11 +166,110 @@ impl ModeRules for Mode {
         matches!(self, Mode::Armed | Mode::Tracking)
     }
 
-    fn is_latched(self) -> bool {
+    fn is_latched(&self) -> bool {
         matches!(self, Mode::Hold | Mode::Exhaust | Mode::Fault)
     }
 
-    fn is_disarmed(self) -> bool {
+    fn is_disarmed(&self) -> bool {
         matches!(self, Mode::Boot | Mode::Idle | Mode::Fault)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pair, written down a second time: modes by initial
+    /// (Boot, Idle, Armed, Tracking, Hold, Exhaust, Fault), refusals by sign.
+    /// `-` not applicable, `!` latched, `r` not ready, `d` not disarmed.
+    const EXPECTED: [(Event, &str); 16] = [
+        (Event::SelfTestPassed, "I------"),
+        (Event::SelfTestFailed, "F------"),
+        (Event::Arm, "rAAT!!!"),
+        (Event::Disarm, "BIII!!!"),
+        (Event::ClearFault, "BIATIIB"),
+        (Event::SetpointValid, "--TT---"),
+        (Event::SetpointWithdrawn, "--AA---"),
+        (Event::EmergencyBrake, "BHHHHHF"),
+        (Event::EmergencyStop, "BHHHHHF"),
+        (Event::LinkLost, "BIHHHEF"),
+        (Event::AxisFault, "BIHHHEF"),
+        (Event::BoardFault, "FFFFFFF"),
+        (Event::OpenAllValves, "rEEEEE!"),
+        (Event::BlowThrough, "rEddddd"),
+        (Event::StageExhaust, "----EE-"),
+        (Event::BlowThroughOver, "-----I-"),
+    ];
+
+    fn sign(entry: Result<Mode, Refusal>) -> char {
+        match entry {
+            Ok(mode) => mode.name().chars().next().unwrap(),
+            Err(Refusal::NotApplicable) => '-',
+            Err(Refusal::Latched) => '!',
+            Err(Refusal::NotReady) => 'r',
+            Err(Refusal::NotDisarmed) => 'd',
+            Err(refusal) => panic!("{refusal:?} is not the table's to give"),
+        }
+    }
+
+    #[test]
+    fn every_pair_is_as_written() {
+        for (index, (event, row)) in EXPECTED.into_iter().enumerate() {
+            assert_eq!(event, EVENTS[index]);
+            assert_eq!(event as usize, index);
+            let actual: String = Mode::ALL
+                .iter()
+                .map(|mode| sign(mode.after(event)))
+                .collect();
+            assert_eq!(actual, row, "{event:?}");
+        }
+    }
+
+    #[test]
+    fn only_arming_leads_to_a_driving_mode() {
+        for mode in Mode::ALL {
+            for event in EVENTS {
+                let Ok(next) = mode.after(event) else {
+                    continue;
+                };
+                if next.may_drive() && !mode.may_drive() {
+                    assert_eq!((event, *mode), (Event::Arm, Mode::Idle));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn latched_modes_end_with_an_explicit_clear_only() {
+        for mode in Mode::ALL.iter().filter(|mode| mode.is_latched()) {
+            for event in EVENTS {
+                let Ok(next) = mode.after(event) else {
+                    continue;
+                };
+                let ends = !next.is_latched();
+                // A blow-through is a command of its own, not a stop.
+                let allowed = matches!(event, Event::ClearFault | Event::BlowThroughOver);
+                assert!(!ends || allowed, "{mode:?} {event:?} {next:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_fault_event_has_an_answer_in_every_mode() {
+        use Event::{AxisFault, BoardFault, EmergencyBrake, EmergencyStop, LinkLost};
+        for mode in Mode::ALL {
+            for event in [
+                AxisFault,
+                BoardFault,
+                EmergencyBrake,
+                EmergencyStop,
+                LinkLost,
+            ] {
+                assert!(
+                    !mode.after(event).unwrap().may_drive(),
+                    "{mode:?} {event:?}"
+                );
+            }
+        }
     }
 }

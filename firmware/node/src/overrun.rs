@@ -58,6 +58,11 @@ impl OverrunDetector {
         overrun
     }
 
+    /// The period changes: the next start is taken as it comes.
+    pub fn restart(&mut self) {
+        self.start = None;
+    }
+
     /// Longest tick so far.
     pub const fn longest(&self) -> Micros {
         self.longest

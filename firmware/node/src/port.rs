@@ -59,10 +59,11 @@ impl BusPort {
                 message,
             ));
         }
-        if envelope.destination == Address::BROADCAST && envelope.source == Address::MASTER {
-            if let Ok(Message::Sync(sync)) = Message::parse(&frame) {
-                return Some(Incoming::Sync(sync));
-            }
+        if envelope.destination == Address::BROADCAST
+            && envelope.source == Address::MASTER
+            && let Ok(Message::Sync(sync)) = Message::parse(&frame)
+        {
+            return Some(Incoming::Sync(sync));
         }
         None
     }

@@ -89,3 +89,20 @@ impl JointSnapshot {
         }
     }
 }
+
+impl WheelSnapshot {
+    /// Before the first sample.
+    pub(crate) fn at_boot() -> Self {
+        Self {
+            at: Micros::ZERO,
+            mode: Mode::Boot,
+            count: WheelCount::ZERO,
+            control: WheelOutput::default(),
+            drive_percent: 0,
+            supply_present: false,
+            dump_open: false,
+            faults: FaultBits::NONE,
+            limits: LimitBits::NONE,
+        }
+    }
+}

@@ -274,6 +274,11 @@ impl Supervisor {
         }
     }
 
+    /// The tick period changes: the next tick starts a new measurement.
+    pub fn restart_timing(&mut self) {
+        self.overrun.restart();
+    }
+
     /// Clears latched faults and leaves the latched stop, unless a cause stands.
     pub fn clear(&mut self, healthy: bool, at: Micros) -> Result<Mode, Refusal> {
         if !healthy || self.emergency {

@@ -1,0 +1,11 @@
+//! The wheel board: one DC motor with encoder under the HCTL-1100's control
+//! laws; on the first wheel also the supply-pressure switch and the dump valve.
+
+mod encoder;
+mod motion;
+mod node;
+mod requests;
+mod settings;
+
+pub use node::WheelNode;
+pub use settings::WheelSettings;

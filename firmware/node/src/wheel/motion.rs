@@ -1,0 +1,137 @@
+//! From the set-points of the bus to commands of the wheel controller.
+//!
+//! Position mode: the wanted position moves on with the velocity of its
+//! set-point for at most one bus cycle; the command follows it by at most the
+//! maximum speed per sample, and starts at the actual position when the board
+//! arms. Trapezoidal mode: a changed reference starts a profile as soon as none
+//! runs. Velocity modes: the velocity of the set-point.
+
+use super::settings::WheelSettings;
+use wheeleg_control::wheel::{WheelCommand, WheelController, WheelMode, WheelVelocity};
+use wheeleg_protocol::{WheelControlMode, WheelSetpoint};
+use wheeleg_units::WheelCount;
+
+/// What the bus wants of the wheel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Target {
+    pub(super) position: WheelCount,
+    /// 12.4 counts per sample.
+    pub(super) velocity_raw: i16,
+    age: u32,
+}
+
+impl Target {
+    /// Stand still at `position`.
+    pub(super) const fn at(position: WheelCount) -> Self {
+        Self {
+            position,
+            velocity_raw: 0,
+            age: 0,
+        }
+    }
+
+    /// Turn at a velocity.
+    pub(super) const fn turning(position: WheelCount, velocity_raw: i16) -> Self {
+        Self {
+            position,
+            velocity_raw,
+            age: 0,
+        }
+    }
+
+    pub(super) const fn from_setpoint(setpoint: &WheelSetpoint) -> Self {
+        Self {
+            position: setpoint.reference,
+            velocity_raw: setpoint.velocity_raw,
+            age: 0,
+        }
+    }
+
+    /// Wanted position of this sample, then one sample older.
+    fn advance(&mut self, cycle_ticks: u32) -> WheelCount {
+        let samples = i64::from(self.age.min(cycle_ticks));
+        let sixteenths = i64::from(self.velocity_raw).saturating_mul(samples);
+        let counts = i32::try_from(sixteenths.wrapping_shr(4)).unwrap_or(0);
+        self.age = self.age.saturating_add(1);
+        self.position.wrapping_add(counts)
+    }
+}
+
+/// What limited the command of this sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct MotionLimits {
+    /// The command was slowed to the maximum speed, or the velocity step to
+    /// what the controller takes.
+    pub(super) rate: bool,
+}
+
+/// Puts the controller into `mode`, standing still at the actual position.
+///
+/// Trapezoidal mode stands in position control until a profile is started.
+pub(super) fn engage(controller: &mut WheelController, mode: WheelControlMode, actual: WheelCount) {
+    let enter = match mode {
+        WheelControlMode::Idle => WheelMode::Idle,
+        WheelControlMode::Position | WheelControlMode::Trapezoidal => WheelMode::Position,
+        WheelControlMode::ProportionalVelocity => WheelMode::ProportionalVelocity,
+        WheelControlMode::IntegralVelocity => WheelMode::IntegralVelocity,
+    };
+    // From idle, with a sample timer that the settings have checked, none of
+    // these is refused; if one were, the controller would stay in idle, which
+    // drives nothing.
+    let _ = controller.apply(WheelCommand::Idle);
+    let _ = controller.apply(WheelCommand::Position(actual));
+    let _ = controller.apply(WheelCommand::FinalPosition(actual));
+    let _ = controller.apply(WheelCommand::Velocity(WheelVelocity::ZERO));
+    let _ = controller.apply(WheelCommand::Enter(enter));
+}
+
+/// Gives the controller the command of this sample.
+pub(super) fn command(
+    controller: &mut WheelController,
+    mode: WheelControlMode,
+    target: &mut Target,
+    settings: &WheelSettings,
+) -> MotionLimits {
+    let mut limits = MotionLimits::default();
+    match mode {
+        WheelControlMode::Idle => {}
+        WheelControlMode::Position => {
+            let wanted = target.advance(settings.cycle_ticks);
+            let present = controller.command();
+            let distance = wanted.wrapping_difference(present);
+            let speed = i32::from(settings.max_speed);
+            let step = distance.clamp(speed.saturating_neg(), speed);
+            limits.rate = step != distance;
+            let _ = controller.apply(WheelCommand::Position(present.wrapping_add(step)));
+        }
+        WheelControlMode::Trapezoidal => {
+            let arrived = controller.command() == target.position;
+            if controller.mode() == WheelMode::Position && !arrived {
+                let _ = controller.apply(WheelCommand::FinalPosition(target.position));
+                let _ = controller.apply(WheelCommand::Enter(WheelMode::Trapezoidal));
+            }
+        }
+        WheelControlMode::ProportionalVelocity => {
+            let velocity = WheelVelocity::from_bits(target.velocity_raw);
+            let _ = controller.apply(WheelCommand::Velocity(velocity));
+        }
+        WheelControlMode::IntegralVelocity => {
+            let wanted = whole_velocity(target.velocity_raw);
+            if controller
+                .apply(WheelCommand::IntegralVelocity(wanted))
+                .is_err()
+            {
+                // Too large a step for the chip: by way of zero.
+                limits.rate = true;
+                let _ = controller.apply(WheelCommand::IntegralVelocity(0));
+            }
+        }
+    }
+    limits
+}
+
+/// 12.4 counts per sample as whole counts, rounded toward −∞, −128…127.
+pub(super) fn whole_velocity(velocity_raw: i16) -> i8 {
+    let whole = velocity_raw.wrapping_shr(4);
+    i8::try_from(whole).unwrap_or(if whole < 0 { i8::MIN } else { i8::MAX })
+}
