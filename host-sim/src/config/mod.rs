@@ -3,7 +3,9 @@
 
 pub mod builtin;
 mod error;
+mod node;
 mod params;
+mod plant;
 mod quantity;
 mod reader;
 mod robot;
@@ -11,6 +13,7 @@ mod scenario;
 mod suggest;
 
 pub use error::{ConfigError, Problem};
+pub use node::NodeParams;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use robot::{BusParams, GaitParams, ReferenceParams, RobotConfig};

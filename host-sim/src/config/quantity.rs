@@ -9,6 +9,8 @@ pub enum Dimension {
     Count,
     /// Yes or no.
     Flag,
+    /// Least significant bits of a converter.
+    Lsb,
     /// Length.
     Length,
     /// Area.
@@ -97,6 +99,7 @@ impl Dimension {
             Self::Number => &[("1", 1.0), ("%", 0.01)],
             Self::Count => &[("count", 1.0), ("bit", 1.0), ("byte", 1.0)],
             Self::Flag => &[("flag", 1.0)],
+            Self::Lsb => &[("LSB", 1.0)],
             Self::Length => &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)],
             Self::Area => &[("m2", 1.0), ("cm2", 1e-4), ("mm2", 1e-6)],
             Self::Volume => &[("m3", 1.0), ("dm3", 1e-3), ("cm3", 1e-6), ("mm3", 1e-9)],

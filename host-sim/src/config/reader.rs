@@ -84,19 +84,6 @@ impl Reader {
         Some(item)
     }
 
-    /// Whether something stands at `path`.
-    pub(crate) fn has(&self, path: &str) -> bool {
-        self.item(path).is_some()
-    }
-
-    /// Names of the entries of the table at `path`.
-    pub(crate) fn keys(&self, path: &str) -> Vec<String> {
-        self.item(path)
-            .and_then(Item::as_table_like)
-            .map(|t| t.iter().map(|(k, _)| k.to_owned()).collect())
-            .unwrap_or_default()
-    }
-
     /// Number of entries of the array of tables at `path`; a wrong type is a
     /// problem, absence is zero.
     pub(crate) fn array_len(&mut self, path: &str) -> usize {
@@ -302,6 +289,69 @@ impl Reader {
             doc: spec.doc,
         });
         Some(written.into_iter().map(|v| v * factor).collect())
+    }
+
+    /// Reads a quantity that has exactly one unit: value, position of the
+    /// value, source.
+    pub(crate) fn table_quantity(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        unit: &str,
+        doc: &str,
+    ) -> Option<(f64, Range<usize>, String)> {
+        let path = entry.field_path(key);
+        let (key_span, item) = entry.get(key)?;
+        let example = format!("write `{key} = {{ value = …, unit = \"{unit}\", source = \"…\" }}`");
+        let Some(table) = item.as_table_like() else {
+            let span = item.span().or(Some(key_span));
+            let message = format!("`{path}` has no unit; accepted: \"{unit}\"");
+            self.problem(span, message, "a bare value", Some(example));
+            return None;
+        };
+        let inner = Entry {
+            path: path.clone(),
+            fields: fields(table),
+            span: item.span().unwrap_or(key_span),
+        };
+        self.reject_unknown(&inner, &["value", "unit", "source"]);
+        let source = self.source(&inner);
+        let value = inner.get("value");
+        let number_found = value.as_ref().and_then(|(_, v)| number(v.as_value()));
+        let Some((value, number_found)) = value.zip(number_found) else {
+            let message = format!("`{path}` needs a number as its value, in {unit}");
+            self.problem(
+                Some(inner.span.clone()),
+                message,
+                "no number",
+                Some(example),
+            );
+            return None;
+        };
+        let written = inner.get("unit");
+        if written.as_ref().and_then(|(_, u)| u.as_str()) != Some(unit) {
+            let span = written
+                .and_then(|(k, i)| i.span().or(Some(k)))
+                .unwrap_or(inner.span);
+            let message = format!(
+                "`{path}` (value {}) is in another unit; accepted: \"{unit}\"",
+                pretty(number_found)
+            );
+            self.problem(
+                Some(span),
+                message,
+                "wrong unit",
+                Some(format!("{path}: {doc}")),
+            );
+            return None;
+        }
+        let span = value.1.span().unwrap_or(value.0);
+        Some((number_found, span, source))
+    }
+
+    /// Adds a parameter to the listing.
+    pub(crate) fn list(&mut self, info: ParameterInfo) {
+        self.parameters.push(info);
     }
 
     fn source(&mut self, inner: &Entry) -> String {

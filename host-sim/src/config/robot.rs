@@ -1,7 +1,11 @@
 //! A robot: everything about the machine that a run needs, in SI units.
 
+use wheeleg_plant::PlantParams;
+
 use super::error::ConfigError;
+use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
+use super::plant;
 use super::reader::Reader;
 
 params! {
@@ -85,11 +89,13 @@ pub struct RobotConfig {
     pub gait: GaitParams,
     /// Reference model of the paper's figures.
     pub reference: ReferenceParams,
+    /// Plant: pneumatics, motors, sensors, mechanism.
+    pub plant: PlantParams,
+    /// Board parameters that differ from the boards' defaults.
+    pub node: NodeParams,
     /// Every parameter as written, for listings and reports.
     pub parameters: Vec<ParameterInfo>,
 }
-
-const SECTIONS: [&str; 5] = ["name", "description", "bus", "gait", "reference"];
 
 impl RobotConfig {
     /// Reads a robot from TOML text; `file` is the name for messages.
@@ -102,13 +108,17 @@ impl RobotConfig {
         let mut r = Reader::parse(&what, file, text, true)?;
         let top = r.table("");
         if let Some(top) = &top {
-            r.reject_unknown(top, &SECTIONS);
+            let mut known = vec!["name", "description", "bus", "gait", "reference", "node"];
+            known.extend(plant::SECTIONS);
+            r.reject_unknown(top, &known);
         }
         let name = top.as_ref().and_then(|t| r.text(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let bus = r.section::<BusParams>("bus");
         let gait = r.section::<GaitParams>("gait");
         let reference = r.section::<ReferenceParams>("reference");
+        let plant = plant::read(&mut r);
+        let node = node::read(&mut r);
         let robot = (|| {
             Some(Self {
                 name: name?,
@@ -116,6 +126,8 @@ impl RobotConfig {
                 bus: bus?,
                 gait: gait?,
                 reference: reference?,
+                plant: plant?,
+                node,
                 parameters: Vec::new(),
             })
         })();

@@ -1,0 +1,112 @@
+//! Board parameters set by a robot file, by the names of the protocol's tables.
+
+use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
+
+use super::params::ParameterInfo;
+use super::quantity::pretty;
+use super::reader::{Entry, Reader};
+
+/// Parameters that the master sends to the boards before arming, as raw
+/// numbers of the wire format.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NodeParams {
+    /// Per joint 1 to 6: (number, raw value), ascending.
+    pub joints: [Vec<(u16, i32)>; 6],
+    /// Per wheel 7, 8.
+    pub wheels: [Vec<(u16, i32)>; 2],
+}
+
+/// Names of the sections, and the joints (index from 0) that each sets. Later
+/// sections replace what earlier ones set.
+const JOINT_SECTIONS: [(&str, &[usize]); 4] = [
+    ("joint", &[0, 1, 2, 3, 4, 5]),
+    ("yaw", &[0, 3]),
+    ("horizontal", &[1, 4]),
+    ("vertical", &[2, 5]),
+];
+
+/// Reads `[node.joint]`, `[node.yaw]`, `[node.horizontal]`, `[node.vertical]`
+/// and `[node.wheel]`. What is not set keeps the board's default.
+pub(super) fn read(r: &mut Reader) -> NodeParams {
+    let mut params = NodeParams::default();
+    let Some(top) = r.table("node") else {
+        return params;
+    };
+    r.reject_unknown(&top, &["joint", "yaw", "horizontal", "vertical", "wheel"]);
+    for (name, joints) in JOINT_SECTIONS {
+        for (id, raw) in section(r, &format!("node.{name}"), JOINT_PARAMS) {
+            for joint in joints {
+                set(&mut params.joints[*joint], id, raw);
+            }
+        }
+    }
+    for (id, raw) in section(r, "node.wheel", WHEEL_PARAMS) {
+        for wheel in &mut params.wheels {
+            set(wheel, id, raw);
+        }
+    }
+    params
+}
+
+fn set(list: &mut Vec<(u16, i32)>, id: u16, raw: i32) {
+    match list.binary_search_by_key(&id, |(id, _)| *id) {
+        Ok(at) => list[at].1 = raw,
+        Err(at) => list.insert(at, (id, raw)),
+    }
+}
+
+fn section(r: &mut Reader, path: &str, table: &'static [ParamInfo]) -> Vec<(u16, i32)> {
+    let Some(entry) = r.table(path) else {
+        return Vec::new();
+    };
+    let names: Vec<&str> = table.iter().map(|p| p.name).collect();
+    r.reject_unknown(&entry, &names);
+    table
+        .iter()
+        .filter(|p| entry.get(p.name).is_some())
+        .filter_map(|p| Some((p.id, one(r, &entry, p)?)))
+        .collect()
+}
+
+/// Converts between a parameter's unit and its raw numbers.
+fn scale(format: Format) -> f64 {
+    f64::from(format.fraction_bits()).exp2()
+}
+
+fn one(r: &mut Reader, entry: &Entry, info: &'static ParamInfo) -> Option<i32> {
+    let scale = scale(info.format);
+    let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+    let (value, span, source) = r.table_quantity(entry, info.name, info.unit, info.text)?;
+    let path = format!("{}.{}", entry.path, info.name);
+    let raw = (value * scale).round();
+    if !(f64::from(info.min)..=f64::from(info.max)).contains(&raw) {
+        r.problem(
+            Some(span),
+            format!(
+                "`{path}` = {} {unit} is out of range: allowed {} to {} {unit}",
+                pretty(value),
+                pretty(min),
+                pretty(max),
+                unit = info.unit
+            ),
+            "out of range",
+            Some(format!("{path}: {}", info.text)),
+        );
+        return None;
+    }
+    if scale == 1.0 && value.fract() != 0.0 {
+        let message = format!("`{path}` = {} must be a whole number", pretty(value));
+        r.problem(Some(span), message, "not whole", None);
+        return None;
+    }
+    r.list(ParameterInfo {
+        path,
+        value: vec![value],
+        unit: info.unit.to_owned(),
+        min,
+        max,
+        source,
+        doc: info.text,
+    });
+    Some(raw as i32)
+}

@@ -1,0 +1,469 @@
+//! The plant's parameters: sections of a robot file, and their conversion.
+
+use wheeleg_plant::PlantParams;
+use wheeleg_plant::chamber::GasModel;
+use wheeleg_plant::cylinder::CylinderParams;
+use wheeleg_plant::endstop::EndStopParams;
+use wheeleg_plant::flow::{GasParams, Iso6358};
+use wheeleg_plant::friction::FrictionParams;
+use wheeleg_plant::motor::MotorParams;
+use wheeleg_plant::sensors::{AdcNoise, AdcParams, PotentiometerParams};
+use wheeleg_plant::supply::SupplyParams;
+use wheeleg_plant::valve::ValveParams;
+
+use super::params::params;
+use super::reader::Reader;
+
+params! {
+    /// Gas and atmosphere.
+    GasSection {
+        /// Specific gas constant.
+        gas_constant: f64, "gas_constant", SpecificHeat, 1.0, 5000.0;
+        /// Ratio of specific heats.
+        heat_capacity_ratio: f64, "heat_capacity_ratio", Number, 1.0, 2.0;
+        /// Density at the reference atmosphere (ANR).
+        reference_density: f64, "reference_density", Density, 0.01, 10.0;
+        /// Temperature of the reference atmosphere (ANR).
+        reference_temperature: f64, "reference_temperature", Temperature, 200.0, 400.0;
+        /// Pressure of the reference atmosphere (ANR).
+        reference_pressure: f64, "reference_pressure", Pressure, 5e4, 2e5;
+        /// Ambient pressure, absolute.
+        ambient_pressure: f64, "ambient_pressure", Pressure, 3e4, 2e5;
+        /// Temperature of surroundings, walls and supply.
+        ambient_temperature: f64, "ambient_temperature", Temperature, 230.0, 340.0;
+    }
+
+    /// Air supply.
+    SupplySection {
+        /// Pressure before the regulator, absolute.
+        source_pressure: f64, "source_pressure", Pressure, 1e5, 3e7;
+        /// Pressure that the regulator holds at no flow, absolute.
+        set_pressure: f64, "set_pressure", Pressure, 1e5, 2e6;
+        /// Pressure below the set point at which the regulator is fully open.
+        droop: f64, "droop", Pressure, 100.0, 1e6;
+        /// Volume of reservoir and manifold.
+        reservoir: f64, "reservoir", Volume, 1e-6, 1.0;
+        /// Reservoir pressure at the start, absolute.
+        initial_pressure: f64, "initial_pressure", Pressure, 5e4, 2e6;
+        /// The pressure switch closes above this, absolute.
+        switch_on: f64, "switch_on", Pressure, 1e4, 2e6;
+        /// The pressure switch opens below this, absolute.
+        switch_off: f64, "switch_off", Pressure, 1e4, 2e6;
+    }
+
+    /// A flow path after ISO 6358.
+    FlowSection {
+        /// Sonic conductance C.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio b.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent m.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+    }
+
+    /// An on/off valve.
+    ValveSection {
+        /// Sonic conductance C of the open valve.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio b.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent m.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+        /// From energising to open.
+        t_on: f64, "t_on", Time, 0.0, 0.1;
+        /// From de-energising to shut.
+        t_off: f64, "t_off", Time, 0.0, 0.1;
+    }
+
+    /// Tube between the valves and each chamber.
+    LineSection {
+        /// Volume of the tube.
+        volume: f64, "volume", Volume, 0.0, 1e-3;
+        /// Travel time of the pressure wave.
+        delay: f64, "delay", Time, 0.0, 0.007;
+        /// Wall area of tube and dead volume for heat exchange.
+        wall_area: f64, "wall_area", Area, 0.0, 1.0;
+        /// Sonic conductance of the tube.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio of the tube.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent of the tube.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+    }
+
+    /// A cylinder.
+    CylinderSection {
+        /// Bore.
+        bore: f64, "bore", Length, 0.004, 0.2;
+        /// Diameter of the rod.
+        rod: f64, "rod", Length, 0.0, 0.2;
+        /// Stroke between the stops.
+        stroke: f64, "stroke", Length, 0.001, 2.0;
+        /// Dead volume at the end of chamber A.
+        dead_volume_a: f64, "dead_volume_a", Volume, 1e-8, 1e-3;
+        /// Dead volume at the end of chamber B.
+        dead_volume_b: f64, "dead_volume_b", Volume, 1e-8, 1e-3;
+        /// Leak past the piston seal.
+        piston_leak: f64, "piston_leak", SonicConductance, 0.0, 1e-9;
+        /// Leak past the rod seal.
+        rod_leak: f64, "rod_leak", SonicConductance, 0.0, 1e-9;
+        /// Factor on the switching times of fill A, vent A, fill B, vent B.
+        timing_spread: [f64; 4], "timing_spread", Number, 0.1, 10.0;
+        /// Polytropic exponent of the gas in the chambers.
+        exponent: f64, "exponent", Number, 1.0, 1.7;
+    }
+
+    /// Seal friction (LuGre type with an elastic share).
+    FrictionSection {
+        /// Coulomb force.
+        coulomb: f64, "coulomb", Force, 0.0, 500.0;
+        /// Break-away force.
+        static_force: f64, "static", Force, 0.0, 500.0;
+        /// Stribeck velocity.
+        stribeck: f64, "stribeck", Velocity, 1e-4, 1.0;
+        /// Viscous coefficient.
+        viscous: f64, "viscous", Damping, 0.0, 1000.0;
+        /// Bristle stiffness.
+        bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1e3, 1e6;
+        /// Bristle damping.
+        bristle_damping: f64, "bristle_damping", Damping, 0.0, 2000.0;
+        /// Share of the steady bristle deflection that is purely elastic.
+        elastic_share: f64, "elastic_share", Number, 0.0, 0.95;
+    }
+
+    /// End stops of a cylinder.
+    EndStopSection {
+        /// Stiffness of the hard stop.
+        stiffness: f64, "stiffness", Stiffness, 1e4, 1e7;
+        /// Hunt–Crossley damping factor.
+        damping: f64, "damping", PerVelocity, 0.0, 50.0;
+        /// Length of the cushion before each stop.
+        cushion_length: f64, "cushion_length", Length, 0.0, 0.05;
+        /// Damping of the cushion at the stop.
+        cushion_damping: f64, "cushion_damping", Damping, 0.0, 2000.0;
+    }
+
+    /// State of a cylinder at the start.
+    StartSection {
+        /// Stroke.
+        stroke: f64, "stroke", Length, 0.0, 0.18;
+        /// Pressure of chamber A, absolute.
+        pressure_a: f64, "pressure_a", Pressure, 1e4, 2e6;
+        /// Pressure of chamber B, absolute.
+        pressure_b: f64, "pressure_b", Pressure, 1e4, 2e6;
+    }
+
+    /// A wheel motor with its gear.
+    MotorSection {
+        /// Voltage of the bridge.
+        supply: f64, "supply", Voltage, 1.0, 60.0;
+        /// Winding, brushes and bridge.
+        resistance: f64, "resistance", Resistance, 0.01, 100.0;
+        /// Winding inductance.
+        inductance: f64, "inductance", Inductance, 0.0, 1.0;
+        /// Torque constant, equal to the EMF constant.
+        torque_constant: f64, "torque_constant", TorqueConstant, 1e-4, 1.0;
+        /// Reduction from motor to wheel.
+        reduction: f64, "reduction", Number, 1.0, 10_000.0;
+        /// Efficiency of gear and chain.
+        efficiency: f64, "efficiency", Number, 0.2, 1.0;
+        /// Motor speed over which the efficiency changes from driving to driven.
+        efficiency_blend: f64, "efficiency_blend", AngularVelocity, 0.01, 100.0;
+        /// Brush and bearing friction at the motor shaft.
+        friction: f64, "friction", Torque, 0.0, 1.0;
+        /// Motor speed over which that friction reverses.
+        friction_blend: f64, "friction_blend", AngularVelocity, 0.01, 100.0;
+        /// Encoder lines on the motor shaft, four edges each.
+        encoder_lines: u32, "encoder_lines", Count, 1.0, 10_000.0;
+    }
+
+    /// Position sensor of a joint.
+    PotentiometerSection {
+        /// Wiper travel over the whole electrical range.
+        electrical_stroke: f64, "electrical_stroke", Length, 0.001, 2.0;
+        /// Wiper position at stroke zero.
+        offset: f64, "offset", Length, -0.1, 0.1;
+        /// Gain error; 1 is ideal.
+        gain: f64, "gain", Number, 0.8, 1.2;
+        /// Independent linearity, share of the electrical stroke.
+        nonlinearity: f64, "nonlinearity", Number, 0.0, 0.05;
+    }
+
+    /// Converter of the position sensors.
+    AdcSection {
+        /// Resolution of one conversion.
+        bits: u32, "bits", Count, 8.0, 16.0;
+        /// Conversions averaged in one reading.
+        oversampling: u32, "oversampling", Count, 1.0, 256.0;
+        /// Standard deviation of one conversion, in its least significant bits; Gaussian.
+        noise: f64, "noise", Lsb, 0.0, 100.0;
+    }
+
+    /// Numerics of the plant.
+    NumericsSection {
+        /// Length of a full step; steps are cut at every valve edge.
+        step: f64, "step", Time, 1e-6, 1e-3;
+    }
+}
+
+/// Names of the plant's sections.
+pub(super) const SECTIONS: [&str; 14] = [
+    "gas",
+    "supply",
+    "regulator",
+    "dump_valve",
+    "fill_valve",
+    "vent_valve",
+    "line",
+    "cylinder",
+    "friction",
+    "end_stop",
+    "start",
+    "motor",
+    "sensor",
+    "numerics",
+];
+
+fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {
+    Iso6358 {
+        conductance_m3_s_pa: c,
+        critical_ratio: b,
+        subsonic_exponent: m,
+        linear_ratio: linear,
+    }
+}
+
+fn valve(v: &ValveSection) -> ValveParams {
+    ValveParams {
+        flow: iso(
+            v.conductance,
+            v.critical_ratio,
+            v.subsonic_exponent,
+            v.linear_ratio,
+        ),
+        t_on_s: v.t_on,
+        t_off_s: v.t_off,
+    }
+}
+
+/// Reads all sections of the plant.
+pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
+    let gas = r.section::<GasSection>("gas");
+    let supply = r.section::<SupplySection>("supply");
+    let regulator = r.section::<FlowSection>("regulator");
+    let dump_valve = r.section::<ValveSection>("dump_valve");
+    let fill_valve = r.section::<ValveSection>("fill_valve");
+    let vent_valve = r.section::<ValveSection>("vent_valve");
+    let line = r.section::<LineSection>("line");
+    let cylinder = r.section::<CylinderSection>("cylinder");
+    let friction = r.section::<FrictionSection>("friction");
+    let end_stop = r.section::<EndStopSection>("end_stop");
+    if let Some(start) = r.table("start") {
+        r.reject_unknown(&start, &["yaw", "horizontal", "vertical"]);
+    }
+    let yaw = r.section::<StartSection>("start.yaw");
+    let horizontal = r.section::<StartSection>("start.horizontal");
+    let vertical = r.section::<StartSection>("start.vertical");
+    let motor = r.section::<MotorSection>("motor");
+    if let Some(sensor) = r.table("sensor") {
+        r.reject_unknown(&sensor, &["potentiometer", "adc"]);
+    }
+    let potentiometer = r.section::<PotentiometerSection>("sensor.potentiometer");
+    let adc = r.section::<AdcSection>("sensor.adc");
+    let numerics = r.section::<NumericsSection>("numerics");
+
+    let base = cylinder_params(
+        &cylinder?,
+        &line?,
+        &fill_valve?,
+        &vent_valve?,
+        &friction?,
+        &end_stop?,
+    );
+    let starts = [yaw?, horizontal?, vertical?];
+    Some(PlantParams {
+        gas: gas_params(&gas?),
+        supply: supply_params(&supply?, &regulator?, &dump_valve?),
+        cylinders: std::array::from_fn(|i| CylinderParams {
+            initial_pressure_a_pa: starts[i % 3].pressure_a,
+            initial_pressure_b_pa: starts[i % 3].pressure_b,
+            ..base.clone()
+        }),
+        initial_stroke_m: std::array::from_fn(|i| starts[i % 3].stroke),
+        motors: [motor_params(&motor?); 2],
+        potentiometers: [potentiometer_params(&potentiometer?); 6],
+        adc: adc_params(&adc?),
+        step_ns: (numerics?.step * 1e9).round() as u64,
+    })
+}
+
+fn gas_params(s: &GasSection) -> GasParams {
+    GasParams {
+        gas_constant_j_kg_k: s.gas_constant,
+        heat_capacity_ratio: s.heat_capacity_ratio,
+        reference_density_kg_m3: s.reference_density,
+        reference_temperature_k: s.reference_temperature,
+        reference_pressure_pa: s.reference_pressure,
+        ambient_pressure_pa: s.ambient_pressure,
+        ambient_temperature_k: s.ambient_temperature,
+    }
+}
+
+fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection) -> SupplyParams {
+    SupplyParams {
+        source_pressure_pa: s.source_pressure,
+        set_pressure_pa: s.set_pressure,
+        droop_pa: s.droop,
+        regulator_flow: iso(
+            regulator.conductance,
+            regulator.critical_ratio,
+            regulator.subsonic_exponent,
+            regulator.linear_ratio,
+        ),
+        reservoir_m3: s.reservoir,
+        initial_pressure_pa: s.initial_pressure,
+        dump_valve: valve(dump),
+        switch_on_pa: s.switch_on,
+        switch_off_pa: s.switch_off,
+    }
+}
+
+fn cylinder_params(
+    c: &CylinderSection,
+    line: &LineSection,
+    fill: &ValveSection,
+    vent: &ValveSection,
+    f: &FrictionSection,
+    e: &EndStopSection,
+) -> CylinderParams {
+    CylinderParams {
+        bore_m: c.bore,
+        rod_m: c.rod,
+        stroke_m: c.stroke,
+        dead_volume_a_m3: c.dead_volume_a,
+        dead_volume_b_m3: c.dead_volume_b,
+        line_volume_m3: line.volume,
+        line_flow: Some(iso(
+            line.conductance,
+            line.critical_ratio,
+            line.subsonic_exponent,
+            line.linear_ratio,
+        )),
+        line_delay_s: line.delay,
+        dead_wall_area_m2: line.wall_area,
+        piston_leak_m3_s_pa: c.piston_leak,
+        rod_leak_m3_s_pa: c.rod_leak,
+        fill_valve: valve(fill),
+        vent_valve: valve(vent),
+        timing_spread: c.timing_spread,
+        gas_model: GasModel::Polytropic {
+            exponent: c.exponent,
+        },
+        friction: FrictionParams {
+            coulomb_n: f.coulomb,
+            static_n: f.static_force,
+            stribeck_m_s: f.stribeck,
+            viscous_n_s_m: f.viscous,
+            bristle_stiffness_n_m: f.bristle_stiffness,
+            bristle_damping_n_s_m: f.bristle_damping,
+            elastic_share: f.elastic_share,
+        },
+        end_stop: EndStopParams {
+            stiffness_n_m: e.stiffness,
+            damping_s_m: e.damping,
+            cushion_length_m: e.cushion_length,
+            cushion_damping_n_s_m: e.cushion_damping,
+        },
+        // Replaced per cylinder from [start].
+        initial_pressure_a_pa: 0.0,
+        initial_pressure_b_pa: 0.0,
+    }
+}
+
+fn motor_params(s: &MotorSection) -> MotorParams {
+    MotorParams {
+        supply_v: s.supply,
+        resistance_ohm: s.resistance,
+        inductance_h: s.inductance,
+        torque_constant_n_m_a: s.torque_constant,
+        reduction: s.reduction,
+        efficiency: s.efficiency,
+        efficiency_blend_rad_s: s.efficiency_blend,
+        friction_n_m: s.friction,
+        friction_blend_rad_s: s.friction_blend,
+        encoder_lines: s.encoder_lines,
+    }
+}
+
+fn potentiometer_params(s: &PotentiometerSection) -> PotentiometerParams {
+    PotentiometerParams {
+        electrical_stroke_m: s.electrical_stroke,
+        offset_m: s.offset,
+        gain: s.gain,
+        nonlinearity: s.nonlinearity,
+    }
+}
+
+fn adc_params(s: &AdcSection) -> AdcParams {
+    AdcParams {
+        bits: s.bits,
+        oversampling: s.oversampling,
+        noise: if s.noise > 0.0 {
+            AdcNoise::Gaussian { sigma_lsb: s.noise }
+        } else {
+            AdcNoise::None
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::builtin;
+    use serde_json::Value;
+
+    fn compare(path: &str, a: &Value, b: &Value) {
+        match (a, b) {
+            (Value::Number(x), Value::Number(y)) => {
+                let (x, y) = (x.as_f64().unwrap_or(0.0), y.as_f64().unwrap_or(1.0));
+                let scale = x.abs().max(y.abs());
+                assert!((x - y).abs() <= 1e-9 * scale, "{path}: {x} and {y}");
+            }
+            (Value::Object(x), Value::Object(y)) => {
+                assert_eq!(x.len(), y.len(), "{path}");
+                for (key, value) in x {
+                    compare(&format!("{path}.{key}"), value, &y[key]);
+                }
+            }
+            (Value::Array(x), Value::Array(y)) => {
+                assert_eq!(x.len(), y.len(), "{path}");
+                for (i, (x, y)) in x.iter().zip(y).enumerate() {
+                    compare(&format!("{path}[{i}]"), x, y);
+                }
+            }
+            _ => assert_eq!(a, b, "{path}"),
+        }
+    }
+
+    /// The plant's own tests run on a copy of these values that needs no file;
+    /// the two must not drift apart.
+    #[test]
+    fn robot_file_and_plant_tests_use_the_same_robot() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let file = serde_json::to_value(&robot.plant).expect("serialises");
+        let copy =
+            serde_json::to_value(wheeleg_plant::testing::wheeleg_2003()).expect("serialises");
+        compare("plant", &file, &copy);
+    }
+
+    #[test]
+    fn the_plant_accepts_the_robot() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        assert!(wheeleg_plant::Plant::new(&robot.plant).is_ok());
+    }
+}
