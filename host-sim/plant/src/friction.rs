@@ -61,27 +61,27 @@ impl FrictionParams {
         check("friction.elastic_share", self.elastic_share, 0.0, 0.95)
     }
 
-    /// Largest steady bristle deflection at speed `v` \[m\].
+    /// Largest steady bristle deflection z_ss at speed `v` \[m\] and its inverse.
     #[inline]
-    fn steady_deflection_m(&self, v_m_s: f64) -> f64 {
+    fn steady_deflection_m(&self, v_m_s: f64) -> (f64, f64) {
         let s = v_m_s / self.stribeck_m_s;
-        let g = self.coulomb_n + (self.static_n - self.coulomb_n) / (1.0 + s * s);
-        g / self.bristle_stiffness_n_m
+        let r = 1.0 + s * s;
+        let (g, scale) = (
+            self.coulomb_n * r + (self.static_n - self.coulomb_n),
+            r * self.bristle_stiffness_n_m,
+        );
+        (g / scale, scale / g)
     }
 
-    /// Share α of plastic sliding, 0..1.
+    /// Share α of plastic sliding, 0..1, for a deflection as a share of z_ss.
+    /// Relaxing bristles are elastic; v = 0 leaves dz/dt = 0 either way.
     #[inline]
-    fn plastic_share(&self, z_m: f64, z_ss_m: f64, v_m_s: f64) -> f64 {
-        // Relaxing bristles are elastic; v = 0 leaves dz/dt = 0 either way.
-        if z_m * v_m_s <= 0.0 {
+    fn plastic_share(&self, share: f64, v_m_s: f64) -> f64 {
+        let depth = share.abs() - self.elastic_share;
+        if depth <= 0.0 || share * v_m_s <= 0.0 {
             return 0.0;
         }
-        let elastic = self.elastic_share * z_ss_m;
-        let depth = z_m.abs() - elastic;
-        if depth <= 0.0 {
-            return 0.0;
-        }
-        let width = z_ss_m - elastic;
+        let width = 1.0 - self.elastic_share;
         if depth >= width {
             return 1.0;
         }
@@ -93,12 +93,11 @@ impl FrictionParams {
     #[must_use]
     #[inline]
     pub fn bristle_rate_m_s(&self, z_m: f64, v_m_s: f64) -> f64 {
-        let z_ss = self.steady_deflection_m(v_m_s);
-        if z_ss <= 0.0 {
+        if self.static_n <= 0.0 {
             return 0.0;
         }
-        let alpha = self.plastic_share(z_m, z_ss, v_m_s);
-        v_m_s * (1.0 - alpha * z_m.abs() / z_ss)
+        let share = z_m * self.steady_deflection_m(v_m_s).1;
+        v_m_s * (1.0 - self.plastic_share(share, v_m_s) * share.abs())
     }
 
     /// Bristle deflection `h` seconds later at constant speed `v_m_s`.
@@ -109,17 +108,20 @@ impl FrictionParams {
     #[must_use]
     #[inline]
     pub fn advance_bristle_m(&self, z_m: f64, v_m_s: f64, h: f64) -> f64 {
-        let z_ss = self.steady_deflection_m(v_m_s);
-        if z_ss <= 0.0 {
+        if self.static_n <= 0.0 {
             return 0.0;
         }
+        let (z_ss, inverse) = self.steady_deflection_m(v_m_s);
+        let rate = v_m_s.abs() * inverse;
         let step = |alpha: f64, h: f64| {
-            let x = alpha * v_m_s.abs() / z_ss * h;
+            if alpha == 0.0 {
+                return z_m + h * v_m_s;
+            }
+            let x = alpha * rate * h;
             (z_m + h * v_m_s * (1.0 + 0.5 * x)) / (1.0 + x + 0.5 * x * x)
         };
-        let alpha = self.plastic_share(z_m, z_ss, v_m_s);
-        let middle = step(alpha, 0.5 * h);
-        let next = step(self.plastic_share(middle, z_ss, v_m_s), h);
+        let middle = step(self.plastic_share(z_m * inverse, v_m_s), 0.5 * h);
+        let next = step(self.plastic_share(middle * inverse, v_m_s), h);
         // Elastic motion in one long step could overshoot the largest
         // deflection the bristle can carry.
         let limit = z_ss.max(z_m.abs());
