@@ -4,8 +4,10 @@
 //! e = reference − measured              ė = reference velocity − velocity
 //! u = Kp e + C · rules(e, ė)  [PD]   or   Kp e + C · rules(∫e, ė)  [ID]
 //!     + Kf · reference velocity + fade
-//! duty = 0                                   settled, or |u| < minimum
-//!      = limit(u + sign(u) · dead zone)      otherwise
+//! duty = 0                                   at rest, or |u| < minimum
+//!      = limit(u + sign(u) · dead zone)      driving: u towards a reference outside
+//!                                            the settle band, or along its motion
+//!      = limit(u)                            otherwise: braking
 //! ```
 //!
 //! * **Velocity** is a regression over a window ([`crate::velocity`]).
@@ -14,9 +16,14 @@
 //!   its own scale. It is zero under the PD correction.
 //! * **Bumpless**: after a change of correction or gains the output continues
 //!   from its last value, and the difference fades out linearly.
-//! * **Settled** shuts all valves after a dwell inside the settle band and opens
-//!   none until the error has left the wider release band, or the reference
-//!   moves. At rest nothing switches.
+//! * **Dead zone.** Static friction and the shortest opening of a valve are bridged
+//!   when the piston is to be driven, not when it is to be braked: friction
+//!   brakes by itself, and a bridged brake pulse turns a slow approach into a
+//!   reversal, and that into a limit cycle.
+//! * **At rest**, that is slow and inside the settle band, all valves are shut at
+//!   once. After a dwell there the joint is *settled*, and no valve opens until
+//!   the error has left the wider release band for its dwell, or the reference
+//!   moves. Then nothing switches, whatever the noise.
 //! * **Limits** that shaped an output are reported with it.
 //!
 //! The law is odd: inputs of opposite sign give exactly the opposite duty.

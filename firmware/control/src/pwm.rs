@@ -19,9 +19,10 @@
 //! **Phase.** There is no free-running period. The period of a valve starts with
 //! its pulse, so a command to an idle valve acts at the next tick edge. While a
 //! pulse lasts, its length follows the command (natural sampling): it may grow, or
-//! end early, but not below the shortest that acts; once ended it does not begin
-//! again within the period. A valve switches at most twice per period, and a
-//! valve with nothing to do not at all.
+//! end early, though a command that can act does not cut it below the shortest
+//! that acts. A command of zero ends it at the next tick edge, however short. Once
+//! ended, it does not begin again within the period. A valve switches at most
+//! twice per period, and a valve with nothing to do not at all.
 
 use crate::valve::{VALVE_COUNT, ValveOpenings};
 use wheeleg_units::Micros;
@@ -157,7 +158,10 @@ impl Channel {
         }
         let mut on = 0;
         if self.energised {
-            let length = target.max(timing.shortest_pulse);
+            let length = match target {
+                0 => 0,
+                target => target.max(timing.shortest_pulse),
+            };
             on = length.saturating_sub(self.elapsed).min(timing.tick);
             if on < timing.tick {
                 self.energised = false;
@@ -167,19 +171,6 @@ impl Channel {
         self.elapsed = self.elapsed.saturating_add(timing.tick);
         // At most the tick, 2000.
         on as u16
-    }
-
-    /// Releases the coil at the next edge, whatever the pulse.
-    #[inline]
-    fn shut(&mut self, timing: &PwmTiming) {
-        self.end_period(timing);
-        if self.energised {
-            self.energised = false;
-            self.ended_at = self.elapsed;
-        }
-        if self.running {
-            self.elapsed = self.elapsed.saturating_add(timing.tick);
-        }
     }
 
     /// A new pulse may begin when the period is over and, if the coil was released
@@ -232,14 +223,11 @@ impl ValvePwm {
         on
     }
 
-    /// All valves shut at the next tick edge: hold, brake, settled, fault. A
-    /// pulse that was running is cut, however short.
+    /// All valves shut at the next tick edge: hold, brake, fault. The same as
+    /// [`ValvePwm::tick`] with [`ValveOpenings::SHUT`].
     #[must_use]
     pub fn shut(&mut self) -> OnTimes {
-        for channel in &mut self.channels {
-            channel.shut(&self.timing);
-        }
-        [0; VALVE_COUNT]
+        self.tick(&ValveOpenings::SHUT)
     }
 
     /// Pulses begun per valve since power-on, wrapping: the switching count.

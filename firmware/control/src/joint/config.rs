@@ -44,7 +44,7 @@ pub struct JointGains {
     pub integral_zone: PositionMm,
     /// Largest |duty|. 0…1, above `minimum_duty`.
     pub duty_limit: Duty,
-    /// Duty added, with its sign, to every acting duty: bridges the static
+    /// Duty added, with its sign, to a duty that drives: bridges the static
     /// friction and the shortest opening that a valve can make. 0…0.5; sensible
     /// (t_off + margin) / PWM period, 0.05…0.25; below it, small duties give
     /// pulses that [`crate::pwm`] can not send.
@@ -52,12 +52,13 @@ pub struct JointGains {
     /// |duty| of the law below which the valves stay shut. 0…0.5; sensible
     /// 0.005…0.03. Must exceed what measurement noise makes of Kp.
     pub minimum_duty: Duty,
-    /// Settled when |error| is at most this … 0…100 mm; sensible 0.3…1.
+    /// At rest, all valves shut, when |error| is at most this … 0…100 mm; sensible
+    /// 0.3…1, at least half of what the shortest opening moves the piston.
     pub settle_band: PositionMm,
     /// … and |velocity| is at most this … 0.1…1000 mm/s; sensible 5…20, above the
     /// noise of the velocity estimate.
     pub settle_velocity: VelocityMmS,
-    /// … for this long. 0…10 s; sensible 20…100 ms.
+    /// … and settled after this long. 0…10 s; sensible 20…100 ms.
     pub settle_dwell: Micros,
     /// Released when |error| exceeds this; larger than `settle_band` by more
     /// than the measurement noise. Sensible 2…3 times the settle band.

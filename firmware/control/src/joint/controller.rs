@@ -26,8 +26,8 @@ pub struct JointController {
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
     integral: i64,
-    /// u before the limit, × 2^30, of the last tick.
-    last_law: i64,
+    /// u before the limit, × 2^30, of the last tick; none unless it tracked.
+    last_law: Option<i64>,
     /// Set by a change of law: the next tick continues from `last_law`.
     changed: bool,
     /// What is still added to the law after a change, × 2^30, and its decay.
@@ -45,7 +45,7 @@ impl JointController {
             velocity: VelocityEstimator::new(),
             settle: Settle::new(),
             integral: 0,
-            last_law: 0,
+            last_law: None,
             changed: false,
             fade: 0,
             fade_step: 0,
@@ -105,7 +105,7 @@ impl JointController {
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
         self.settle = Settle::new();
         self.integral = 0;
-        self.last_law = 0;
+        self.last_law = None;
         self.changed = false;
         self.fade = 0;
         self.velocity.update(&self.config.window, measured)
@@ -123,18 +123,20 @@ impl JointController {
 
         let law = self.law(error, error_rate, input.reference_velocity, &mut limits);
         let law = self.faded(law);
-        self.last_law = law;
+        self.last_law = Some(law);
 
-        let settled = self
+        let quiet = self
             .settle
             .update(&self.config, error, velocity, input.reference_velocity);
-        let duty = if settled {
+        let duty = if quiet {
             self.fade = 0;
             Duty::ZERO
         } else {
-            self.shaped(law, &mut limits)
+            self.shaped(law, error, input.reference_velocity, &mut limits)
         };
-        self.integrate(error, settled, duty, &mut limits);
+        if self.correction == Correction::Id && !quiet {
+            self.integrate(error, duty, &mut limits);
+        }
         JointOutput {
             duty,
             openings: if duty == Duty::ZERO {
@@ -145,7 +147,7 @@ impl JointController {
             error,
             velocity,
             limits,
-            settled,
+            settled: self.settle.is_settled(),
         }
     }
 
@@ -197,7 +199,7 @@ impl JointController {
             if ticks == 0 {
                 self.fade = 0;
             } else {
-                let bump = self.last_law.wrapping_sub(law);
+                let bump = self.last_law.unwrap_or(law).wrapping_sub(law);
                 self.fade = within(bump, FADE_LIMIT);
                 // Rounded up: the fade ends within the configured time.
                 let step = self.fade.wrapping_abs().checked_div(ticks).unwrap_or(0);
@@ -213,7 +215,13 @@ impl JointController {
 
     /// Minimum, dead-zone compensation and limit.
     #[inline]
-    fn shaped(&self, law: i64, limits: &mut JointLimits) -> Duty {
+    fn shaped(
+        &self,
+        law: i64,
+        error: PositionMm,
+        reference_velocity: VelocityMmS,
+        limits: &mut JointLimits,
+    ) -> Duty {
         let gains = self.config.gains();
         let magnitude = law.wrapping_abs();
         if magnitude == 0 {
@@ -223,7 +231,12 @@ impl JointController {
             limits.below_minimum = true;
             return Duty::ZERO;
         }
-        let bridged = magnitude.wrapping_add(i64::from(gains.dead_zone_duty.raw()));
+        let away = error.saturating_abs() > gains.settle_band && same_sign(law, error.raw());
+        let bridged = if away || same_sign(law, reference_velocity.raw()) {
+            magnitude.wrapping_add(i64::from(gains.dead_zone_duty.raw()))
+        } else {
+            magnitude
+        };
         let limit = i64::from(gains.duty_limit.raw());
         limits.duty = bridged > limit;
         let cut = bridged.min(limit);
@@ -232,24 +245,13 @@ impl JointController {
 
     /// Conditional, bounded integration; what it adds acts from the next tick on.
     #[inline]
-    fn integrate(
-        &mut self,
-        error: PositionMm,
-        settled: bool,
-        duty: Duty,
-        limits: &mut JointLimits,
-    ) {
-        if self.correction == Correction::Pd {
-            return;
-        }
+    fn integrate(&mut self, error: PositionMm, duty: Duty, limits: &mut JointLimits) {
         let outside = error.saturating_abs() > self.config.gains().integral_zone;
-        let pushes = limits.duty && (error.raw() > 0) == (duty.raw() > 0);
-        if settled || outside || pushes {
-            limits.integral_frozen = true;
-        } else {
-            let limit = self.config.integral_limit;
+        let pushes = limits.duty && same_sign(i64::from(duty.raw()), error.raw());
+        limits.integral_frozen = outside || pushes;
+        if !limits.integral_frozen {
             let sum = self.integral.wrapping_add(i64::from(error.raw()));
-            self.integral = within(sum, limit);
+            self.integral = within(sum, self.config.integral_limit);
         }
         limits.integral_clamped = self.integral.wrapping_abs() == self.config.integral_limit;
     }
@@ -260,6 +262,12 @@ impl JointController {
 #[inline]
 fn within(value: i64, bound: i64) -> i64 {
     value.max(bound.wrapping_neg()).min(bound)
+}
+
+/// Whether both are positive or both negative.
+#[inline]
+const fn same_sign(a: i64, b: i32) -> bool {
+    (a > 0 && b > 0) || (a < 0 && b < 0)
 }
 
 /// Exact product of two raw numbers.

@@ -23,7 +23,9 @@ impl Settle {
         self.settled
     }
 
-    /// Takes the magnitudes of this tick; gives whether the valves are to stay shut.
+    /// Takes the magnitudes of this tick; gives whether the valves are to be
+    /// shut: at rest, and already while the dwell before it runs, because the
+    /// shortest opening of a valve would push a small error out of the band again.
     #[inline]
     pub(super) fn update(
         &mut self,
@@ -54,6 +56,6 @@ impl Settle {
             self.settled = !self.settled;
             self.held = 0;
         }
-        self.settled
+        self.settled || self.held > 0
     }
 }

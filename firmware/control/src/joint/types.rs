@@ -42,7 +42,8 @@ pub struct JointLimits {
     /// The duty was cut to the configured limit.
     pub duty: bool,
     /// The integral was not advanced: the output is saturated and the error
-    /// pushes further, or the error is outside the integral zone.
+    /// pushes further, or the error is outside the integral zone. At rest it is
+    /// not advanced either, and that is no limit.
     pub integral_frozen: bool,
     /// The integral stands at its bound.
     pub integral_clamped: bool,

@@ -89,17 +89,20 @@ class Joint:
             self.settled, self.held = not self.settled, 0
 
         cut = False
-        if self.settled:
+        quiet = self.settled or self.held > 0
+        if quiet:
             duty, self.bump = F(0), F(0)
         elif abs(law) < g["minimum"]:
             duty = F(0)
         else:
-            size = abs(law) + g["dead"]
+            away = law * error > 0 and abs(error) > g["settle"]
+            drives = away or law * reference_velocity > 0
+            size = abs(law) + (g["dead"] if drives else 0)
             cut = size > g["limit"]
             duty = min(size, g["limit"]) * (1 if law > 0 else -1)
         if self.kind == "id":
-            pushes = cut and (error > 0) == (duty > 0)
-            if not (self.settled or abs(error) > g["zone"] or pushes):
+            pushes = cut and error * duty > 0
+            if not (quiet or abs(error) > g["zone"] or pushes):
                 bound = g["integral_scale"]
                 self.integral = clip(self.integral + error * TICK, -bound, bound)
         return duty, velocity
