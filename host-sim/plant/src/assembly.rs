@@ -196,7 +196,7 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         let supply_pa = self.supply.pressure_pa(state.supply.mass_kg);
         let first: [CylinderRates; C] = std::array::from_fn(|i| {
             let c = &state.cylinders[i];
-            let chambers = [&c.chamber_a, &c.chamber_b];
+            let chambers = [c.chamber_a.content(), c.chamber_b.content()];
             self.cylinders[i].rates(c, chambers, before[i], rate[i], supply_pa)
         });
         let source = self.supply.rates(&state.supply, state.supply.mass_kg);
@@ -209,10 +209,11 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         for i in 0..C {
             let (model, one) = (&self.cylinders[i], &first[i]);
             let c = &mut state.cylinders[i];
-            let (mut a, mut b) = (c.chamber_a, c.chamber_b);
-            a.apply(&one.a, model.exponent, h);
-            b.apply(&one.b, model.exponent, h);
-            let two = model.rates(c, [&a, &b], after[i], rate[i], supply_pa);
+            let predicted = [
+                c.chamber_a.predicted(&one.a, model.exponent, h),
+                c.chamber_b.predicted(&one.b, model.exponent, h),
+            ];
+            let two = model.rates(c, predicted, after[i], rate[i], supply_pa);
             c.chamber_a.apply(&one.a.mean(&two.a), model.exponent, h);
             c.chamber_b.apply(&one.b.mean(&two.b), model.exponent, h);
             let from_supply = 0.5 * h * (one.supply_kg_s + two.supply_kg_s);

@@ -79,6 +79,13 @@ pub struct ChamberState {
     pub ledger: Ledger,
 }
 
+/// What a chamber holds, without its ledger.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Content {
+    pub(crate) pv_j: f64,
+    pub(crate) mass_kg: f64,
+}
+
 /// Time derivatives of a chamber, by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ChamberRates {
@@ -104,11 +111,29 @@ impl ChamberState {
         }
     }
 
+    /// What the chamber holds now.
+    #[inline]
+    pub(crate) fn content(&self) -> Content {
+        Content {
+            pv_j: self.pv_j,
+            mass_kg: self.mass_kg,
+        }
+    }
+
+    /// What the chamber would hold `h` seconds later.
+    #[inline]
+    pub(crate) fn predicted(&self, rates: &ChamberRates, exponent: f64, h: f64) -> Content {
+        Content {
+            pv_j: self.pv_j + h * rates.pv_w(exponent),
+            mass_kg: self.mass_kg + h * rates.mass_kg_s,
+        }
+    }
+
     /// Advances by `h` seconds with rates constant over it.
     #[inline]
     pub fn apply(&mut self, rates: &ChamberRates, exponent: f64, h: f64) {
         self.mass_kg += h * rates.mass_kg_s;
-        self.pv_j += h * (rates.inflow_w + (exponent - 1.0) * (rates.heat_w - rates.work_w));
+        self.pv_j += h * rates.pv_w(exponent);
         self.ledger.mass_in_kg += h * rates.mass_kg_s;
         self.ledger.inflow_j += h * rates.inflow_w;
         self.ledger.work_j += h * rates.work_w;
@@ -131,6 +156,12 @@ impl ChamberState {
 }
 
 impl ChamberRates {
+    /// dY/dt \[W\].
+    #[inline]
+    fn pv_w(&self, exponent: f64) -> f64 {
+        self.inflow_w + (exponent - 1.0) * (self.heat_w - self.work_w)
+    }
+
     /// Mean of two rates, for Heun's corrector.
     #[must_use]
     #[inline]

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::chamber::{ChamberRates, ChamberState, GasModel};
+use crate::chamber::{ChamberRates, ChamberState, Content, GasModel};
 use crate::endstop::EndStopParams;
 use crate::error::{PlantError, check, check_state};
 use crate::flow::{GasParams, Iso6358, Restrictor, leak_kg_s};
@@ -440,7 +440,7 @@ impl CylinderModel {
     pub(crate) fn rates(
         &self,
         state: &CylinderState,
-        chambers: [&ChamberState; 2],
+        chambers: [Content; 2],
         stroke_m: f64,
         v_m_s: f64,
         supply_pa: f64,
