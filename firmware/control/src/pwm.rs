@@ -146,15 +146,27 @@ impl Channel {
     #[inline]
     fn tick(&mut self, timing: &PwmTiming, opening: Micros) -> u16 {
         let target = timing.pulse(opening).get();
-        self.end_period(timing);
+        if self.running && self.elapsed >= timing.period {
+            if self.energised && target > 0 {
+                // A full pulse goes on: the next period follows without a gap.
+                self.elapsed = 0;
+            } else if !self.energised {
+                // A new pulse may begin once the valve has had the time to shut.
+                let off = self.elapsed.saturating_sub(self.ended_at);
+                self.running = off < timing.shortest_gap;
+            }
+        }
         if !self.running {
             if target == 0 {
                 return 0;
             }
-            self.pulses = self.pulses.wrapping_add(u32::from(!self.energised));
-            self.running = true;
-            self.energised = true;
-            self.elapsed = 0;
+            *self = Self {
+                running: true,
+                energised: true,
+                elapsed: 0,
+                ended_at: 0,
+                pulses: self.pulses.wrapping_add(1),
+            };
         }
         let mut on = 0;
         if self.energised {
@@ -171,16 +183,6 @@ impl Channel {
         self.elapsed = self.elapsed.saturating_add(timing.tick);
         // At most the tick, 2000.
         on as u16
-    }
-
-    /// A new pulse may begin when the period is over and, if the coil was released
-    /// in it, has been off long enough for the valve to have shut.
-    #[inline]
-    fn end_period(&mut self, timing: &PwmTiming) {
-        let off = self.elapsed.saturating_sub(self.ended_at);
-        if self.elapsed >= timing.period && (self.energised || off >= timing.shortest_gap) {
-            self.running = false;
-        }
     }
 }
 

@@ -125,10 +125,4 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
         }
         mean_i64(numerator, denominator)
     }
-
-    /// The reference path, for the test that both paths agree.
-    #[cfg(test)]
-    pub(crate) fn infer_all_for_test(&self, first: i16, second: i16) -> i16 {
-        self.infer_all(first, second)
-    }
 }

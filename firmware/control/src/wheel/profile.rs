@@ -13,10 +13,10 @@ const FRACTION: u32 = 8;
 /// From rest at the start, velocity rises by at most the acceleration per
 /// sample, stays at the maximum, and falls so as to end exactly on the final
 /// position: a triangle when the way is too short for the maximum. In each
-/// sample the profile goes as fast as it can and still stop: it takes v + a if
-/// the rest of the way then still allows a stop in steps of a, else v, else v − a.
-/// The last step is what is left, at most a. The chip's own sequence of points is
-/// not in its data sheet; shape, limits and end agree with it.
+/// sample the profile goes as fast as still allows a stop in steps of the
+/// acceleration, so no profile within these limits is faster by a whole sample.
+/// The chip's own sequence of points is not in its data sheet; shape, limits and
+/// end agree with it.
 ///
 /// The way is the shorter one around the 24-bit circle, at most 7FFFFFH counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,39 +102,32 @@ impl Profile {
         })
     }
 
-    /// The largest admissible velocity for this sample.
+    /// The largest velocity for this sample: at most v + a and the maximum, and
+    /// such that the way left allows one sample at it and then a stop in steps
+    /// of a.
+    ///
+    /// One sample at w and the stop after it, w + (w − a) + (w − 2a) + … while
+    /// positive, cover (n + 1) w − a n (n + 1)/2 with n = ⌊w/a⌋. That rises with w,
+    /// so the largest w of a given n is (way + a n (n + 1)/2) / (n + 1), if
+    /// that is at least n a. Since v − a always allows the stop, the search ends
+    /// after at most three n.
     #[inline]
     fn choose(&self) -> u32 {
-        let up = self
-            .velocity
-            .wrapping_add(self.acceleration)
-            .min(self.maximum);
-        if self.can_stop_after(up) {
-            return up;
+        // All terms below 2^31: v < 2^15 + 2^15, n a <= v, way <= 2^31.
+        let a = self.acceleration;
+        let high = self.velocity.wrapping_add(a).min(self.maximum);
+        let mut n = high.checked_div(a).unwrap_or(0);
+        for _ in 0..4 {
+            let next = n.wrapping_add(1);
+            let gain = a.wrapping_mul(n).wrapping_mul(next).wrapping_shr(1);
+            let best = self.remaining.wrapping_add(gain).checked_div(next);
+            let best = best.unwrap_or(0).min(high);
+            if best >= n.wrapping_mul(a) {
+                return best;
+            }
+            n = n.saturating_sub(1);
         }
-        if self.can_stop_after(self.velocity) && self.velocity > 0 {
-            return self.velocity;
-        }
-        let down = self.velocity.saturating_sub(self.acceleration);
-        if down > 0 {
-            down
-        } else {
-            // Less than one step of the acceleration is left.
-            self.remaining
-        }
-    }
-
-    /// Whether the way left allows one sample at `velocity` and then a stop in
-    /// steps of the acceleration: v + (v − a) + (v − 2a) + … while positive.
-    #[inline]
-    fn can_stop_after(&self, velocity: u32) -> bool {
-        // v < 2^15, so both terms stay below 2^31; a >= 1.
-        let steps = velocity.checked_div(self.acceleration).unwrap_or(0);
-        let all = velocity.wrapping_mul(steps.wrapping_add(1));
-        let fall = self
-            .acceleration
-            .wrapping_mul(steps.wrapping_mul(steps.wrapping_add(1)).wrapping_shr(1));
-        all.wrapping_sub(fall) <= self.remaining
+        self.velocity.saturating_sub(a)
     }
 }
 

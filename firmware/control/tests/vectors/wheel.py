@@ -3,8 +3,9 @@
 
 Filter: MC_n = (K/4) X_n - (A/256)(K/4) X_{n-1} - (B/256) MC_{n-1}, with MC
 limited to -128..127 before it is fed back, and no rounding at all.
-Profile: each sample tries v + a, v, v - a in this order, and takes the first
-after which a stop in steps of a, simulated sample by sample, does not overrun.
+Profile: each sample takes the largest velocity, found by bisection on the grid of
+1/256 count, after which a stop in steps of a, simulated sample by sample, does not
+overrun.
 Standard library only. Run `python3 wheel.py` to write wheel.json anew.
 """
 
@@ -47,12 +48,14 @@ def profile(way, v_max, a):
     """Way left after each sample, in counts."""
     left, v, out = Fraction(way), Fraction(0), []
     while left > 0:
-        choice = None
-        for candidate in (min(v + a, Fraction(v_max)), v, v - a):
-            if candidate > 0 and stop_distance(candidate, a) <= left:
-                choice = candidate
-                break
-        v = min(choice, left) if choice is not None else left
+        low, high = 0, int(min(v + a, Fraction(v_max)) * 256)
+        while low < high:
+            middle = (low + high + 1) // 2
+            if stop_distance(Fraction(middle, 256), a) <= left:
+                low = middle
+            else:
+                high = middle - 1
+        v = Fraction(low, 256)
         left -= v
         out.append(left)
     return out
@@ -76,8 +79,8 @@ def main():
         filters.append({"a": a, "b": b, "k": k, "errors": errors,
                         "commands": filter_response(a, b, k, errors)})
     profiles = []
-    for way, v_max, raw in [(1, 127, 32767), (2, 1, 1), (10, 127, 256), (1000, 20, 128),
-                            (1000, 127, 77), (5000, 34, 13), (777, 34, 1), (3, 127, 3),
+    for way, v_max, raw in [(1, 127, 32767), (2, 1, 9), (10, 127, 256), (1000, 20, 128),
+                            (1000, 127, 77), (5000, 34, 40), (77, 34, 5), (3, 127, 17),
                             (40000, 127, 256), (255, 16, 4096), (256, 16, 4096), (257, 16, 4096),
                             (6001, 60, 333), (128, 127, 32767), (100000, 100, 2000)]:
         left = profile(way, v_max, Fraction(raw, 256))
