@@ -1,1 +1,1 @@
-//! In progress.
+//! System tests across crates; see the folder `tests` beside this one.

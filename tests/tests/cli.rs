@@ -1,0 +1,375 @@
+//! The command line as a user meets it: good input, bad input, an interrupted run.
+
+mod program;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Longest time that any one call may take before it counts as hung.
+const HUNG: Duration = Duration::from_secs(120);
+
+fn wheeleg() -> Command {
+    let mut command = Command::new(program::path());
+    command.timeout(HUNG).env("NO_COLOR", "1");
+    command
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("temporary folder")
+}
+
+fn source(path: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim");
+    fs::read_to_string(root.join(path)).expect(path)
+}
+
+/// `text` with the first line of `key` replaced; fails if there is no such line.
+fn with_line(text: &str, key: &str, line: &str) -> String {
+    let prefix = format!("{key} = ");
+    let old = text
+        .lines()
+        .find(|found| found.starts_with(&prefix))
+        .unwrap_or_else(|| panic!("no `{key}` in\n{text}"));
+    text.replacen(old, line, 1)
+}
+
+/// The three-step scenario, cut to `duration_s`, in a file of its own.
+fn scenario_file(folder: &Path, duration_s: f64) -> PathBuf {
+    let text = source("scenarios/three-step.toml");
+    let duration = format!("duration = {{ value = {duration_s:?}, unit = \"s\" }}");
+    let text = with_line(&text, "duration", &duration);
+    let text = with_line(&text, "targets", "targets = \"none\"");
+    write(folder, "short.toml", &text)
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, text).expect(name);
+    path
+}
+
+/// Runs a scenario with `--json` and returns standard output's JSON.
+fn summary(scenario: &Path, out: &Path, seed: &str) -> Value {
+    let assert = wheeleg()
+        .args(["run", "--json", "--seed", seed, "--out"])
+        .args([out, scenario])
+        .assert()
+        .success();
+    let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
+    serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"))
+}
+
+/// The one MCAP log of a run.
+fn log_of(out: &Path) -> PathBuf {
+    let mut logs: Vec<PathBuf> = fs::read_dir(out)
+        .expect("output folder")
+        .map(|entry| entry.expect("entry").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
+        .collect();
+    assert_eq!(logs.len(), 1, "{logs:?}");
+    logs.remove(0)
+}
+
+#[test]
+fn json_is_one_object_with_every_key() {
+    let dir = folder();
+    let out = dir.path().join("out");
+    let json = summary(&scenario_file(dir.path(), 0.5), &out, "3");
+    let object = json.as_object().expect("an object");
+    for key in [
+        "scenario",
+        "seed",
+        "hash",
+        "simulated_s",
+        "wall_s",
+        "realtime_factor",
+        "targets",
+    ] {
+        assert!(object.contains_key(key), "no `{key}` in {json}");
+    }
+    assert_eq!(json["seed"], 3);
+    let simulated = json["simulated_s"].as_f64().expect("a number");
+    assert!((simulated - 0.5).abs() < 1e-6, "{simulated}");
+    let hash = json["hash"].as_str().expect("text");
+    assert_eq!(hash.len(), 64, "{hash}");
+    assert!(hash.chars().all(|c| c.is_ascii_hexdigit()), "{hash}");
+    let file: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("summary.json")).expect("summary.json"))
+            .expect("JSON");
+    assert_eq!(file, json, "summary.json and standard output agree");
+}
+
+#[test]
+fn targets_carry_value_unit_band_and_verdict() {
+    let dir = folder();
+    let text = source("scenarios/three-step.toml");
+    let scenario = write(dir.path(), "full.toml", &text);
+    let out = dir.path().join("out");
+    let assert = wheeleg()
+        .args(["run", "--json", "--out"])
+        .args([&out, &scenario])
+        .assert();
+    let stdout = &assert.get_output().stdout;
+    let json: Value = serde_json::from_slice(stdout).expect("one JSON object");
+    let targets = json["targets"].as_array().expect("targets");
+    assert!(targets.len() >= 8, "{targets:?}");
+    for target in targets {
+        assert!(target["id"].is_string(), "{target}");
+        assert!(target["unit"].is_string(), "{target}");
+        assert!(target["pass"].is_boolean(), "{target}");
+        for key in ["value", "min", "max"] {
+            assert!(
+                target[key].is_number() || target[key].is_null(),
+                "{key} of {target}"
+            );
+        }
+        // The verdict is the comparison, nothing else.
+        if let Some(value) = target["value"].as_f64() {
+            let above = target["min"].as_f64().is_none_or(|min| value >= min);
+            let below = target["max"].as_f64().is_none_or(|max| value <= max);
+            assert_eq!(target["pass"], above && below, "{target}");
+        }
+    }
+}
+
+#[test]
+fn the_seed_and_only_the_seed_changes_the_hash() {
+    let dir = folder();
+    let scenario = scenario_file(dir.path(), 0.5);
+    let hash = |name: &str, seed: &str| {
+        let json = summary(&scenario, &dir.path().join(name), seed);
+        json["hash"].as_str().expect("hash").to_owned()
+    };
+    let first = hash("a", "7");
+    assert_eq!(first, hash("elsewhere/and/deeper", "7"));
+    assert_ne!(first, hash("b", "8"));
+}
+
+#[test]
+fn list_and_params_tell_what_there_is() {
+    let mut list = wheeleg();
+    list.arg("list").assert().success().stdout(
+        contains("three-step")
+            .and(contains("master-lost"))
+            .and(contains("stand")),
+    );
+    // Parameters come with their units.
+    let mut params = wheeleg();
+    params.arg("params").assert().success().stdout(
+        contains("pwm_period_us")
+            .or(contains("pwm_period"))
+            .and(contains("mm")),
+    );
+}
+
+#[test]
+fn an_unknown_scenario_is_named_with_what_there_is() {
+    let dir = folder();
+    let out = dir.path().join("out");
+    let mut command = wheeleg();
+    command
+        .args(["run", "tree-step", "--out"])
+        .arg(&out)
+        .assert()
+        .failure()
+        .stderr(contains("tree-step").and(contains("three-step")));
+    assert!(!out.exists(), "a run that never began leaves nothing");
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let dir = folder();
+    let missing = dir.path().join("nowhere.toml");
+    let mut command = wheeleg();
+    command
+        .args(["run", "--out"])
+        .args([&dir.path().join("out"), &missing])
+        .assert()
+        .failure()
+        .stderr(contains("nowhere.toml").and(contains("cannot read")));
+}
+
+#[test]
+fn a_wrong_unit_is_answered_with_file_field_value_and_allowed_units() {
+    let dir = folder();
+    let text = with_line(
+        &source("scenarios/three-step.toml"),
+        "duration",
+        "duration = { value = 10.0, unit = \"mm\" }",
+    );
+    let scenario = write(dir.path(), "bad-unit.toml", &text);
+    let mut command = wheeleg();
+    command
+        .args(["run", "--out"])
+        .args([&dir.path().join("out"), &scenario])
+        .assert()
+        .failure()
+        .stderr(
+            contains("bad-unit.toml")
+                .and(contains("duration"))
+                .and(contains("mm"))
+                .and(contains("ms")),
+        );
+}
+
+#[test]
+fn an_out_of_range_gain_is_answered_with_file_field_value_and_range() {
+    let dir = folder();
+    let robot = source("robots/wheeleg-2003.toml");
+    let line = robot
+        .lines()
+        .find(|line| line.starts_with("kp") && line.contains("value = "))
+        .expect("a proportional gain in the robot file");
+    let (key, rest) = line.split_once(" = ").expect("key = value");
+    let (head, tail) = rest.split_once("value = ").expect("a value");
+    let (_, tail) = tail.split_once(',').expect("a unit");
+    let changed = robot.replacen(line, &format!("{key} = {head}value = 987654.0,{tail}"), 1);
+    let robot = write(dir.path(), "wild.toml", &changed);
+    let scenario = with_line(
+        &source("scenarios/three-step.toml"),
+        "robot",
+        &format!("robot = {:?}", robot.to_str().expect("UTF-8")),
+    );
+    let scenario = write(dir.path(), "scenario.toml", &scenario);
+    let mut command = wheeleg();
+    command
+        .args(["run", "--out"])
+        .args([&dir.path().join("out"), &scenario])
+        .assert()
+        .failure()
+        .stderr(
+            contains("wild.toml")
+                .and(contains(key))
+                .and(contains("987654"))
+                .and(contains("range")),
+        );
+}
+
+#[test]
+fn broken_toml_is_answered_with_the_line() {
+    let dir = folder();
+    let scenario = write(dir.path(), "torn.toml", "name = \"x\"\nduration = {\n");
+    let mut command = wheeleg();
+    command
+        .args(["run", "--out"])
+        .args([&dir.path().join("out"), &scenario])
+        .assert()
+        .failure()
+        .stderr(contains("torn.toml"));
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_made_is_named_before_the_run() {
+    let dir = folder();
+    // Below a regular file: fails for root as for anybody else.
+    let file = write(dir.path(), "file", "not a folder");
+    let mut command = wheeleg();
+    command
+        .args(["run", "three-step", "--out"])
+        .arg(file.join("out"))
+        .assert()
+        .failure()
+        .stderr(contains("file").and(contains("--out")));
+    assert_eq!(fs::read_to_string(&file).expect("file"), "not a folder");
+}
+
+#[test]
+fn a_bad_seed_is_refused() {
+    for seed in ["-1", "abc", "1.5", "99999999999999999999999999"] {
+        let mut command = wheeleg();
+        command
+            .arg("run")
+            .arg(format!("--seed={seed}"))
+            .assert()
+            .failure()
+            .code(2)
+            .stderr(contains("--seed").and(contains(seed)));
+    }
+}
+
+/// Ctrl-C in mid-run: the program ends by itself, says so, and the log up to
+/// then opens whole.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_a_readable_log() {
+    let dir = folder();
+    let scenario = scenario_file(dir.path(), 3600.0);
+    let out = dir.path().join("out");
+    let mut child = std::process::Command::new(program::path())
+        .args(["run", "--json", "--out"])
+        .args([&out, &scenario])
+        .env("NO_COLOR", "1")
+        .stdin(std::process::Stdio::null())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("start");
+    let begin = Instant::now();
+    let begun = || {
+        out.is_dir()
+            && fs::read_dir(&out).is_ok_and(|entries| {
+                entries.flatten().any(|entry| {
+                    entry.path().extension().is_some_and(|e| e == "mcap")
+                        && entry.metadata().is_ok_and(|m| m.len() > 1_000_000)
+                })
+            })
+    };
+    while !begun() {
+        if let Some(status) = child.try_wait().expect("status") {
+            panic!("ended by itself with {status}");
+        }
+        assert!(begin.elapsed() < HUNG, "no log appeared");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let signalled = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill");
+    assert!(signalled.success());
+    let asked = Instant::now();
+    while child.try_wait().expect("status").is_none() {
+        if asked.elapsed() > HUNG {
+            let _ = child.kill();
+            panic!("still running {HUNG:?} after Ctrl-C");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().expect("output");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.to_lowercase().contains("interrupt"), "{stderr}");
+    // A handled signal ends with the shell's number for it, not by the signal.
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+
+    // The whole log reads, summary section and all.
+    let bytes = fs::read(log_of(&out)).expect("log");
+    let index = mcap::Summary::read(&bytes)
+        .expect("summary section")
+        .expect("a summary section");
+    assert!(!index.chunk_indexes.is_empty());
+    let mut last_ns = 0;
+    let mut messages = 0_u64;
+    let mut topics = std::collections::BTreeSet::new();
+    for message in mcap::MessageStream::new(&bytes).expect("log") {
+        let message = message.expect("message");
+        last_ns = last_ns.max(message.log_time);
+        messages += 1;
+        topics.insert(message.channel.topic.clone());
+    }
+    assert!(topics.contains("/joint/1"), "{topics:?}");
+    assert!(messages > 1000, "{messages}");
+    let last_s = last_ns as f64 * 1e-9;
+    assert!((0.1..3599.0).contains(&last_s), "{last_s}");
+    // A summary, if there is one, must not claim a whole run.
+    if let Ok(text) = fs::read_to_string(out.join("summary.json")) {
+        let json: Value = serde_json::from_str(&text).expect("JSON");
+        let simulated = json["simulated_s"].as_f64().expect("a number");
+        assert!(simulated < 3599.0, "{simulated}");
+    }
+}

@@ -1,0 +1,350 @@
+//! The rules of the house that a compiler does not check: who may depend on
+//! whom, one place for versions and lints, nothing that refers outside.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Who may depend on which of our own crates (ARCHITECTURE.md). Development
+/// dependencies count too: a test is no back door.
+const ARROWS: [(&str, &[&str]); 10] = [
+    ("wheeleg-units", &[]),
+    ("wheeleg-kinematics", &[]),
+    ("wheeleg-control", &["wheeleg-units"]),
+    ("wheeleg-protocol", &["wheeleg-units"]),
+    (
+        "wheeleg-node",
+        &["wheeleg-control", "wheeleg-protocol", "wheeleg-units"],
+    ),
+    (
+        "wheeleg-master",
+        &["wheeleg-kinematics", "wheeleg-protocol", "wheeleg-units"],
+    ),
+    ("wheeleg-plant", &["wheeleg-kinematics"]),
+    ("wheeleg-sim", &LIBRARIES),
+    ("wheeleg-tests", &TESTED),
+    ("xtask", &[]),
+];
+
+const LIBRARIES: [&str; 7] = [
+    "wheeleg-control",
+    "wheeleg-kinematics",
+    "wheeleg-master",
+    "wheeleg-node",
+    "wheeleg-plant",
+    "wheeleg-protocol",
+    "wheeleg-units",
+];
+
+const TESTED: [&str; 8] = [
+    "wheeleg-control",
+    "wheeleg-kinematics",
+    "wheeleg-master",
+    "wheeleg-node",
+    "wheeleg-plant",
+    "wheeleg-protocol",
+    "wheeleg-sim",
+    "wheeleg-units",
+];
+
+/// Folders in which `unsafe` may stand: board glue, of which there is none yet.
+const UNSAFE_ALLOWED: [&str; 0] = [];
+
+/// Longest source file, in lines.
+const LINES_MAX: usize = 800;
+
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().expect("the workspace root").to_path_buf()
+}
+
+/// `cargo metadata`'s packages: name and the package's description.
+fn packages() -> BTreeMap<String, Value> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .args([
+            "metadata",
+            "--no-deps",
+            "--offline",
+            "--format-version",
+            "1",
+        ])
+        .current_dir(root())
+        .output()
+        .expect("cargo metadata");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let metadata: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let list = metadata["packages"].as_array().expect("packages");
+    list.iter()
+        .map(|package| (text(&package["name"]), package.clone()))
+        .collect()
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().expect("text").to_owned()
+}
+
+fn dependencies(package: &Value) -> BTreeSet<String> {
+    let list = package["dependencies"].as_array().expect("dependencies");
+    list.iter()
+        .map(|dependency| text(&dependency["name"]))
+        .collect()
+}
+
+/// Tracked files with their text, as (path from the root, text); binary files
+/// are left out. Without git (a source archive), all files but build products.
+fn files() -> Vec<(String, String)> {
+    let listed = Command::new("git")
+        .args(["ls-files", "-z"])
+        .current_dir(root())
+        .output()
+        .ok()
+        .filter(|output| output.status.success() && root().join(".git").exists());
+    let names: Vec<String> = match listed {
+        Some(output) => String::from_utf8(output.stdout)
+            .expect("file names in UTF-8")
+            .split_terminator('\0')
+            .map(str::to_owned)
+            .collect(),
+        None => {
+            let mut names = Vec::new();
+            walk(&root(), "", &mut names);
+            names
+        }
+    };
+    let files: Vec<(String, String)> = names
+        .into_iter()
+        .filter_map(|name| {
+            let text = fs::read_to_string(root().join(&name)).ok()?;
+            Some((name, text))
+        })
+        .collect();
+    assert!(files.len() > 20, "only {} files found", files.len());
+    files
+}
+
+fn walk(folder: &Path, prefix: &str, names: &mut Vec<String>) {
+    const SKIP: [&str; 5] = [".git", "target", "runs", ".venv", "__pycache__"];
+    for entry in fs::read_dir(folder).expect("folder") {
+        let entry = entry.expect("entry");
+        let name = entry.file_name().into_string().expect("UTF-8");
+        if SKIP.contains(&name.as_str()) {
+            continue;
+        }
+        let path = format!("{prefix}{name}");
+        if entry.file_type().expect("type").is_dir() {
+            walk(&entry.path(), &format!("{path}/"), names);
+        } else {
+            names.push(path);
+        }
+    }
+}
+
+fn rust_files() -> Vec<(String, String)> {
+    files()
+        .into_iter()
+        .filter(|(name, _)| name.ends_with(".rs"))
+        .collect()
+}
+
+/// The code of a line, without its comment. (A `//` in a string cuts the line
+/// short; good enough for keywords.)
+fn code(line: &str) -> &str {
+    line.split("//").next().unwrap_or(line)
+}
+
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    line.split(|c: char| !(c.is_alphanumeric() || c == '_'))
+}
+
+#[test]
+fn arrows_point_one_way() {
+    let packages = packages();
+    let ours: BTreeSet<&str> = packages.keys().map(String::as_str).collect();
+    let listed: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
+    assert_eq!(
+        ours, listed,
+        "a crate without a line in the table of arrows"
+    );
+    for (name, allowed) in ARROWS {
+        let allowed: BTreeSet<&str> = allowed.iter().copied().collect();
+        let found = dependencies(&packages[name]);
+        let found: BTreeSet<&str> = found
+            .iter()
+            .map(String::as_str)
+            .filter(|dependency| ours.contains(dependency))
+            .collect();
+        let extra: Vec<_> = found.difference(&allowed).collect();
+        assert!(extra.is_empty(), "{name} must not depend on {extra:?}");
+    }
+}
+
+#[test]
+fn the_plant_never_sees_fixed_point_nor_the_firmware_a_clock_or_a_heap() {
+    let packages = packages();
+    let plant = dependencies(&packages["wheeleg-plant"]);
+    assert!(!plant.contains("fixed"), "{plant:?}");
+    for name in [
+        "wheeleg-units",
+        "wheeleg-control",
+        "wheeleg-protocol",
+        "wheeleg-node",
+    ] {
+        let package = &packages[name];
+        for dependency in package["dependencies"].as_array().expect("dependencies") {
+            if dependency["kind"].is_null() {
+                let name_of = text(&dependency["name"]);
+                let ours = dependency["path"].is_string();
+                assert!(
+                    ours || dependency["uses_default_features"] == Value::Bool(false),
+                    "{name}: {name_of} with default features may bring std in"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn micromath_is_used_in_the_master_alone() {
+    for (name, package) in packages() {
+        if name != "wheeleg-master" {
+            assert!(!dependencies(&package).contains("micromath"), "{name}");
+        }
+    }
+}
+
+#[test]
+fn versions_and_lints_stand_in_one_place() {
+    for (name, package) in packages() {
+        let path = text(&package["manifest_path"]);
+        let manifest = fs::read_to_string(&path).expect("manifest");
+        let mut section = String::new();
+        let mut lints = false;
+        for line in manifest.lines().map(str::trim) {
+            if let Some(header) = line.strip_prefix('[') {
+                section = header.trim_end_matches(']').to_owned();
+                // `[dependencies.x]` would hide from the check below.
+                assert!(
+                    !section.contains("dependencies."),
+                    "{name}: write [{section}] as one line"
+                );
+                continue;
+            }
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            if section.ends_with("dependencies") {
+                assert!(
+                    line.contains("workspace = true") || line.contains(".workspace = true"),
+                    "{name}: the version of `{line}` belongs into the root table"
+                );
+            }
+            lints |= section == "lints" && line == "workspace = true";
+        }
+        assert!(lints, "{name} does not inherit the workspace's lints");
+        for key in ["edition", "license", "publish", "rust-version", "version"] {
+            let inherited = format!("{key}.workspace = true");
+            assert!(manifest.contains(&inherited), "{name}: {inherited}");
+        }
+    }
+}
+
+#[test]
+fn unsafe_stands_nowhere() {
+    let keyword = concat!("un", "safe");
+    let mut found = Vec::new();
+    for (name, text) in rust_files() {
+        if UNSAFE_ALLOWED
+            .iter()
+            .any(|folder: &&str| name.starts_with(folder))
+        {
+            continue;
+        }
+        for (i, line) in text.lines().enumerate() {
+            if words(code(line)).any(|word| word == keyword) {
+                found.push(format!("{name}:{}", i + 1));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
+fn no_file_refers_outside_the_repository() {
+    // Written in pieces, so that this file is not its own counter-example.
+    let patterns = [
+        concat!("/ho", "me/"),
+        concat!("/ro", "ot/"),
+        concat!("/wo", "rk/"),
+        concat!("/Us", "ers/"),
+        concat!("../sha", "red"),
+    ];
+    let mut found = Vec::new();
+    for (name, text) in files() {
+        for (i, line) in text.lines().enumerate() {
+            for pattern in patterns {
+                for (at, _) in line.match_indices(pattern) {
+                    // A path begins here, or this is part of a longer one.
+                    let before = line[..at].chars().next_back();
+                    if !before.is_some_and(|c| c.is_alphanumeric() || "._-~}".contains(c)) {
+                        found.push(format!("{name}:{}: {pattern}", i + 1));
+                    }
+                }
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn every_source_file_can_be_read_in_one_sitting() {
+    let long: Vec<String> = rust_files()
+        .into_iter()
+        .filter_map(|(name, text)| {
+            let lines = text.lines().count();
+            (lines > LINES_MAX).then(|| format!("{name}: {lines} lines"))
+        })
+        .collect();
+    assert!(long.is_empty(), "{long:?}");
+}
+
+#[test]
+fn no_test_is_switched_off_or_asserts_nothing() {
+    let ignore = concat!("#[ig", "nore");
+    let test = concat!("#[te", "st]");
+    let mut tests = 0;
+    for (name, text) in rust_files() {
+        let lines: Vec<&str> = text.lines().map(str::trim).collect();
+        let count = lines.iter().filter(|line| **line == test).count();
+        tests += count;
+        assert!(
+            !lines.iter().any(|line| line.starts_with(ignore)),
+            "{name}: a test is switched off"
+        );
+        assert!(
+            count == 0 || lines.iter().any(|line| code(line).contains("assert")),
+            "{name}: tests without an assertion"
+        );
+    }
+    assert!(tests > 50, "only {tests} tests found");
+}
+
+#[test]
+fn continuous_integration_runs_the_command_of_the_readme() {
+    let readme = fs::read_to_string(root().join("README.md")).expect("README.md");
+    let script = fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
+    let command = "cargo xtask test";
+    assert!(readme.lines().any(|line| line.trim() == command));
+    assert!(script.contains("set -euo pipefail"));
+    assert!(script.lines().any(|line| {
+        let line = line.trim();
+        !line.starts_with('#') && line.starts_with(&format!("exec {command}"))
+    }));
+}
