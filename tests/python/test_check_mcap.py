@@ -48,11 +48,9 @@ class CheckMcap(unittest.TestCase):
     def test_good(self):
         self.assertEqual(self.defects(), [])
 
-    def test_units_in_metadata_count(self):
-        bare = {"type": "object", "properties": {"position_mm": {"type": "number"}, "mode": {"type": "string"}}}
-        units = {"units": json.dumps({"position_mm": "mm", "mode": "1"})}
-        self.assertEqual(self.defects(schema=bare, metadata=units), [])
-        self.refused("/joint/1.mode: no unit", schema=bare, metadata={"units": json.dumps({"position_mm": "mm"})})
+    def test_units_agree(self):
+        self.assertEqual(self.defects(metadata={"unit.position_mm": "mm"}), [])
+        self.refused("another in the metadata", metadata={"unit.position_mm": "m"})
 
     def test_description(self):
         self.refused("no topic", topic=" ")
