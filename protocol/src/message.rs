@@ -108,8 +108,14 @@ macro_rules! messages {
         )*
 
         /// Any message of the bus.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, PartialEq, Eq)]
         pub enum Message { $( $(#[$meta])* $name($name), )* }
+
+        impl core::fmt::Debug for Message {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                match self { $( Self::$name(message) => message.fmt(f) ),* }
+            }
+        }
 
         impl Message {
             /// Its type.

@@ -35,11 +35,27 @@ wire_enum! {
 /// | 6 | 2 | next reference, i16 | I10F6 mm | 0 |
 /// | 8 | 1 | bus cycles until the next reference | 1–255, 0 = none known | 0 |
 /// | 9 | 1 | flags | bit 0 valid, bits 1–2 link-loss action, bit 3 track | bit 0, bit 3 |
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "RawSlot", into = "RawSlot")]
 pub struct SyncSlot(RawSlot);
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+impl core::fmt::Debug for SyncSlot {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.is_valid() {
+            f.debug_struct("SyncSlot")
+                .field("reference", &self.0.reference)
+                .field("velocity", &self.0.velocity)
+                .field("next_reference", &self.0.next_reference)
+                .field("cycles_to_next", &self.0.cycles_to_next)
+                .field("flags", &self.0.flags)
+                .finish()
+        } else {
+            f.write_str("Empty")
+        }
+    }
+}
+
+#[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct RawSlot {
     #[serde(with = "le")]
     reference: i32,

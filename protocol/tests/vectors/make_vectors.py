@@ -145,7 +145,8 @@ def render(kind, value):
         return bytes([value]), f"FaultCode(Some({FAULTS[value]}))" if value else "FaultCode(None)"
     if kind == "SyncSlots":
         names = ("reference", "velocity", "next_reference", "cycles_to_next", "flags")
-        texts = ["SyncSlot(RawSlot { %s })" % ", ".join(f"{n}: {v}" for n, v in zip(names, s)) for s in value]
+        texts = ["SyncSlot { %s }" % ", ".join(f"{n}: {v}" for n, v in zip(names, s)) if s[4] & 1 else "Empty"
+                 for s in value]
         return b"".join(struct.pack("<ihhBB", *s) for s in value), "SyncSlots([%s])" % ", ".join(texts)
     return bytes(value), "[%s]" % ", ".join(map(str, value))
 
