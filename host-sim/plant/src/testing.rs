@@ -179,6 +179,26 @@ pub fn wheeleg_2003_axis() -> AxisParams {
     }
 }
 
+/// Bench for controller comparisons: VQ110U-class valves, unthrottled, short tubes.
+#[must_use]
+pub fn vq110u_axis() -> AxisParams {
+    let valve = ValveParams {
+        flow: Iso6358::new(0.144 * DM3_S_BAR, 0.3), // C, b DATASHEET SMC VQ110U, modelled
+        t_on_s: 3.5e-3,                             // s DATASHEET SMC VQ110U
+        t_off_s: 2.0e-3,                            // s DATASHEET SMC VQ110U
+    };
+    let mut axis = wheeleg_2003_axis();
+    axis.cylinder.fill_valve = valve;
+    axis.cylinder.vent_valve = valve;
+    axis.cylinder.dead_volume_a_m3 = 1.0e-6; // m3 ASSUMED
+    axis.cylinder.dead_volume_b_m3 = 1.0e-6; // m3 ASSUMED
+    axis.cylinder.line_volume_m3 = 1.5e-6; // m3 DERIVED 0.3 m of 2.5 mm bore
+    axis.cylinder.line_flow = Some(Iso6358::new(0.56 * DM3_S_BAR, 0.42)); // DERIVED Eckersten
+    axis.cylinder.line_delay_s = 0.9e-3; // s DERIVED 0.3 m at 343 m/s
+    axis.cylinder.dead_wall_area_m2 = 0.0030; // m2 DERIVED
+    axis
+}
+
 /// The whole robot at home: yaw in the middle, horizontal retracted, vertical extended.
 ///
 /// Vertical cylinders start as a controller that kept pushing leaves them (A at the

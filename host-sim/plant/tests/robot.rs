@@ -1,0 +1,203 @@
+//! Behaviour of the assembled robot.
+
+use wheeleg_plant::testing::wheeleg_2003;
+use wheeleg_plant::{Inputs, Plant, PlantError, PlantState};
+
+const MS: u64 = 1_000_000;
+
+fn robot() -> (Plant, PlantState) {
+    let plant = Plant::new(&wheeleg_2003()).unwrap();
+    let state = plant.initial_state(1).unwrap();
+    (plant, state)
+}
+
+/// One tick of a lively program on all joints and both wheels.
+fn lively(k: u16) -> Inputs {
+    let mut inputs = Inputs::default();
+    for (joint, on) in inputs.valve_on_us.iter_mut().enumerate() {
+        let phase = (usize::from(k) + 37 * joint) % 20;
+        let us = if phase < 7 {
+            1000
+        } else if phase == 7 {
+            350
+        } else {
+            0
+        };
+        *on = if (k / 250).is_multiple_of(2) {
+            [0, us, us, 0]
+        } else {
+            [us, 0, 0, us]
+        };
+    }
+    inputs.bridge_duty = [0.2, 0.2];
+    inputs.bridge_enabled = [k % 500 > 100; 2];
+    inputs
+}
+
+#[test]
+fn air_is_conserved_across_six_cylinders_and_the_supply() {
+    let (plant, start) = robot();
+    let mut state = start.clone();
+    for k in 0..3000 {
+        plant.tick(&mut state, &lively(k)).unwrap();
+    }
+    let before = plant.assembly.mass_balance_kg(&start.core);
+    let after = plant.assembly.mass_balance_kg(&state.core);
+    assert!(
+        ((after - before) / before).abs() < 1e-12,
+        "{before} {after}"
+    );
+    assert!(plant.outputs(&state).air_used_kg > 1e-3);
+    let residual = plant.assembly.energy_residual_j(&start.core, &state.core);
+    assert!(residual < 1e-9, "{residual}");
+}
+
+#[test]
+fn cylinders_share_the_supply() {
+    let mut params = wheeleg_2003();
+    params.supply.reservoir_m3 = 2e-4;
+    params.supply.source_pressure_pa = 101_325.0;
+    let plant = Plant::new(&params).unwrap();
+    let sag = |joints: usize| {
+        let mut state = plant.initial_state(0).unwrap();
+        let mut inputs = Inputs::default();
+        for on in inputs.valve_on_us.iter_mut().take(joints) {
+            *on = [0, 0, 1000, 0];
+        }
+        for _ in 0..100 {
+            plant.tick(&mut state, &inputs).unwrap();
+        }
+        params.supply.initial_pressure_pa - plant.outputs(&state).supply_pressure_pa
+    };
+    let (none, one, two) = (sag(0), sag(1), sag(2));
+    assert!(none.abs() < 1e-6, "{none}");
+    assert!(one > 1e3 && two > 1.5 * one, "{one} {two}");
+}
+
+#[test]
+fn tick_by_tick_equals_nothing_but_the_same_ticks() {
+    let (plant, mut a) = robot();
+    let mut b = a.clone();
+    for k in 0..400 {
+        plant.tick(&mut a, &lively(k)).unwrap();
+        let t = u64::from(k) * MS;
+        plant.advance(&mut b, t, t + MS, &lively(k)).unwrap();
+        assert_eq!(
+            plant.read_position(&mut a, 2),
+            plant.read_position(&mut b, 2)
+        );
+    }
+    assert_eq!(plant.state_hash(&a), plant.state_hash(&b));
+    plant.tick(&mut b, &lively(400)).unwrap();
+    assert_ne!(plant.state_hash(&a), plant.state_hash(&b));
+}
+
+#[test]
+fn save_and_restore_goes_on_bit_for_bit() {
+    let (plant, mut state) = robot();
+    for k in 0..333 {
+        plant.tick(&mut state, &lively(k)).unwrap();
+    }
+    let saved = serde_json::to_string(&state).unwrap();
+    let mut restored: PlantState = serde_json::from_str(&saved).unwrap();
+    assert_eq!(plant.state_hash(&state), plant.state_hash(&restored));
+    for s in [&mut state, &mut restored] {
+        for k in 333..777 {
+            plant.tick(s, &lively(k)).unwrap();
+            let _ = plant.read_position(s, 0);
+        }
+    }
+    assert_eq!(plant.state_hash(&state), plant.state_hash(&restored));
+}
+
+#[test]
+fn every_state_variable_is_in_the_hash() {
+    let (plant, state) = robot();
+    let base = plant.state_hash(&state);
+    let changes: [fn(&mut PlantState); 9] = [
+        |s| s.core.time_ns += 1,
+        |s| s.core.motion.position[7] += 1e-15,
+        |s| s.core.motion.velocity[0] = -0.0,
+        |s| s.core.motion.motors[1].current_a = 1e-300,
+        |s| s.core.cylinders[5].chamber_b.mass_kg *= 1.0 + f64::EPSILON,
+        |s| s.core.cylinders[3].bristle_m = 1e-300,
+        |s| s.core.cylinders[0].command_fall_ns[2] = 7,
+        |s| s.core.supply.mass_kg *= 1.0 + f64::EPSILON,
+        |s| s.adc[4] = wheeleg_plant::sensors::AdcState::new(2, "other"),
+    ];
+    for (i, change) in changes.iter().enumerate() {
+        let mut other = state.clone();
+        change(&mut other);
+        assert_ne!(plant.state_hash(&other), base, "change {i}");
+    }
+}
+
+#[test]
+fn bad_inputs_are_refused_and_latch_nothing() {
+    let (plant, mut state) = robot();
+    let before = state.clone();
+    let mut inputs = Inputs::default();
+    inputs.valve_on_us[4][1] = 1001;
+    let error = plant.apply(&mut state, &inputs).unwrap_err();
+    assert!(
+        matches!(error, PlantError::Input { index: 4, .. }),
+        "{error}"
+    );
+    for duty in [1.001, f64::NAN, f64::INFINITY] {
+        let inputs = Inputs {
+            bridge_duty: [0.0, duty],
+            ..Inputs::default()
+        };
+        let error = plant.apply(&mut state, &inputs).unwrap_err();
+        assert!(
+            matches!(error, PlantError::Input { index: 1, .. }),
+            "{error}"
+        );
+    }
+    let error = plant
+        .advance(&mut state, 5, 10, &Inputs::default())
+        .unwrap_err();
+    assert!(
+        matches!(
+            error,
+            PlantError::Time {
+                state_ns: 0,
+                from_ns: 5,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!(state, before);
+}
+
+#[test]
+fn dumping_empties_the_supply_and_opens_the_switch() {
+    let (plant, mut state) = robot();
+    assert!(plant.outputs(&state).pressure_switch);
+    let dump = Inputs {
+        dump: true,
+        ..Inputs::default()
+    };
+    for _ in 0..1500 {
+        plant.tick(&mut state, &dump).unwrap();
+    }
+    let o = plant.outputs(&state);
+    assert!(o.dumping && !o.pressure_switch);
+    assert!(o.supply_pressure_pa < 110_000.0, "{}", o.supply_pressure_pa);
+    // The standing legs keep their gas.
+    assert!(o.cylinders[2].pressure_pa[0] > 6e5);
+}
+
+#[test]
+fn an_exploding_state_is_named() {
+    let (plant, mut state) = robot();
+    state.core.motion.velocity[4] = 1e9;
+    let error = plant.tick(&mut state, &Inputs::default()).unwrap_err();
+    let text = error.to_string();
+    assert!(!matches!(error, PlantError::Input { .. }), "{text}");
+    let (plant, mut state) = robot();
+    state.core.cylinders[1].chamber_a.pv_j = f64::NAN;
+    let error = plant.tick(&mut state, &Inputs::default()).unwrap_err();
+    assert!(!matches!(error, PlantError::Input { .. }), "{error}");
+}
