@@ -2,7 +2,8 @@
 //! write must equal, byte for byte, what is checked in.
 //!
 //! A generator is a Python script in a folder `tests/vectors` of a crate (or
-//! in `tests/vectors` itself) that writes its data files beside itself. It is
+//! in `tests/vectors` itself) that writes its data files beside itself, or to
+//! standard output if it documents the call `python3 NAME.py > FILE`. It is
 //! run in a copy of the folder from which all data files have been removed, so
 //! that only what it really computes is compared.
 //!
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::process::{command, root, run, target_dir};
+use crate::process::{command, output, root, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::tools;
 
@@ -85,7 +86,13 @@ fn check(folder: &Path) -> StepResult {
         }
         fs::create_dir_all(&scratch)?;
         copy_sources(folder, &scratch)?;
-        run(command(python).arg("-B").arg(&script).current_dir(&scratch))?;
+        let mut call = command(python);
+        call.arg("-B").arg(&script).current_dir(&scratch);
+        let source = fs::read_to_string(scratch.join(&script))?;
+        match redirection(&source, &script) {
+            Some(file) => fs::write(scratch.join(file), output(&mut call)?)?,
+            None => run(&mut call)?,
+        }
         let written = data_files(&scratch)?;
         ensure_some(&script, &written)?;
         regenerated.extend(written);
@@ -98,6 +105,15 @@ fn check(folder: &Path) -> StepResult {
         regenerated.len()
     );
     Ok(())
+}
+
+/// The file that a script's documented call redirects its output to.
+fn redirection<'a>(source: &'a str, script: &str) -> Option<&'a str> {
+    let call = format!("python3 {script} > ");
+    source
+        .lines()
+        .find_map(|line| line.trim().strip_prefix(call.as_str()))
+        .filter(|file| is_data(file) && !file.contains(['/', '\\']))
 }
 
 fn ensure_some(script: &str, written: &Files) -> Result<()> {
@@ -214,6 +230,14 @@ mod tests {
         assert!(compare(&old, &Files::new(), "").is_err());
         assert!(compare(&old, &Files::new(), "`a.json`: digitised").is_ok());
         assert!(compare(&Files::new(), &old, "a.json").is_err());
+    }
+
+    #[test]
+    fn a_documented_redirection_names_the_file() {
+        let source = "\"\"\"Doc.\n\n    python3 make.py > a.json\n\"\"\"\n";
+        assert_eq!(redirection(source, "make.py"), Some("a.json"));
+        assert_eq!(redirection(source, "other.py"), None);
+        assert_eq!(redirection("python3 make.py > ../a.json", "make.py"), None);
     }
 
     #[test]
