@@ -67,6 +67,10 @@ impl Layer0 {
 
     /// Ends a cycle for the supervision of the nodes.
     pub(super) fn supervise(&mut self, now_us: u64, events: &mut Events) {
+        if self.cycle == 0 {
+            // No SYNC was sent: nobody could answer.
+            return;
+        }
         let mut lost = None;
         let mut changes = [None; crate::setpoint::NODES];
         self.liveness.end_cycle(|index, change| {
