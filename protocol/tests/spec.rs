@@ -24,10 +24,18 @@ use wheeleg_protocol::{
 const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/SPEC.md");
 
 fn field_table(out: &mut String, fields: &[FieldSchema], first: usize) {
-    let _ = writeln!(out, "| offset | bytes | field | type | meaning |\n|---|---|---|---|---|");
+    let _ = writeln!(
+        out,
+        "| offset | bytes | field | type | meaning |\n|---|---|---|---|---|"
+    );
     let mut offset = first;
     for field in fields {
-        let FieldSchema { name, ty, size, format } = field;
+        let FieldSchema {
+            name,
+            ty,
+            size,
+            format,
+        } = field;
         let _ = writeln!(out, "| {offset} | {size} | `{name}` | {ty} | {format} |");
         offset += size;
     }
@@ -66,9 +74,18 @@ fn example(out: &mut String, message: &MessageSchema) {
 }
 
 fn fault_table(out: &mut String, rows: &[FaultSchema]) {
-    let _ = writeln!(out, "| number | bit | name | what happened | remedy |\n|---|---|---|---|---|");
+    let _ = writeln!(
+        out,
+        "| number | bit | name | what happened | remedy |\n|---|---|---|---|---|"
+    );
     for row in rows {
-        let FaultSchema { code, bit, name, sentence, remedy } = row;
+        let FaultSchema {
+            code,
+            bit,
+            name,
+            sentence,
+            remedy,
+        } = row;
         let _ = writeln!(out, "| {code} | {bit} | {name} | {sentence} | {remedy} |");
     }
 }
@@ -80,7 +97,11 @@ fn parameter_table(out: &mut String, rows: &[ParamInfo]) {
     );
     for row in rows {
         let value = |raw: i32| f64::from(raw) / f64::from(1_u32 << row.format.fraction_bits());
-        let when = if row.disarmed_only { "disarmed" } else { "any time" };
+        let when = if row.disarmed_only {
+            "disarmed"
+        } else {
+            "any time"
+        };
         let _ = writeln!(
             out,
             "| 0x{:04X} | `{}` | {} | {} | {} | {} | {} | {when} | {} |",
@@ -111,8 +132,14 @@ fn render(name: &str) -> String {
         "limits" => {
             let _ = writeln!(out, "| quantity | value |\n|---|---|");
             let _ = writeln!(out, "| protocol version | {VERSION} |");
-            let _ = writeln!(out, "| schema hash of this version | 0x{SCHEMA_HASH:016X} |");
-            let _ = writeln!(out, "| longest frame on the line, delimiters included | {MAX_ENCODED} bytes |");
+            let _ = writeln!(
+                out,
+                "| schema hash of this version | 0x{SCHEMA_HASH:016X} |"
+            );
+            let _ = writeln!(
+                out,
+                "| longest frame on the line, delimiters included | {MAX_ENCODED} bytes |"
+            );
             let _ = writeln!(out, "| longest decoded frame | {MAX_DECODED} bytes |");
             let _ = writeln!(out, "| longest payload | {MAX_PAYLOAD} bytes |");
         }
@@ -128,23 +155,54 @@ fn render(name: &str) -> String {
             let _ = writeln!(out, "| quantity | value |\n|---|---|");
             let _ = writeln!(out, "| line rate | {BAUD} bit/s, 10 bits a byte |");
             let _ = writeln!(out, "| bus cycle | {CYCLE_US} µs |");
-            let _ = writeln!(out, "| SYNC on the line | {} µs |", timing.frame_us(MessageType::Sync));
-            let _ = writeln!(out, "| reply on the line | {} µs |", timing.frame_us(MessageType::SlotReply));
+            let _ = writeln!(
+                out,
+                "| SYNC on the line | {} µs |",
+                timing.frame_us(MessageType::Sync)
+            );
+            let _ = writeln!(
+                out,
+                "| reply on the line | {} µs |",
+                timing.frame_us(MessageType::SlotReply)
+            );
             let _ = writeln!(out, "| turnaround | {TURNAROUND_US} µs |");
             let _ = writeln!(out, "| gap between slots | {GAP_US} µs |");
-            let _ = writeln!(out, "| driver-enable limit of a node | {} µs |", timing.driver_limit_us());
-            let _ = writeln!(out, "| cyclic part of the cycle | {} µs |", timing.cyclic_us());
-            let _ = writeln!(out, "| cyclic share | {CYCLIC_SHARE_PERMILLE} ‰ (at most 400 ‰) |");
-            let _ = writeln!(out, "| memory for repeated requests | {DUPLICATE_WINDOW_US} µs |");
-            let _ = writeln!(out, "| a command may lie ahead of its deadline by | {MAX_DEADLINE_CYCLES} cycles |");
-            let _ = writeln!(out, "\n| node | slot starts after the end of SYNC |\n|---|---|");
+            let _ = writeln!(
+                out,
+                "| driver-enable limit of a node | {} µs |",
+                timing.driver_limit_us()
+            );
+            let _ = writeln!(
+                out,
+                "| cyclic part of the cycle | {} µs |",
+                timing.cyclic_us()
+            );
+            let _ = writeln!(
+                out,
+                "| cyclic share | {CYCLIC_SHARE_PERMILLE} ‰ (at most 400 ‰) |"
+            );
+            let _ = writeln!(
+                out,
+                "| memory for repeated requests | {DUPLICATE_WINDOW_US} µs |"
+            );
+            let _ = writeln!(
+                out,
+                "| a command may lie ahead of its deadline by | {MAX_DEADLINE_CYCLES} cycles |"
+            );
+            let _ = writeln!(
+                out,
+                "\n| node | slot starts after the end of SYNC |\n|---|---|"
+            );
             for node in Address::nodes() {
                 let start = timing.slot_start_us(node).expect("a node");
                 let _ = writeln!(out, "| {node} | {start} µs |");
             }
         }
         "types" => {
-            let _ = writeln!(out, "| type | name | class | payload | on the line | answer |\n|---|---|---|---|---|---|");
+            let _ = writeln!(
+                out,
+                "| type | name | class | payload | on the line | answer |\n|---|---|---|---|---|---|"
+            );
             for message in MESSAGES {
                 let len = message.payload_len();
                 let answer = MessageType::from_code(message.id)
@@ -175,7 +233,11 @@ fn render(name: &str) -> String {
         "slot" => field_table(&mut out, SYNC_SLOT_FIELDS, 0),
         "enums" => {
             for set in INTERFACE.enums {
-                let _ = writeln!(out, "### {}\n\n| value | name | meaning |\n|---|---|---|", set.name);
+                let _ = writeln!(
+                    out,
+                    "### {}\n\n| value | name | meaning |\n|---|---|---|",
+                    set.name
+                );
                 for value in set.values {
                     let _ = writeln!(out, "| {} | {} | {} |", value.value, value.name, value.text);
                 }
@@ -192,8 +254,17 @@ fn render(name: &str) -> String {
 }
 
 const PARTS: [&str; 11] = [
-    "limits", "addresses", "timing", "types", "slot", "messages", "enums", "faults", "limit-bits",
-    "joint-parameters", "wheel-parameters",
+    "limits",
+    "addresses",
+    "timing",
+    "types",
+    "slot",
+    "messages",
+    "enums",
+    "faults",
+    "limit-bits",
+    "joint-parameters",
+    "wheel-parameters",
 ];
 
 #[test]
@@ -201,14 +272,27 @@ fn the_tables_are_those_of_the_code() {
     let mut document = std::fs::read_to_string(PATH).expect("SPEC.md");
     let update = std::env::var_os("UPDATE_SPEC").is_some();
     for part in PARTS {
-        let (begin, end) = (format!("<!-- begin {part} -->\n"), format!("<!-- end {part} -->"));
-        let start = document.find(&begin).unwrap_or_else(|| panic!("no part {part}")) + begin.len();
-        let stop = start + document[start..].find(&end).unwrap_or_else(|| panic!("{part} has no end"));
+        let (begin, end) = (
+            format!("<!-- begin {part} -->\n"),
+            format!("<!-- end {part} -->"),
+        );
+        let start = document
+            .find(&begin)
+            .unwrap_or_else(|| panic!("no part {part}"))
+            + begin.len();
+        let stop = start
+            + document[start..]
+                .find(&end)
+                .unwrap_or_else(|| panic!("{part} has no end"));
         let expected = render(part);
         if update {
             document.replace_range(start..stop, &expected);
         } else {
-            assert_eq!(&document[start..stop], expected, "part {part} of SPEC.md differs from the code");
+            assert_eq!(
+                &document[start..stop],
+                expected,
+                "part {part} of SPEC.md differs from the code"
+            );
         }
     }
     if update {
@@ -263,11 +347,18 @@ fn the_worked_examples_hold_both_ways() {
         assert_eq!(envelope_text(envelope), example.way);
         assert_eq!(plain(&example.line), example.plain);
         let mut buffer = [0; MAX_ENCODED];
-        assert_eq!(message.emit(envelope, &mut buffer).expect("fits"), example.line);
+        assert_eq!(
+            message.emit(envelope, &mut buffer).expect("fits"),
+            example.line
+        );
         seen.push(message.message_type());
     }
     for message_type in MessageType::ALL {
-        assert!(seen.contains(message_type), "no example of {}", message_type.name());
+        assert!(
+            seen.contains(message_type),
+            "no example of {}",
+            message_type.name()
+        );
     }
 }
 
@@ -285,14 +376,23 @@ fn the_sync_example_means_what_the_text_says() {
         let three = joint(3).expect("set-point of joint 3");
         assert_eq!(three.reference.to_f64(), 90.0);
         assert!(three.track);
-        assert_eq!(three.on_link_loss, wheeleg_protocol::LinkLossAction::HoldThenExhaust);
+        assert_eq!(
+            three.on_link_loss,
+            wheeleg_protocol::LinkLossAction::HoldThenExhaust
+        );
         let next = three.next.expect("next reference");
-        assert_eq!((next.reference.to_num::<f64>(), next.cycles.get()), (120.0, 7));
+        assert_eq!(
+            (next.reference.to_num::<f64>(), next.cycles.get()),
+            (120.0, 7)
+        );
         let six = joint(6).expect("set-point of joint 6");
         assert_eq!(six.reference.to_f64(), 12.5);
         assert_eq!(six.velocity_mm_s().to_f64(), -10.0);
         assert_eq!(joint(1), None);
-        let seven = sync.slots.wheel(Address::wheel(7).expect("wheel")).expect("set-point");
+        let seven = sync
+            .slots
+            .wheel(Address::wheel(7).expect("wheel"))
+            .expect("set-point");
         assert_eq!(seven.reference.get(), 66_000);
         assert_eq!(sync.slots.wheel(Address::wheel(8).expect("wheel")), None);
         looked = true;
