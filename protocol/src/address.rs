@@ -73,6 +73,18 @@ impl Address {
         self.0
     }
 
+    /// Whether it is the master, 0.
+    #[must_use]
+    pub const fn is_master(self) -> bool {
+        self.0 == Self::MASTER.0
+    }
+
+    /// Whether it is all nodes at once, 255.
+    #[must_use]
+    pub const fn is_broadcast(self) -> bool {
+        self.0 == Self::BROADCAST.0
+    }
+
     /// Whether it is a joint board, 1–6.
     #[must_use]
     pub const fn is_joint(self) -> bool {

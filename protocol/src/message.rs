@@ -32,7 +32,7 @@ pub enum Class {
 
 macro_rules! messages {
     ($(
-        $(#[$meta:meta])*
+        $(#[doc = $doc:literal])*
         $name:ident = $id:literal, $class:ident $(-> $answer:ident)? {
             $( $(#[$fmeta:meta])* $field:ident: $ty:ty = $format:literal; )*
         }
@@ -44,7 +44,7 @@ macro_rules! messages {
         /// used again for something else.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
-        pub enum MessageType { $( $(#[$meta])* $name = $id, )* }
+        pub enum MessageType { $( $(#[doc = $doc])* $name = $id, )* }
 
         impl MessageType {
             /// All types, in ascending order.
@@ -85,7 +85,7 @@ macro_rules! messages {
         }
 
         $(
-            $(#[$meta])*
+            $(#[doc = $doc])*
             #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
             pub struct $name { $( $(#[$fmeta])* #[doc = $format] pub $field: $ty, )* }
 
@@ -109,7 +109,7 @@ macro_rules! messages {
 
         /// Any message of the bus.
         #[derive(Clone, Copy, PartialEq, Eq)]
-        pub enum Message { $( $(#[$meta])* $name($name), )* }
+        pub enum Message { $( $(#[doc = $doc])* $name($name), )* }
 
         impl core::fmt::Debug for Message {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -141,6 +141,7 @@ macro_rules! messages {
             id: $id,
             name: stringify!($name),
             class: stringify!($class),
+            text: concat!($($doc),*),
             fields: &[ $( FieldSchema {
                 name: stringify!($field),
                 ty: stringify!($ty),
@@ -290,6 +291,19 @@ impl MessageType {
         self as u8
     }
 
+    /// Whether a message of this type may go from `source` to `destination`: no
+    /// node can command another, and requests are never broadcast.
+    #[must_use]
+    pub const fn may_go(self, source: Address, destination: Address) -> bool {
+        match (self, self.class()) {
+            (Self::Sync, _) => source.is_master() && destination.is_broadcast(),
+            (Self::SlotReply, _) | (_, Class::Answer) => {
+                source.is_node() && destination.is_master()
+            }
+            (_, Class::Request | Class::Cyclic) => source.is_master() && destination.is_node(),
+        }
+    }
+
     /// Whether the type keeps number and layout in every protocol version.
     #[must_use]
     pub const fn is_version_independent(code: u8) -> bool {
@@ -345,6 +359,12 @@ pub enum ParseError {
         /// Bytes found.
         found: usize,
     },
+    /// The message may not go this way: SYNC goes from the master to all, a reply
+    /// or an answer from a node to the master, a request from the master to a node.
+    Route {
+        /// The type.
+        message_type: MessageType,
+    },
     /// A field is outside its range, or a reserved bit is set.
     Value {
         /// The type.
@@ -359,6 +379,7 @@ impl ParseError {
         match self {
             Self::UnknownType { .. } => NackReason::UnknownMessage,
             Self::Length { .. } => NackReason::BadLength,
+            Self::Route { .. } => NackReason::NotMaster,
             Self::Value { .. } => NackReason::OutOfRange,
         }
     }
@@ -377,6 +398,11 @@ impl core::fmt::Display for ParseError {
                 message_type.name(),
                 message_type.payload_len()
             ),
+            Self::Route { message_type } => write!(
+                f,
+                "{} may not go from this source to this destination",
+                message_type.name()
+            ),
             Self::Value { message_type } => {
                 write!(f, "{} holds a value outside its range", message_type.name())
             }
@@ -388,8 +414,8 @@ impl Message {
     /// The message in a checked frame.
     ///
     /// # Errors
-    /// [`ParseError`]: unknown type, wrong size, or a value outside its range.
-    /// Never panics, for any payload.
+    /// [`ParseError`]: unknown type, wrong size, wrong way, or a value outside its
+    /// range, in this order. Never panics, for any payload.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, ParseError> {
         let code = frame.header.message_type;
         let message_type = MessageType::from_code(code).ok_or(ParseError::UnknownType { code })?;
@@ -398,6 +424,9 @@ impl Message {
                 message_type,
                 found: frame.payload.len(),
             });
+        }
+        if !message_type.may_go(frame.header.source, frame.header.destination) {
+            return Err(ParseError::Route { message_type });
         }
         match Self::read_payload(message_type, frame.payload) {
             Ok((message, [])) => Ok(message),

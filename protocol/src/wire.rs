@@ -42,6 +42,8 @@ pub struct MessageSchema {
     pub name: &'static str,
     /// `cyclic`, `request` or `answer`.
     pub class: &'static str,
+    /// What it is for; not part of the schema hash.
+    pub text: &'static str,
     /// Payload fields in wire order.
     pub fields: &'static [FieldSchema],
 }

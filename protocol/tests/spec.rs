@@ -221,6 +221,7 @@ fn render(name: &str) -> String {
         "messages" => {
             for message in MESSAGES {
                 let _ = writeln!(out, "### {} (0x{:02X})\n", message.name, message.id);
+                let _ = writeln!(out, "{}\n", message.text.trim());
                 if message.fields.is_empty() {
                     let _ = writeln!(out, "No payload.");
                 } else {

@@ -85,6 +85,7 @@ fn rejected_vectors_give_their_reason() {
         "Length",
         "Address",
         "UnknownType",
+        "Route",
         "Value",
     ] {
         assert!(

@@ -261,7 +261,7 @@ def rejected():
         return {"hex": data.hex(), "reason": why, "what": what}
 
     def value(kind, payload, what):
-        return bad(f"Value {{ message_type: {MESSAGES[kind][0]} }}", frame(kind, payload, 0, 1, 9), what)
+        return bad(f"Value {{ message_type: {MESSAGES[kind][0]} }}", frame(kind, payload, *addresses(kind)), what)
 
     for kind in MESSAGES:
         payload, _ = message(kind, "any")
@@ -284,6 +284,11 @@ def rejected():
         assert good[0] == good[-1] == 0
     for source, destination in ((9, 0), (255, 0), (0, 9), (0, 254), (128, 1)):
         yield bad("Address", frame(0x10, b"", source, destination, 1), "address that does not exist as such")
+    for kind, ways in {0x01: ((0, 1), (1, 255), (3, 0)), 0x02: ((0, 0), (0, 1), (2, 3), (2, 255)),
+                       0x11: ((1, 2), (0, 255), (0, 0), (3, 0)), 0x80: ((0, 1), (0, 0), (1, 2), (1, 255))}.items():
+        for way in ways:
+            yield bad(f"Route {{ message_type: {MESSAGES[kind][0]} }}", frame(kind, message(kind, "any")[0], *way, 1),
+                      "a way this message may not go")
     for kind in (0x00, 0x03, 0x17, 0x7F, 0x86, 0xFF):
         yield bad(f"UnknownType {{ code: {kind} }}", frame(kind, b"\1\2", 0, 1, 1), "unassigned message type")
     yield bad("Short", b"\0" + cobs(b"123") + b"\0", "three bytes")
