@@ -158,11 +158,11 @@ mod tests {
         for (index, mode) in ValveMode::USEFUL.iter().enumerate() {
             let [fill_a, vent_a, fill_b, vent_b] = mode.open();
             assert!(
-                !(fill_a && vent_a) && !(fill_b && vent_b),
+                !(fill_a && vent_a || fill_b && vent_b),
                 "{mode:?} blows through"
             );
             assert!(
-                !(fill_a && fill_b) && !(vent_a && vent_b),
+                !(fill_a && fill_b || vent_a && vent_b),
                 "{mode:?} has no direction"
             );
             for other in &ValveMode::USEFUL[..index] {

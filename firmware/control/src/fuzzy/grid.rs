@@ -107,12 +107,14 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
     #[inline(never)]
     fn infer_all(&self, first: i16, second: i16) -> i16 {
         let mut second_levels = [0_u16; SECOND];
-        for (j, level) in second_levels.iter_mut().enumerate() {
+        // Ranges instead of `enumerate`, whose counter is an overflow check that
+        // keeps a panic in the image.
+        for (j, level) in (0..SECOND).zip(&mut second_levels) {
             *level = self.second.membership(j, second);
         }
         let mut numerator = 0_i64;
         let mut denominator = 0_i64;
-        for (i, row) in self.consequents.iter().enumerate() {
+        for (i, row) in (0..FIRST).zip(&self.consequents) {
             let level = self.first.membership(i, first);
             if level == 0 {
                 continue;

@@ -73,7 +73,7 @@ impl<const INPUTS: usize, const SETS: usize, const RULES: usize> RuleList<INPUTS
     pub fn infer(&self, inputs: [i16; INPUTS]) -> i16 {
         let mut levels = [[0_u16; SETS]; INPUTS];
         for ((row, partition), input) in levels.iter_mut().zip(&self.partitions).zip(inputs) {
-            for (index, level) in row.iter_mut().enumerate() {
+            for (index, level) in (0..SETS).zip(row) {
                 *level = partition.membership(index, input);
             }
         }
