@@ -14,7 +14,7 @@ const SOURCES: [&str; 3] = ["host-sim", "firmware", "protocol"];
 /// `cargo test --workspace` builds it beside the tests. `cargo test -p
 /// wheeleg-tests` does not, so it is built here if it is missing or older than
 /// its sources.
-pub fn path() -> &'static Path {
+pub(crate) fn path() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| {
         let test = std::env::current_exe().expect("path of the test program");
