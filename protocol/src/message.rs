@@ -1,6 +1,6 @@
 //! Messages: typed structs, one exact payload size each.
 //!
-//! Bytes become a checked [`Frame`](crate::Frame), a frame becomes a
+//! Bytes become a checked [`Frame`], a frame becomes a
 //! [`Message`]; only messages reach logic. [`Message::parse`] can fail for an
 //! unknown type, a wrong size or a value outside its range, and says which, so
 //! that a node can answer with the matching [`NackReason`]. After a successful
@@ -373,13 +373,16 @@ pub enum ParseError {
 }
 
 impl ParseError {
-    /// The reason with which a node refuses such a request.
+    /// The reason with which a node refuses such a request of the master.
+    ///
+    /// Only the master is ever answered: two boards could otherwise answer each
+    /// other's refusals without end.
     #[must_use]
     pub const fn nack_reason(self) -> NackReason {
         match self {
-            Self::UnknownType { .. } => NackReason::UnknownMessage,
+            // A board knows no request that goes another way than from the master to it.
+            Self::UnknownType { .. } | Self::Route { .. } => NackReason::UnknownMessage,
             Self::Length { .. } => NackReason::BadLength,
-            Self::Route { .. } => NackReason::NotMaster,
             Self::Value { .. } => NackReason::OutOfRange,
         }
     }
