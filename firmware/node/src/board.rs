@@ -187,7 +187,6 @@ fn take_request<A: Application>(
     };
     let at_us = application.core().supervisor.time_us(at);
     let answer = match message {
-        _ if envelope.source != Address::MASTER => nack(NackReason::NotMaster),
         Err(error) => nack(error.nack_reason()),
         Ok(request) if request.message_type().answer().is_none() => {
             nack(NackReason::UnknownMessage)

@@ -16,7 +16,7 @@ use wheeleg_units::Micros;
 pub enum Incoming {
     /// The set-points of all nodes.
     Sync(Sync),
-    /// A frame addressed to this board, whatever its payload.
+    /// A frame of the master to this board, whatever its payload.
     Addressed(Envelope, u8, Result<Message, ParseError>),
     /// A frame that claims to come from this board.
     Impostor,
@@ -51,6 +51,10 @@ impl BusPort {
         if envelope.source == self.address {
             return Some(Incoming::Impostor);
         }
+        // Only the master asks; an answer to anybody else would disturb the line.
+        if envelope.source != Address::MASTER {
+            return None;
+        }
         if envelope.destination == self.address {
             let message = Message::parse(&frame);
             return Some(Incoming::Addressed(
@@ -60,7 +64,6 @@ impl BusPort {
             ));
         }
         if envelope.destination == Address::BROADCAST
-            && envelope.source == Address::MASTER
             && let Ok(Message::Sync(sync)) = Message::parse(&frame)
         {
             return Some(Incoming::Sync(sync));

@@ -305,8 +305,10 @@ fn requests_for_others_are_ignored_and_wrong_ones_named() {
     }
     let stranger = frame_from(Address::joint(4).unwrap(), rig.address, 5, &ARM);
     rig.node.on_bus_bytes(&stranger, Micros(rig.now));
-    let answer = decode(&rig.node.take_transmission().unwrap()).1;
-    assert_eq!(refusal(&answer), Some(NackReason::NotMaster));
+    assert!(
+        rig.node.take_transmission().is_none(),
+        "not from the master"
+    );
     let filter = Message::WheelFilter(WheelFilter {
         zero: 0,
         pole: 0,

@@ -1,0 +1,396 @@
+//! The wheel board on a motor model: safe states, modes, services.
+
+mod common;
+
+use common::wheel::{WheelRig, setpoint};
+use common::{ARM, refusal};
+use wheeleg_node::mode::Mode;
+use wheeleg_protocol::param::WheelParam;
+use wheeleg_protocol::{
+    Acceleration8p8, ClearFault, Count24, EmergencyBrake, Fault, InputBits, Limit, Message,
+    NackReason, OpenAllValves, OpenMode, ParamGet, ParamSet, Speed7, WheelAcceleration,
+    WheelControlMode, WheelFilter, WheelMaxSpeed, WheelMode, WheelReference, WheelSampleTimer,
+    WheelVelocity,
+};
+use wheeleg_units::{Micros, WheelCount};
+
+fn clear(rig: &mut WheelRig) -> Message {
+    rig.request(&Message::ClearFault(ClearFault {}))
+}
+
+fn select(rig: &mut WheelRig, mode: WheelControlMode) -> Message {
+    rig.request(&Message::WheelMode(WheelMode { mode }))
+}
+
+/// Runs without SYNC; gives the times at which the drive first fell below
+/// `from` and first was zero.
+fn ramp(rig: &mut WheelRig, from: i32) -> (u32, u32) {
+    let (start, mut begun, mut last) = (rig.now, None, from);
+    while rig.now - start < 1_000_000 {
+        rig.tick();
+        let drive = rig.drive();
+        if rig.node.mode() == Mode::Hold {
+            assert!(drive <= last, "no step up in the ramp: {last} to {drive}");
+            last = drive;
+            begun.get_or_insert(rig.now - start);
+            if drive == 0 {
+                return (begun.unwrap(), rig.now - start);
+            }
+        }
+    }
+    panic!("not stopped within 1 s");
+}
+
+#[test]
+fn link_loss_ramps_within_60_ms_and_stops_within_500() {
+    let mut rig = WheelRig::turning();
+    let drive = rig.drive();
+    // The last SYNC was up to one cycle before now.
+    let (begun, stopped) = ramp(&mut rig, drive);
+    assert!((40_000..=50_000).contains(&begun), "{begun}");
+    let took = stopped - begun;
+    assert!((250_000..=300_000).contains(&took), "{took}");
+    assert!(stopped + 10_000 <= 500_000);
+    assert!(rig.node.faults().contains(Fault::LinkLost));
+    let count = rig.counter.0.get();
+    for _ in 0..2_000 {
+        rig.tick();
+        assert_eq!(rig.drive(), 0);
+    }
+    assert_eq!(rig.counter.0.get(), count, "stands");
+    assert_eq!(rig.node.mode(), Mode::Hold);
+}
+
+#[test]
+fn ramp_time_of_the_parameter_limits_keeps_the_deadline() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(30, None);
+    let set = Message::ParamSet(ParamSet {
+        id: WheelParam::StopRamp.id(),
+        value: WheelParam::StopRamp.info().max,
+    });
+    assert!(matches!(rig.request(&set), Message::ParamValue(_)));
+    // 50 ms watchdog, one SYNC cycle, the longest ramp: below 500 ms.
+    assert!(60 + WheelParam::StopRamp.info().max <= 500);
+}
+
+#[test]
+fn emergency_stop_ramps_at_once_and_dumps_the_supply() {
+    let mut rig = WheelRig::turning();
+    assert!(!rig.dump.high.get());
+    rig.sync(None, true);
+    rig.tick();
+    assert!(rig.dump.high.get(), "dump valve opens in the next tick");
+    assert_eq!(rig.node.mode(), Mode::Hold);
+    let reply = rig.sync(None, true);
+    assert!(reply.inputs.contains(InputBits::DUMP_OPEN));
+    assert_eq!(refusal(&clear(&mut rig)), Some(NackReason::FaultLatched));
+    rig.run_ms(500, None);
+    assert!(rig.dump.high.get(), "latched without the bit");
+    assert_eq!(rig.drive(), 0);
+    assert!(matches!(clear(&mut rig), Message::Ack(_)));
+    rig.tick();
+    assert!(!rig.dump.high.get());
+}
+
+#[test]
+fn emergency_brake_ramps_only_this_wheel_and_keeps_the_supply() {
+    let mut rig = WheelRig::turning();
+    rig.request(&Message::EmergencyBrake(EmergencyBrake {}));
+    rig.run_ms(310, None);
+    assert_eq!((rig.node.mode(), rig.drive()), (Mode::Hold, 0));
+    assert!(!rig.dump.high.get());
+}
+
+#[test]
+fn lost_encoder_stops_the_drive_within_100_ms() {
+    for speed_at_full in [0, -60] {
+        let mut rig = WheelRig::armed();
+        rig.speed_at_full = speed_at_full;
+        let start = rig.now;
+        while rig.node.mode() != Mode::Hold {
+            let ahead = rig.counter.0.get() + 2_000;
+            rig.run_ms(10, Some(setpoint(ahead, 0)));
+            assert!(rig.now - start < 115_000, "encoder {speed_at_full}");
+        }
+        let faults = rig.node.faults();
+        assert!(faults.contains(Fault::EncoderFault), "{faults:?}");
+        rig.tick();
+        assert_eq!(rig.drive(), 0, "no ramp: the drive may be what runs away");
+    }
+}
+
+#[test]
+fn following_error_stops_after_its_time() {
+    let mut rig = WheelRig::armed();
+    let start = rig.now;
+    // Slower than the reference by far, but turning.
+    rig.speed_at_full = 5;
+    let mut target = rig.counter.0.get();
+    while rig.node.mode() != Mode::Hold {
+        target += 60 * 19;
+        rig.run_ms(10, Some(setpoint(target, 60 * 16)));
+        assert!(rig.now - start < 1_000_000);
+    }
+    assert!(rig.node.faults().contains(Fault::FollowingError));
+    // 20 000 counts at 55 counts per 520 µs take 190 ms; 50 ms more.
+    let took = rig.now - start;
+    assert!((200_000..=300_000).contains(&took), "{took}");
+}
+
+#[test]
+fn overrun_is_latched_with_the_drive_off() {
+    let mut rig = WheelRig::turning();
+    rig.node.tick(Micros(rig.now));
+    rig.node.tick_done(Micros(rig.now + 521));
+    assert_eq!(rig.node.mode(), Mode::Fault);
+    rig.now += 520;
+    rig.tick();
+    assert_eq!(rig.drive(), 0);
+    assert!(rig.node.faults().contains(Fault::TickOverrun));
+}
+
+#[test]
+fn disarmed_wheel_does_not_turn() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(200, Some(setpoint(100_000, 500)));
+    assert_eq!((rig.node.mode(), rig.drive()), (Mode::Idle, 0));
+}
+
+#[test]
+fn arming_far_from_the_reference_moves_at_the_maximum_speed() {
+    let mut rig = WheelRig::armed();
+    let start = rig.counter.0.get();
+    let mut last = rig.node.snapshot().control.command;
+    for sample in 0..200 {
+        if sample % 19 == 0 {
+            rig.sync(Some(setpoint(start + 1_000_000, 0)), false);
+        }
+        rig.tick();
+        let snapshot = rig.node.snapshot();
+        let step = snapshot.control.command.wrapping_difference(last);
+        // max_speed: 60 counts per sample by default.
+        assert!((0..=60).contains(&step), "step {step}");
+        assert!(snapshot.limits.contains(Limit::RateLimited));
+        last = snapshot.control.command;
+    }
+}
+
+#[test]
+fn position_is_reached_across_the_wrap_of_the_count() {
+    let mut rig = WheelRig::new();
+    rig.counter.0.set(8_388_000);
+    rig.run_ms(40, None);
+    rig.request(&ARM);
+    rig.run_ms(400, Some(setpoint(8_388_000 + 2_000, 0)));
+    let count = WheelCount::wrapping_new(rig.counter.0.get());
+    let error = WheelCount::wrapping_new(8_390_000).wrapping_difference(count);
+    assert!(error.abs() <= 8, "error {error}");
+    assert!(count.get() < 0, "wrapped");
+    assert!(rig.node.faults().is_empty());
+}
+
+#[test]
+fn trapezoidal_reference_runs_a_profile_and_arrives() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(40, None);
+    assert!(matches!(
+        select(&mut rig, WheelControlMode::Trapezoidal),
+        Message::Ack(_)
+    ));
+    rig.request(&ARM);
+    let speed = Message::WheelMaxSpeed(WheelMaxSpeed {
+        speed: Speed7::new(20).unwrap(),
+    });
+    assert!(matches!(rig.request(&speed), Message::Ack(_)));
+    let goal = rig.counter.0.get() + 6_000;
+    let reference = Message::WheelReference(WheelReference {
+        position: Count24::new(WheelCount::wrapping_new(goal)),
+        deadline_cycle: rig.cycle.wrapping_add(3),
+    });
+    assert!(matches!(rig.request(&reference), Message::Ack(_)));
+    let mut fastest = 0;
+    let mut last = rig.node.snapshot().control.command;
+    for _ in 0..110 {
+        rig.run_ms(10, None);
+        let command = rig.node.snapshot().control.command;
+        fastest = fastest.max(command.wrapping_difference(last));
+        last = command;
+    }
+    // 20 counts per sample for 19 or 20 samples.
+    assert!((370..=400).contains(&fastest), "{fastest}");
+    assert!((rig.counter.0.get() - goal).abs() <= 8);
+    assert!(rig.node.faults().is_empty());
+}
+
+#[test]
+fn velocity_modes_turn_at_the_commanded_velocity() {
+    for mode in [
+        WheelControlMode::ProportionalVelocity,
+        WheelControlMode::IntegralVelocity,
+    ] {
+        let mut rig = WheelRig::new();
+        rig.run_ms(40, None);
+        select(&mut rig, mode);
+        rig.request(&ARM);
+        let velocity = |velocity_raw, deadline_cycle| {
+            Message::WheelVelocity(WheelVelocity {
+                velocity_raw,
+                deadline_cycle,
+            })
+        };
+        let cycle = rig.cycle;
+        let stale = rig.request(&velocity(20 * 16, cycle.wrapping_sub(1)));
+        assert_eq!(refusal(&stale), Some(NackReason::Expired));
+        assert!(matches!(
+            rig.request(&velocity(20 * 16, cycle)),
+            Message::Ack(_)
+        ));
+        rig.run_ms(600, None);
+        let from = rig.counter.0.get();
+        rig.run_ms(520, None);
+        let turned = rig.counter.0.get() - from;
+        // 1000 samples; the gain-only law of proportional velocity has a droop.
+        let expected = if mode == WheelControlMode::IntegralVelocity {
+            19_800..=20_200
+        } else {
+            12_000..=20_000
+        };
+        assert!(expected.contains(&turned), "{mode:?}: {turned}");
+    }
+}
+
+#[test]
+fn integral_velocity_takes_whole_counts_only() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(40, None);
+    select(&mut rig, WheelControlMode::IntegralVelocity);
+    rig.request(&ARM);
+    for (velocity_raw, ok) in [
+        (16, true),
+        (-128 * 16, true),
+        (17, false),
+        (128 * 16, false),
+    ] {
+        let command = Message::WheelVelocity(WheelVelocity {
+            velocity_raw,
+            deadline_cycle: rig.cycle,
+        });
+        assert_eq!(
+            refusal(&rig.request(&command)).is_none(),
+            ok,
+            "{velocity_raw}"
+        );
+    }
+}
+
+#[test]
+fn filter_timer_and_profile_commands_are_parameters() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(40, None);
+    let commands = [
+        Message::WheelFilter(WheelFilter {
+            zero: 200,
+            pole: 30,
+            gain: 20,
+        }),
+        Message::WheelAcceleration(WheelAcceleration {
+            acceleration: Acceleration8p8::new(300).unwrap(),
+        }),
+        Message::WheelSampleTimer(WheelSampleTimer { timer: 124 }),
+    ];
+    for command in commands {
+        assert!(
+            matches!(rig.request(&command), Message::Ack(_)),
+            "{command:?}"
+        );
+    }
+    for (parameter, expected) in [
+        (WheelParam::FilterZero, 200),
+        (WheelParam::FilterPole, 30),
+        (WheelParam::FilterGain, 20),
+        (WheelParam::Acceleration, 300),
+        (WheelParam::SampleTimer, 124),
+    ] {
+        let get = Message::ParamGet(ParamGet { id: parameter.id() });
+        let Message::ParamValue(value) = rig.request(&get) else {
+            panic!()
+        };
+        assert_eq!(value.value, expected);
+    }
+    // 16 (124 + 1) clocks of 2 MHz.
+    assert_eq!(rig.node.tick_period_us(), 1000);
+    rig.run_ms(40, None);
+    assert!(rig.node.faults().is_empty(), "a new period is no overrun");
+    rig.request(&ARM);
+    let timer = Message::WheelSampleTimer(WheelSampleTimer { timer: 64 });
+    assert_eq!(refusal(&rig.request(&timer)), Some(NackReason::Armed));
+}
+
+#[test]
+fn sample_timer_below_the_minimum_of_the_mode_is_refused() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(40, None);
+    let timer = Message::WheelSampleTimer(WheelSampleTimer { timer: 10 });
+    assert!(
+        matches!(rig.request(&timer), Message::Ack(_)),
+        "position mode: 7"
+    );
+    let refused = select(&mut rig, WheelControlMode::Trapezoidal);
+    assert_eq!(
+        refusal(&refused),
+        Some(NackReason::OutOfRange),
+        "profile: 15"
+    );
+    assert_eq!(rig.node.control_mode(), WheelControlMode::Position);
+}
+
+#[test]
+fn joint_commands_are_for_the_other_board() {
+    let mut rig = WheelRig::armed();
+    let open = Message::OpenAllValves(OpenAllValves {
+        mode: OpenMode::Exhaust,
+    });
+    assert_eq!(refusal(&rig.request(&open)), Some(NackReason::WrongBoard));
+    assert_eq!(rig.node.mode(), Mode::Armed);
+}
+
+#[test]
+fn supply_switch_is_debounced_and_reported() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(20, None);
+    assert!(
+        !rig.sync(None, false)
+            .inputs
+            .contains(InputBits::SUPPLY_PRESSURE)
+    );
+    rig.supply.high.set(true);
+    rig.tick();
+    rig.tick();
+    assert!(!rig.node.snapshot().supply_present);
+    rig.tick();
+    assert!(rig.node.snapshot().supply_present);
+    assert!(
+        rig.sync(None, false)
+            .inputs
+            .contains(InputBits::SUPPLY_PRESSURE)
+    );
+}
+
+#[test]
+fn rearming_starts_at_the_actual_count() {
+    let mut rig = WheelRig::turning();
+    rig.run_ms(1, None);
+    for _ in 0..1000 {
+        rig.tick();
+    }
+    assert_eq!(rig.node.mode(), Mode::Hold);
+    // Pushed by hand while stopped.
+    rig.counter.0.set(rig.counter.0.get() + 5_000);
+    rig.run_ms(40, None);
+    clear(&mut rig);
+    rig.request(&ARM);
+    rig.run_ms(50, None);
+    assert_eq!(rig.drive(), 0);
+    assert_eq!(rig.node.snapshot().control.error, 0);
+}
