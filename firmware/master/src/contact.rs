@@ -7,7 +7,7 @@
 //! sector of 45 degrees (0.785 rad) and is logged; an error of 0.003 rad cannot
 //! move a bearing from the middle of one sector into another.
 
-use micromath::F32Ext as _;
+use micromath::F32Ext;
 
 /// Largest error of [`bearing_of`] in rad, any direction.
 pub const BEARING_ERROR_RAD: f32 = 0.003;
@@ -93,7 +93,9 @@ impl FootSwitches {
 /// [`BEARING_ERROR_RAD`] of the exact arctangent. (0, 0) gives 0.
 #[must_use]
 pub fn bearing_of(left: f32, forward: f32) -> f32 {
-    left.atan2(forward)
+    // By its full name: where `std` is linked, `left.atan2(forward)` would be
+    // another function, and host and target would differ.
+    F32Ext::atan2(left, forward)
 }
 
 /// Sector of 45 degrees, centred on the eight principal directions.

@@ -131,6 +131,8 @@ pub enum Refusal {
         /// Bus address.
         node: u8,
     },
+    /// All nodes acknowledged arming, but not all show a closed loop.
+    NotConfirmed,
     /// There is no such joint.
     NoSuchJoint {
         /// Number given.

@@ -32,8 +32,6 @@ pub enum HoldReason {
     LayerOneStalled,
     /// An E-stop was commanded.
     EmergencyStop,
-    /// The user asked for it.
-    User,
 }
 
 /// An event.

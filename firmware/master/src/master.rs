@@ -91,8 +91,9 @@ impl Master {
     pub fn submit_request(&mut self, request: Request, now_us: u64) -> Result<Ticket, Reject> {
         let accepted = self.dispatcher.admit(&request, now_us)?;
         if matches!(request.command, Command::EmergencyStop) {
-            // A stop does not queue.
-            self.layer0.execute(&accepted, now_us, &mut self.events);
+            // A stop neither queues nor expires.
+            self.layer0.emergency_stop(now_us, &mut self.events);
+            self.events.push(now_us, Event::Done(accepted.ticket));
             return Ok(accepted.ticket);
         }
         let (mut to_layer0, _) = self.commands0.split();

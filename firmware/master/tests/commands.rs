@@ -1,8 +1,6 @@
 //! Dispatcher: routing by code, deadlines, duplicates, queues.
 
-use wheeleg_master::command::{
-    Command, CommandCode, CorrectionKind, Layer, TABLE, write_markdown,
-};
+use wheeleg_master::command::{Command, CommandCode, CorrectionKind, Layer, TABLE, write_markdown};
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject, Request};
 use wheeleg_master::event::{EVENT_DEPTH, Event, Events, HoldReason};
@@ -86,7 +84,10 @@ fn every_code_names_the_layer_that_answers_it() {
             Layer::Zero => Command::StartGait,
             Layer::One => Command::Arm,
         };
-        assert!(master.submit(other, 0).is_ok(), "the other layer still answers");
+        assert!(
+            master.submit(other, 0).is_ok(),
+            "the other layer still answers"
+        );
     }
     assert_eq!(Layer::of_code(0x00FF), None);
     assert_eq!(Layer::of_code(0x0100), Some(Layer::Zero));
@@ -99,14 +100,18 @@ fn every_code_names_the_layer_that_answers_it() {
 fn documentation_is_generated_from_the_table() {
     let mut table = String::new();
     write_markdown(&mut table).unwrap();
-    let file = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/COMMANDS.md")).unwrap();
+    let file =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/COMMANDS.md")).unwrap();
     let shown = file
         .split_once("<!-- table -->\n")
         .and_then(|(_, rest)| rest.split_once("<!-- end -->"))
         .map(|(table, _)| table);
     assert_eq!(shown, Some(table.as_str()), "paste this:\n{table}");
     for policy in POLICIES {
-        let row = format!("| {} | {} | {:?} |", policy.name, policy.depth, policy.when_full);
+        let row = format!(
+            "| {} | {} | {:?} |",
+            policy.name, policy.depth, policy.when_full
+        );
         assert!(file.contains(&row), "{row} {}|", policy.why);
     }
 }
@@ -145,7 +150,10 @@ fn late_far_repeated_and_reordered_commands_are_refused() {
     assert_eq!(submit(request(3, u32::MAX, now)), Ok(u32::MAX));
     assert_eq!(submit(request(3, 0, now)), Ok(0));
     // A client that connects anew may start again.
-    assert_eq!(submit(request(2, 1, now)), Err(Reject::OutOfOrder { last: 9 }));
+    assert_eq!(
+        submit(request(2, 1, now)),
+        Err(Reject::OutOfOrder { last: 9 })
+    );
     master.open_session(2);
     assert!(master.submit_request(request(2, 1, now), now).is_ok());
 }
@@ -158,10 +166,7 @@ fn an_old_emergency_stop_is_obeyed() {
         ..request(1, 1, 0)
     };
     assert!(master.submit_request(stop, 60_000_000).is_ok());
-    assert_eq!(
-        master.layer0().hold(),
-        Some(HoldReason::EmergencyStop)
-    );
+    assert_eq!(master.layer0().hold(), Some(HoldReason::EmergencyStop));
 }
 
 #[test]

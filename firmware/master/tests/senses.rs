@@ -24,9 +24,12 @@ fn bearing_error_is_within_its_bound_and_the_bound_is_tight() {
         let (left, forward) = (angle.sin() as f32, angle.cos() as f32);
         let exact = f64::from(left).atan2(f64::from(forward));
         let found = f64::from(bearing_of(left, forward));
-        assert!(circle_distance(found, exact) <= f64::from(BEARING_ERROR_RAD), "{angle}");
-        let signed = (found - exact + 9.0 * std::f64::consts::PI)
-            .rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+        assert!(
+            circle_distance(found, exact) <= f64::from(BEARING_ERROR_RAD),
+            "{angle}"
+        );
+        let signed = (found - exact + 9.0 * std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
+            - std::f64::consts::PI;
         low = low.min(signed);
         high = high.max(signed);
     }
@@ -137,7 +140,11 @@ fn a_standing_foot_follows_the_measured_travel() {
         reflexes.observe(&setpoints, &senses);
         reflexes.apply(1, joint, &senses).reference_mm.to_f64()
     };
-    assert_eq!(at(1, 5_000_000), 170.0, "travel counts from the segment's start");
+    assert_eq!(
+        at(1, 5_000_000),
+        170.0,
+        "travel counts from the segment's start"
+    );
     assert_eq!(at(1, 5_050_000), 120.0);
     assert!((at(1, 5_050_001) - 119.999).abs() < 2e-5);
     assert_eq!(at(1, 5_400_000), 0.0, "kept inside the stroke");

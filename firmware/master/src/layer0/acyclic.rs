@@ -55,38 +55,35 @@ impl Jobs {
         self.queue.push_back(job).is_ok()
     }
 
-    /// Free places.
-    #[must_use]
-    pub fn free(&self) -> usize {
-        JOBS.saturating_sub(self.queue.len())
-    }
-
     /// Takes the next request.
     pub fn pop(&mut self) -> Option<Job> {
         self.queue.pop_front()
     }
 
-    /// Whether none waits.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.queue.is_empty()
-    }
-
-    /// Replaces all waiting requests by the stop of every node, and calls
-    /// `dropped` for the ticket of each user command that was waiting.
-    pub fn stop_all(&mut self, message: Message, mut dropped: impl FnMut(Ticket)) {
+    /// Drops all waiting requests, and calls `dropped` for the ticket of each
+    /// user command among them.
+    pub fn clear(&mut self, mut dropped: impl FnMut(Ticket)) {
         while let Some(job) = self.queue.pop_front() {
             if let Purpose::User(ticket) = job.purpose {
                 dropped(ticket);
             }
         }
-        for to in Address::nodes() {
-            // Eight of them fit the queue just emptied.
-            let _fits = self.push(Job {
-                to,
-                message,
-                purpose: Purpose::Stop,
-            });
+    }
+
+    /// Asks every node the same, for nobody: first those that are `alive` (a
+    /// silent one would keep the others waiting through its retries).
+    pub fn ask_all(&mut self, message: Message, alive: impl Fn(usize) -> bool) {
+        for wanted in [true, false] {
+            for to in Address::nodes() {
+                if to.slot().is_some_and(|index| alive(index) == wanted) {
+                    // Eight of them fit the queue, which the caller has cleared.
+                    let _fits = self.push(Job {
+                        to,
+                        message,
+                        purpose: Purpose::Stop,
+                    });
+                }
+            }
         }
     }
 }

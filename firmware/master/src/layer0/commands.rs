@@ -42,11 +42,11 @@ impl Layer0 {
             Command::Disarm => {
                 self.power = Power::Disarmed;
                 self.release();
-                self.fail_group(Refusal::Interrupted, now_us, events);
+                self.drop_requests(now_us, events);
                 self.begin_group(accepted, GroupKind::Disarm, &[proto::Disarm {}.into()])
             }
             Command::ClearFault => {
-                self.fail_group(Refusal::Interrupted, now_us, events);
+                self.drop_requests(now_us, events);
                 self.emergency_stop = false;
                 self.hold = None;
                 self.frozen = None;
@@ -55,10 +55,6 @@ impl Layer0 {
                 // A node that had not stopped is still armed after the clear.
                 let requests = [proto::ClearFault {}.into(), proto::Disarm {}.into()];
                 self.begin_group(accepted, GroupKind::Clear, &requests)
-            }
-            Command::EmergencyStop => {
-                self.emergency_stop(now_us, events);
-                Ok(true)
             }
             Command::JointReference { joint, stroke_mm } => {
                 self.may_lead()?;
@@ -139,7 +135,7 @@ impl Layer0 {
                 };
                 self.ask(accepted, wheel_address(side)?, message.into())
             }
-            // Commands of layer 1 are never routed here.
+            // The E-stop does not queue, and commands of layer 1 are never routed here.
             _ => Err(Refusal::NotMoving),
         }
     }
@@ -233,6 +229,7 @@ impl Layer0 {
             kind: GroupKind::Arm,
             left,
             failed: None,
+            waited: 0,
         });
         Ok(false)
     }
@@ -243,8 +240,6 @@ impl Layer0 {
         kind: GroupKind,
         requests: &[Message],
     ) -> Result<bool, Refusal> {
-        // Whatever waited is overtaken: these requests make every node safe.
-        self.jobs = super::acyclic::Jobs::new();
         let mut left = 0_u8;
         for message in requests {
             for to in Address::nodes() {
@@ -270,6 +265,7 @@ impl Layer0 {
             kind,
             left,
             failed: None,
+            waited: 0,
         });
         Ok(false)
     }

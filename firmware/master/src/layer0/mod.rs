@@ -28,7 +28,7 @@ use crate::config::MasterConfig;
 use crate::contact::FootSwitches;
 use crate::dispatcher::{Refusal, Ticket};
 use crate::event::HoldReason;
-use crate::setpoint::{JOINTS, Setpoints, TravelSetpoint, WHEELS};
+use crate::setpoint::{JOINTS, Phase, Setpoints, TravelSetpoint, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
 use liveness::Liveness;
@@ -63,6 +63,8 @@ struct Group {
     kind: GroupKind,
     left: u8,
     failed: Option<Refusal>,
+    /// Cycles waited for the nodes to show what they acknowledged.
+    waited: u8,
 }
 
 /// State of layer 0.
@@ -157,6 +159,12 @@ impl Layer0 {
     #[must_use]
     pub const fn hold(&self) -> Option<HoldReason> {
         self.hold
+    }
+
+    /// Phase of the motion whose set-points are in use.
+    #[must_use]
+    pub const fn phase(&self) -> Phase {
+        self.setpoints.phase
     }
 
     /// What is known of each node.

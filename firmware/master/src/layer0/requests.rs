@@ -1,7 +1,7 @@
 //! Acyclic part of the cycle: sends requests, judges answers, enumerates.
 
 use wheeleg_protocol::link::{CYCLE_US, GiveUp, Outcome, SlotTiming, Step};
-use wheeleg_protocol::{Address, Envelope, Identify, Message};
+use wheeleg_protocol::{Address, Disarm, Envelope, Identify, Message};
 
 use super::acyclic::{Job, Purpose};
 use super::cycle::frame_of;
@@ -142,38 +142,35 @@ impl Layer0 {
         };
         group.failed = group.failed.or(failed);
         group.left = group.left.saturating_sub(1);
-        let abort = group.kind == GroupKind::Arm && group.failed.is_some();
-        if group.left > 0 && !abort {
-            return;
-        }
-        let group = *group;
-        self.group = None;
-        let ticket = group.ticket;
-        match (group.kind, group.failed) {
-            (GroupKind::Arm, None) => {
-                self.power = Power::Armed;
-                self.stale_cycles = 0;
-                events.push(now_us, Event::Armed);
-                events.push(now_us, Event::Done(ticket));
-            }
-            (kind, Some(reason)) => {
-                if kind == GroupKind::Arm {
-                    self.abort_arming();
-                }
+        let (kind, ticket, left, failed) = (group.kind, group.ticket, group.left, group.failed);
+        match (kind, failed) {
+            (GroupKind::Arm, Some(reason)) => {
+                self.group = None;
+                self.abort_arming();
                 events.push(now_us, Event::Refused { ticket, reason });
             }
-            (GroupKind::Disarm | GroupKind::Clear, None) => {
+            // Armed when the replies say so: see `confirm_arming`.
+            (GroupKind::Arm, None) => {}
+            _ if left > 0 => {}
+            (_, Some(reason)) => {
+                self.group = None;
+                events.push(now_us, Event::Refused { ticket, reason });
+            }
+            (_, None) => {
+                self.group = None;
                 events.push(now_us, Event::Disarmed);
                 events.push(now_us, Event::Done(ticket));
             }
         }
     }
 
-    /// One node refused: those that are armed already are disarmed again.
-    fn abort_arming(&mut self) {
+    /// One node refused or stayed behind: the others are disarmed again.
+    pub(super) fn abort_arming(&mut self) {
         self.power = Power::Disarmed;
+        self.jobs.clear(|_ticket| {});
+        let liveness = &self.liveness;
         self.jobs
-            .stop_all(wheeleg_protocol::Disarm {}.into(), |_ticket| {});
+            .ask_all(Disarm {}.into(), |index| liveness.alive(index));
     }
 
     fn user_answer(

@@ -2,11 +2,16 @@
 
 use wheeleg_protocol::{Address, EmergencyBrake, InputBits};
 
+use super::acyclic::Purpose;
 use super::liveness::Change;
-use super::{Layer0, Power, STALL_CYCLES};
+use super::{GroupKind, Layer0, Power, STALL_CYCLES};
 use crate::dispatcher::Refusal;
 use crate::event::{Event, Events, HoldReason};
 use crate::setpoint::Setpoints;
+
+/// Cycles that the nodes have to show a closed loop after the last of them
+/// acknowledged arming.
+const CONFIRM_CYCLES: u8 = 10;
 
 /// Index of the node with the supply-pressure switch: wheel board 7.
 const SUPPLY_NODE: usize = 6;
@@ -28,13 +33,25 @@ impl Layer0 {
         self.hold = Some(reason);
         events.push(now_us, Event::Hold(reason));
         self.freeze();
-        self.fail_group(Refusal::Interrupted, now_us, events);
-        let dropped = |ticket| {
-            let reason = Refusal::Interrupted;
-            events.push(now_us, Event::Refused { ticket, reason });
-        };
-        if self.power != Power::Disarmed {
-            self.jobs.stop_all(EmergencyBrake {}.into(), dropped);
+        self.drop_requests(now_us, events);
+        if self.power != Power::Disarmed && !self.emergency_stop {
+            let liveness = &self.liveness;
+            self.jobs
+                .ask_all(EmergencyBrake {}.into(), |index| liveness.alive(index));
+        }
+    }
+
+    /// Ends every request, waiting or under way, and the group they belong to.
+    pub(super) fn drop_requests(&mut self, now_us: u64, events: &mut Events) {
+        let reason = Refusal::Interrupted;
+        let mut refuse = |ticket| events.push(now_us, Event::Refused { ticket, reason });
+        self.jobs.clear(&mut refuse);
+        self.requester.cancel();
+        if let Some(Purpose::User(ticket)) = self.in_flight.take().map(|job| job.purpose) {
+            refuse(ticket);
+        }
+        if let Some(group) = self.group.take() {
+            refuse(group.ticket);
         }
     }
 
@@ -57,10 +74,26 @@ impl Layer0 {
         self.setpoints = Setpoints::idle(self.cycle_start_us);
     }
 
-    /// Ends the running group of requests with a refusal.
-    pub(super) fn fail_group(&mut self, reason: Refusal, now_us: u64, events: &mut Events) {
-        if let Some(group) = self.group.take() {
-            let ticket = group.ticket;
+    /// Ends arming once the replies of all nodes show a closed loop.
+    fn confirm_arming(&mut self, now_us: u64, events: &mut Events) {
+        let Some(group) = &mut self.group else {
+            return;
+        };
+        if group.kind != GroupKind::Arm || group.left > 0 {
+            return;
+        }
+        group.waited = group.waited.saturating_add(1);
+        let (ticket, waited) = (group.ticket, group.waited);
+        if self.nodes.all_armed() {
+            self.group = None;
+            self.power = Power::Armed;
+            self.stale_cycles = 0;
+            events.push(now_us, Event::Armed);
+            events.push(now_us, Event::Done(ticket));
+        } else if waited > CONFIRM_CYCLES {
+            self.group = None;
+            self.abort_arming();
+            let reason = Refusal::NotConfirmed;
             events.push(now_us, Event::Refused { ticket, reason });
         }
     }
@@ -98,6 +131,7 @@ impl Layer0 {
         if self.power == Power::Disarmed {
             return;
         }
+        self.confirm_arming(now_us, events);
         if let Some(node) = lost {
             self.hold_all(HoldReason::NodeLost(node), now_us, events);
         }

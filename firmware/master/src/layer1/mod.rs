@@ -182,6 +182,8 @@ impl Layer1 {
                         node: self.unheard(),
                     },
                 )?;
+                // A new motion of the wheels: they stay where they are.
+                self.segment = self.segment.wrapping_add(1);
                 self.mode = Mode::Homing(homing);
             }
             Command::StartGait => {
