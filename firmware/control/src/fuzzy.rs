@@ -17,6 +17,49 @@
 //! one is reported by a `Result`, which a `const` item turns into a
 //! compilation error.
 //!
+//! ```
+//! use wheeleg_control::fuzzy::{GridRules, Partition};
+//!
+//! const RULES: GridRules<3, 3> = {
+//!     let Ok(error) = Partition::even(-1000, 1000) else { panic!() };
+//!     let Ok(rate) = Partition::fan([-400, 0, 400]) else { panic!() };
+//!     let table = [[-90, -60, 0], [-60, 0, 60], [0, 60, 90]];
+//!     let Ok(rules) = GridRules::new(error, rate, table) else { panic!() };
+//!     rules
+//! };
+//! // Half way between (0, 0) and (0, 1): the mean of 0 and 60.
+//! assert_eq!(RULES.infer(0, 200), 30);
+//! assert_eq!(RULES.infer(0, -200), -30);
+//! ```
+//!
+//! Sets that leave a gap do not compile:
+//!
+//! ```compile_fail
+//! use wheeleg_control::fuzzy::{Partition, Triangle};
+//!
+//! const GAP: Partition<2> = {
+//!     let low = Triangle { vertex: -10, left: 0, right: 10 };
+//!     let high = Triangle { vertex: 10, left: 10, right: 0 };
+//!     let Ok(sets) = Partition::new(-10, 10, [low, high]) else { panic!() };
+//!     sets
+//! };
+//! assert_eq!(GAP.len(), 2);
+//! ```
+//!
+//! and one unit more of either side does:
+//!
+//! ```
+//! use wheeleg_control::fuzzy::{Partition, Triangle};
+//!
+//! const TOUCHING: Partition<2> = {
+//!     let low = Triangle { vertex: -10, left: 0, right: 11 };
+//!     let high = Triangle { vertex: 10, left: 10, right: 0 };
+//!     let Ok(sets) = Partition::new(-10, 10, [low, high]) else { panic!() };
+//!     sets
+//! };
+//! assert_eq!(TOUCHING.len(), 2);
+//! ```
+//!
 //! # Numbers
 //!
 //! Inputs, vertices and consequents are `i16` in a domain that the table

@@ -322,17 +322,13 @@ impl<const N: usize> Partition<N> {
     #[inline]
     pub(super) fn pair(&self, input: i16) -> Pair {
         let input = self.limit(input);
-        // Vertices past `len` equal `high`; the last used one does too in a fan,
-        // so neither is counted: 1 <= count <= len - 1 after the correction.
+        // Over the whole array, so that the loop unrolls. The last vertex, and unused
+        // places after it, equal `high`: the limit takes them back.
         let mut index = 0_usize;
-        for &vertex in self
-            .vertices
-            .iter()
-            .skip(1)
-            .take(self.len().saturating_sub(2))
-        {
+        for &vertex in self.vertices.iter().skip(1) {
             index = index.wrapping_add(usize::from(input >= vertex));
         }
+        let index = index.min(self.len().saturating_sub(2));
         let next = index.wrapping_add(1);
         let levels = u32::from(self.levels);
         let lower = match (self.vertices.get(index), self.right.get(index)) {
