@@ -38,23 +38,21 @@ pub trait Mechanics<const C: usize> {
     /// Speeds change by `h` seconds of the accelerations held.
     fn kick(&self, state: &mut Self::State, h: f64);
 
-    /// Positions (and inner states such as contact or current) advance by `h`
-    /// seconds at the speeds held.
-    ///
-    /// # Errors
-    /// [`PlantError::Mechanics`] if the new position cannot be.
-    fn drift(&self, state: &mut Self::State, h: f64) -> Result<(), PlantError>;
+    /// Positions (and inner states such as currents) advance by `h` seconds at
+    /// the speeds held.
+    fn drift(&self, state: &mut Self::State, h: f64);
 
-    /// New accelerations from the forces of the pistons \[N\], at speeds
-    /// `ahead_s` after the state.
+    /// New accelerations from the forces of the pistons \[N\], at the end of a
+    /// step of `step_s` seconds that has been drifted and half kicked: speeds
+    /// are those predicted half a step ahead. A step of 0 evaluates the state as it is.
     ///
     /// # Errors
-    /// [`PlantError::Mechanics`] if they cannot be found.
+    /// [`PlantError::Mechanics`] or [`PlantError::NonFinite`] if they cannot be found.
     fn evaluate(
         &self,
         state: &mut Self::State,
         piston_n: &[f64; C],
-        ahead_s: f64,
+        step_s: f64,
     ) -> Result<(), PlantError>;
 
     /// Refuses a state that is not finite or has left the model's range.
@@ -164,7 +162,7 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         let before = mechanics.strokes_m(&state.motion);
         mechanics.kick(&mut state.motion, 0.5 * h);
         let middle = mechanics.rates_m_s(&state.motion, 0.0);
-        mechanics.drift(&mut state.motion, h)?;
+        mechanics.drift(&mut state.motion, h);
         let after = mechanics.strokes_m(&state.motion);
         self.step_gas(state, &before, &after, &middle, h);
         let predicted = mechanics.rates_m_s(&state.motion, 0.5 * h);
@@ -179,7 +177,7 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
                     .advance_bristle_m(cylinder.bristle_m, middle[i], h);
             net[i] = model.forces(cylinder, after[i], predicted[i]).net_n();
         }
-        mechanics.evaluate(&mut state.motion, &net, 0.5 * h)?;
+        mechanics.evaluate(&mut state.motion, &net, h)?;
         mechanics.kick(&mut state.motion, 0.5 * h);
         Ok(())
     }

@@ -73,9 +73,8 @@ impl Mechanics<1> for AxisMechanics {
     fn kick(&self, state: &mut AxisMotion, h: f64) {
         state.velocity_m_s += h * state.acceleration_m_s2;
     }
-    fn drift(&self, state: &mut AxisMotion, h: f64) -> Result<(), PlantError> {
+    fn drift(&self, state: &mut AxisMotion, h: f64) {
         state.stroke_m += h * state.velocity_m_s;
-        Ok(())
     }
     fn evaluate(
         &self,

@@ -4,12 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::assembly::{Assembly, AssemblyState, CylinderOutputs};
 use crate::axis::{TICK_NS, TICK_US};
-use crate::body::{BodyMechanics, BodyMotion};
+use crate::body::{BodyMechanics, BodyMotion, FootOutputs};
+use crate::contact::ContactParams;
 use crate::cylinder::{CylinderModel, CylinderParams};
+use crate::dynamics::{RobotDynamics, RobotDynamicsParams};
 use crate::error::{PlantError, check};
 use crate::flow::GasParams;
 use crate::hash::StateHasher;
-use crate::motor::{MotorParams, MotorState};
+use crate::motor::MotorParams;
 use crate::sensors::{AdcParams, AdcState, PotentiometerParams};
 use crate::supply::{SupplyModel, SupplyParams};
 
@@ -26,7 +28,13 @@ pub struct PlantParams {
     pub cylinders: [CylinderParams; 6],
     /// Stroke of each joint at the start \[m\].
     pub initial_stroke_m: [f64; 6],
-    /// Wheel drives, left and right.
+    /// Joint lengths b at stroke 0 \[m\]: 0.31, 0.01, 0.01 and again.
+    pub stroke_zero_m: [f64; 6],
+    /// Masses and dimensions.
+    pub body: RobotDynamicsParams,
+    /// Feet and ground.
+    pub contact: ContactParams,
+    /// Wheel drives, left and right. Their reduction must be the body's.
     pub motors: [MotorParams; 2],
     /// Position sensors.
     pub potentiometers: [PotentiometerParams; 6],
@@ -82,9 +90,13 @@ pub struct Outputs {
     pub pitch_rad: f64,
     /// Pitch rate \[rad/s\].
     pub pitch_rate_rad_s: f64,
-    /// Ground force on each foot \[N\], world axes x forward, y left, z up.
+    /// Ground force on each foot \[N\], ground axes x forward, y left, z up.
     pub foot_force_n: [[f64; 3]; 2],
-    /// The four optical switches of each foot.
+    /// Normal force on each foot \[N\], not negative.
+    pub foot_normal_n: [f64; 2],
+    /// Sole centre of each foot, ground axes \[m\].
+    pub sole_m: [[f64; 3]; 2],
+    /// The four optical switches of each foot, `[front, back, left, right]`.
     pub foot_switches: [[bool; 4]; 2],
     /// Reservoir pressure \[Pa absolute\].
     pub supply_pressure_pa: f64,
@@ -134,6 +146,16 @@ impl Plant {
         for (stroke, cylinder) in params.initial_stroke_m.iter().zip(&params.cylinders) {
             check("initial_stroke_m", *stroke, 0.0, cylinder.stroke_m)?;
         }
+        params.contact.validate()?;
+        for motor in &params.motors {
+            // Two names for one gear: a rotor inertia reflected by another ratio
+            // than the torque's would be a silent error.
+            let ratio = params.body.gear_ratio;
+            check("motors.reduction", motor.reduction, ratio, ratio)?;
+        }
+        for zero in params.stroke_zero_m {
+            check("stroke_zero_m", zero, 0.0, 10.0)?;
+        }
         let c = &params.cylinders;
         let cylinder = |i: usize| CylinderModel::new(&c[i], &params.gas);
         Ok(Self {
@@ -149,8 +171,9 @@ impl Plant {
                 ],
                 supply: SupplyModel::new(&params.supply, &params.gas)?,
                 mechanics: BodyMechanics {
-                    stroke_zero_m: [0.31, 0.01, 0.01, 0.31, 0.01, 0.01],
-                    wheel_radius_m: 0.15,
+                    dynamics: RobotDynamics::new(&params.body)?,
+                    contact: params.contact,
+                    stroke_zero_m: params.stroke_zero_m,
                     motors: params.motors,
                 },
                 step_ns: params.step_ns,
@@ -167,29 +190,56 @@ impl Plant {
     /// Robot at rest at time 0, valves shut, bridges off. The seed belongs to
     /// the sensors' noise.
     ///
+    /// At rest means in equilibrium: the feet sink into the ground until they carry
+    /// the robot, a piston pushed against a stop sinks into it until the stop holds,
+    /// a piston between its stops hangs on its seals as far as they bear.
+    ///
     /// # Errors
     /// [`PlantError::Mechanics`] if the mechanism cannot stand in that pose.
     pub fn initial_state(&self, seed: u64) -> Result<PlantState, PlantError> {
-        let mechanics = &self.assembly.mechanics;
-        let mut position = [0.0; 8];
-        for i in 0..6 {
-            position[i + 2] = mechanics.stroke_zero_m[i] + self.params.initial_stroke_m[i];
+        let assembly = &self.assembly;
+        let mechanics = &assembly.mechanics;
+        let mut stroke = self.params.initial_stroke_m;
+        let mut bristle = [0.0; 6];
+        // Stops and ground are stiff against the gas: two rounds settle to rounding,
+        // the third costs nothing.
+        let mut motion = BodyMotion::at_rest([0.0; 8]);
+        for _ in 0..4 {
+            for i in 0..6 {
+                motion.position[i + 2] = mechanics.stroke_zero_m[i] + stroke[i];
+            }
+            mechanics.settle_pitch(&mut motion)?;
+            let needed = mechanics.holding_forces_n(&motion)?;
+            for (i, cylinder) in assembly.cylinders.iter().enumerate() {
+                let c = cylinder.params();
+                let pressure =
+                    cylinder.pressure_force_n(c.initial_pressure_a_pa, c.initial_pressure_b_pa);
+                let excess = pressure - needed[i];
+                let start = self.params.initial_stroke_m[i];
+                if start >= c.stroke_m && excess > 0.0 || start <= 0.0 && excess < 0.0 {
+                    stroke[i] = start + excess / c.end_stop.stiffness_n_m;
+                } else {
+                    let bears = c.friction.elastic_share * c.friction.static_n;
+                    bristle[i] = excess.max(-bears).min(bears) / c.friction.bristle_stiffness_n_m;
+                }
+            }
         }
+        let cylinders = assembly
+            .cylinders
+            .iter()
+            .enumerate()
+            .map(|(i, cylinder)| {
+                let mut state = cylinder.initial_state(stroke[i]);
+                state.bristle_m = bristle[i];
+                state
+            })
+            .collect();
         Ok(PlantState {
             core: AssemblyState {
                 time_ns: 0,
-                cylinders: (0..6)
-                    .map(|i| {
-                        self.assembly.cylinders[i].initial_state(self.params.initial_stroke_m[i])
-                    })
-                    .collect(),
-                supply: self.assembly.supply.initial_state(),
-                motion: BodyMotion {
-                    position,
-                    velocity: [0.0; 8],
-                    acceleration: [0.0; 8],
-                    motors: [MotorState::default(); 2],
-                },
+                cylinders,
+                supply: assembly.supply.initial_state(),
+                motion,
             },
             adc: [1, 2, 3, 4, 5, 6]
                 .map(|joint| AdcState::new(seed, &format!("joint.{joint}.potentiometer"))),
@@ -282,10 +332,16 @@ impl Plant {
     }
 
     /// Everything that can be seen of the robot.
+    ///
+    /// Foot values are NaN if the pose cannot be evaluated, which no state that
+    /// [`Self::advance`] returned `Ok` on can show.
     #[must_use]
     pub fn outputs(&self, state: &PlantState) -> Outputs {
         let core = &state.core;
         let mechanics = &self.assembly.mechanics;
+        let feet = mechanics
+            .feet(&core.motion)
+            .unwrap_or([FootOutputs::UNKNOWN; 2]);
         let angle = mechanics.wheel_angle_rad(&core.motion);
         let rate = mechanics.wheel_rate_rad_s(&core.motion, 0.0);
         Outputs {
@@ -295,14 +351,16 @@ impl Plant {
             speed_m_s: core.motion.velocity[0],
             pitch_rad: core.motion.position[1],
             pitch_rate_rad_s: core.motion.velocity[1],
-            foot_force_n: [[0.0; 3]; 2],
-            foot_switches: [[false; 4]; 2],
+            foot_force_n: std::array::from_fn(|i| feet[i].force.force_n),
+            foot_normal_n: std::array::from_fn(|i| feet[i].force.normal_n),
+            sole_m: std::array::from_fn(|i| feet[i].sole_m),
+            foot_switches: std::array::from_fn(|i| feet[i].switches.to_array()),
             supply_pressure_pa: self.assembly.supply.pressure_pa(core.supply.mass_kg),
             pressure_switch: core.supply.pressure_switch,
             dumping: core.supply.dump.is_open(),
             motor_current_a: std::array::from_fn(|i| core.motion.motors[i].current_a),
             wheel_torque_n_m: std::array::from_fn(|i| {
-                mechanics.motors[i].wheel_torque_n_m(core.motion.motors[i].current_a, rate)
+                mechanics.wheel_torque_n_m(&core.motion, i, 0.0)
             }),
             wheel_angle_rad: [angle; 2],
             wheel_rate_rad_s: [rate; 2],

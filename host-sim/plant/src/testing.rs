@@ -6,7 +6,9 @@
 
 use crate::axis::AxisParams;
 use crate::chamber::GasModel;
+use crate::contact::ContactParams;
 use crate::cylinder::CylinderParams;
+use crate::dynamics::RobotDynamicsParams;
 use crate::endstop::EndStopParams;
 use crate::flow::{GasParams, Iso6358};
 use crate::friction::FrictionParams;
@@ -179,6 +181,22 @@ pub fn wheeleg_2003_axis() -> AxisParams {
     }
 }
 
+/// Rubber sole on firm ground.
+#[must_use]
+pub fn ground_contact() -> ContactParams {
+    ContactParams {
+        stiffness_n_m: 2.0e4,         // N/m ASSUMED (0.8 mm under 17 N)
+        damping_s_m: 5.0,             // s/m ASSUMED
+        mu_static: 0.8,               // - ASSUMED rubber on stone
+        mu_kinetic: 0.7,              // - ASSUMED
+        stribeck_m_s: 0.01,           // m/s ASSUMED
+        bristle_stiffness_n_m: 2.0e4, // N/m ASSUMED
+        bristle_damping_n_s_m: 100.0, // N s/m ASSUMED
+        sole_radius_m: 0.03,          // m ASSUMED
+        switch_threshold_m: 0.0002,   // m ASSUMED (4 N on a flat sole)
+    }
+}
+
 /// Bench for controller comparisons: VQ110U-class valves, unthrottled, short tubes.
 #[must_use]
 pub fn vq110u_axis() -> AxisParams {
@@ -226,6 +244,9 @@ pub fn wheeleg_2003() -> PlantParams {
         cylinders: [yaw, horizontal, vertical, yaw_r, horizontal_r, vertical_r],
         // m: b2 = 0.40 (PAPER Table 2 closure), b5 and b6 as the step test starts
         initial_stroke_m: [0.09, 0.0, 0.18, 0.09, 0.0, 0.18],
+        stroke_zero_m: [0.31, 0.01, 0.01, 0.31, 0.01, 0.01], // m ASSUMED; 0.01 PAPER Table 1
+        body: RobotDynamicsParams::wheeleg_2003(),
+        contact: ground_contact(),
         motors: [wheel_motor(); 2],
         potentiometers: [potentiometer(); 6],
         adc: adc(),

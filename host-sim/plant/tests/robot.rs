@@ -201,3 +201,146 @@ fn an_exploding_state_is_named() {
     let error = plant.tick(&mut state, &Inputs::default()).unwrap_err();
     assert!(!matches!(error, PlantError::Input { .. }), "{error}");
 }
+
+fn run(plant: &Plant, state: &mut PlantState, inputs: &Inputs, ms: u32) {
+    for _ in 0..ms {
+        plant.tick(state, inputs).unwrap();
+    }
+}
+
+#[test]
+fn starts_in_equilibrium_and_stands() {
+    let (plant, mut state) = robot();
+    let start = plant.outputs(&state);
+    let m6g = 0.8 * 9.81;
+    for k in 0..500 {
+        plant.tick(&mut state, &Inputs::default()).unwrap();
+        let o = plant.outputs(&state);
+        for leg in 0..2 {
+            let f6 = o.cylinders[3 * leg + 2].forces.net_n();
+            // F6 = N − m6 g at rest, and no jolt in the first milliseconds.
+            assert!((f6 - (o.foot_normal_n[leg] - m6g)).abs() < 0.3, "{k}: {f6}");
+            assert!((o.foot_normal_n[leg] - start.foot_normal_n[leg]).abs() < 0.5);
+            assert_eq!(o.foot_switches[leg], [true; 4]);
+        }
+        assert!(o.speed_m_s.abs() < 1e-3, "{k}: {}", o.speed_m_s);
+    }
+    let end = plant.outputs(&state);
+    for (a, b) in start.cylinders.iter().zip(&end.cylinders) {
+        assert!((a.stroke_m - b.stroke_m).abs() < 2e-5);
+    }
+    assert!(end.travel_m.abs() < 1e-4);
+}
+
+#[test]
+fn feet_carry_what_the_moments_about_the_axle_say() {
+    // Both legs at b5 = 0.01: moment of legs and chassis over the feet's lever.
+    let (plant, state) = robot();
+    let body = plant.assembly.mechanics.dynamics.clone();
+    let motion = &state.core.motion;
+    let kin = body.prepare(&motion.position, &motion.velocity).unwrap();
+    let weight = body.params().total_mass_kg() * 9.81;
+    let o = plant.outputs(&state);
+    let lever = o.sole_m[0][0];
+    let expected = weight * kin.com_m()[0] / lever;
+    let carried: f64 = o.foot_normal_n.iter().sum();
+    assert!(
+        (carried - expected).abs() < 1e-6 * expected,
+        "{carried} {expected}"
+    );
+    assert!(
+        carried / weight < 0.16,
+        "wheels carry most of it: {carried}"
+    );
+}
+
+#[test]
+fn lifting_one_leg_puts_its_load_on_the_other() {
+    let (plant, mut state) = robot();
+    let before: f64 = plant.outputs(&state).foot_normal_n.iter().sum();
+    let mut inputs = Inputs::default();
+    inputs.valve_on_us[2] = [0, 1000, 1000, 0];
+    run(&plant, &mut state, &inputs, 2500);
+    let o = plant.outputs(&state);
+    assert_eq!(o.foot_switches, [[false; 4], [true; 4]]);
+    assert_eq!(o.foot_normal_n[0], 0.0);
+    assert!(
+        (o.foot_normal_n[1] / before - 1.0).abs() < 0.03,
+        "{:?}",
+        o.foot_normal_n
+    );
+    assert!(o.cylinders[2].stroke_m < 1e-3);
+    assert!((o.sole_m[0][2] - 0.178).abs() < 0.004, "{:?}", o.sole_m);
+    // In the air the cylinder carries the foot's weight.
+    assert!((o.cylinders[2].forces.net_n() + 0.8 * 9.81).abs() < 0.5);
+    // And down again: it touches.
+    inputs.valve_on_us[2] = [1000, 0, 0, 1000];
+    run(&plant, &mut state, &inputs, 2500);
+    let o = plant.outputs(&state);
+    assert_eq!(o.foot_switches, [[true; 4]; 2]);
+    assert!((o.foot_normal_n.iter().sum::<f64>() / before - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn drives_at_the_speed_the_motor_characteristic_gives() {
+    // Both feet dragged along: friction at the feet and the chassis, the motor's line.
+    let (plant, mut state) = robot();
+    let inputs = Inputs {
+        bridge_duty: [0.5; 2],
+        bridge_enabled: [true; 2],
+        ..Inputs::default()
+    };
+    run(&plant, &mut state, &inputs, 4000);
+    let o = plant.outputs(&state);
+    let m = &plant.params().motors[0];
+    assert!(o.speed_m_s > 0.1, "{}", o.speed_m_s);
+    // Steady: torque of both wheels over the radius balances the drag.
+    let drag = -(o.foot_force_n[0][0] + o.foot_force_n[1][0]) + 4.0 * o.speed_m_s;
+    let push = (o.wheel_torque_n_m[0] + o.wheel_torque_n_m[1]) / 0.15;
+    assert!((push / drag - 1.0).abs() < 0.02, "{push} {drag}");
+    // Winding equation at that speed.
+    let motor_rad_s = o.wheel_rate_rad_s[0] * m.reduction;
+    let current = (0.5 * m.supply_v - m.torque_constant_n_m_a * motor_rad_s) / m.resistance_ohm;
+    assert!(
+        (o.motor_current_a[0] / current - 1.0).abs() < 0.02,
+        "{current}"
+    );
+    // Encoder: four edges a line, 260 turns of the motor a wheel turn.
+    let turns = (o.travel_m / 0.15 + o.pitch_rad) / std::f64::consts::TAU;
+    let edges = turns * 4.0 * f64::from(m.encoder_lines) * 260.0;
+    assert!((o.encoder_edges[0] as f64 - edges).abs() <= 1.0, "{edges}");
+    // Coulomb drag of sliding soles.
+    let mu = plant.params().contact.mu_kinetic;
+    assert!((-o.foot_force_n[0][0] / (mu * o.foot_normal_n[0]) - 1.0).abs() < 0.01);
+    // Bridges off: gear and drag stop it.
+    run(&plant, &mut state, &Inputs::default(), 1000);
+    assert!(plant.outputs(&state).speed_m_s.abs() < 2e-3);
+}
+
+#[test]
+fn halving_the_step_changes_the_gait_little() {
+    // A lift over its first second: contact breaks, stick turns to slip; only first
+    // order can be asked for, and little of it.
+    let stroke = |step_ns| {
+        let mut params = wheeleg_2003();
+        params.step_ns = step_ns;
+        let plant = Plant::new(&params).unwrap();
+        let mut state = plant.initial_state(0).unwrap();
+        let mut inputs = Inputs::default();
+        inputs.valve_on_us[2] = [0, 1000, 1000, 0];
+        run(&plant, &mut state, &inputs, 700);
+        plant.outputs(&state).cylinders[2].stroke_m
+    };
+    let (coarse, fine, finest) = (stroke(100_000), stroke(50_000), stroke(12_500));
+    assert!((0.02..0.17).contains(&finest), "{finest}");
+    assert!((coarse - finest).abs() < 2e-5, "{coarse} {fine} {finest}");
+    assert!((fine - finest).abs() < (coarse - finest).abs() + 1e-9);
+}
+
+#[test]
+fn a_gear_named_twice_must_be_the_same_gear() {
+    let mut params = wheeleg_2003();
+    params.motors[1].reduction = 130.0;
+    let error = Plant::new(&params).unwrap_err().to_string();
+    assert!(error.contains("motors.reduction"), "{error}");
+}
