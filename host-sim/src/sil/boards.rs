@@ -1,0 +1,264 @@
+//! Board models: an application, the simulated hardware around it, and the
+//! latching at its tick edges.
+//!
+//! At a tick edge the outputs preloaded during the last tick become active,
+//! then the inputs are latched, then the application runs. So a measurement
+//! acts on a valve one tick later, as on the board.
+
+use wheeleg_node::hardware::{
+    DumpPin, FootSwitches, FourValves, HBridge, NoDumpValve, NoSwitches, SupplySwitch,
+};
+use wheeleg_node::joint::JointNode;
+use wheeleg_node::parameters::{JointParameters, WheelParameters};
+use wheeleg_node::wheel::WheelNode;
+use wheeleg_node::snapshot::TickReport;
+use wheeleg_node::{NodeIdentity, Transmission};
+use wheeleg_protocol::{Address, NackReason};
+use wheeleg_units::Micros;
+
+use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
+use crate::SimError;
+
+/// Counts of the valve timer in one tick: 1 µs each.
+const VALVE_COUNTS: u16 = 1000;
+/// Counts of the H-bridge timer in one period: per cent, as on the HCTL-1100.
+const BRIDGE_COUNTS: u16 = 100;
+
+type Valves = FourValves<PwmChannel, PwmChannel, PwmChannel, PwmChannel>;
+type Feet = FootSwitches<Line, Line, Line, Line>;
+
+/// The application of a joint board; vertical joints read the foot switches.
+enum JointApplication {
+    Plain(JointNode<Valves, AdcInput, NoSwitches>),
+    WithFoot(JointNode<Valves, AdcInput, Feet>),
+}
+
+macro_rules! each {
+    ($self:expr, $node:ident => $call:expr) => {
+        match $self {
+            JointApplication::Plain($node) => $call,
+            JointApplication::WithFoot($node) => $call,
+        }
+    };
+}
+
+/// One joint board.
+pub struct JointBoard {
+    application: JointApplication,
+    sensor: AdcInput,
+    foot: [Line; 4],
+    valves: [PwmChannel; 4],
+}
+
+/// 96-bit unique id of a simulated processor: its address in every byte.
+fn identity(address: Address) -> NodeIdentity {
+    NodeIdentity {
+        address,
+        unique_id: [address.raw(); 12],
+    }
+}
+
+fn rejected(address: Address, error: wheeleg_node::ConfigError) -> SimError {
+    SimError::simulation(
+        format!("the board of {address} refuses its configuration: {error:?}"),
+        "see the sections [node.…] of the robot file",
+    )
+}
+
+/// The board's parameters: its defaults with the commissioned values on top.
+fn stored_parameters<P>(
+    address: Address,
+    stored: &[(u16, i32)],
+    defaults: P,
+    with: impl Fn(&P, u16, i32) -> Result<P, NackReason>,
+) -> Result<P, SimError> {
+    stored.iter().try_fold(defaults, |parameters, (id, raw)| {
+        with(&parameters, *id, *raw).map_err(|reason| {
+            SimError::simulation(
+                format!(
+                    "the board of {address} refuses parameter 0x{id:04X} = {raw}: {}",
+                    reason.text()
+                ),
+                "see the sections [node.…] of the robot file",
+            )
+        })
+    })
+}
+
+impl JointBoard {
+    /// A board at `address`, in boot, all valves off. `stored` are the parameters
+    /// (number, raw value) that commissioning left in its memory.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the application refuses its parameters.
+    pub fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        let parameters = stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
+            p.with(id, raw, true)
+        })?;
+        let sensor = AdcInput::default();
+        let valves: [PwmChannel; 4] = std::array::from_fn(|_| PwmChannel::new(VALVE_COUNTS));
+        let foot: [Line; 4] = std::array::from_fn(|_| Line::default());
+        let [fill_a, vent_a, fill_b, vent_b] = valves.clone();
+        let bank = FourValves {
+            fill_a,
+            vent_a,
+            fill_b,
+            vent_b,
+        };
+        let who = identity(address);
+        let application = if address.raw() % 3 == 0 {
+            let [front, back, left, right] = foot.clone();
+            let switches = FootSwitches(front, back, left, right);
+            JointNode::new(who, parameters, bank, sensor.clone(), switches)
+                .map(JointApplication::WithFoot)
+        } else {
+            JointNode::new(who, parameters, bank, sensor.clone(), NoSwitches)
+                .map(JointApplication::Plain)
+        };
+        Ok(Self {
+            application: application.map_err(|e| rejected(address, e))?,
+            sensor,
+            foot,
+            valves,
+        })
+    }
+
+    /// On-times that become active at this tick edge, µs.
+    pub fn active_on_us(&self) -> [u16; 4] {
+        std::array::from_fn(|i| self.valves[i].preloaded())
+    }
+
+    /// Latches the inputs and runs the tick that starts now.
+    pub fn tick(&mut self, now: Micros, code: u16, foot: [bool; 4]) -> TickReport {
+        self.sensor.latch(code);
+        for (line, closed) in self.foot.iter().zip(foot) {
+            line.set_level(closed);
+        }
+        each!(&mut self.application, node => {
+            let report = node.tick(now);
+            // Native code takes no simulated time; the emulated boards measure it.
+            node.tick_done(now);
+            report
+        })
+    }
+
+    /// Hands received bytes over; the last one ended at `t_end`.
+    pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+        each!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
+    }
+
+    /// What the application wants to send.
+    pub fn take_transmission(&mut self) -> Option<Transmission> {
+        each!(&mut self.application, node => node.take_transmission())
+    }
+
+    /// Internals after the last tick.
+    pub fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
+        each!(&self.application, node => node.snapshot())
+    }
+}
+
+/// The application of a wheel board; the first one has the supply switch and
+/// the dump valve.
+enum WheelApplication {
+    Plain(WheelNode<HBridge<PwmChannel, Line>, CounterInput, NoSwitches, NoDumpValve>),
+    WithSupply(WheelNode<HBridge<PwmChannel, Line>, CounterInput, SupplySwitch<Line>, DumpPin<Line>>),
+}
+
+macro_rules! each_wheel {
+    ($self:expr, $node:ident => $call:expr) => {
+        match $self {
+            WheelApplication::Plain($node) => $call,
+            WheelApplication::WithSupply($node) => $call,
+        }
+    };
+}
+
+/// One wheel board.
+pub struct WheelBoard {
+    application: WheelApplication,
+    encoder: CounterInput,
+    pulse: PwmChannel,
+    sign: Line,
+    supply: Line,
+    dump: Line,
+}
+
+impl WheelBoard {
+    /// A board at `address`, in boot, bridge off. `stored` as for joints.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the application refuses its parameters.
+    pub fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        let parameters = stored_parameters(address, stored, WheelParameters::default(), |p, id, raw| {
+            p.with(id, raw, true)
+        })?;
+        let encoder = CounterInput::default();
+        let pulse = PwmChannel::new(BRIDGE_COUNTS);
+        let (sign, supply, dump) = (Line::default(), Line::default(), Line::default());
+        let bridge = HBridge {
+            pulse: pulse.clone(),
+            sign: sign.clone(),
+        };
+        let who = identity(address);
+        let application = if address.raw() == 7 {
+            let switch = SupplySwitch(supply.clone());
+            let valve = DumpPin(dump.clone());
+            WheelNode::new(who, parameters, bridge, encoder.clone(), switch, valve)
+                .map(WheelApplication::WithSupply)
+        } else {
+            WheelNode::new(who, parameters, bridge, encoder.clone(), NoSwitches, NoDumpValve)
+                .map(WheelApplication::Plain)
+        };
+        Ok(Self {
+            application: application.map_err(|e| rejected(address, e))?,
+            encoder,
+            pulse,
+            sign,
+            supply,
+            dump,
+        })
+    }
+
+    /// Bridge duty that becomes active at this sample edge, −1..=1.
+    pub fn active_duty(&self) -> f64 {
+        let magnitude = f64::from(self.pulse.preloaded()) / f64::from(BRIDGE_COUNTS);
+        if self.sign.level() { -magnitude } else { magnitude }
+    }
+
+    /// Whether the dump valve is driven open.
+    pub fn dumps(&self) -> bool {
+        self.dump.level()
+    }
+
+    /// Sample period of the application, µs.
+    pub fn period_us(&self) -> u32 {
+        each_wheel!(&self.application, node => node.tick_period_us())
+    }
+
+    /// Latches the inputs and runs the sample that starts now.
+    pub fn tick(&mut self, now: Micros, encoder_edges: i64, supply_switch: bool) -> TickReport {
+        self.encoder.latch(encoder_edges);
+        self.supply.set_level(supply_switch);
+        each_wheel!(&mut self.application, node => {
+            let report = node.tick(now);
+            node.tick_done(now);
+            report
+        })
+    }
+
+    /// Hands received bytes over; the last one ended at `t_end`.
+    pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+        each_wheel!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
+    }
+
+    /// What the application wants to send.
+    pub fn take_transmission(&mut self) -> Option<Transmission> {
+        each_wheel!(&mut self.application, node => node.take_transmission())
+    }
+
+    /// Internals after the last sample.
+    pub fn snapshot(&self) -> &wheeleg_node::snapshot::WheelSnapshot {
+        each_wheel!(&self.application, node => node.snapshot())
+    }
+}

@@ -1,0 +1,274 @@
+//! The person at the console: gets the robot ready, starts the motion, and
+//! carries out the scenario's events, all through the master's dispatcher.
+
+use wheeleg_master::command::Command;
+use wheeleg_master::contact::Side;
+use wheeleg_master::event::Event;
+use wheeleg_master::layer1::foot::FootShape;
+use wheeleg_units::PositionMm;
+
+use super::world::World;
+use crate::SimError;
+use crate::config::{LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent};
+use crate::telemetry::{EventKind, Recorder};
+
+/// Longest start-up, simulated ns: enumeration, homing and settling.
+const START_UP_LIMIT_NS: u64 = 40_000_000_000;
+/// Rest at the start pose before the record begins, ns: all valves have
+/// settled and trapped pressures stand.
+const SETTLE_NS: u64 = 1_000_000_000;
+
+/// How far the start-up has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Enumerating,
+    Arming,
+    Homing,
+    Settling { until_ns: u64 },
+}
+
+/// The operator of one run.
+pub struct Operator<'a> {
+    scenario: &'a Scenario,
+    robot: &'a RobotConfig,
+    stage: Stage,
+    notes: Vec<(u64, String)>,
+    next_event: usize,
+}
+
+/// A command of a scenario file.
+///
+/// # Errors
+/// [`SimError::Simulation`] naming the argument that is missing.
+pub fn command(
+    name: &str,
+    joint: Option<u8>,
+    stroke_m: Option<f64>,
+    travel_m: Option<f64>,
+) -> Result<Command, SimError> {
+    let missing = |argument: &str| {
+        SimError::simulation(
+            format!("the command {name} of the scenario needs `{argument}`"),
+            format!("add `{argument}` to the event"),
+        )
+    };
+    let the_joint = || joint.ok_or_else(|| missing("joint"));
+    let mm = |m: f64| PositionMm::from_f64(m * 1e3);
+    Ok(match name {
+        "JointReference" => Command::JointReference {
+            joint: the_joint()?,
+            stroke_mm: mm(stroke_m.ok_or_else(|| missing("stroke"))?),
+        },
+        "TransmitPosition" => Command::TransmitPosition { joint: the_joint()? },
+        "OpenAllValves" => Command::OpenAllValves { joint: the_joint()? },
+        "EmergencyBrake" => Command::EmergencyBrake { joint: the_joint()? },
+        "WheelReference" => Command::WheelReference {
+            travel_mm: mm(travel_m.ok_or_else(|| missing("travel"))?),
+        },
+        "Arm" => Command::Arm,
+        "Disarm" => Command::Disarm,
+        "ClearFault" => Command::ClearFault,
+        "EmergencyStop" => Command::EmergencyStop,
+        "Stand" => Command::Stand,
+        "Hold" => Command::Hold,
+        "StartGait" => Command::StartGait,
+        "StopGait" => Command::StopGait,
+        other => {
+            return Err(SimError::simulation(
+                format!("the scenario gives the command {other}, which the console does not know"),
+                "the names are those of the master's table of commands",
+            ));
+        }
+    })
+}
+
+/// Side of a leg as the master names it.
+pub fn side(leg: LegChoice) -> Side {
+    match leg {
+        LegChoice::Left => Side::Left,
+        LegChoice::Right => Side::Right,
+    }
+}
+
+impl<'a> Operator<'a> {
+    /// An operator at a robot that is just being switched on.
+    pub fn new(scenario: &'a Scenario, robot: &'a RobotConfig) -> Self {
+        Self {
+            scenario,
+            robot,
+            stage: Stage::Enumerating,
+            notes: Vec::new(),
+            next_event: 0,
+        }
+    }
+
+    /// One look at the robot during start-up; true once it stands at rest in
+    /// its start pose.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] with the reason if it does not get there.
+    pub fn prepare(&mut self, world: &mut World) -> Result<bool, SimError> {
+        let now_ns = world.now_ns();
+        let now_us = now_ns / 1000;
+        while let Some((time_us, event)) = world.master().take_event() {
+            self.notes.push((time_us, describe(&event)));
+            match event {
+                Event::Homed if self.stage == Stage::Homing => {
+                    self.stage = Stage::Settling {
+                        until_ns: now_ns + SETTLE_NS,
+                    };
+                }
+                Event::HomingFailed { .. }
+                | Event::Hold(_)
+                | Event::SchemaMismatch { .. }
+                | Event::Refused { .. } => return Err(self.not_ready(now_ns)),
+                _ => {}
+            }
+        }
+        let (command, next) = match self.stage {
+            Stage::Enumerating if world.master().is_ready() => (Command::Arm, Stage::Arming),
+            Stage::Arming if world.master().is_armed() => (Command::Stand, Stage::Homing),
+            Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
+            _ if now_ns > START_UP_LIMIT_NS => return Err(self.not_ready(now_ns)),
+            _ => return Ok(false),
+        };
+        world
+            .master()
+            .submit(command, now_us)
+            .map_err(|reject| refused(&command, &format!("{reject:?}")))?;
+        self.stage = next;
+        Ok(false)
+    }
+
+    fn not_ready(&self, now_ns: u64) -> SimError {
+        let story: Vec<String> = self
+            .notes
+            .iter()
+            .rev()
+            .take(6)
+            .rev()
+            .map(|(us, text)| format!("{:.3} s: {text}", *us as f64 * 1e-6))
+            .collect();
+        SimError::simulation(
+            format!(
+                "the robot did not get ready in {:.2} s of simulated time (stage {:?}); last events: {}",
+                now_ns as f64 * 1e-9,
+                self.stage,
+                story.join("; ")
+            ),
+            "check supply pressure, board gains and start pose in the robot file",
+        )
+    }
+
+    /// Writes the story of the start-up into the record, at time 0.
+    pub fn report_start_up(&self, recorder: &mut Recorder) {
+        for (us, text) in &self.notes {
+            let at_s = *us as f64 * 1e-6;
+            recorder.event(0, EventKind::Info, format!("start-up, {at_s:.3} s after power-up: {text}"));
+        }
+    }
+
+    /// Starts the scenario's motion.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the dispatcher refuses it.
+    pub fn begin(&self, world: &mut World) -> Result<(), SimError> {
+        let command = match self.scenario.motion {
+            Motion::Stand => return Ok(()),
+            Motion::SquareWave { .. } => Command::StartGait,
+            Motion::Sinusoid {
+                leg,
+                length_m,
+                height_m,
+                rate_rad_s,
+            } => Command::FootTrajectory {
+                side: side(leg),
+                shape: FootShape::Arch {
+                    forward_mm: PositionMm::from_f64(length_m * 1e3),
+                    left_mm: PositionMm::ZERO,
+                    height_mm: PositionMm::from_f64(height_m * 1e3),
+                    rate_rad_s: rate_rad_s as f32,
+                },
+            },
+        };
+        let now_us = world.now_ns() / 1000;
+        world
+            .master()
+            .submit(command, now_us)
+            .map(|_| ())
+            .map_err(|reject| refused(&command, &format!("{reject:?}")))
+    }
+
+    /// The events of the scenario that are due at `t_ns`, each once.
+    pub fn due(&mut self, t_ns: u64) -> Vec<ScenarioEvent> {
+        let t_s = t_ns as f64 * 1e-9;
+        let rest = &self.scenario.events[self.next_event..];
+        let due: Vec<ScenarioEvent> = rest
+            .iter()
+            .take_while(|e| e.at_s <= t_s + 1e-9)
+            .cloned()
+            .collect();
+        self.next_event += due.len();
+        due
+    }
+
+    /// Gives a command in mid-run. A refusal is an event, as on the real console.
+    ///
+    /// # Errors
+    /// Never at present; kept for commands that cannot be given at all.
+    pub fn submit(
+        &self,
+        world: &mut World,
+        command: Command,
+        t_ns: u64,
+        recorder: &mut Recorder,
+    ) -> Result<(), SimError> {
+        let name = format!("{:?}", command.code());
+        if !world.master_alive() {
+            recorder.event(t_ns, EventKind::Command, format!("{name}: nobody answers, the master is dead"));
+            return Ok(());
+        }
+        let now_us = world.now_ns() / 1000;
+        let text = match world.master().submit(command, now_us) {
+            Ok(_) => format!("{name}: accepted"),
+            Err(reject) => format!("{name}: refused, {reject:?}"),
+        };
+        recorder.event(t_ns, EventKind::Command, text);
+        Ok(())
+    }
+
+    /// Writes the master's events into the record.
+    pub fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
+        while let Some((_, event)) = world.master().take_event() {
+            let kind = match event {
+                Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
+                Event::Hold(_) | Event::HomingFailed { .. } | Event::SchemaMismatch { .. } => {
+                    EventKind::Fault
+                }
+                Event::Done(_) | Event::Refused { .. } | Event::Position { .. } => {
+                    EventKind::Command
+                }
+                Event::Armed | Event::Disarmed => EventKind::Mode,
+                _ => EventKind::Info,
+            };
+            recorder.event(t_ns, kind, describe(&event));
+        }
+    }
+
+    /// Name of the robot that is operated.
+    pub fn robot(&self) -> &str {
+        &self.robot.name
+    }
+}
+
+fn refused(command: &Command, reason: &str) -> SimError {
+    SimError::simulation(
+        format!("the master refuses {:?}: {reason}", command.code()),
+        "the events of the log tell what the robot was doing",
+    )
+}
+
+/// An event of the master in words.
+fn describe(event: &Event) -> String {
+    format!("master: {event:?}")
+}

@@ -1,0 +1,92 @@
+//! From a robot and a scenario to the configuration of plant and master: the
+//! one place where the two files' SI values become the master's units.
+
+use std::f64::consts::TAU;
+
+use fixed::types::I16F16;
+use wheeleg_master::MasterConfig;
+use wheeleg_master::layer0::odometry::WheelGeometry;
+use wheeleg_master::layer1::params::{GaitParams, Pattern};
+use wheeleg_plant::PlantParams;
+use wheeleg_protocol::param::WheelParam;
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use super::operator::side;
+use crate::config::{LegChoice, Motion, RobotConfig, Scenario};
+
+/// Clock of the HCTL-1100 that the wheel boards stand in for, Hz.
+const WHEEL_CLOCK_HZ: u32 = 2_000_000;
+
+/// The leg that moves; the left one where the scenario does not say.
+fn stepping_leg(scenario: &Scenario) -> LegChoice {
+    match scenario.motion {
+        Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => leg,
+        Motion::Stand => LegChoice::Left,
+    }
+}
+
+fn millimetres(m: f64) -> PositionMm {
+    PositionMm::from_f64(m * 1e3)
+}
+
+fn microseconds(s: f64) -> u32 {
+    (s * 1e6).round() as u32
+}
+
+/// The plant of the robot, standing in the start pose of the gait.
+///
+/// Powering up in the start pose, chambers at their initial pressures, is the
+/// paper's home position; the start-up then arms and settles there.
+pub fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
+    let gait = &robot.gait;
+    let home = [gait.yaw_s2_m, 0.0, gait.stroke_m];
+    let held = [gait.yaw_s2_m, gait.held_leg_s5_m, gait.held_leg_s6_m];
+    let mut plant = robot.plant.clone();
+    let (left, right) = match stepping_leg(scenario) {
+        LegChoice::Left => (home, held),
+        LegChoice::Right => (held, home),
+    };
+    plant.initial_stroke_m[..3].copy_from_slice(&left);
+    plant.initial_stroke_m[3..].copy_from_slice(&right);
+    plant
+}
+
+/// The master's configuration.
+pub fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
+    let gait = &robot.gait;
+    let motor = &robot.plant.motors[0];
+    let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
+    let circumference_um = robot.plant.body.wheel_radius_m * TAU * 1e6;
+    MasterConfig {
+        gait: GaitParams {
+            steps: gait.steps,
+            period_us: microseconds(gait.period_s),
+            lift_us: microseconds(gait.lift_s),
+            reach_us: microseconds(gait.reach_s),
+            lower_us: microseconds(gait.lower_s),
+            push_us: microseconds(gait.push_s),
+            stroke_mm: millimetres(gait.stroke_m),
+            held_leg_s5_mm: millimetres(gait.held_leg_s5_m),
+            held_leg_s6_mm: millimetres(gait.held_leg_s6_m),
+            yaw_s2_mm: millimetres(gait.yaw_s2_m),
+            push_speed_mm_s: VelocityMmS::from_f64(gait.push_speed_m_s * 1e3),
+            push_acceleration_mm_s2: I16F16::from_num(gait.push_acceleration_m_s2 * 1e3),
+            pattern: Pattern::Single(side(stepping_leg(scenario))),
+            touchdown_reflex: gait.touchdown_reflex,
+        },
+        wheels: WheelGeometry {
+            counts_per_revolution: counts.round() as u32,
+            circumference_um: circumference_um.round() as u32,
+        },
+        wheel_sample_us: wheel_sample_us(robot),
+        ..MasterConfig::default()
+    }
+}
+
+/// Sample time of the wheel boards, t = 16 (T + 1) / f (HCTL-1100 data sheet p. 24), µs.
+fn wheel_sample_us(robot: &RobotConfig) -> u32 {
+    let id = WheelParam::SampleTimer.id();
+    let stored = robot.node.wheels[0].iter().find(|(number, _)| *number == id);
+    let timer = stored.map_or(WheelParam::SampleTimer.info().default, |(_, raw)| *raw);
+    16 * (timer.unsigned_abs() + 1) / (WHEEL_CLOCK_HZ / 1_000_000)
+}

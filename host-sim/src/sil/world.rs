@@ -1,0 +1,346 @@
+//! Boards, bus, master and plant on one clock.
+//!
+//! The clock counts nanoseconds. Four kinds of events exist, and at equal times
+//! they are taken in this order: bytes delivered by the bus, joint ticks
+//! (1 kHz, addresses ascending), wheel samples, master cycles (100 Hz). The
+//! plant is advanced to a tick before its inputs are latched; bus events do
+//! not touch it.
+
+use wheeleg_master::{Master, MasterConfig};
+use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
+use wheeleg_protocol::Address;
+use wheeleg_units::Micros;
+
+use super::boards::{JointBoard, WheelBoard};
+use super::bus::Bus;
+use crate::SimError;
+use crate::config::RobotConfig;
+
+/// Joint tick, ns.
+pub const JOINT_TICK_NS: u64 = 1_000_000;
+const NS_PER_US: u64 = 1_000;
+
+/// What has just happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Happened {
+    /// Bytes reached the boards.
+    Delivery,
+    /// All joint boards ran one tick; the plant stands at its start.
+    JointTick,
+    /// A wheel board ran one sample.
+    WheelSample,
+    /// The master started a bus cycle (or would have, were it alive).
+    MasterCycle,
+}
+
+/// Everything that is simulated.
+pub struct World {
+    plant: Plant,
+    state: PlantState,
+    inputs: Inputs,
+    joints: [JointBoard; 6],
+    wheels: [WheelBoard; 2],
+    bus: Bus,
+    master: Master,
+    master_alive: bool,
+    cycle_ns: u64,
+    now_ns: u64,
+    next_joint_ns: u64,
+    next_wheel_ns: [u64; 2],
+    next_cycle_ns: u64,
+    tick_inputs: TickInputs,
+}
+
+/// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct TickInputs {
+    /// On-times, µs, per joint `[fill A, vent A, fill B, vent B]`.
+    pub on_us: [[u16; 4]; 6],
+    /// Commanded edges since the start, per joint.
+    pub edges: [u32; 6],
+}
+
+impl TickInputs {
+    /// Takes the on-times of the next tick and counts the edges they make.
+    fn take(&mut self, joint: usize, on_us: [u16; 4]) {
+        for (before, now) in self.on_us[joint].iter().zip(on_us) {
+            let full = VALVE_TICK_US;
+            let stood_on = *before == full;
+            let starts_on = now > 0;
+            self.edges[joint] += u32::from(stood_on != starts_on);
+            self.edges[joint] += u32::from(starts_on && now < full);
+        }
+        self.on_us[joint] = on_us;
+    }
+}
+
+const VALVE_TICK_US: u16 = 1000;
+
+fn micros(ns: u64) -> Micros {
+    // The boards' clocks are 32-bit microsecond counters and wrap.
+    Micros((ns / NS_PER_US) as u32)
+}
+
+impl World {
+    /// Builds the robot in its initial pose, everything unpowered.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if a part refuses its parameters.
+    pub fn new(
+        robot: &RobotConfig,
+        plant: &PlantParams,
+        master: MasterConfig,
+        seed: u64,
+    ) -> Result<Self, SimError> {
+        let refused = |part: &str, e: &dyn std::fmt::Display| {
+            SimError::simulation(
+                format!("the {part} refuses its parameters: {e}"),
+                format!("correct the robot `{}`; `wheeleg params` lists it", robot.name),
+            )
+        };
+        let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
+        let state = plant.initial_state(seed).map_err(|e| refused("plant", &e))?;
+        let stored = &robot.node;
+        let address = |n: u8| {
+            Address::new(n).ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
+        };
+        let joint = |n: u8| JointBoard::new(address(n)?, &stored.joints[usize::from(n) - 1]);
+        let wheel = |n: u8| WheelBoard::new(address(n)?, &stored.wheels[usize::from(n) - 7]);
+        Ok(Self {
+            plant,
+            state,
+            inputs: Inputs::default(),
+            joints: [joint(1)?, joint(2)?, joint(3)?, joint(4)?, joint(5)?, joint(6)?],
+            wheels: [wheel(7)?, wheel(8)?],
+            bus: Bus::new(robot.bus.baud_bit_s as u32),
+            master: Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?,
+            master_alive: true,
+            cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
+            now_ns: 0,
+            next_joint_ns: 0,
+            next_wheel_ns: [0; 2],
+            next_cycle_ns: 0,
+            tick_inputs: TickInputs::default(),
+        })
+    }
+
+    /// Takes the next event.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] when the plant leaves the range of its model.
+    pub fn step(&mut self) -> Result<Happened, SimError> {
+        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
+        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        if let Some(due) = self.bus.next_delivery_ns()
+            && due <= tick_ns
+        {
+            self.now_ns = due;
+            self.deliver();
+            return Ok(Happened::Delivery);
+        }
+        self.now_ns = tick_ns;
+        if self.next_joint_ns == tick_ns {
+            self.joint_tick()?;
+            return Ok(Happened::JointTick);
+        }
+        if wheel_ns == tick_ns {
+            self.wheel_sample(usize::from(self.next_wheel_ns[0] != tick_ns))?;
+            return Ok(Happened::WheelSample);
+        }
+        self.master_cycle();
+        Ok(Happened::MasterCycle)
+    }
+
+    fn advance_plant(&mut self) -> Result<(), SimError> {
+        self.plant
+            .advance_to(&mut self.state, self.now_ns)
+            .map_err(|e| unphysical(self.now_ns, &e))
+    }
+
+    fn joint_tick(&mut self) -> Result<(), SimError> {
+        self.advance_plant()?;
+        for (i, board) in self.joints.iter().enumerate() {
+            let on_us = board.active_on_us();
+            self.tick_inputs.take(i, on_us);
+            self.inputs.valve_on_us[i] = on_us;
+        }
+        self.inputs.dump = self.wheels[0].dumps();
+        self.plant
+            .apply(&mut self.state, &self.inputs)
+            .map_err(|e| unphysical(self.now_ns, &e))?;
+        let feet = self.plant.foot_switches(&self.state);
+        let now = micros(self.now_ns);
+        for (i, board) in self.joints.iter_mut().enumerate() {
+            let code = self.plant.read_position(&mut self.state, i);
+            board.tick(now, code, feet[i / 3]);
+        }
+        self.next_joint_ns += JOINT_TICK_NS;
+        self.collect_transmissions();
+        self.offer_acyclic();
+        Ok(())
+    }
+
+    fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
+        self.advance_plant()?;
+        let board = &mut self.wheels[wheel];
+        self.inputs.bridge_duty[wheel] = board.active_duty();
+        self.inputs.bridge_enabled[wheel] = true;
+        self.plant
+            .set_bridge(&mut self.state, wheel, self.inputs.bridge_duty[wheel]);
+        let edges = self.plant.encoder_edges(&self.state, wheel);
+        let switch = self.plant.pressure_switch(&self.state);
+        board.tick(micros(self.now_ns), edges, switch);
+        self.next_wheel_ns[wheel] += u64::from(board.period_us()) * NS_PER_US;
+        self.collect_transmissions();
+        Ok(())
+    }
+
+    fn master_cycle(&mut self) {
+        if self.master_alive {
+            let bytes = self.master.cycle(self.now_ns / NS_PER_US);
+            self.bus.transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+        }
+        self.next_cycle_ns += self.cycle_ns;
+    }
+
+    fn deliver(&mut self) {
+        while let Some(delivery) = self.bus.take_due(self.now_ns) {
+            let t_end = micros(delivery.end_ns);
+            for (board, address) in self.joints.iter_mut().zip(1..) {
+                if delivery.from != address {
+                    board.on_bus_bytes(&delivery.bytes, t_end);
+                }
+            }
+            for (board, address) in self.wheels.iter_mut().zip(7..) {
+                if delivery.from != address {
+                    board.on_bus_bytes(&delivery.bytes, t_end);
+                }
+            }
+            if self.master_alive && delivery.from != Address::MASTER.raw() {
+                self.master
+                    .on_bus_bytes(&delivery.bytes, delivery.end_ns / NS_PER_US);
+            }
+        }
+        self.collect_transmissions();
+        self.offer_acyclic();
+    }
+
+    /// Puts on the line what the boards want to send, at the times they chose.
+    fn collect_transmissions(&mut self) {
+        let now = micros(self.now_ns);
+        let now_ns = self.now_ns;
+        let bus = &mut self.bus;
+        let mut send = |from: u8, t: wheeleg_node::Transmission| {
+            let ahead = t.start_at.get().wrapping_sub(now.get());
+            // More than half the counter's range ahead means: already past.
+            let ahead_ns = if ahead < 1 << 31 { u64::from(ahead) * NS_PER_US } else { 0 };
+            bus.transmit(from, now_ns + ahead_ns, t.bytes.to_vec());
+        };
+        for (board, address) in self.joints.iter_mut().zip(1..) {
+            while let Some(t) = board.take_transmission() {
+                send(address, t);
+            }
+        }
+        for (board, address) in self.wheels.iter_mut().zip(7..) {
+            while let Some(t) = board.take_transmission() {
+                send(address, t);
+            }
+        }
+    }
+
+    /// Lets the master use the line for a request while nothing is on it or scheduled.
+    fn offer_acyclic(&mut self) {
+        if self.master_alive && self.bus.next_delivery_ns().is_none()
+            && let Some(bytes) = self.master.next_acyclic(self.now_ns / NS_PER_US)
+        {
+            self.bus.transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+        }
+    }
+
+    /// The master dies: it never sends or hears again.
+    pub fn kill_master(&mut self) {
+        self.master_alive = false;
+    }
+
+    /// Whether the master lives.
+    pub fn master_alive(&self) -> bool {
+        self.master_alive
+    }
+
+    /// The master, for user commands and its events.
+    pub fn master(&mut self) -> &mut Master {
+        &mut self.master
+    }
+
+    /// Simulated time since power-up, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Everything that can be seen of the plant.
+    pub fn outputs(&self) -> Outputs {
+        self.plant.outputs(&self.state)
+    }
+
+    /// BLAKE3 of the plant's state.
+    pub fn state_hash(&self) -> [u8; 32] {
+        self.plant.state_hash(&self.state)
+    }
+
+    /// Commands of the tick that has just begun.
+    pub fn tick_inputs(&self) -> &TickInputs {
+        &self.tick_inputs
+    }
+
+    /// The joint boards, addresses 1 to 6.
+    pub fn joints(&self) -> &[JointBoard; 6] {
+        &self.joints
+    }
+
+    /// The wheel boards, addresses 7 and 8.
+    pub fn wheels(&self) -> &[WheelBoard; 2] {
+        &self.wheels
+    }
+
+    /// The line.
+    pub fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    /// The plant's model.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+}
+
+fn unphysical(now_ns: u64, error: &wheeleg_plant::PlantError) -> SimError {
+    SimError::simulation(
+        format!(
+            "the plant left its range at {:.4} s after power-up: {error}",
+            now_ns as f64 * 1e-9
+        ),
+        "what was logged up to here is complete; check the robot's parameters",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TickInputs;
+
+    #[test]
+    fn edges_are_counted_where_the_line_changes() {
+        let mut inputs = TickInputs::default();
+        let mut take = |on: u16| {
+            let before = inputs.edges[0];
+            inputs.take(0, [on, 0, 0, 0]);
+            inputs.edges[0] - before
+        };
+        assert_eq!(take(0), 0, "stays off");
+        assert_eq!(take(1000), 1, "on at the tick edge, stays on");
+        assert_eq!(take(1000), 0, "stays on");
+        assert_eq!(take(350), 1, "off within the tick");
+        assert_eq!(take(350), 2, "on and off");
+        assert_eq!(take(1000), 1);
+        assert_eq!(take(0), 1, "off at the tick edge");
+    }
+}
