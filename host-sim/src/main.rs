@@ -1,2 +1,5 @@
-//! The wheeleg program.
-fn main() {}
+//! The `wheeleg` program; see `wheeleg --help`.
+
+fn main() -> std::process::ExitCode {
+    wheeleg_sim::cli::main()
+}

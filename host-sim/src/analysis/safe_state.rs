@@ -79,8 +79,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             "axes with a latched fault at the end of the run",
             Some(latched_axes(recording)),
             "1",
-            // An E-stop is a command, not a fault: the mode is latched instead.
-            (!estop).then_some(8.0),
+            Some(8.0),
             Some(8.0),
         ),
         Target::new(

@@ -5,7 +5,7 @@ pub mod builtin;
 mod error;
 mod node;
 mod params;
-mod plant;
+pub mod plant;
 mod quantity;
 mod reader;
 mod robot;

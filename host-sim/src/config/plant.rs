@@ -2,7 +2,9 @@
 
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::chamber::GasModel;
+use wheeleg_plant::contact::ContactParams;
 use wheeleg_plant::cylinder::CylinderParams;
+use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
 use wheeleg_plant::endstop::EndStopParams;
 use wheeleg_plant::flow::{GasParams, Iso6358};
 use wheeleg_plant::friction::FrictionParams;
@@ -205,6 +207,72 @@ params! {
         noise: f64, "noise", Lsb, 0.0, 100.0;
     }
 
+    /// Dimensions of the robot, chassis and wheels.
+    BodySection {
+        /// Crank from O3 to O4.
+        crank: f64, "crank", Length, 0.01, 2.0;
+        /// O4 seen from O1: forward, left.
+        p4: [f64; 2], "p4", Length, -2.0, 2.0;
+        /// Smallest accepted moment arm of the yaw cylinder, as a share of the crank.
+        min_cos_theta3: f64, "min_cos_theta3", Number, 0.0, 1.0;
+        /// Joint lengths b2, b5, b6 at stroke zero.
+        stroke_zero: [f64; 3], "stroke_zero", Length, 0.0, 10.0;
+        /// O4 of the left leg from the middle of the wheel axle: forward, left, up.
+        o4: [f64; 3], "o4", Length, -5.0, 5.0;
+        /// Sole below the foot point P.
+        foot_pad: f64, "foot_pad", Length, 0.0, 1.0;
+        /// Mass of the chassis without wheels and legs.
+        chassis_mass: f64, "chassis_mass", Mass, 0.1, 1000.0;
+        /// Centre of mass of the chassis from the wheel axle: forward, up.
+        chassis_com: [f64; 2], "chassis_com", Length, -5.0, 5.0;
+        /// Inertia of the chassis about its centre of mass, pitch axis.
+        chassis_pitch_inertia: f64, "chassis_pitch_inertia", Inertia, 1e-4, 1000.0;
+        /// Viscous friction of the chassis travel.
+        chassis_viscous: f64, "chassis_viscous", Damping, 0.0, 1000.0;
+        /// Mass of one wheel.
+        wheel_mass: f64, "wheel_mass", Mass, 0.01, 100.0;
+        /// Radius of the wheels.
+        wheel_radius: f64, "wheel_radius", Length, 0.01, 2.0;
+        /// Inertia of one wheel about its axle.
+        wheel_inertia: f64, "wheel_inertia", Inertia, 0.0, 100.0;
+        /// Inertia of one motor's rotor.
+        rotor_inertia: f64, "rotor_inertia", Inertia, 0.0, 1.0;
+        /// Gravity in ground axes: forward, left, normal to the ground.
+        gravity: [f64; 3], "gravity", Acceleration, -30.0, 30.0;
+    }
+
+    /// A rigid body of a leg, in its link frame.
+    LinkSection {
+        /// Mass.
+        mass: f64, "mass", Mass, 1e-3, 100.0;
+        /// Centre of mass.
+        com: [f64; 3], "com", Length, -2.0, 2.0;
+        /// Principal inertias at the centre of mass.
+        inertia: [f64; 3], "inertia", Inertia, 0.0, 100.0;
+    }
+
+    /// Soles and ground.
+    ContactSection {
+        /// Normal stiffness.
+        stiffness: f64, "stiffness", Stiffness, 1.0, 1e9;
+        /// Hunt–Crossley damping factor.
+        damping: f64, "damping", PerVelocity, 0.0, 1e3;
+        /// Coefficient of static friction.
+        mu_static: f64, "mu_static", Number, 0.0, 10.0;
+        /// Coefficient of kinetic friction; at most the static one.
+        mu_kinetic: f64, "mu_kinetic", Number, 0.0, 10.0;
+        /// Stribeck velocity.
+        stribeck: f64, "stribeck", Velocity, 1e-6, 10.0;
+        /// Bristle stiffness.
+        bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1.0, 1e9;
+        /// Bristle damping.
+        bristle_damping: f64, "bristle_damping", Damping, 0.0, 1e6;
+        /// Radius of the sole.
+        sole_radius: f64, "sole_radius", Length, 0.0, 1.0;
+        /// Penetration of a side of the sole that closes its switch.
+        switch_threshold: f64, "switch_threshold", Length, 0.0, 0.1;
+    }
+
     /// Numerics of the plant.
     NumericsSection {
         /// Length of a full step; steps are cut at every valve edge.
@@ -213,7 +281,7 @@ params! {
 }
 
 /// Names of the plant's sections.
-pub(super) const SECTIONS: [&str; 14] = [
+pub(super) const SECTIONS: [&str; 17] = [
     "gas",
     "supply",
     "regulator",
@@ -228,6 +296,19 @@ pub(super) const SECTIONS: [&str; 14] = [
     "motor",
     "sensor",
     "numerics",
+    "body",
+    "link",
+    "contact",
+];
+
+/// The six bodies of a leg, in the order of the chain.
+const LINKS: [&str; 6] = [
+    "yaw_barrel",
+    "yaw_rod",
+    "crank",
+    "yaw_carriage",
+    "horizontal_carriage",
+    "vertical_rod",
 ];
 
 fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {
@@ -278,6 +359,13 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
     let adc = r.section::<AdcSection>("sensor.adc");
     let numerics = r.section::<NumericsSection>("numerics");
 
+    let body = r.section::<BodySection>("body");
+    if let Some(link) = r.table("link") {
+        r.reject_unknown(&link, &LINKS);
+    }
+    let links = LINKS.map(|name| r.section::<LinkSection>(&format!("link.{name}")));
+    let contact = r.section::<ContactSection>("contact");
+
     let base = cylinder_params(
         &cylinder?,
         &line?,
@@ -287,6 +375,9 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
         &end_stop?,
     );
     let starts = [yaw?, horizontal?, vertical?];
+    let (body, motor) = (body?, motor?);
+    let [l1, l2, l3, l4, l5, l6] = links;
+    let links = [l1?, l2?, l3?, l4?, l5?, l6?];
     Some(PlantParams {
         gas: gas_params(&gas?),
         supply: supply_params(&supply?, &regulator?, &dump_valve?),
@@ -296,7 +387,10 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
             ..base.clone()
         }),
         initial_stroke_m: std::array::from_fn(|i| starts[i % 3].stroke),
-        motors: [motor_params(&motor?); 2],
+        stroke_zero_m: std::array::from_fn(|i| body.stroke_zero[i % 3]),
+        body: dynamics_params(&body, &links, motor.reduction),
+        contact: contact_params(&contact?),
+        motors: [motor_params(&motor); 2],
         potentiometers: [potentiometer_params(&potentiometer?); 6],
         adc: adc_params(&adc?),
         step_ns: (numerics?.step * 1e9).round() as u64,
@@ -401,6 +495,50 @@ fn motor_params(s: &MotorSection) -> MotorParams {
     }
 }
 
+fn dynamics_params(
+    s: &BodySection,
+    links: &[LinkSection; 6],
+    gear_ratio: f64,
+) -> RobotDynamicsParams {
+    RobotDynamicsParams {
+        crank_m: s.crank,
+        p4_m: s.p4,
+        min_cos_theta3: s.min_cos_theta3,
+        leg_bodies: links.map(|l| BodyParams {
+            mass_kg: l.mass,
+            com_m: l.com,
+            inertia_kg_m2: l.inertia,
+        }),
+        chassis_mass_kg: s.chassis_mass,
+        chassis_com_m: s.chassis_com,
+        chassis_pitch_inertia_kg_m2: s.chassis_pitch_inertia,
+        o4_m: s.o4,
+        foot_pad_m: s.foot_pad,
+        wheel_mass_kg: s.wheel_mass,
+        wheel_radius_m: s.wheel_radius,
+        wheel_inertia_kg_m2: s.wheel_inertia,
+        rotor_inertia_kg_m2: s.rotor_inertia,
+        gear_ratio,
+        // Friction of the cylinders is in the pneumatic model.
+        viscous: [s.chassis_viscous, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        gravity_m_s2: s.gravity,
+    }
+}
+
+fn contact_params(s: &ContactSection) -> ContactParams {
+    ContactParams {
+        stiffness_n_m: s.stiffness,
+        damping_s_m: s.damping,
+        mu_static: s.mu_static,
+        mu_kinetic: s.mu_kinetic,
+        stribeck_m_s: s.stribeck,
+        bristle_stiffness_n_m: s.bristle_stiffness,
+        bristle_damping_n_s_m: s.bristle_damping,
+        sole_radius_m: s.sole_radius,
+        switch_threshold_m: s.switch_threshold,
+    }
+}
+
 fn potentiometer_params(s: &PotentiometerSection) -> PotentiometerParams {
     PotentiometerParams {
         electrical_stroke_m: s.electrical_stroke,
@@ -459,6 +597,33 @@ mod tests {
         let copy =
             serde_json::to_value(wheeleg_plant::testing::wheeleg_2003()).expect("serialises");
         compare("plant", &file, &copy);
+    }
+
+    /// The reference model's foot load rests on three numbers derived from
+    /// the masses; they must follow when the masses change.
+    #[test]
+    fn load_of_the_reference_model_follows_from_the_masses() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let body = &robot.plant.body;
+        let (leg, r) = (&body.leg_bodies, &robot.reference);
+        let b5_zero = robot.plant.stroke_zero_m[1];
+        let slide = leg[4].mass_kg + leg[5].mass_kg;
+        // First moments about the axle at the home yaw (theta1 = pi, theta4 =
+        // pi/2), frames as in model.md; O1 is p4 behind O4.
+        let o1 = body.o4_m[0] - body.p4_m[0];
+        let fixed = leg[0].mass_kg * (o1 - leg[0].com_m[0])
+            + leg[1].mass_kg * (o1 + leg[1].com_m[0])
+            + leg[2].mass_kg * (body.o4_m[0] + leg[2].com_m[0])
+            + leg[3].mass_kg * (body.o4_m[0] + leg[3].com_m[2])
+            + leg[4].mass_kg * (body.o4_m[0] + leg[4].com_m[1])
+            + leg[5].mass_kg * (body.o4_m[0] + leg[5].com_m[1]);
+        let other = b5_zero + robot.gait.held_leg_s5_m;
+        let moment =
+            body.chassis_mass_kg * body.chassis_com_m[0] + 2.0 * fixed + slide * (b5_zero + other);
+        assert!((moment - r.load_moment_kg_m).abs() < 1e-9, "{moment}");
+        assert!((slide - r.slide_mass_kg).abs() < 1e-12);
+        assert!((body.o4_m[0] + b5_zero - r.load_arm_m).abs() < 1e-12);
+        assert!((leg[5].mass_kg - r.m6_kg).abs() < 1e-12);
     }
 
     #[test]

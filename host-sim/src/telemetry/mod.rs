@@ -17,7 +17,7 @@ pub use csv_out::write_csv;
 pub use encode::push_fixed;
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;
-pub use recorder::{Recorder, Recording, Row};
+pub use recorder::{PLOT_CUTOFF_HZ, Recorder, Recording, Row};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, channels, json_schema};
 pub use samples::{
     BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, MasterSample,

@@ -1,0 +1,87 @@
+//! The machine-readable summary of a run.
+
+use serde::Serialize;
+
+use crate::analysis::{Analysis, Target};
+use crate::config::{RobotConfig, Scenario};
+use crate::telemetry::Recording;
+
+/// Facts about a run that are not in its recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunInfo {
+    /// Seed used.
+    pub seed: u64,
+    /// Simulated time, start-up included, s.
+    pub simulated_s: f64,
+    /// Scenario time in the record, s.
+    pub recorded_s: f64,
+    /// Wall time of simulation and log, without figures and report, s.
+    pub wall_s: f64,
+    /// False when the run was stopped before its end.
+    pub complete: bool,
+}
+
+/// Contents of `summary.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Seed used.
+    pub seed: u64,
+    /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
+    pub hash: String,
+    /// Simulated time, start-up included, s.
+    pub simulated_s: f64,
+    /// Scenario time in the record, s.
+    pub recorded_s: f64,
+    /// Wall time of simulation and log, without figures and report, s.
+    pub wall_s: f64,
+    /// Simulated over wall time.
+    pub realtime_factor: f64,
+    /// False when the run was stopped before its end.
+    pub complete: bool,
+    /// Whether every required target is met.
+    pub passed: bool,
+    /// Targets with values and verdicts.
+    pub targets: Vec<Target>,
+}
+
+impl Summary {
+    /// Collects the summary of a run.
+    #[must_use]
+    pub fn new(
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        recording: &Recording,
+        analysis: &Analysis,
+        info: RunInfo,
+    ) -> Self {
+        Self {
+            scenario: scenario.name.clone(),
+            robot: robot.name.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+            seed: info.seed,
+            hash: recording.hash.clone(),
+            simulated_s: info.simulated_s,
+            recorded_s: info.recorded_s,
+            wall_s: info.wall_s,
+            realtime_factor: info.simulated_s / info.wall_s.max(1e-9),
+            complete: info.complete,
+            passed: info.complete && analysis.passed(),
+            targets: analysis.targets.clone(),
+        }
+    }
+
+    /// As indented JSON with a final newline.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // A struct of numbers and texts always serialises.
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+}

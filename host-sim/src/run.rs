@@ -1,0 +1,118 @@
+//! One run from names to files.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::config::{RobotConfig, Scenario, builtin};
+use crate::report::{self, RunInfo, Summary};
+use crate::sil;
+use crate::telemetry::Recorder;
+use crate::{SimError, analysis};
+
+/// Scenario of a bare `wheeleg`.
+pub const DEFAULT_SCENARIO: &str = "three-step";
+/// Robot of a bare `wheeleg params`.
+pub const DEFAULT_ROBOT: &str = "wheeleg-2003";
+
+/// What to run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Built-in scenario or path.
+    pub scenario: String,
+    /// Robot instead of the scenario's.
+    pub robot: Option<String>,
+    /// Seed instead of the scenario's.
+    pub seed: Option<u64>,
+    /// Folder for the results instead of `runs/<scenario>-seed<N>`.
+    pub out: Option<PathBuf>,
+}
+
+/// A run with its files written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finished {
+    /// Contents of `summary.json`.
+    pub summary: Summary,
+    /// Path of the report.
+    pub report: PathBuf,
+}
+
+/// Set by Ctrl-C.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Runs a scenario: log, tables, figures, summary, report. Ctrl-C stops it at
+/// the next bus cycle and the files are finished all the same.
+///
+/// # Errors
+/// Any [`SimError`]. A log that was begun is closed and stays readable.
+pub fn run(options: &Options) -> Result<Finished, SimError> {
+    let scenario = builtin::scenario(&options.scenario)?;
+    let robot = builtin::robot(options.robot.as_deref().unwrap_or(&scenario.robot))?;
+    let seed = options.seed.unwrap_or(scenario.seed);
+    let folder = options
+        .out
+        .clone()
+        .unwrap_or_else(|| crate::cli::default_out(&scenario.name, seed));
+    std::fs::create_dir_all(&folder)
+        .map_err(|e| SimError::output("create the folder", &folder, e))?;
+    let mut recorder = Recorder::create(&folder.join("log.mcap"))?;
+    provenance(&mut recorder, &scenario, &robot, seed);
+
+    // Only one handler can be set in a process; a second run keeps the first.
+    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst));
+    let bar = progress_bar(&scenario);
+    let begun = Instant::now();
+    let outcome = sil::run(&scenario, &robot, seed, &mut recorder, &mut |t_s| {
+        bar.set_position((t_s * 1e3) as u64);
+        if INTERRUPTED.load(Ordering::SeqCst) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    let closed = recorder.finish();
+    let wall_s = begun.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let outcome = outcome?;
+    let recording = closed?;
+
+    let info = RunInfo {
+        seed,
+        simulated_s: outcome.simulated_s,
+        recorded_s: outcome.recorded_s,
+        wall_s,
+        complete: !outcome.stopped,
+    };
+    let analysis = analysis::analyse(&scenario, &robot, &recording);
+    let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
+    let report = report::write(&folder, &scenario, &robot, &recording, &analysis, &summary)?;
+    Ok(Finished { summary, report })
+}
+
+/// What went into the run, as messages at time zero: part of the log and of
+/// the hash, so without paths and wall-clock times.
+fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotConfig, seed: u64) {
+    recorder.provenance("program", concat!("wheeleg ", env!("CARGO_PKG_VERSION")));
+    recorder.provenance("scenario", &scenario.name);
+    recorder.provenance("robot", &robot.name);
+    recorder.provenance("seed", seed.to_string());
+    for p in &robot.parameters {
+        recorder.provenance(
+            "parameter",
+            format!("{} = {} {}", p.path, p.value_text(), p.unit),
+        );
+    }
+}
+
+fn progress_bar(scenario: &Scenario) -> ProgressBar {
+    // Draws on stderr, and only if that is a terminal.
+    let bar = ProgressBar::new((scenario.duration_s * 1e3) as u64);
+    let style = ProgressStyle::with_template("{prefix} {wide_bar} {percent:>3} %  {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_prefix(scenario.name.clone());
+    bar.set_message(format!("{:.0} s simulated", scenario.duration_s));
+    bar
+}
