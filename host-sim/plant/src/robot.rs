@@ -201,12 +201,12 @@ impl Plant {
         let mechanics = &assembly.mechanics;
         let mut stroke = self.params.initial_stroke_m;
         let mut bristle = [0.0; 6];
-        // Stops and ground are stiff against the gas: two rounds settle to rounding,
-        // the third costs nothing.
+        // Stops and ground are stiff, so each round shrinks the error some
+        // hundredfold; four reach rounding.
         let mut motion = BodyMotion::at_rest([0.0; 8]);
         for _ in 0..4 {
-            for i in 0..6 {
-                motion.position[i + 2] = mechanics.stroke_zero_m[i] + stroke[i];
+            for (i, (zero, stroke)) in mechanics.stroke_zero_m.iter().zip(&stroke).enumerate() {
+                motion.position[i + 2] = zero + stroke;
             }
             mechanics.settle_pitch(&mut motion)?;
             let needed = mechanics.holding_forces_n(&motion)?;

@@ -7,6 +7,8 @@
 //! 3. effect: the poppet's edges, later by the travel time of the pressure wave
 //!    in the line. What the chamber sees.
 //!
+//! Without power every driver is off and every valve shuts after its t_off.
+//!
 //! Simplification (stated, not hidden): a poppet caught half-way goes back at
 //! once and keeps no memory of it; lift is all or nothing.
 

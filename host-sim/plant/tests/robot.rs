@@ -344,3 +344,48 @@ fn a_gear_named_twice_must_be_the_same_gear() {
     let error = Plant::new(&params).unwrap_err().to_string();
     assert!(error.contains("motors.reduction"), "{error}");
 }
+
+#[test]
+fn survives_nonsense_commands_and_keeps_its_books() {
+    use rand::Rng;
+    for seed in 0..6 {
+        let plant = Plant::new(&wheeleg_2003()).unwrap();
+        let start = plant.initial_state(seed).unwrap();
+        let mut state = start.clone();
+        let mut rng = wheeleg_plant::sensors::signal_rng(seed, "nonsense");
+        let mut inputs = Inputs::default();
+        for tick in 0..6000 {
+            if tick % 37 == 0 {
+                for us in inputs.valve_on_us.iter_mut().flatten() {
+                    let draw = rng.next_u32();
+                    *us = match draw % 4 {
+                        0 => 1000,
+                        1 => u16::try_from(draw % 1001).unwrap(),
+                        _ => 0,
+                    };
+                }
+                for (wheel, duty) in inputs.bridge_duty.iter_mut().enumerate() {
+                    *duty = f64::from(rng.next_u32()) / f64::from(u32::MAX) * 2.0 - 1.0;
+                    inputs.bridge_enabled[wheel] = !rng.next_u32().is_multiple_of(3);
+                }
+                inputs.dump = tick / 1000 == 4;
+            }
+            if let Err(error) = plant.tick(&mut state, &inputs) {
+                panic!("seed {seed}, tick {tick}: {error}");
+            }
+        }
+        let (before, after) = (
+            plant.assembly.mass_balance_kg(&start.core),
+            plant.assembly.mass_balance_kg(&state.core),
+        );
+        assert!(((after - before) / before).abs() < 1e-11);
+        for c in plant.outputs(&state).cylinders {
+            assert!((-0.002..0.182).contains(&c.stroke_m), "{}", c.stroke_m);
+            assert!(
+                c.pressure_pa.iter().all(|p| (5e4..9e5).contains(p)),
+                "{:?}",
+                c.pressure_pa
+            );
+        }
+    }
+}
