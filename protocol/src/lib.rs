@@ -10,6 +10,26 @@
 //! often than its input is long, whatever the input. Everything that can go
 //! wrong is a value: [`FrameError`], [`ParseError`], [`EncodeError`],
 //! [`NackReason`].
+//!
+//! ```
+//! use wheeleg_protocol::{Address, Decoder, Disarm, Envelope, MAX_ENCODED, Message};
+//!
+//! let envelope = Envelope {
+//!     source: Address::MASTER,
+//!     destination: Address::joint(3).expect("joints are 1 to 6"),
+//!     sequence: 7,
+//! };
+//! let mut buffer = [0; MAX_ENCODED];
+//! let bytes = Message::Disarm(Disarm {}).emit(envelope, &mut buffer)?;
+//!
+//! let mut decoder = Decoder::new();
+//! let mut received = None;
+//! decoder.push_slice(bytes, |result| {
+//!     received = result.ok().and_then(|frame| Message::parse(&frame).ok());
+//! });
+//! assert_eq!(received, Some(Message::Disarm(Disarm {})));
+//! # Ok::<(), wheeleg_protocol::EncodeError>(())
+//! ```
 #![no_std]
 #![cfg_attr(
     not(test),

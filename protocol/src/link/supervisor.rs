@@ -319,6 +319,23 @@ mod tests {
     }
 
     #[test]
+    fn a_second_restart_of_the_master_can_be_cleared_too() {
+        let mut link = up_at(1_000_000);
+        link.poll(1_060_000);
+        // It comes back counting from 5000, and starts again from 0 before the clear.
+        link.on_sync(5_000, 2_000_000);
+        assert!(link.on_sync(5_001, 2_010_000));
+        assert!(!link.on_sync(0, 3_000_000), "a step back is no advance");
+        assert_eq!(link.clear(3_000_000), Err(ClearError));
+        assert!(link.on_sync(1, 3_010_000));
+        assert_eq!(link.clear(3_010_000), Ok(()));
+        // In use, a step back is not followed: that stream is stale.
+        assert!(!link.on_sync(0, 3_020_000));
+        assert!(!link.on_sync(1, 3_030_000));
+        assert_eq!(link.poll(3_060_001), Some(LinkLoss::Stale));
+    }
+
+    #[test]
     fn the_watchdog_has_limits() {
         assert_eq!(WatchdogCycles::new(0), None);
         assert_eq!(WatchdogCycles::new(11), None);
