@@ -1,4 +1,5 @@
-//! A wheel board on mocks, with a motor that turns in proportion to its drive.
+//! A wheel board on mocks, with a motor of first order: its speed follows the
+//! drive with a time constant of 30 ms.
 
 use super::mock::{Counter, Pin, Pwm};
 use super::{ARM, decode, frame};
@@ -27,6 +28,9 @@ pub struct WheelRig {
     /// Counts per sample at full drive; 0 blocks the motor, negative reverses
     /// the encoder.
     pub speed_at_full: i32,
+    /// Motor speed, counts per sample, and the fraction of a count travelled.
+    speed: f64,
+    fraction: f64,
     /// Time to the next SYNC, µs.
     due: u32,
 }
@@ -63,6 +67,8 @@ impl WheelRig {
             sequence: 0,
             address,
             speed_at_full: 60,
+            speed: 0.0,
+            fraction: 0.0,
             due: 0,
         }
     }
@@ -101,10 +107,15 @@ impl WheelRig {
 
     pub fn tick(&mut self) -> TickReport {
         let writes = self.pulse.writes.get();
-        let turned = self.speed_at_full * self.drive() / 100;
+        let wanted = f64::from(self.speed_at_full * self.drive()) / 100.0;
+        let period = f64::from(self.node.tick_period_us());
+        self.speed += (wanted - self.speed) * period / 30_000.0;
+        self.fraction += self.speed;
+        let turned = self.fraction.floor();
+        self.fraction -= turned;
         self.counter
             .0
-            .set(self.counter.0.get().wrapping_add(turned));
+            .set(self.counter.0.get().wrapping_add(turned as i32));
         let report = self.node.tick(Micros(self.now));
         assert!(
             self.pulse.writes.get() > writes,
