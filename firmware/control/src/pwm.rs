@@ -97,6 +97,17 @@ impl PwmTiming {
         Micros(self.period)
     }
 
+    /// Shortest opening that a pulse can give, t_off + margin or one microsecond:
+    /// the least non-zero argument for which [`PwmTiming::pulse`] is not zero.
+    #[must_use]
+    pub const fn shortest_opening(&self) -> Micros {
+        let opening = self
+            .shortest_pulse
+            .saturating_add(self.off_delay)
+            .saturating_sub(self.on_delay);
+        Micros(if opening == 0 { 1 } else { opening })
+    }
+
     /// Time for which the coil is energised to get `opening`: 0 when it can not
     /// act, the period when the valve could not shut in between.
     #[must_use]

@@ -87,6 +87,12 @@ fn the_coil_time_compensates_the_delays() {
     assert_eq!(pulse(4500), 5500);
     assert_eq!(pulse(4499), 0);
     assert_eq!(pulse(1), 0);
+    assert_eq!(timing().shortest_opening(), Micros(4500));
+    let instant = [PERIOD, 1000, 0, 0, 0].map(Micros);
+    let [period, tick, on, off, margin] = instant;
+    let ideal = PwmTiming::new(period, tick, on, off, margin).expect("valid timing");
+    assert_eq!(ideal.shortest_opening(), Micros(1));
+    assert_eq!(ideal.pulse(Micros(1)), Micros(1));
     // Longest pulse with a gap of t_off + margin = 4.5 ms; one more is full.
     assert_eq!(pulse(14_500), 15_500);
     assert_eq!(pulse(14_501), PERIOD);

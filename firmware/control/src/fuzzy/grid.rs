@@ -12,6 +12,8 @@ use super::{FuzzyError, mean_i32, mean_i64};
 pub struct GridRules<const FIRST: usize, const SECOND: usize> {
     first: Partition<FIRST>,
     second: Partition<SECOND>,
+    /// Both inputs are fans: four rules at most fire.
+    fan: bool,
     consequents: [[i16; SECOND]; FIRST],
 }
 
@@ -35,6 +37,7 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
         Ok(Self {
             first,
             second,
+            fan: first.is_fan() && second.is_fan(),
             consequents,
         })
     }
@@ -56,7 +59,7 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
     #[inline]
     #[must_use]
     pub fn infer(&self, first: i16, second: i16) -> i16 {
-        if self.first.is_fan() && self.second.is_fan() {
+        if self.fan {
             self.infer_fan(first, second)
         } else {
             self.infer_all(first, second)

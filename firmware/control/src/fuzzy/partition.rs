@@ -48,13 +48,13 @@ impl Side {
         Self { width, slope }
     }
 
-    /// Membership at `distance` from the vertex. The product is below
-    /// levels × 2^16 + width / 2 <= 2^30 + 2^15, because distance < width.
+    /// Membership at `distance` from the vertex. The product is at most
+    /// levels × 2^16 + width / 2 <= 2^30 + 2^15.
     #[inline]
-    const fn level(self, distance: u32, levels: u32) -> u32 {
-        if distance >= self.width {
-            return 0;
-        }
+    fn level(self, distance: u32, levels: u32) -> u32 {
+        // Past the side, its end: one value without a branch. There the fall is
+        // all of `levels`, because width × slope is levels × 2^16 within half a width.
+        let distance = distance.min(self.width);
         let fall = distance
             .wrapping_mul(self.slope)
             .wrapping_add(1 << 15)
@@ -318,37 +318,38 @@ impl<const N: usize> Partition<N> {
         side.level(offset.unsigned_abs(), u32::from(self.levels)) as u16
     }
 
-    /// The two sets around `input` in a fan.
+    /// The two sets around `input` in a fan of all `N` sets.
     #[inline]
     pub(super) fn pair(&self, input: i16) -> Pair {
         let input = self.limit(input);
-        // Over the whole array, so that the loop unrolls. The last vertex, and unused
-        // places after it, equal `high`: the limit takes them back.
+        // Inner vertices at or below the input. Bounds from `N` alone, so that the
+        // loop unrolls and the look-ups below need no check.
         let mut index = 0_usize;
-        for &vertex in self.vertices.iter().skip(1) {
+        for &vertex in self.vertices.iter().take(N.saturating_sub(1)).skip(1) {
             index = index.wrapping_add(usize::from(input >= vertex));
         }
-        let index = index.min(self.len().saturating_sub(2));
+        let index = index.min(N.saturating_sub(2));
         let next = index.wrapping_add(1);
         let levels = u32::from(self.levels);
-        let lower = match (self.vertices.get(index), self.right.get(index)) {
-            (Some(&vertex), Some(&side)) => side.level(
-                i32::from(input)
-                    .wrapping_sub(i32::from(vertex))
-                    .unsigned_abs(),
-                levels,
-            ),
-            _ => 0,
+        let sides = (
+            self.vertices.get(index),
+            self.right.get(index),
+            self.vertices.get(next),
+            self.left.get(next),
+        );
+        let (Some(&low), Some(&fall), Some(&high), Some(&rise)) = sides else {
+            return Pair {
+                index,
+                lower: 0,
+                upper: 0,
+            };
         };
-        let upper = match (self.vertices.get(next), self.left.get(next)) {
-            (Some(&vertex), Some(&side)) => side.level(
-                i32::from(vertex)
-                    .wrapping_sub(i32::from(input))
-                    .unsigned_abs(),
-                levels,
-            ),
-            _ => 0,
-        };
+        // low <= input <= high: both distances are non-negative.
+        let lower = fall.level(i32::from(input).wrapping_sub(i32::from(low)) as u32, levels);
+        let upper = rise.level(
+            i32::from(high).wrapping_sub(i32::from(input)) as u32,
+            levels,
+        );
         Pair {
             index,
             lower,
