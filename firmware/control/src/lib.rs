@@ -8,6 +8,12 @@
 //!   valves, with their switching delays compensated.
 //! * [`wheel`]: the HCTL-1100's lead filter and its four modes.
 //!
+//! Cost on a Cortex-M4, as instructions in a linked image (opt-level 2, static
+//! count; every loop but the four valves is unrolled, so a tick executes
+//! fewer): rule base of 7 × 7 about 180, velocity 170, the whole joint tick 910, valve
+//! PWM 140 per valve at most, wheel sample about 300. The tick of a change of law adds one 64-bit
+//! division.
+//!
 //! Sign conventions, units and rounding are those of [`wheeleg_units`]. There
 //! is no clock: the length of a tick enters a configuration once, and every
 //! call is one tick. No function of this crate panics, allocates or loops more
