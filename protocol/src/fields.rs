@@ -84,9 +84,8 @@ wire_enum! {
         VersionMismatch = 12, "Master and board were built from different interface definitions.";
         FaultLatched = 13, "A fault is latched; clear it first.";
         WrongBoard = 14, "The request is for the other kind of board.";
-        NotMaster = 15, "Only the master may send requests.";
-        LinkDown = 16, "No live SYNC stream from the master.";
-        NotReady = 17, "The board is still starting.";
+        LinkDown = 15, "No live SYNC stream from the master.";
+        NotReady = 16, "The board is still starting.";
     }
 }
 

@@ -43,6 +43,7 @@
 )]
 
 pub mod address;
+pub mod decoder;
 pub mod fault;
 pub mod fields;
 pub mod frame;
@@ -54,6 +55,7 @@ pub mod sync;
 pub mod wire;
 
 pub use address::{Address, NODES};
+pub use decoder::{Decoder, LinkQuality};
 pub use fault::{
     FAULTS, Fault, FaultBits, FaultClass, FaultCode, FaultSchema, LIMITS, Limit, LimitBits,
 };
@@ -62,8 +64,8 @@ pub use fields::{
     OpenMode, OutOfRange, Speed7, WheelControlMode,
 };
 pub use frame::{
-    CRC_LEN, DELIMITER, Decoder, EncodeError, Frame, FrameError, HEADER_LEN, Header, LinkQuality,
-    MAX_DECODED, MAX_ENCODED, MAX_PAYLOAD, VERSION, checksum, encode, encoded_len,
+    CRC_LEN, DELIMITER, EncodeError, Frame, FrameError, HEADER_LEN, Header, MAX_DECODED,
+    MAX_ENCODED, MAX_PAYLOAD, VERSION, checksum, encode, encoded_len,
 };
 pub use message::*;
 pub use schema::{INTERFACE, Interface, SCHEMA_HASH};

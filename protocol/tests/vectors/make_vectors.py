@@ -59,8 +59,7 @@ ENUMS = {
                      6: "EmergencyBrake", 7: "OpenAllValves"},
     "NackReason": {1: "UnknownMessage", 2: "BadLength", 3: "OutOfRange", 4: "Busy", 5: "WrongMode", 6: "NotArmed",
                    7: "Armed", 8: "Duplicate", 9: "Expired", 10: "UnknownParameter", 11: "ReadOnly",
-                   12: "VersionMismatch", 13: "FaultLatched", 14: "WrongBoard", 15: "NotMaster", 16: "LinkDown",
-                   17: "NotReady"},
+                   12: "VersionMismatch", 13: "FaultLatched", 14: "WrongBoard", 15: "LinkDown", 16: "NotReady"},
 }
 FAULTS = {1: "LinkLost", 2: "StaleMaster", 3: "SlotOverrun", 4: "VersionMismatch", 32: "SensorRange",
           33: "SensorRate", 34: "FollowingError", 35: "TickOverrun", 36: "ParameterCorrupt", 37: "StateCorrupt",
@@ -326,7 +325,7 @@ def rejected():
     yield value(0x33, b"\x00\x80", "acceleration 128")
     yield value(0x36, b"\5", "wheel mode 5")
     yield value(0x81, b"\x10\x00", "nack reason 0")
-    yield value(0x81, b"\x10\x12", "nack reason 18")
+    yield value(0x81, b"\x10\x11", "nack reason 17")
     yield value(0x82, bytes([3, 1]) + bytes(23), "board kind 3")
     yield value(0x82, bytes([1, 9]) + bytes(23), "address 9")
     yield value(0x85, struct.pack("<HHBIBB", 0, 0, 5, 0, 0, 0), "fault number 5")
