@@ -63,6 +63,11 @@ pub enum Command {
         /// 1..=6.
         joint: JointNumber,
     },
+    /// All four valves of one joint open, so that the supply blows through.
+    BlowThrough {
+        /// 1..=6.
+        joint: JointNumber,
+    },
     /// All valves of one joint shut: air trapped.
     EmergencyBrake {
         /// 1..=6.
@@ -178,6 +183,7 @@ commands! {
     OpenAllValves = 0x0103, "joint 1-6", "Exhaust: inlets shut, outlets open. Layer 1 is stopped first.", Self::OpenAllValves { .. } =>
     EmergencyBrake = 0x0104, "joint 1-6", "HOLD of one joint: all four valves shut. Layer 1 is stopped first.", Self::EmergencyBrake { .. } =>
     SelectCorrection = 0x0105, "joint 1-6, PD or ID", "Fuzzy correction of one joint.", Self::SelectCorrection { .. } =>
+    BlowThrough = 0x0106, "joint 1-6", "Maintenance: all four valves open, supply blows through. Refused unless disarmed.", Self::BlowThrough { .. } =>
     WheelReference = 0x0110, "travel mm", "Drives both wheels by a distance; refused while layer 1 moves the robot.", Self::WheelReference { .. } =>
     WheelSpeed = 0x0111, "side, mm/s", "Highest speed of the wheel's own profile.", Self::WheelSpeed { .. } =>
     WheelAcceleration = 0x0112, "side, mm/s^2", "Acceleration of the wheel's own profile.", Self::WheelAcceleration { .. } =>

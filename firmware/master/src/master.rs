@@ -45,6 +45,10 @@ pub struct Master {
     next_id: u32,
 }
 
+// Memory is bounded at compile time; most of it is the telemetry queue. The
+// limit leaves the master room on a small microcontroller.
+const _: () = assert!(core::mem::size_of::<Master>() <= 48 * 1024);
+
 impl Master {
     /// A disarmed master that has heard no node.
     ///

@@ -8,11 +8,10 @@ use wheeleg_master::command::Command;
 use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::contact::{Sector, Side};
 use wheeleg_master::dispatcher::Refusal;
-use wheeleg_master::event::{Event, HoldReason};
-use wheeleg_master::setpoint::Phase;
+use wheeleg_master::event::Event;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{
-    Address, BoardKind, Fault, InputBits, Message, NackReason, NodeMode, SCHEMA_HASH, SyncFlags,
+    Address, BoardKind, InputBits, Message, NackReason, NodeMode, SCHEMA_HASH, SyncFlags,
 };
 use wheeleg_units::PositionMm;
 
@@ -132,139 +131,6 @@ fn one_refusal_while_arming_disarms_the_others() {
 }
 
 #[test]
-fn a_silent_node_is_lost_after_three_cycles_and_the_rest_hold() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.stand();
-    let ticket = rig.submit(Command::StartGait);
-    rig.run(60);
-    let strokes: Vec<_> = rig.nodes[..6].iter().map(|node| node.position).collect();
-    rig.node(4).silent = true;
-    rig.run(3);
-    assert!(!rig.saw(|event| matches!(event, Event::NodeLost(_))));
-    let sync = rig.cycle();
-    assert!(rig.saw(|event| *event == Event::NodeLost(4)));
-    assert!(rig.saw(|event| *event == Event::Hold(HoldReason::NodeLost(4))));
-    // In that very SYNC the references freeze at the strokes measured, and the wheels are withdrawn.
-    for joint in [1, 2, 3, 5, 6] {
-        let slot = sync.slots.joint(Address::joint(joint).unwrap()).unwrap();
-        let moved = i64::from(slot.reference.raw()) - strokes[usize::from(joint) - 1];
-        assert!(moved.abs() <= 3 * rig.node(joint).rate, "{joint}");
-        assert!(slot.next.is_none());
-    }
-    assert!(sync.slots.wheel(Address::wheel(7).unwrap()).is_none());
-    assert_eq!(
-        sync.flags,
-        SyncFlags::NONE,
-        "no supply dump for a lost node"
-    );
-    rig.run(12);
-    for node in [1, 2, 3, 5, 6, 7, 8] {
-        assert_eq!(rig.node(node).mode, NodeMode::Hold, "{node}");
-    }
-    assert_eq!(rig.refusal(ticket), Some(Refusal::Interrupted));
-    // It stays latched when the node returns.
-    rig.node(4).silent = false;
-    rig.run(50);
-    assert!(rig.saw(|event| *event == Event::NodeBack(4)));
-    assert_eq!(rig.master.layer0().hold(), Some(HoldReason::NodeLost(4)));
-    let ticket = rig.submit(Command::Arm);
-    rig.run(3);
-    assert_eq!(rig.refusal(ticket), Some(Refusal::Latched));
-    let ticket = rig.submit(Command::ClearFault);
-    rig.run(20);
-    assert!(rig.done(ticket));
-    rig.arm();
-}
-
-#[test]
-fn a_node_that_repeats_an_old_reply_is_lost_too() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.arm();
-    rig.node(3).echo_offset = 1;
-    rig.run(4);
-    assert!(rig.saw(|event| *event == Event::NodeLost(3)));
-    assert!(rig.last_record.unwrap().counters.stale_replies >= 3);
-}
-
-#[test]
-fn two_missed_cycles_are_no_loss() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.arm();
-    for _ in 0..10 {
-        rig.node(3).silent = true;
-        rig.run(2);
-        rig.node(3).silent = false;
-        rig.run(1);
-    }
-    assert!(!rig.saw(|event| matches!(event, Event::NodeLost(_))));
-    assert!(rig.master.is_armed());
-    assert_eq!(rig.last_record.unwrap().counters.missed[2], 20);
-}
-
-#[test]
-fn emergency_stop_sets_the_bit_until_cleared_and_never_queues() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.arm();
-    // Fill the queue of layer 0 first.
-    while rig.master.submit(Command::Disarm, rig.now_us).is_ok() {}
-    let ticket = rig.submit(Command::EmergencyStop);
-    let sync = rig.cycle();
-    assert!(sync.flags.contains(SyncFlags::ESTOP));
-    assert!(rig.done(ticket));
-    for _ in 0..30 {
-        assert!(rig.cycle().flags.contains(SyncFlags::ESTOP));
-    }
-    let ticket = rig.submit(Command::Arm);
-    rig.run(2);
-    assert_eq!(rig.refusal(ticket), Some(Refusal::Latched));
-    rig.submit(Command::ClearFault);
-    assert!(!rig.cycle().flags.contains(SyncFlags::ESTOP));
-}
-
-#[test]
-fn node_fault_and_supply_loss_hold_all() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.arm();
-    rig.node(2).faults = Fault::SensorRange.into();
-    rig.run(2);
-    let reason = HoldReason::NodeFault {
-        node: 2,
-        faults: 1 << 4,
-    };
-    assert!(rig.saw(|event| *event == Event::Hold(reason)));
-
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.arm();
-    rig.node(7).inputs = InputBits::NONE;
-    rig.run(2);
-    assert!(rig.saw(|event| *event == Event::Hold(HoldReason::SupplyLost)));
-    assert!(!rig.master.is_armed());
-}
-
-#[test]
-fn a_stalled_layer_one_is_held_for_a_tenth_of_a_second() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.stand();
-    rig.submit(Command::StartGait);
-    rig.run(60);
-    let vertical = Address::joint(3).unwrap();
-    let before = rig.last_sync.unwrap().slots.joint(vertical).unwrap();
-    rig.master.set_layer1_enabled(false);
-    for _ in 0..10 {
-        let slot = rig.cycle().slots.joint(vertical).unwrap();
-        assert_eq!(slot.reference, before.reference, "last reference held");
-        assert!(slot.track && slot.next.is_none());
-        assert!(!rig.saw(|event| matches!(event, Event::Hold(_))));
-    }
-    rig.cycle();
-    assert!(rig.saw(|event| *event == Event::Hold(HoldReason::LayerOneStalled)));
-    // It comes back: still latched.
-    rig.master.set_layer1_enabled(true);
-    rig.run(5);
-    assert!(!rig.master.is_armed());
-}
-
-#[test]
 fn direct_references_reach_their_slot_only_while_nothing_moves() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.run(30);
@@ -354,23 +220,6 @@ fn user_requests_are_answered_by_the_node() {
     let ticket = rig.submit(Command::TransmitPosition { joint: 4 });
     rig.run(12);
     assert_eq!(rig.refusal(ticket), Some(Refusal::NoAnswer { node: 4 }));
-}
-
-#[test]
-fn emergency_brake_of_one_joint_stops_motion_and_keeps_the_others() {
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.stand();
-    let gait = rig.submit(Command::StartGait);
-    rig.run(60);
-    let brake = rig.submit(Command::EmergencyBrake { joint: 3 });
-    rig.run(5);
-    assert!(rig.done(brake));
-    assert_eq!(rig.refusal(gait), Some(Refusal::Interrupted));
-    assert_eq!(rig.node(3).mode, NodeMode::Hold);
-    for node in [1, 2, 4, 5, 6] {
-        assert_eq!(rig.node(node).mode, NodeMode::Tracking, "{node}");
-    }
-    assert_eq!(rig.last_record.unwrap().phase, Phase::Idle);
 }
 
 #[test]

@@ -25,6 +25,7 @@ fn all() -> Vec<Command> {
             joint,
             correction: CorrectionKind::Id,
         },
+        Command::BlowThrough { joint },
         Command::WheelReference {
             travel_mm: PositionMm::ZERO,
         },

@@ -87,6 +87,14 @@ impl Layer0 {
                 self.freeze_if_armed();
                 self.ask(accepted, to, proto::OpenAllValves { mode }.into())
             }
+            Command::BlowThrough { joint } => {
+                if self.power != Power::Disarmed {
+                    return Err(Refusal::NotDisarmed);
+                }
+                let mode = OpenMode::BlowThrough;
+                let to = joint_address(joint)?;
+                self.ask(accepted, to, proto::OpenAllValves { mode }.into())
+            }
             Command::EmergencyBrake { joint } => {
                 let to = joint_address(joint)?;
                 self.freeze_if_armed();

@@ -4,7 +4,7 @@ use wheeleg_units::PositionMm;
 
 use crate::contact::{FootSwitches, Side};
 use crate::layer1::params::STROKE_MM;
-use crate::layer1::um_to_mm;
+use crate::layer1::units::um_to_mm;
 use crate::setpoint::{Cylinder, JointSetpoint, Reflex, Setpoints, WHEELS};
 
 /// Progress of the lowering of one foot.

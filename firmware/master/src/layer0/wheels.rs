@@ -6,7 +6,7 @@ use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
 use super::odometry::{Odometry, WheelGeometry};
 use crate::config::WheelDrive;
 use crate::contact::Side;
-use crate::layer1::mm_to_um;
+use crate::layer1::units::mm_to_um;
 use crate::setpoint::{TravelSetpoint, WHEELS};
 
 /// Conversions between distance and the wheel controller's counts and samples.

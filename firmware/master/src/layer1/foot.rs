@@ -12,7 +12,7 @@
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::params::{ParamError, STROKE_MM, in_range};
-use super::{seconds_to_us, us_to_seconds};
+use super::units::{seconds_to_us, us_to_seconds};
 use crate::contact::Side;
 use crate::mirror;
 use crate::setpoint::{Cylinder, JointSetpoint, OnLinkLoss, Phase, Setpoints};

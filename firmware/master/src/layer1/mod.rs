@@ -5,11 +5,13 @@
 //! a thread of its own, and layer 0 notices when it stops ([`Layer1::cycle`]
 //! not called for 100 ms).
 
+mod commands;
 pub mod foot;
 pub mod homing;
 pub mod params;
 pub mod profile;
 pub mod square;
+pub(crate) mod units;
 
 use heapless::spsc::{Consumer, Producer};
 use wheeleg_units::PositionMm;
@@ -23,6 +25,9 @@ use foot::FootTrajectory;
 use homing::{Homing, HomingConfig, HomingStep};
 use params::GaitParams;
 use square::SquareGait;
+
+/// Bus cycle, µs.
+pub(crate) const CYCLE_US: u64 = wheeleg_protocol::link::CYCLE_US as u64;
 
 /// What layer 1 is doing.
 #[derive(Clone, Copy, Debug)]
@@ -143,75 +148,6 @@ impl Layer1 {
         }
     }
 
-    /// Starts a command. `Ok(true)` if it is done at once, `Ok(false)` if its
-    /// end is reported later.
-    fn execute(&mut self, accepted: &Accepted, now_us: u64) -> Result<bool, Refusal> {
-        let moving = matches!(self.mode, Mode::Homing(_) | Mode::Gait(_) | Mode::Foot(_));
-        let allowed = self.feedback.motion_allowed;
-        match accepted.command {
-            Command::SetGait(params) => {
-                if moving {
-                    return Err(Refusal::Moving);
-                }
-                params.validate().map_err(Refusal::Parameter)?;
-                let moved = self.pose(&params) != self.pose(&self.params);
-                self.params = params;
-                if let (true, Mode::Ready(last)) = (moved, self.mode) {
-                    self.mode = Mode::Done(last);
-                }
-                return Ok(true);
-            }
-            _ if !allowed => return Err(Refusal::NotArmed),
-            Command::Hold => {
-                let frozen = self.frozen(now_us);
-                self.mode = Mode::Done(frozen);
-                return Ok(true);
-            }
-            Command::StopGait => {
-                let Mode::Gait(gait) = &mut self.mode else {
-                    return Err(Refusal::NotMoving);
-                };
-                gait.stop_after_step(now_us);
-                return Ok(true);
-            }
-            _ if moving => return Err(Refusal::Moving),
-            Command::Stand => {
-                let target = self.pose(&self.params);
-                let homing = Homing::new(self.homing, target, &self.feedback).ok_or(
-                    Refusal::NodeMissing {
-                        node: self.unheard(),
-                    },
-                )?;
-                // A new motion of the wheels: they stay where they are.
-                self.segment = self.segment.wrapping_add(1);
-                self.mode = Mode::Homing(homing);
-            }
-            Command::StartGait => {
-                if !matches!(self.mode, Mode::Ready(_)) {
-                    return Err(Refusal::NotAtStart);
-                }
-                let gait = SquareGait::new(self.params, now_us, self.segment.wrapping_add(1))
-                    .map_err(Refusal::Parameter)?;
-                self.mode = Mode::Gait(gait);
-            }
-            Command::FootTrajectory { side, shape } => {
-                let Mode::Ready(start) = self.mode else {
-                    return Err(Refusal::NotAtStart);
-                };
-                if side != self.params.stepping_leg(0) {
-                    return Err(Refusal::NotAtStart);
-                }
-                let trajectory =
-                    FootTrajectory::new(shape, side, start, now_us).map_err(Refusal::Parameter)?;
-                self.mode = Mode::Foot(trajectory);
-            }
-            // Commands of layer 0 are never routed here.
-            _ => return Err(Refusal::NotMoving),
-        }
-        self.active = Some(accepted.ticket);
-        Ok(false)
-    }
-
     /// Bus address of the first joint that was not heard in the last cycle.
     fn unheard(&self) -> u8 {
         let index = self.feedback.strokes_mm.iter().position(Option::is_none);
@@ -307,38 +243,4 @@ impl Layer1 {
             }
         }
     }
-}
-
-/// Seconds to whole µs, saturating; not-a-number gives 0.
-#[must_use]
-pub(crate) fn seconds_to_us(seconds: f32) -> u32 {
-    // A float to integer `as` saturates and maps NaN to 0.
-    (seconds * 1.0e6) as u32
-}
-
-/// Whole µs to seconds, exact to 24 bits.
-#[must_use]
-pub(crate) fn us_to_seconds(us: u64) -> f32 {
-    us as f32 * 1.0e-6
-}
-
-/// Bus cycle, µs.
-pub(crate) const CYCLE_US: u64 = 10_000;
-
-/// Distance in µm to mm in I16F16, to the nearest LSB (15 nm); saturates at ±32 m.
-#[must_use]
-pub(crate) fn um_to_mm(um: i64) -> PositionMm {
-    // × 65 536 / 1000 = × 8192 / 125, rounded, ties away from zero.
-    let scaled = um.saturating_mul(8192);
-    let half = if um < 0 { -62 } else { 62 };
-    let raw = scaled.saturating_add(half).checked_div(125).unwrap_or(0);
-    PositionMm::from_raw(i32::try_from(raw).unwrap_or(if raw < 0 { i32::MIN } else { i32::MAX }))
-}
-
-/// Stroke or distance in mm to µm, to the nearest µm.
-#[must_use]
-pub(crate) fn mm_to_um(mm: PositionMm) -> i64 {
-    let scaled = i64::from(mm.raw()).saturating_mul(125);
-    let half = if scaled < 0 { -4096 } else { 4096 };
-    scaled.saturating_add(half).checked_div(8192).unwrap_or(0)
 }

@@ -210,7 +210,7 @@ impl GaitParams {
             self.push_speed_mm_s.get().to_num::<f32>(),
             self.push_acceleration_mm_s2.to_num::<f32>(),
         );
-        let needs_us = super::seconds_to_us(push.duration_s());
+        let needs_us = super::units::seconds_to_us(push.duration_s());
         let has_us = self.period_us.saturating_sub(self.push_us);
         if needs_us > has_us {
             return Err(ParamError::PushTooLong { needs_us, has_us });

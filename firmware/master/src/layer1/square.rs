@@ -11,15 +11,16 @@
 //! | lower to push | stroke | stroke | stopped |
 //! | push to end | stroke | stroke reached − measured travel | trapezoid |
 
+mod ahead;
+
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::params::{GaitParams, ParamError, Pattern};
 use super::profile::Trapezoid;
-use super::{CYCLE_US, seconds_to_us, um_to_mm, us_to_seconds};
+use super::units::{seconds_to_us, um_to_mm, us_to_seconds};
 use crate::contact::Side;
 use crate::setpoint::{
-    Ahead, Cylinder, Feedback, JointSetpoint, OnLinkLoss, Phase, Reflex, Setpoints, TravelSetpoint,
-    WHEELS,
+    Cylinder, Feedback, JointSetpoint, OnLinkLoss, Phase, Reflex, Setpoints, TravelSetpoint, WHEELS,
 };
 
 /// Progress of a running square-wave gait.
@@ -282,69 +283,6 @@ impl SquareGait {
         };
         if self.params.touchdown_reflex && lowered {
             out.reflex = Reflex::StopOnTouch;
-        }
-    }
-
-    /// Next move of a joint after `at`, if it begins within 254 cycles.
-    ///
-    /// For a square wave the reference jumps to the given value when the count
-    /// runs out; for the push it begins to move towards it.
-    fn ahead(&self, side: Side, cylinder: Cylinder, at: Instant) -> Option<Ahead> {
-        let p = &self.params;
-        let up = PositionMm::ZERO;
-        // The present step and the two after it: an alternating leg moves at
-        // least once in them.
-        for later in 0..3_u16 {
-            let step = at.step.saturating_add(later);
-            if step >= self.steps {
-                return None;
-            }
-            let leg = p.stepping_leg(step);
-            let begun = u64::from(p.period_us).saturating_mul(u64::from(step));
-            let moves: [Option<(u32, PositionMm)>; 2] = match cylinder {
-                Cylinder::Yaw => [None, None],
-                Cylinder::Vertical if side == leg => {
-                    [Some((p.lift_us, up)), Some((p.lower_us, p.stroke_mm))]
-                }
-                Cylinder::Vertical => [None, None],
-                Cylinder::Horizontal => {
-                    let (reach, from) = if side == leg {
-                        (Some((p.reach_us, p.stroke_mm)), p.stroke_mm)
-                    } else {
-                        (None, self.standing_before(side, step))
-                    };
-                    let end = from.saturating_sub(p.push_distance_mm(p.stroke_mm));
-                    let push = self
-                        .follows(side, leg)
-                        .then_some((p.push_us, end.limit(up, p.stroke_mm)));
-                    [reach, push]
-                }
-            };
-            for (offset_us, reference_mm) in moves.into_iter().flatten() {
-                let wait = begun
-                    .saturating_add(u64::from(offset_us))
-                    .saturating_sub(at.elapsed_us);
-                if wait > 0 {
-                    let cycles = u8::try_from(wait.div_ceil(CYCLE_US)).ok()?;
-                    return (cycles < u8::MAX).then_some(Ahead {
-                        reference_mm,
-                        cycles,
-                    });
-                }
-            }
-        }
-        None
-    }
-
-    /// Nominal stroke of b5 at which the leg that does not step in `step` stands before its push.
-    fn standing_before(&self, side: Side, step: u16) -> PositionMm {
-        if step == 0 {
-            let [_, s5, _] = self.params.start_pose(side);
-            s5
-        } else {
-            self.params
-                .stroke_mm
-                .saturating_sub(self.params.push_distance_mm(self.params.stroke_mm))
         }
     }
 }

@@ -1,0 +1,79 @@
+//! Commands of the gait level.
+
+use super::foot::FootTrajectory;
+use super::homing::Homing;
+use super::square::SquareGait;
+use super::{Layer1, Mode};
+use crate::command::Command;
+use crate::dispatcher::{Accepted, Refusal};
+
+impl Layer1 {
+    /// Starts a command. `Ok(true)` if it is done at once, `Ok(false)` if its
+    /// end is reported later.
+    pub(super) fn execute(&mut self, accepted: &Accepted, now_us: u64) -> Result<bool, Refusal> {
+        let moving = matches!(self.mode, Mode::Homing(_) | Mode::Gait(_) | Mode::Foot(_));
+        let allowed = self.feedback.motion_allowed;
+        match accepted.command {
+            Command::SetGait(params) => {
+                if moving {
+                    return Err(Refusal::Moving);
+                }
+                params.validate().map_err(Refusal::Parameter)?;
+                let moved = self.pose(&params) != self.pose(&self.params);
+                self.params = params;
+                if let (true, Mode::Ready(last)) = (moved, self.mode) {
+                    self.mode = Mode::Done(last);
+                }
+                return Ok(true);
+            }
+            _ if !allowed => return Err(Refusal::NotArmed),
+            Command::Hold => {
+                let frozen = self.frozen(now_us);
+                self.mode = Mode::Done(frozen);
+                return Ok(true);
+            }
+            Command::StopGait => {
+                let Mode::Gait(gait) = &mut self.mode else {
+                    return Err(Refusal::NotMoving);
+                };
+                gait.stop_after_step(now_us);
+                return Ok(true);
+            }
+            _ if moving => return Err(Refusal::Moving),
+            Command::Stand => {
+                let target = self.pose(&self.params);
+                let homing = Homing::new(self.homing, target, &self.feedback).ok_or(
+                    Refusal::NodeMissing {
+                        node: self.unheard(),
+                    },
+                )?;
+                // A new motion of the wheels: they stay where they are.
+                self.segment = self.segment.wrapping_add(1);
+                self.mode = Mode::Homing(homing);
+            }
+            Command::StartGait => {
+                if !matches!(self.mode, Mode::Ready(_)) {
+                    return Err(Refusal::NotAtStart);
+                }
+                let gait = SquareGait::new(self.params, now_us, self.segment.wrapping_add(1))
+                    .map_err(Refusal::Parameter)?;
+                self.mode = Mode::Gait(gait);
+            }
+            Command::FootTrajectory { side, shape } => {
+                let Mode::Ready(start) = self.mode else {
+                    return Err(Refusal::NotAtStart);
+                };
+                if side != self.params.stepping_leg(0) {
+                    return Err(Refusal::NotAtStart);
+                }
+                let trajectory =
+                    FootTrajectory::new(shape, side, start, now_us).map_err(Refusal::Parameter)?;
+                self.mode = Mode::Foot(trajectory);
+            }
+            // Commands of layer 0 are never routed here.
+            _ => return Err(Refusal::NotMoving),
+        }
+        self.active = Some(accepted.ticket);
+        Ok(false)
+    }
+}
