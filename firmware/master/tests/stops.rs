@@ -2,13 +2,16 @@
 
 mod common;
 
-use common::Rig;
+use common::{Rig, emit};
+use proptest::prelude::*;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::setpoint::Phase;
-use wheeleg_protocol::{Address, Fault, InputBits, NodeMode, SyncFlags};
+use wheeleg_protocol::{
+    Address, Fault, InputBits, LimitBits, Message, NodeMode, SlotReply, SyncFlags,
+};
 
 #[test]
 fn a_silent_node_is_lost_after_three_cycles_and_the_rest_hold() {
@@ -185,5 +188,52 @@ fn a_stop_reaches_the_others_before_the_silent_node_times_out() {
     assert_eq!(rig.refusal(ticket), Some(Refusal::Interrupted));
     for node in 2..=8 {
         assert_eq!(rig.node(node).mode, NodeMode::Hold, "{node}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Garbage and forged replies in mid-step: every reference stays inside the
+    /// stroke, and a HOLD, once entered, is not left.
+    #[test]
+    fn references_stay_in_the_stroke_whatever_the_bus_brings(
+        garbage in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 120),
+        forged in prop::collection::vec((1_u8..=8, any::<i32>(), any::<u8>(), any::<bool>()), 120),
+    ) {
+        let mut rig = Rig::new(MasterConfig::default());
+        rig.stand();
+        rig.submit(Command::StartGait);
+        rig.run(20);
+        let mut held = None;
+        for (bytes, (from, position_raw, inputs, faulty)) in garbage.into_iter().zip(forged) {
+            rig.master.on_bus_bytes(&bytes, rig.now_us - 100);
+            let cycle = rig.last_sync.unwrap().cycle;
+            let active_faults = wheeleg_protocol::FaultBits::from_raw(u16::from(faulty && inputs > 250));
+            let reply = SlotReply {
+                position_raw,
+                velocity_raw: 0,
+                effort_raw: 0,
+                active_faults,
+                mode: NodeMode::Tracking,
+                limits: LimitBits::NONE,
+                inputs: InputBits::from_raw(inputs & 0x0F).unwrap().with(InputBits::SUPPLY_PRESSURE),
+                sync_echo: cycle as u8,
+            };
+            let forged = emit(&Message::from(reply), Address::new(from).unwrap(), 0);
+            rig.master.on_bus_bytes(&forged, rig.now_us - 50);
+            let sync = rig.cycle();
+            for joint in 1..=6 {
+                if let Some(slot) = sync.slots.joint(Address::joint(joint).unwrap()) {
+                    let mm = slot.reference.to_f64();
+                    prop_assert!((0.0..=180.0).contains(&mm), "{joint}: {mm}");
+                }
+            }
+            let hold = rig.master.layer0().hold();
+            if held.is_some() {
+                prop_assert_eq!(hold, held);
+            }
+            held = hold;
+        }
     }
 }

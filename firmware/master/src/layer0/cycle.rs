@@ -14,6 +14,7 @@ use crate::TxBytes;
 use crate::config::SwitchFrame;
 use crate::contact::{FootSwitches, INNER, OUTER, Side};
 use crate::event::{Event, Events};
+use crate::layer1::params::STROKE_MM;
 use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Setpoints};
 use crate::telemetry::Record;
 
@@ -113,7 +114,7 @@ impl Layer0 {
                 (Some(joint), _) => self.wire_joint(joint),
                 // No reference: the axis keeps its position.
                 (None, Some(reply)) => WireJoint {
-                    reference: reply.joint_position(),
+                    reference: in_stroke(reply.joint_position()),
                     velocity: VelocityMmS::ZERO.to_wire(),
                     next: None,
                     on_link_loss: LinkLossAction::Hold,
@@ -170,7 +171,7 @@ impl Layer0 {
             })
         });
         WireJoint {
-            reference: joint.reference_mm,
+            reference: in_stroke(joint.reference_mm),
             velocity: joint.velocity_mm_s.to_wire(),
             next,
             on_link_loss: match joint.on_link_loss {
@@ -256,6 +257,11 @@ impl Layer0 {
             }
         }
     }
+}
+
+/// A stroke that may be asked for: a measured one can lie beyond an end by noise.
+fn in_stroke(stroke_mm: PositionMm) -> PositionMm {
+    stroke_mm.limit(PositionMm::ZERO, STROKE_MM)
 }
 
 /// Bytes of a message from the master. Empty only if it could not be encoded,

@@ -109,7 +109,8 @@ impl FootShape {
             Self::Literal { forward_mm } => (forward_mm, PositionMm::ZERO, 1.0, 0.125),
         };
         let duration = self.duration_s();
-        let t = t_s.clamp(0.0, duration);
+        // Not `clamp`, which panics for a duration that is not a number.
+        let t = t_s.max(0.0).min(duration);
         let (x, y) = (metres(forward_mm), metres(left_mm));
         let (sin, cos) = (libm::sinf(rate * t), libm::cosf(rate * t));
         let moving = if t_s < duration { 1.0 / duration } else { 0.0 };
