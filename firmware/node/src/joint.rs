@@ -1,9 +1,13 @@
 //! The joint board: one pneumatic cylinder with four on/off valves.
 
 mod node;
+mod outputs;
 mod reference;
 mod requests;
 mod settings;
+
+#[cfg(test)]
+mod integrity_tests;
 
 pub use node::JointNode;
 pub use settings::JointSettings;

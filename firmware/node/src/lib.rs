@@ -27,6 +27,7 @@
 )]
 
 mod board;
+pub mod clock;
 pub mod debounce;
 pub mod faults;
 pub mod hardware;

@@ -8,6 +8,7 @@
 //! SYNC slot allows it (the gait phase: a swing leg may go limp, a stance leg
 //! may not). An emergency brake, a sensor or state fault stays in Hold.
 
+use crate::clock::Clock;
 use crate::faults::FaultLog;
 use crate::mode::{Event, Mode, ModeRules, Refusal};
 use crate::overrun::{OverrunDetector, elapsed};
@@ -46,24 +47,6 @@ pub enum ExhaustKind {
     Commanded,
     /// Maintenance: inlets and outlets open, for a bounded time.
     BlowThrough,
-}
-
-/// Unwraps the 32-bit microsecond counter; must be asked at least every 35 min.
-#[derive(Clone, Copy, Debug, Default)]
-struct Clock {
-    time_us: u64,
-}
-
-impl Clock {
-    fn unwrap(&mut self, now: Micros) -> u64 {
-        // Low word of the newest time; the shorter way round is taken, so an
-        // instant slightly in the past is in the past.
-        let low = (self.time_us & 0xFFFF_FFFF) as u32;
-        let step = now.get().wrapping_sub(low) as i32;
-        let time = self.time_us.saturating_add_signed(i64::from(step));
-        self.time_us = self.time_us.max(time);
-        time
-    }
 }
 
 /// Mode, faults and supervision of one board.

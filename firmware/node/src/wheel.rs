@@ -4,8 +4,12 @@
 mod encoder;
 mod motion;
 mod node;
+mod outputs;
 mod requests;
 mod settings;
+
+#[cfg(test)]
+mod integrity_tests;
 
 pub use node::WheelNode;
 pub use settings::WheelSettings;

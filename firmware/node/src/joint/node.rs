@@ -1,6 +1,6 @@
 //! The joint board application.
 
-use super::reference::{Target, TickReference, advance};
+use super::reference::Target;
 use super::settings::JointSettings;
 use crate::board::{BoardCore, NodeIdentity, receive};
 use crate::debounce::Debounce;
@@ -8,25 +8,34 @@ use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::JointParameters;
 use crate::seal::Seal;
-use crate::sensor::{Reading, Rejection, SensorMonitor};
+use crate::sensor::{Reading, Rejection, SensorConfig, SensorMonitor};
 use crate::snapshot::{JointSnapshot, TickReport};
-use crate::supervisor::ExhaustKind;
+use crate::supervisor::SupervisionTimes;
 use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
-use wheeleg_control::joint::{JointController, JointInput, JointLimits};
-use wheeleg_control::pwm::{OnTimes, ValvePwm};
-use wheeleg_control::valve::{ValveMode, ValveOpenings};
-use wheeleg_protocol::{BoardKind, Fault, FaultBits, Limit, LimitBits};
-use wheeleg_units::{Duty, Micros, PositionMm, Ticks, VelocityMmS};
+use wheeleg_control::joint::JointController;
+use wheeleg_control::pwm::ValvePwm;
+use wheeleg_protocol::{BoardKind, Fault, FaultBits};
+use wheeleg_units::{Micros, PositionMm, Ticks};
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TickState {
     pub(super) reference: PositionMm,
     pub(super) measured: PositionMm,
-    following: Ticks,
+    pub(super) following: Ticks,
     boot_ticks: Ticks,
 }
+
+type Sealed<'a> = (
+    &'a JointParameters,
+    &'a TickState,
+    &'a SensorMonitor,
+    &'a SensorConfig,
+    &'a SupervisionTimes,
+    [i32; 2],
+    Ticks,
+);
 
 /// Application of one joint board: sense, control, valves.
 ///
@@ -45,8 +54,8 @@ pub struct JointNode<V, S, W> {
     pub(super) state: TickState,
     pub(super) seal: Seal,
     pub(super) snapshot: JointSnapshot,
-    switches: Debounce,
-    valves: V,
+    pub(super) switches: Debounce,
+    pub(super) valves: V,
     sensor: S,
     switch_pins: W,
 }
@@ -117,7 +126,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.seal.holds(&self.sealed()) {
+        if !self.is_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -179,15 +188,32 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    fn sealed(&self) -> (&JointParameters, &TickState, &SensorMonitor) {
-        (&self.parameters, &self.state, &self.monitor)
+    /// What the checksum covers. Gains and valve timing are not in it: they
+    /// stand in memory twice and are compared.
+    fn sealed(&self) -> Sealed<'_> {
+        (
+            &self.parameters,
+            &self.state,
+            &self.monitor,
+            &self.settings.sensor,
+            &self.core.times,
+            [self.settings.slew_step, self.settings.following_error].map(PositionMm::raw),
+            self.settings.following_ticks,
+        )
+    }
+
+    /// Whether the state is as the last tick or request left it.
+    fn is_intact(&self) -> bool {
+        self.seal.holds(&self.sealed())
+            && self.controller.config().gains() == self.settings.control.gains()
+            && *self.pwm.timing() == self.settings.timing
     }
 
     pub(super) fn reseal(&mut self) {
         self.seal = Seal::of(&self.sealed());
     }
 
-    fn axis_fault(&mut self, fault: Fault, now: Micros) {
+    pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {
         self.core.supervisor.fault(fault, Event::AxisFault, now);
     }
 
@@ -216,116 +242,4 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 .fault(fault, Event::SelfTestFailed, now);
         }
     }
-
-    /// Closed loop on the reference of this tick.
-    fn drive(&mut self, now: Micros) -> OnTimes {
-        let TickReference {
-            reference,
-            velocity,
-            announced,
-            slew_limited,
-        } = advance(self.state.reference, &mut self.target, &self.settings);
-        self.state.reference = reference;
-        let output = self.controller.step(&JointInput {
-            measured: self.state.measured,
-            reference,
-            reference_velocity: velocity,
-            announced,
-        });
-        let beyond = output.error.saturating_abs() > self.settings.following_error;
-        self.state.following = if beyond {
-            self.state.following.next()
-        } else {
-            Ticks::ZERO
-        };
-        if self.state.following >= self.settings.following_ticks {
-            self.axis_fault(Fault::FollowingError, now);
-        }
-        // At rest, and in the very tick of a fault, no pulse goes on.
-        let on_times = if output.settled || !self.core.mode().may_drive() {
-            self.pwm.shut()
-        } else {
-            self.pwm.tick(&output.openings)
-        };
-        let mut limits = limit_bits(&output.limits, output.settled);
-        if slew_limited {
-            limits.insert(Limit::SlewLimited);
-        }
-        self.record(now, output.velocity, output.duty, on_times);
-        self.snapshot.limits = limits;
-        self.snapshot.settled = output.settled;
-        on_times
-    }
-
-    /// No control: the valves do what the mode says, the reference follows the
-    /// measured stroke.
-    fn rest(&mut self, now: Micros) -> OnTimes {
-        self.state.reference = self.state.measured;
-        self.state.following = Ticks::ZERO;
-        self.target = Target::at(self.state.measured);
-        let velocity = self.controller.observe(self.state.measured);
-        let on_times = if self.core.mode() == Mode::Exhaust {
-            let openings = self.exhaust_openings();
-            self.pwm.tick(&openings)
-        } else {
-            self.pwm.shut()
-        };
-        self.record(now, velocity, Duty::ZERO, on_times);
-        self.snapshot.limits = LimitBits::NONE;
-        self.snapshot.settled = false;
-        on_times
-    }
-
-    fn exhaust_openings(&self) -> ValveOpenings {
-        match self.core.supervisor.exhaust() {
-            ExhaustKind::Staged => self.settings.staged_exhaust,
-            ExhaustKind::Commanded => ValveMode::Exhaust.openings(self.settings.full_period),
-            ExhaustKind::BlowThrough => ValveMode::BlowThrough.openings(self.settings.full_period),
-        }
-    }
-
-    fn record(&mut self, now: Micros, velocity: VelocityMmS, duty: Duty, on_times: OnTimes) {
-        self.snapshot = JointSnapshot {
-            at: now,
-            mode: self.core.mode(),
-            measured: self.state.measured,
-            reference: self.state.reference,
-            commanded: self.target.reference(),
-            velocity,
-            duty,
-            pulses: on_times.map(|on| Micros(u32::from(on))),
-            switches: self.switches.state(),
-            faults: self.core.supervisor.faults().latched(),
-            ..self.snapshot
-        };
-    }
-
-    /// Scales on-times in µs to the counts of the PWM channels and writes them.
-    fn write(&mut self, on_times: OnTimes) -> Result<(), crate::hardware::PinError> {
-        let max = u32::from(self.valves.max_duty());
-        let duty = on_times.map(|on| {
-            let scaled = u32::from(on)
-                .saturating_mul(max)
-                .checked_div(JOINT_TICK.get());
-            // At most `max`, because an on-time is at most one tick.
-            u16::try_from(scaled.unwrap_or(0).min(max)).unwrap_or(0)
-        });
-        self.valves.write(duty)
-    }
-}
-
-fn limit_bits(limits: &JointLimits, settled: bool) -> LimitBits {
-    [
-        (limits.duty, Limit::DutySaturated),
-        (limits.reference, Limit::TravelLimited),
-        (
-            limits.integral_frozen || limits.integral_clamped,
-            Limit::IntegralLimited,
-        ),
-        (limits.below_minimum, Limit::PulseTooShort),
-        (settled, Limit::SettledShut),
-    ]
-    .into_iter()
-    .filter(|(active, _)| *active)
-    .fold(LimitBits::NONE, |bits, (_, limit)| bits.with(limit))
 }

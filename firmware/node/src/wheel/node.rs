@@ -1,23 +1,20 @@
 //! The wheel board application.
 
 use super::encoder::EncoderWatch;
-use super::motion::{Target, command, engage};
+use super::motion::Target;
 use super::settings::WheelSettings;
 use crate::board::{BoardCore, NodeIdentity, receive};
 use crate::debounce::Debounce;
-use crate::hardware::{DumpValve, Encoder, MotorDrive, PinError, SwitchBank};
+use crate::hardware::{DumpValve, Encoder, MotorDrive, SwitchBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::WheelParameters;
 use crate::seal::Seal;
 use crate::snapshot::{TickReport, WheelSnapshot};
+use crate::supervisor::SupervisionTimes;
 use crate::transmission::Transmission;
 use crate::{ConfigError, SWITCH_TICKS};
-use wheeleg_control::wheel::{
-    WheelCommand, WheelController, WheelInput, WheelMode, WheelOutput, WheelStatus,
-};
-use wheeleg_protocol::{
-    BoardKind, DisarmReason, Fault, FaultBits, Limit, LimitBits, WheelControlMode,
-};
+use wheeleg_control::wheel::{WheelCommand, WheelController};
+use wheeleg_protocol::{BoardKind, Fault, FaultBits, LimitBits, WheelControlMode};
 use wheeleg_units::{Micros, Ticks, WheelCount};
 
 /// Samples in Boot: long enough for the switch to be debounced.
@@ -30,8 +27,8 @@ pub(super) struct TickState {
     /// Drive written last, per cent.
     pub(super) drive: i8,
     /// Drive from which the ramp of a stop starts.
-    ramp_from: i8,
-    following: Ticks,
+    pub(super) ramp_from: i8,
+    pub(super) following: Ticks,
     boot_ticks: Ticks,
     encoder: EncoderWatch,
 }
@@ -56,10 +53,10 @@ pub struct WheelNode<M, E, P, D> {
     seal: Seal,
     pub(super) snapshot: WheelSnapshot,
     switches: Debounce,
-    motor: M,
+    pub(super) motor: M,
     encoder: E,
     switch_pins: P,
-    dump_valve: D,
+    pub(super) dump_valve: D,
 }
 
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, D> {
@@ -128,7 +125,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.seal.holds(&(&self.parameters, &self.state)) || self.shadow != self.controller {
+        if !self.seal.holds(&self.sealed()) || self.shadow != self.controller {
             self.axis_fault(Fault::StateCorrupt, now);
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -231,107 +228,35 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.reseal();
     }
 
-    fn tune_profile(&mut self) {
+    pub(super) fn tune_profile(&mut self) {
         let speed = WheelCommand::MaximumVelocity(self.settings.max_speed);
         let acceleration = WheelCommand::Acceleration(self.settings.acceleration);
         let _ = self.controller.apply(speed);
         let _ = self.controller.apply(acceleration);
     }
 
+    fn sealed(
+        &self,
+    ) -> (
+        &WheelParameters,
+        &TickState,
+        &WheelSettings,
+        &SupervisionTimes,
+    ) {
+        (
+            &self.parameters,
+            &self.state,
+            &self.settings,
+            &self.core.times,
+        )
+    }
+
     pub(super) fn reseal(&mut self) {
         self.shadow = self.controller.clone();
-        self.seal = Seal::of(&(&self.parameters, &self.state));
+        self.seal = Seal::of(&self.sealed());
     }
 
-    fn axis_fault(&mut self, fault: Fault, now: Micros) {
+    pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {
         self.core.supervisor.fault(fault, Event::AxisFault, now);
     }
-
-    /// Closed loop.
-    fn drive(&mut self, limits: &mut LimitBits, now: Micros) -> WheelOutput {
-        if self.controller.mode() != WheelMode::Trapezoidal {
-            self.tune_profile();
-        }
-        let motion = command(
-            &mut self.controller,
-            self.control_mode,
-            &mut self.target,
-            &self.settings,
-        );
-        let output = self.controller.step(&WheelInput {
-            actual: self.state.actual,
-            limit: false,
-            stop: false,
-        });
-        self.state.drive = output.pwm;
-        self.state.ramp_from = output.pwm;
-        *limits = limit_bits(&output, motion.rate);
-        let has_position = output.mode != WheelMode::ProportionalVelocity;
-        let beyond = has_position && output.error.unsigned_abs() > self.settings.following_error;
-        self.state.following = if beyond {
-            self.state.following.next()
-        } else {
-            Ticks::ZERO
-        };
-        if self.state.following >= self.settings.following_ticks {
-            self.axis_fault(Fault::FollowingError, now);
-            self.state.drive = 0;
-        }
-        output
-    }
-
-    /// No control: ramp to standstill in Hold, nothing otherwise.
-    fn rest(&mut self, now: Micros) -> WheelOutput {
-        self.state.following = Ticks::ZERO;
-        self.target = Target::at(self.state.actual);
-        let _ = self.controller.apply(WheelCommand::Idle);
-        let output = self.controller.step(&WheelInput {
-            actual: self.state.actual,
-            limit: false,
-            stop: false,
-        });
-        // After a fault of the axis its drive may be what runs away: no ramp.
-        let ramps = self.core.mode() == Mode::Hold
-            && self.core.supervisor.disarm_reason() != DisarmReason::Fault;
-        let ramp = i64::from(self.settings.stop_ramp.get());
-        let left = ramp.saturating_sub(i64::from(self.core.supervisor.time_in_mode(now).get()));
-        self.state.drive = if ramps && left > 0 {
-            let scaled = i64::from(self.state.ramp_from).saturating_mul(left);
-            let drive = scaled.checked_div(ramp).unwrap_or(0);
-            i8::try_from(drive).unwrap_or(0)
-        } else {
-            self.state.ramp_from = 0;
-            0
-        };
-        output
-    }
-
-    fn write(&mut self, dump_open: bool) -> Result<(), PinError> {
-        let motor = self.motor.write(self.state.drive);
-        let dump = self.dump_valve.set_open(dump_open);
-        motor.and(dump)
-    }
-
-    /// The wheel has armed: closed loop at standstill where it is.
-    pub(super) fn engage(&mut self) {
-        self.target = Target::at(self.state.actual);
-        engage(&mut self.controller, self.control_mode, self.state.actual);
-        self.reseal();
-    }
-}
-
-fn limit_bits(output: &WheelOutput, rate: bool) -> LimitBits {
-    let WheelStatus {
-        command_saturated,
-        pwm_saturated,
-        ..
-    } = output.status;
-    [
-        (command_saturated || pwm_saturated, Limit::DutySaturated),
-        (rate, Limit::RateLimited),
-        (output.blank_first_pulse, Limit::DriveInhibited),
-    ]
-    .into_iter()
-    .filter(|(active, _)| *active)
-    .fold(LimitBits::NONE, |bits, (_, limit)| bits.with(limit))
 }

@@ -186,6 +186,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         if self.core.mode() == Mode::Armed {
             self.engage();
         }
+        self.reseal();
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use wheeleg_units::{Micros, Ticks};
 const CLOCK_HZ: u32 = 2_000_000;
 
 /// Everything that follows from the parameters, worked out when they change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct WheelSettings {
     /// Digital filter.
     pub filter: LeadFilter,

@@ -1,0 +1,40 @@
+//! A clock that does not wrap, from a counter that does.
+
+use wheeleg_units::Micros;
+
+/// Unwraps the 32-bit microsecond counter; must be asked at least every 35 min.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    time_us: u64,
+}
+
+impl Clock {
+    /// The unwrapped time of `now`.
+    pub fn unwrap(&mut self, now: Micros) -> u64 {
+        // Low word of the newest time; the shorter way round is taken, so an
+        // instant slightly in the past is in the past.
+        let low = (self.time_us & 0xFFFF_FFFF) as u32;
+        let step = now.get().wrapping_sub(low) as i32;
+        let time = self.time_us.saturating_add_signed(i64::from(step));
+        self.time_us = self.time_us.max(time);
+        time
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wraps_are_counted_and_the_recent_past_stays_past() {
+        let mut clock = Clock::default();
+        assert_eq!(clock.unwrap(Micros(10)), 10);
+        let quarter = 1_u32 << 30;
+        for step in 1..=40_u64 {
+            let low = (step * u64::from(quarter)) as u32;
+            assert_eq!(clock.unwrap(Micros(low)), step << 30);
+        }
+        assert_eq!(clock.unwrap(Micros(u32::MAX)), (40 << 30) - 1);
+        assert_eq!(clock.unwrap(Micros(5)), (40 << 30) + 5);
+    }
+}

@@ -1,0 +1,128 @@
+//! From the mode and the control law to the four valve outputs of a tick.
+
+use super::node::JointNode;
+use super::reference::{Target, TickReference, advance};
+use crate::JOINT_TICK;
+use crate::hardware::{PinError, PositionSensor, SwitchBank, ValveBank};
+use crate::mode::{Mode, ModeRules};
+use crate::snapshot::JointSnapshot;
+use crate::supervisor::ExhaustKind;
+use wheeleg_control::joint::{JointInput, JointLimits};
+use wheeleg_control::pwm::OnTimes;
+use wheeleg_control::valve::{ValveMode, ValveOpenings};
+use wheeleg_protocol::{Fault, Limit, LimitBits};
+use wheeleg_units::{Duty, Micros, Ticks, VelocityMmS};
+
+impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
+    /// Closed loop on the reference of this tick.
+    pub(super) fn drive(&mut self, now: Micros) -> OnTimes {
+        let TickReference {
+            reference,
+            velocity,
+            announced,
+            slew_limited,
+        } = advance(self.state.reference, &mut self.target, &self.settings);
+        self.state.reference = reference;
+        let output = self.controller.step(&JointInput {
+            measured: self.state.measured,
+            reference,
+            reference_velocity: velocity,
+            announced,
+        });
+        let beyond = output.error.saturating_abs() > self.settings.following_error;
+        self.state.following = if beyond {
+            self.state.following.next()
+        } else {
+            Ticks::ZERO
+        };
+        if self.state.following >= self.settings.following_ticks {
+            self.axis_fault(Fault::FollowingError, now);
+        }
+        // At rest, and in the very tick of a fault, no pulse goes on.
+        let on_times = if output.settled || !self.core.mode().may_drive() {
+            self.pwm.shut()
+        } else {
+            self.pwm.tick(&output.openings)
+        };
+        let mut limits = limit_bits(&output.limits, output.settled);
+        if slew_limited {
+            limits.insert(Limit::SlewLimited);
+        }
+        self.record(now, output.velocity, output.duty, on_times);
+        self.snapshot.limits = limits;
+        self.snapshot.settled = output.settled;
+        on_times
+    }
+
+    /// No control: the valves do what the mode says, the reference follows the
+    /// measured stroke.
+    pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
+        self.state.reference = self.state.measured;
+        self.state.following = Ticks::ZERO;
+        self.target = Target::at(self.state.measured);
+        let velocity = self.controller.observe(self.state.measured);
+        let on_times = if self.core.mode() == Mode::Exhaust {
+            let openings = self.exhaust_openings();
+            self.pwm.tick(&openings)
+        } else {
+            self.pwm.shut()
+        };
+        self.record(now, velocity, Duty::ZERO, on_times);
+        self.snapshot.limits = LimitBits::NONE;
+        self.snapshot.settled = false;
+        on_times
+    }
+
+    fn exhaust_openings(&self) -> ValveOpenings {
+        match self.core.supervisor.exhaust() {
+            ExhaustKind::Staged => self.settings.staged_exhaust,
+            ExhaustKind::Commanded => ValveMode::Exhaust.openings(self.settings.full_period),
+            ExhaustKind::BlowThrough => ValveMode::BlowThrough.openings(self.settings.full_period),
+        }
+    }
+
+    fn record(&mut self, now: Micros, velocity: VelocityMmS, duty: Duty, on_times: OnTimes) {
+        self.snapshot = JointSnapshot {
+            at: now,
+            mode: self.core.mode(),
+            measured: self.state.measured,
+            reference: self.state.reference,
+            commanded: self.target.reference(),
+            velocity,
+            duty,
+            pulses: on_times.map(|on| Micros(u32::from(on))),
+            switches: self.switches.state(),
+            faults: self.core.supervisor.faults().latched(),
+            ..self.snapshot
+        };
+    }
+
+    /// Scales on-times in µs to the counts of the PWM channels and writes them.
+    pub(super) fn write(&mut self, on_times: OnTimes) -> Result<(), PinError> {
+        let max = u32::from(self.valves.max_duty());
+        let duty = on_times.map(|on| {
+            let scaled = u32::from(on)
+                .saturating_mul(max)
+                .checked_div(JOINT_TICK.get());
+            // At most `max`, because an on-time is at most one tick.
+            u16::try_from(scaled.unwrap_or(0).min(max)).unwrap_or(0)
+        });
+        self.valves.write(duty)
+    }
+}
+
+fn limit_bits(limits: &JointLimits, settled: bool) -> LimitBits {
+    [
+        (limits.duty, Limit::DutySaturated),
+        (limits.reference, Limit::TravelLimited),
+        (
+            limits.integral_frozen || limits.integral_clamped,
+            Limit::IntegralLimited,
+        ),
+        (limits.below_minimum, Limit::PulseTooShort),
+        (settled, Limit::SettledShut),
+    ]
+    .into_iter()
+    .filter(|(active, _)| *active)
+    .fold(LimitBits::NONE, |bits, (_, limit)| bits.with(limit))
+}

@@ -1,0 +1,80 @@
+//! A flipped bit in what a wheel board keeps between two samples means Hold.
+
+use super::node::WheelNode;
+use crate::NodeIdentity;
+use crate::hardware::{Encoder, MotorDrive, NoDumpValve, NoSwitches, PinError};
+use crate::mode::{Event, Mode};
+use crate::parameters::WheelParameters;
+use wheeleg_control::wheel::WheelCommand;
+use wheeleg_protocol::{Address, Fault};
+use wheeleg_units::{Micros, WheelCount};
+
+struct Motor(i8);
+
+impl MotorDrive for Motor {
+    fn write(&mut self, percent: i8) -> Result<(), PinError> {
+        self.0 = percent;
+        Ok(())
+    }
+}
+
+struct Still;
+
+impl Encoder for Still {
+    fn count(&mut self) -> WheelCount {
+        WheelCount::ZERO
+    }
+}
+
+type Node = WheelNode<Motor, Still, NoSwitches, NoDumpValve>;
+
+fn armed() -> Node {
+    let identity = NodeIdentity {
+        address: Address::wheel(8).unwrap(),
+        unique_id: [0; 12],
+    };
+    let mut node = WheelNode::new(
+        identity,
+        WheelParameters::default(),
+        Motor(0),
+        Still,
+        NoSwitches,
+        NoDumpValve,
+    )
+    .unwrap();
+    for tick in 0..20 {
+        node.tick(Micros(tick * 520));
+    }
+    let now = Micros(20 * 520);
+    node.core.supervisor.apply(Event::Arm, now).unwrap();
+    node.engage();
+    node.tick(now);
+    assert_eq!(node.mode(), Mode::Armed);
+    node
+}
+
+fn holds_after(damage: impl FnOnce(&mut Node)) -> bool {
+    let mut node = armed();
+    damage(&mut node);
+    node.tick(Micros(21 * 520));
+    let held = node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt);
+    held && node.motor.0 == 0
+}
+
+#[test]
+fn untouched_state_is_sound() {
+    assert!(!holds_after(|_| {}));
+}
+
+#[test]
+fn damaged_controller_settings_and_state_are_seen() {
+    assert!(holds_after(|node| {
+        let command = WheelCommand::Position(WheelCount::wrapping_new(1));
+        node.controller.apply(command).unwrap();
+    }));
+    assert!(holds_after(|node| node.settings.max_speed ^= 1));
+    assert!(holds_after(|node| node.state.drive ^= 1));
+    assert!(holds_after(|node| {
+        node.core.times.tick = Micros(node.core.times.tick.get() ^ 1);
+    }));
+}
