@@ -228,3 +228,39 @@ fn disarm_in_mid_step_withdraws_every_reference() {
     assert!(rig.done(ticket));
     assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Idle));
 }
+
+#[test]
+fn a_motion_of_layer_one_ends_the_users_references() {
+    let mut rig = rig();
+    let stroke_mm = PositionMm::from_int(50);
+    rig.submit(Command::JointReference {
+        joint: 5,
+        stroke_mm,
+    });
+    rig.run(60);
+    assert_eq!(rig.node(5).stroke_mm(), 50.0);
+    let ticket = rig.submit(Command::Stand);
+    rig.run(400);
+    assert!(rig.done(ticket));
+    assert_eq!(rig.node(5).stroke_mm(), 90.0, "back in the start pose");
+}
+
+#[test]
+fn a_wheel_that_stays_behind_does_not_shift_the_next_move() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    let start = rig.node(7).position;
+    let travel_mm = PositionMm::from_int(100);
+    rig.submit(Command::WheelReference { travel_mm });
+    rig.run(30);
+    // Pushed back by 1000 counts, and held there.
+    rig.node(7).position -= 1_000;
+    rig.node(7).rate = 0;
+    rig.run(2);
+    rig.submit(Command::WheelReference { travel_mm });
+    let sync = rig.cycle();
+    let slot = sync.slots.wheel(Address::wheel(7).unwrap()).unwrap();
+    // Two moves of 55 174 counts from the start, not from where it was pushed.
+    let origin = wheeleg_units::WheelCount::wrapping_new(start as i32);
+    assert_eq!(slot.reference.wrapping_difference(origin), 2 * 55_174);
+}
