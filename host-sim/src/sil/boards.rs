@@ -43,7 +43,7 @@ macro_rules! each {
 }
 
 /// One joint board.
-pub struct JointBoard {
+pub(super) struct JointBoard {
     application: JointApplication,
     sensor: AdcInput,
     foot: [Line; 4],
@@ -91,7 +91,7 @@ impl JointBoard {
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
-    pub fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+    pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
         let parameters = stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
             p.with(id, raw, true)
         })?;
@@ -124,12 +124,12 @@ impl JointBoard {
     }
 
     /// On-times that become active at this tick edge, µs.
-    pub fn active_on_us(&self) -> [u16; 4] {
+    pub(super) fn active_on_us(&self) -> [u16; 4] {
         std::array::from_fn(|i| self.valves[i].preloaded())
     }
 
     /// Latches the inputs and runs the tick that starts now.
-    pub fn tick(&mut self, now: Micros, code: u16, foot: [bool; 4]) -> TickReport {
+    pub(super) fn tick(&mut self, now: Micros, code: u16, foot: [bool; 4]) -> TickReport {
         self.sensor.latch(code);
         for (line, closed) in self.foot.iter().zip(foot) {
             line.set_level(closed);
@@ -143,17 +143,17 @@ impl JointBoard {
     }
 
     /// Hands received bytes over; the last one ended at `t_end`.
-    pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+    pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         each!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
     }
 
     /// What the application wants to send.
-    pub fn take_transmission(&mut self) -> Option<Transmission> {
+    pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
         each!(&mut self.application, node => node.take_transmission())
     }
 
     /// Internals after the last tick.
-    pub fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
+    pub(super) fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
         each!(&self.application, node => node.snapshot())
     }
 }
@@ -175,7 +175,7 @@ macro_rules! each_wheel {
 }
 
 /// One wheel board.
-pub struct WheelBoard {
+pub(super) struct WheelBoard {
     application: WheelApplication,
     encoder: CounterInput,
     pulse: PwmChannel,
@@ -189,7 +189,7 @@ impl WheelBoard {
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
-    pub fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+    pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
         let parameters = stored_parameters(address, stored, WheelParameters::default(), |p, id, raw| {
             p.with(id, raw, true)
         })?;
@@ -221,23 +221,23 @@ impl WheelBoard {
     }
 
     /// Bridge duty that becomes active at this sample edge, −1..=1.
-    pub fn active_duty(&self) -> f64 {
+    pub(super) fn active_duty(&self) -> f64 {
         let magnitude = f64::from(self.pulse.preloaded()) / f64::from(BRIDGE_COUNTS);
         if self.sign.level() { -magnitude } else { magnitude }
     }
 
     /// Whether the dump valve is driven open.
-    pub fn dumps(&self) -> bool {
+    pub(super) fn dumps(&self) -> bool {
         self.dump.level()
     }
 
     /// Sample period of the application, µs.
-    pub fn period_us(&self) -> u32 {
+    pub(super) fn period_us(&self) -> u32 {
         each_wheel!(&self.application, node => node.tick_period_us())
     }
 
     /// Latches the inputs and runs the sample that starts now.
-    pub fn tick(&mut self, now: Micros, encoder_edges: i64, supply_switch: bool) -> TickReport {
+    pub(super) fn tick(&mut self, now: Micros, encoder_edges: i64, supply_switch: bool) -> TickReport {
         self.encoder.latch(encoder_edges);
         self.supply.set_level(supply_switch);
         each_wheel!(&mut self.application, node => {
@@ -248,17 +248,17 @@ impl WheelBoard {
     }
 
     /// Hands received bytes over; the last one ended at `t_end`.
-    pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+    pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         each_wheel!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
     }
 
     /// What the application wants to send.
-    pub fn take_transmission(&mut self) -> Option<Transmission> {
+    pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
         each_wheel!(&mut self.application, node => node.take_transmission())
     }
 
     /// Internals after the last sample.
-    pub fn snapshot(&self) -> &wheeleg_node::snapshot::WheelSnapshot {
+    pub(super) fn snapshot(&self) -> &wheeleg_node::snapshot::WheelSnapshot {
         each_wheel!(&self.application, node => node.snapshot())
     }
 }

@@ -15,11 +15,11 @@ use std::collections::VecDeque;
 const BITS_PER_BYTE: u64 = 10;
 
 /// Who drives the line: a bus address (0 master, 1–8 nodes).
-pub type Driver = u8;
+pub(super) type Driver = u8;
 
 /// One stretch of bytes by one driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Delivery {
+pub(super) struct Delivery {
     /// Sender's address.
     pub from: Driver,
     /// First bit on the line \[ns\].
@@ -32,7 +32,7 @@ pub struct Delivery {
 
 /// Counters of the line, for telemetry and for the bandwidth budget.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct BusCounters {
+pub(super) struct BusCounters {
     /// Bytes put on the line by all drivers.
     pub bytes: u64,
     /// Transmissions.
@@ -45,7 +45,7 @@ pub struct BusCounters {
 
 /// The line: transmissions under way, in order of their end.
 #[derive(Debug)]
-pub struct Bus {
+pub(super) struct Bus {
     byte_ns: u64,
     under_way: VecDeque<Delivery>,
     counters: BusCounters,
@@ -55,7 +55,7 @@ impl Bus {
     /// A line at `baud` bit/s. The byte time is rounded to whole nanoseconds
     /// (exact for 1 Mbit/s and every divisor of it).
     #[must_use]
-    pub fn new(baud: u32) -> Self {
+    pub(super) fn new(baud: u32) -> Self {
         Self {
             byte_ns: BITS_PER_BYTE * 1_000_000_000 / u64::from(baud.max(1)),
             under_way: VecDeque::new(),
@@ -65,12 +65,12 @@ impl Bus {
 
     /// Duration of `bytes` bytes on the line \[ns\].
     #[must_use]
-    pub fn duration_ns(&self, bytes: usize) -> u64 {
+    pub(super) fn duration_ns(&self, bytes: usize) -> u64 {
         self.byte_ns * bytes as u64
     }
 
     /// Puts `bytes` on the line from `start_ns` on.
-    pub fn transmit(&mut self, from: Driver, start_ns: u64, mut bytes: Vec<u8>) {
+    pub(super) fn transmit(&mut self, from: Driver, start_ns: u64, mut bytes: Vec<u8>) {
         if bytes.is_empty() {
             return;
         }
@@ -100,12 +100,12 @@ impl Bus {
 
     /// Instant of the next delivery \[ns\].
     #[must_use]
-    pub fn next_delivery_ns(&self) -> Option<u64> {
+    pub(super) fn next_delivery_ns(&self) -> Option<u64> {
         self.under_way.front().map(|d| d.end_ns)
     }
 
     /// Takes the delivery due at or before `now_ns`, earliest first.
-    pub fn take_due(&mut self, now_ns: u64) -> Option<Delivery> {
+    pub(super) fn take_due(&mut self, now_ns: u64) -> Option<Delivery> {
         if self.next_delivery_ns()? <= now_ns {
             self.under_way.pop_front()
         } else {
@@ -113,17 +113,9 @@ impl Bus {
         }
     }
 
-    /// True while nobody drives the line at `now_ns`.
-    #[must_use]
-    pub fn is_idle(&self, now_ns: u64) -> bool {
-        self.under_way
-            .iter()
-            .all(|d| now_ns < d.start_ns || d.end_ns <= now_ns)
-    }
-
     /// Counters since the start.
     #[must_use]
-    pub fn counters(&self) -> BusCounters {
+    pub(super) fn counters(&self) -> BusCounters {
         self.counters
     }
 }
@@ -185,7 +177,6 @@ mod tests {
         bus.transmit(1, 0, vec![0x11; 4]);
         bus.transmit(2, 40_000, vec![0x22; 4]);
         assert_eq!(bus.counters().collisions, 0);
-        assert!(!bus.is_idle(39_999));
-        assert!(bus.is_idle(80_000));
+        assert_eq!(bus.take_due(u64::MAX).map(|d| d.bytes), Some(vec![0x11; 4]));
     }
 }

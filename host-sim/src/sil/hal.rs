@@ -17,17 +17,17 @@ use wheeleg_units::{AdcCode, WheelCount};
 
 /// A digital line, as input or output.
 #[derive(Debug, Clone, Default)]
-pub struct Line(Rc<Cell<bool>>);
+pub(super) struct Line(Rc<Cell<bool>>);
 
 impl Line {
     /// Level seen by an input, or driven by an output.
     #[must_use]
-    pub fn level(&self) -> bool {
+    pub(super) fn level(&self) -> bool {
         self.0.get()
     }
 
     /// Sets the level of an input.
-    pub fn set_level(&self, high: bool) {
+    pub(super) fn set_level(&self, high: bool) {
         self.0.set(high);
     }
 }
@@ -60,7 +60,7 @@ impl OutputPin for Line {
 
 /// One channel of a timer with preloaded compare register.
 #[derive(Debug, Clone)]
-pub struct PwmChannel {
+pub(super) struct PwmChannel {
     compare: Rc<Cell<u16>>,
     max: u16,
 }
@@ -68,7 +68,7 @@ pub struct PwmChannel {
 impl PwmChannel {
     /// A channel that is off, with `max` counts a period.
     #[must_use]
-    pub fn new(max: u16) -> Self {
+    pub(super) fn new(max: u16) -> Self {
         Self {
             compare: Rc::new(Cell::new(0)),
             max,
@@ -77,7 +77,7 @@ impl PwmChannel {
 
     /// The preloaded compare value, in counts.
     #[must_use]
-    pub fn preloaded(&self) -> u16 {
+    pub(super) fn preloaded(&self) -> u16 {
         self.compare.get()
     }
 }
@@ -100,11 +100,11 @@ impl SetDutyCycle for PwmChannel {
 
 /// Converter result of a linear potentiometer, latched at the tick edge.
 #[derive(Debug, Clone, Default)]
-pub struct AdcInput(Rc<Cell<u16>>);
+pub(super) struct AdcInput(Rc<Cell<u16>>);
 
 impl AdcInput {
     /// Latches a code, 16 bits left-aligned.
-    pub fn latch(&self, code: u16) {
+    pub(super) fn latch(&self, code: u16) {
         self.0.set(code);
     }
 }
@@ -117,7 +117,7 @@ impl PositionSensor for AdcInput {
 
 /// Quadrature counter of a wheel, latched at the sample edge.
 #[derive(Debug, Clone)]
-pub struct CounterInput(Rc<Cell<WheelCount>>);
+pub(super) struct CounterInput(Rc<Cell<WheelCount>>);
 
 impl Default for CounterInput {
     fn default() -> Self {
@@ -127,7 +127,7 @@ impl Default for CounterInput {
 
 impl CounterInput {
     /// Latches the total number of quadrature edges; the counter keeps 24 bits.
-    pub fn latch(&self, edges: i64) {
+    pub(super) fn latch(&self, edges: i64) {
         // Truncation keeps the low bits, of which the counter keeps 24.
         self.0.set(WheelCount::wrapping_new(edges as i32));
     }

@@ -1,1 +1,143 @@
-//! The software-in-the-loop run.
+//! Software in the loop: the board and master crates, natively, on a byte-timed
+//! bus, around the simulated plant.
+//!
+//! A run starts with power-up. The boards test themselves, the master
+//! enumerates and arms them, and the robot moves to its start pose; all of this
+//! is simulated like the rest. Scenario time 0, where the record begins, is the
+//! instant at which the robot stands at rest in that pose.
+
+mod boards;
+mod bus;
+mod hal;
+mod observe;
+mod operator;
+mod setup;
+mod world;
+
+use std::ops::ControlFlow;
+
+use self::observe::Observer;
+use self::operator::Operator;
+use self::world::{Happened, World};
+use crate::SimError;
+use crate::config::{EventAction, RobotConfig, Scenario};
+use crate::telemetry::{EventKind, Recorder};
+
+/// Whether to go on, as the caller of [`run`] decides at every bus cycle.
+pub type Control = ControlFlow<()>;
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunOutcome {
+    /// Scenario time simulated and recorded, s.
+    pub recorded_s: f64,
+    /// All simulated time, start-up included, s.
+    pub simulated_s: f64,
+    /// The caller stopped the run before its end.
+    pub stopped: bool,
+}
+
+/// Runs a scenario and records it.
+///
+/// `progress` is called once per bus cycle with the scenario time in s, negative
+/// during start-up; the run ends early when it breaks.
+///
+/// # Errors
+/// [`SimError::Simulation`] when a part refuses its parameters, the robot does
+/// not get ready, or the plant leaves the range of its model; I/O errors of the
+/// recorder.
+pub fn run(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    recorder: &mut Recorder,
+    progress: &mut dyn FnMut(f64) -> Control,
+) -> Result<RunOutcome, SimError> {
+    let plant = setup::plant(scenario, robot);
+    let master = setup::master(scenario, robot);
+    let mut world = World::new(robot, &plant, master, seed)?;
+    let mut operator = Operator::new(scenario);
+    let mut observer = Observer::default();
+    let cycle_ns = (robot.bus.cycle_s * 1e9).round() as u64;
+    let duration_ns = (scenario.duration_s * 1e9).round() as u64;
+    let mut start_ns: Option<u64> = None;
+    let mut stopped = false;
+
+    loop {
+        let happened = world.step()?;
+        let now_ns = world.now_ns();
+        match (happened, start_ns) {
+            (Happened::JointTick, None) => {
+                if operator.prepare(&mut world)? {
+                    start_ns = Some(now_ns);
+                    operator.report_start_up(recorder);
+                    operator.begin(&mut world)?;
+                    observer.tick(&world, 0, recorder);
+                }
+            }
+            (Happened::JointTick, Some(start_ns)) => {
+                let t_ns = now_ns - start_ns;
+                observer.tick(&world, t_ns, recorder);
+                if t_ns >= duration_ns {
+                    break;
+                }
+                for event in operator.due(t_ns) {
+                    act(&event.action, &mut world, &operator, t_ns, recorder)?;
+                }
+                operator.listen(&mut world, t_ns, recorder);
+            }
+            (Happened::MasterCycle, started) => {
+                let record = world.master().take_telemetry();
+                if let Some(start_ns) = started {
+                    observer.cycle(&world, record, now_ns - start_ns, cycle_ns, recorder);
+                }
+                let t_s = started.map_or(-1.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9);
+                if progress(t_s).is_break() {
+                    stopped = true;
+                    break;
+                }
+                recorder.status()?;
+            }
+            _ => {}
+        }
+    }
+    let now_ns = world.now_ns();
+    Ok(RunOutcome {
+        recorded_s: start_ns.map_or(0.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9),
+        simulated_s: now_ns as f64 * 1e-9,
+        stopped,
+    })
+}
+
+/// Carries out one event of the scenario.
+fn act(
+    action: &EventAction,
+    world: &mut World,
+    operator: &Operator<'_>,
+    t_ns: u64,
+    recorder: &mut Recorder,
+) -> Result<(), SimError> {
+    match action {
+        EventAction::KillMaster => {
+            world.kill_master();
+            recorder.event(t_ns, EventKind::Scenario, "the master dies and stays silent");
+            Ok(())
+        }
+        EventAction::EStop => {
+            recorder.event(t_ns, EventKind::Scenario, "E-stop pressed");
+            operator.submit(world, wheeleg_master::command::Command::EmergencyStop, t_ns, recorder)
+        }
+        EventAction::ClearFault => {
+            operator.submit(world, wheeleg_master::command::Command::ClearFault, t_ns, recorder)
+        }
+        EventAction::Command {
+            name,
+            joint,
+            stroke_m,
+            travel_m,
+        } => {
+            let command = operator::command(name, *joint, *stroke_m, *travel_m)?;
+            operator.submit(world, command, t_ns, recorder)
+        }
+    }
+}

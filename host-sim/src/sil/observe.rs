@@ -17,7 +17,7 @@ const PA_PER_BAR: f64 = 1e5;
 
 /// Turns the world into samples; remembers what it needs for differences.
 #[derive(Debug, Default)]
-pub struct Observer {
+pub(super) struct Observer {
     modes: [Option<Mode>; 8],
     faults: [FaultBits; 8],
     cycles: u32,
@@ -41,10 +41,10 @@ fn bits(levels: impl IntoIterator<Item = bool>) -> u8 {
 
 impl Observer {
     /// Samples everything fast, at the start of a joint tick.
-    pub fn tick(&mut self, world: &World, t_ns: u64, recorder: &mut Recorder) {
+    pub(super) fn tick(&mut self, world: &World, t_ns: u64, recorder: &mut Recorder) {
         let out = world.outputs();
-        self.joints(world, &out, t_ns, recorder);
-        self.wheels(world, &out, t_ns, recorder);
+        self.joints(world, out, t_ns, recorder);
+        self.wheels(world, out, t_ns, recorder);
         for foot in 0..2 {
             let vertical = world.joints()[3 * foot + 2].snapshot();
             recorder.foot(
@@ -53,7 +53,7 @@ impl Observer {
                 FootSample {
                     normal_force_n: out.foot_force_n[foot][2],
                     friction_force_n: out.foot_force_n[foot][0],
-                    clearance_mm: out.foot_clearance_m[foot] * 1e3,
+                    clearance_mm: out.sole_m[foot][2] * 1e3,
                     switches: vertical.switches,
                 },
             );
@@ -119,10 +119,13 @@ impl Observer {
     }
 
     fn wheels(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
-        let radius_mm = world.plant().wheel_radius_m() * 1e3;
+        let params = world.plant().params();
+        let radius_mm = params.body.wheel_radius_m * 1e3;
         for (i, board) in world.wheels().iter().enumerate() {
             let node = board.snapshot();
-            let counts_to_mm = radius_mm / world.plant().counts_per_radian(i);
+            let motor = &params.motors[i];
+            let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
+            let counts_to_mm = radius_mm * std::f64::consts::TAU / counts_per_turn;
             recorder.wheel(
                 t_ns,
                 i,
@@ -177,7 +180,7 @@ impl Observer {
 
     /// Samples bus and master, once per bus cycle. `record` is the master's own
     /// record of the cycle that has just ended, if it lives.
-    pub fn cycle(
+    pub(super) fn cycle(
         &mut self,
         world: &World,
         record: Option<Record>,

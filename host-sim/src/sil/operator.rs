@@ -9,7 +9,7 @@ use wheeleg_units::PositionMm;
 
 use super::world::World;
 use crate::SimError;
-use crate::config::{LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent};
+use crate::config::{LegChoice, Motion, Scenario, ScenarioEvent};
 use crate::telemetry::{EventKind, Recorder};
 
 /// Longest start-up, simulated ns: enumeration, homing and settling.
@@ -28,9 +28,8 @@ enum Stage {
 }
 
 /// The operator of one run.
-pub struct Operator<'a> {
+pub(super) struct Operator<'a> {
     scenario: &'a Scenario,
-    robot: &'a RobotConfig,
     stage: Stage,
     notes: Vec<(u64, String)>,
     next_event: usize,
@@ -40,7 +39,7 @@ pub struct Operator<'a> {
 ///
 /// # Errors
 /// [`SimError::Simulation`] naming the argument that is missing.
-pub fn command(
+pub(super) fn command(
     name: &str,
     joint: Option<u8>,
     stroke_m: Option<f64>,
@@ -83,7 +82,7 @@ pub fn command(
 }
 
 /// Side of a leg as the master names it.
-pub fn side(leg: LegChoice) -> Side {
+pub(super) fn side(leg: LegChoice) -> Side {
     match leg {
         LegChoice::Left => Side::Left,
         LegChoice::Right => Side::Right,
@@ -92,10 +91,9 @@ pub fn side(leg: LegChoice) -> Side {
 
 impl<'a> Operator<'a> {
     /// An operator at a robot that is just being switched on.
-    pub fn new(scenario: &'a Scenario, robot: &'a RobotConfig) -> Self {
+    pub(super) fn new(scenario: &'a Scenario) -> Self {
         Self {
             scenario,
-            robot,
             stage: Stage::Enumerating,
             notes: Vec::new(),
             next_event: 0,
@@ -107,7 +105,7 @@ impl<'a> Operator<'a> {
     ///
     /// # Errors
     /// [`SimError::Simulation`] with the reason if it does not get there.
-    pub fn prepare(&mut self, world: &mut World) -> Result<bool, SimError> {
+    pub(super) fn prepare(&mut self, world: &mut World) -> Result<bool, SimError> {
         let now_ns = world.now_ns();
         let now_us = now_ns / 1000;
         while let Some((time_us, event)) = world.master().take_event() {
@@ -161,7 +159,7 @@ impl<'a> Operator<'a> {
     }
 
     /// Writes the story of the start-up into the record, at time 0.
-    pub fn report_start_up(&self, recorder: &mut Recorder) {
+    pub(super) fn report_start_up(&self, recorder: &mut Recorder) {
         for (us, text) in &self.notes {
             let at_s = *us as f64 * 1e-6;
             recorder.event(0, EventKind::Info, format!("start-up, {at_s:.3} s after power-up: {text}"));
@@ -172,7 +170,7 @@ impl<'a> Operator<'a> {
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the dispatcher refuses it.
-    pub fn begin(&self, world: &mut World) -> Result<(), SimError> {
+    pub(super) fn begin(&self, world: &mut World) -> Result<(), SimError> {
         let command = match self.scenario.motion {
             Motion::Stand => return Ok(()),
             Motion::SquareWave { .. } => Command::StartGait,
@@ -200,7 +198,7 @@ impl<'a> Operator<'a> {
     }
 
     /// The events of the scenario that are due at `t_ns`, each once.
-    pub fn due(&mut self, t_ns: u64) -> Vec<ScenarioEvent> {
+    pub(super) fn due(&mut self, t_ns: u64) -> Vec<ScenarioEvent> {
         let t_s = t_ns as f64 * 1e-9;
         let rest = &self.scenario.events[self.next_event..];
         let due: Vec<ScenarioEvent> = rest
@@ -216,7 +214,7 @@ impl<'a> Operator<'a> {
     ///
     /// # Errors
     /// Never at present; kept for commands that cannot be given at all.
-    pub fn submit(
+    pub(super) fn submit(
         &self,
         world: &mut World,
         command: Command,
@@ -238,7 +236,7 @@ impl<'a> Operator<'a> {
     }
 
     /// Writes the master's events into the record.
-    pub fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
+    pub(super) fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
         while let Some((_, event)) = world.master().take_event() {
             let kind = match event {
                 Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
@@ -253,11 +251,6 @@ impl<'a> Operator<'a> {
             };
             recorder.event(t_ns, kind, describe(&event));
         }
-    }
-
-    /// Name of the robot that is operated.
-    pub fn robot(&self) -> &str {
-        &self.robot.name
     }
 }
 

@@ -37,7 +37,7 @@ fn microseconds(s: f64) -> u32 {
 ///
 /// Powering up in the start pose, chambers at their initial pressures, is the
 /// paper's home position; the start-up then arms and settles there.
-pub fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
+pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
     let gait = &robot.gait;
     let home = [gait.yaw_s2_m, 0.0, gait.stroke_m];
     let held = [gait.yaw_s2_m, gait.held_leg_s5_m, gait.held_leg_s6_m];
@@ -52,7 +52,7 @@ pub fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
 }
 
 /// The master's configuration.
-pub fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
+pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
     let gait = &robot.gait;
     let motor = &robot.plant.motors[0];
     let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;

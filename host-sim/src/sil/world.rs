@@ -17,12 +17,12 @@ use crate::SimError;
 use crate::config::RobotConfig;
 
 /// Joint tick, ns.
-pub const JOINT_TICK_NS: u64 = 1_000_000;
+pub(super) const JOINT_TICK_NS: u64 = 1_000_000;
 const NS_PER_US: u64 = 1_000;
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Happened {
+pub(super) enum Happened {
     /// Bytes reached the boards.
     Delivery,
     /// All joint boards ran one tick; the plant stands at its start.
@@ -34,10 +34,11 @@ pub enum Happened {
 }
 
 /// Everything that is simulated.
-pub struct World {
+pub(super) struct World {
     plant: Plant,
     state: PlantState,
     inputs: Inputs,
+    outputs: Outputs,
     joints: [JointBoard; 6],
     wheels: [WheelBoard; 2],
     bus: Bus,
@@ -53,7 +54,7 @@ pub struct World {
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct TickInputs {
+pub(super) struct TickInputs {
     /// On-times, µs, per joint `[fill A, vent A, fill B, vent B]`.
     pub on_us: [[u16; 4]; 6],
     /// Commanded edges since the start, per joint.
@@ -86,7 +87,7 @@ impl World {
     ///
     /// # Errors
     /// [`SimError::Simulation`] if a part refuses its parameters.
-    pub fn new(
+    pub(super) fn new(
         robot: &RobotConfig,
         plant: &PlantParams,
         master: MasterConfig,
@@ -106,7 +107,9 @@ impl World {
         };
         let joint = |n: u8| JointBoard::new(address(n)?, &stored.joints[usize::from(n) - 1]);
         let wheel = |n: u8| WheelBoard::new(address(n)?, &stored.wheels[usize::from(n) - 7]);
+        let outputs = plant.outputs(&state);
         Ok(Self {
+            outputs,
             plant,
             state,
             inputs: Inputs::default(),
@@ -128,7 +131,7 @@ impl World {
     ///
     /// # Errors
     /// [`SimError::Simulation`] when the plant leaves the range of its model.
-    pub fn step(&mut self) -> Result<Happened, SimError> {
+    pub(super) fn step(&mut self) -> Result<Happened, SimError> {
         let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
         let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
         if let Some(due) = self.bus.next_delivery_ns()
@@ -168,7 +171,8 @@ impl World {
         self.plant
             .apply(&mut self.state, &self.inputs)
             .map_err(|e| unphysical(self.now_ns, &e))?;
-        let feet = self.plant.foot_switches(&self.state);
+        self.outputs = self.plant.outputs(&self.state);
+        let feet = self.outputs.foot_switches;
         let now = micros(self.now_ns);
         for (i, board) in self.joints.iter_mut().enumerate() {
             let code = self.plant.read_position(&mut self.state, i);
@@ -183,12 +187,16 @@ impl World {
     fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
         self.advance_plant()?;
         let board = &mut self.wheels[wheel];
+        // Only the bridge takes new inputs here: the valves keep their tick.
         self.inputs.bridge_duty[wheel] = board.active_duty();
         self.inputs.bridge_enabled[wheel] = true;
-        self.plant
-            .set_bridge(&mut self.state, wheel, self.inputs.bridge_duty[wheel]);
-        let edges = self.plant.encoder_edges(&self.state, wheel);
-        let switch = self.plant.pressure_switch(&self.state);
+        let core = &mut self.state.core;
+        core.motion.motors[wheel].duty = self.inputs.bridge_duty[wheel];
+        core.motion.motors[wheel].enabled = self.inputs.bridge_enabled[wheel];
+        let mechanics = &self.plant.assembly.mechanics;
+        let angle_rad = mechanics.wheel_angle_rad(&core.motion);
+        let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
+        let switch = core.supply.pressure_switch;
         board.tick(micros(self.now_ns), edges, switch);
         self.next_wheel_ns[wheel] += u64::from(board.period_us()) * NS_PER_US;
         self.collect_transmissions();
@@ -258,57 +266,57 @@ impl World {
     }
 
     /// The master dies: it never sends or hears again.
-    pub fn kill_master(&mut self) {
+    pub(super) fn kill_master(&mut self) {
         self.master_alive = false;
     }
 
     /// Whether the master lives.
-    pub fn master_alive(&self) -> bool {
+    pub(super) fn master_alive(&self) -> bool {
         self.master_alive
     }
 
     /// The master, for user commands and its events.
-    pub fn master(&mut self) -> &mut Master {
+    pub(super) fn master(&mut self) -> &mut Master {
         &mut self.master
     }
 
     /// Simulated time since power-up, ns.
-    pub fn now_ns(&self) -> u64 {
+    pub(super) fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
-    /// Everything that can be seen of the plant.
-    pub fn outputs(&self) -> Outputs {
-        self.plant.outputs(&self.state)
+    /// Everything that can be seen of the plant at the last joint tick.
+    pub(super) fn outputs(&self) -> &Outputs {
+        &self.outputs
     }
 
     /// BLAKE3 of the plant's state.
-    pub fn state_hash(&self) -> [u8; 32] {
+    pub(super) fn state_hash(&self) -> [u8; 32] {
         self.plant.state_hash(&self.state)
     }
 
     /// Commands of the tick that has just begun.
-    pub fn tick_inputs(&self) -> &TickInputs {
+    pub(super) fn tick_inputs(&self) -> &TickInputs {
         &self.tick_inputs
     }
 
     /// The joint boards, addresses 1 to 6.
-    pub fn joints(&self) -> &[JointBoard; 6] {
+    pub(super) fn joints(&self) -> &[JointBoard; 6] {
         &self.joints
     }
 
     /// The wheel boards, addresses 7 and 8.
-    pub fn wheels(&self) -> &[WheelBoard; 2] {
+    pub(super) fn wheels(&self) -> &[WheelBoard; 2] {
         &self.wheels
     }
 
     /// The line.
-    pub fn bus(&self) -> &Bus {
+    pub(super) fn bus(&self) -> &Bus {
         &self.bus
     }
 
     /// The plant's model.
-    pub fn plant(&self) -> &Plant {
+    pub(super) fn plant(&self) -> &Plant {
         &self.plant
     }
 }
