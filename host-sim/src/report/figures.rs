@@ -165,7 +165,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
                 id: id.into(),
                 title: format!("Fig. {number}: {name}"),
                 caption: format!("Stroke of {name}. The paper's axis is 0 to 180 mm over 10 s."),
-                panels: vec![s.panel(name, 300, lines("stroke [mm]", range, series))],
+                panels: vec![s.panel(name, 300, lines("[mm]", range, series))],
             }
         };
     let pair = |id: &str,
@@ -261,7 +261,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
             panels: vec![s.panel("F6", 300, Content::Lines {
                 series: force,
                 limits: vec![Limit { y: 30.0 }, Limit { y: -30.0 }],
-                y_label: "force [N]".into(),
+                y_label: "[N]".into(),
                 y_range: (-60.0, 60.0),
             })],
         },
@@ -286,7 +286,7 @@ fn strokes(s: &Source<'_>) -> Figure {
             .collect();
         let range = fitted((0.0, 180.0), &series);
         let title = if first == 0 { "left leg" } else { "right leg" };
-        s.panel(title, 240, lines("stroke [mm]", range, series))
+        s.panel(title, 240, lines("[mm]", range, series))
     });
     Figure {
         id: "strokes".into(),
@@ -339,7 +339,14 @@ fn pressures(s: &Source<'_>, first: usize) -> Figure {
 /// Valve raster of all joints over a window.
 fn valves(s: &Source<'_>, window: (f64, f64), id: &str, title: &str) -> Figure {
     const VALVES: [&str; 4] = ["fill A", "vent A", "fill B", "vent B"];
+    // Bins of whole PWM periods where a period is narrower than a pixel or so,
+    // so that bins and pulses do not beat.
     let bin = (((window.1 - window.0) / 450.0) / 1e-3).ceil().max(1.0) as usize;
+    let bin = if bin > 5 {
+        bin.next_multiple_of(20)
+    } else {
+        bin
+    };
     let mut rows = Vec::new();
     for joint in 0..6 {
         let samples: Vec<&Row<JointSample>> = s.recording.joints[joint]
@@ -424,7 +431,7 @@ fn feet(s: &Source<'_>) -> Figure {
         title: "Foot loads and switches".into(),
         caption: "Ground force normal to each sole (impacts cut off at 120 N), and the four optical switches of each foot as the node sees them.".into(),
         panels: vec![
-            s.panel("normal force", 220, lines("force [N]", range, series)),
+            s.panel("normal force", 220, lines("[N]", range, series)),
             s.panel("foot switches closed", 150, Content::Raster { rows }),
         ],
     }
@@ -543,7 +550,7 @@ fn event_figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
         }))
         .collect();
     let mut panels = vec![
-        s.panel("mode", 150, lines("mode", (-0.5, 6.5), modes)),
+        s.panel("mode", 150, lines("", (-0.5, 6.5), modes)),
         s.panel(
             "sensed movement since the event",
             150,

@@ -43,6 +43,7 @@ pub(super) fn render(
             context! {
                 id => &*figure.id,
                 title => &*figure.title,
+                short => figure.title.split(':').next(),
                 caption => &*figure.caption,
                 svg => Value::from_safe_string(svg.clone()),
             }

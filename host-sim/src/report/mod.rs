@@ -63,3 +63,97 @@ fn subfolder(folder: &Path, name: &str) -> Result<PathBuf, SimError> {
     std::fs::create_dir_all(&path).map_err(|e| SimError::output("create the folder", &path, e))?;
     Ok(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::{self, testing};
+    use crate::config::builtin;
+
+    /// Every file of a run, from a recording made of the reference model.
+    fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario(scenario).expect("built in");
+        let recording = testing::from_reference(&robot, 0.25, 0.0);
+        let analysis = analysis::analyse(&scenario, &robot, &recording);
+        let info = RunInfo {
+            seed: 7,
+            simulated_s: 10.0,
+            recorded_s: 10.0,
+            wall_s: 0.25,
+            complete: true,
+        };
+        let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
+        write(
+            folder.path(),
+            &scenario,
+            &robot,
+            &recording,
+            &analysis,
+            &summary,
+        )
+        .expect("written");
+        (folder, summary)
+    }
+
+    #[test]
+    fn page_stands_alone_and_holds_figures_targets_and_provenance() {
+        let (folder, summary) = report("three-step");
+        let page = std::fs::read_to_string(folder.path().join("report.html")).expect("written");
+        // The only addresses are anchors in the page and the SVG name space.
+        let links = page.replace("http://www.w3.org/2000/svg", "");
+        for forbidden in ["http:", "https:", "src=", "<script", "@import", "url("] {
+            assert!(!links.contains(forbidden), "{forbidden}");
+        }
+        for number in 12..=16 {
+            assert!(page.contains(&format!("Fig. {number}:")), "Fig. {number}");
+        }
+        assert!(page.matches("<svg").count() >= 9);
+        for target in &summary.targets {
+            assert!(page.contains(&target.id), "{}", target.id);
+        }
+        assert!(page.contains(&summary.hash) && page.contains("cylinder.bore"));
+        assert!(page.contains("reference step at the node"));
+    }
+
+    #[test]
+    fn figures_are_written_as_png_and_svg() {
+        let (folder, _) = report("master-lost");
+        let figures = folder.path().join("figures");
+        for id in ["fig12-b5", "fig16-f6", "event", "event-valves", "feet"] {
+            let png = std::fs::read(figures.join(format!("{id}.png"))).expect("PNG");
+            assert_eq!(&png[1..4], b"PNG", "{id}");
+            assert!(png.len() > 5_000, "{id}: {}", png.len());
+            let svg = std::fs::read_to_string(figures.join(format!("{id}.svg"))).expect("SVG");
+            assert!(svg.contains("time [s]"), "{id}");
+        }
+    }
+
+    #[test]
+    fn every_scenario_gives_a_report() {
+        for (name, ..) in builtin::SCENARIOS {
+            let (folder, _) = report(name);
+            assert!(folder.path().join("report.html").exists(), "{name}");
+        }
+    }
+
+    #[test]
+    fn summary_has_the_documented_fields() {
+        let (folder, summary) = report("three-step");
+        let text = std::fs::read_to_string(folder.path().join("summary.json")).expect("written");
+        let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(value["scenario"], "three-step");
+        assert_eq!(value["seed"], 7);
+        assert_eq!(value["hash"], summary.hash.as_str());
+        assert_eq!(value["simulated_s"], 10.0);
+        assert_eq!(value["wall_s"], 0.25);
+        assert_eq!(value["realtime_factor"], 40.0);
+        let targets = value["targets"].as_array().expect("a list");
+        for target in targets {
+            for key in ["id", "value", "unit", "min", "max", "pass"] {
+                assert!(target.get(key).is_some(), "{key}");
+            }
+        }
+    }
+}

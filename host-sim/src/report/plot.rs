@@ -181,9 +181,9 @@ impl Panel {
             Content::Lines {
                 series,
                 limits,
-                y_label,
                 y_range,
-            } => self.lines(&body, scale, axis_px, series, limits, y_label, *y_range),
+                ..
+            } => self.lines(&body, scale, axis_px, series, limits, *y_range),
             Content::Raster { rows } => self.raster(&body, scale, axis_px, rows),
         }
     }
@@ -198,17 +198,21 @@ impl Panel {
         let style = |size: u32| (FONT, size * scale).into_font().color(&colour::INK);
         let title = style(15);
         let y = 6 * s;
-        head.draw_text(&self.title, &title, (LEFT as i32 * s, y))
+        let words = match &self.content {
+            Content::Lines { y_label, .. } => format!("{} {y_label}", self.title),
+            Content::Raster { .. } => self.title.clone(),
+        };
+        head.draw_text(&words, &title, (LEFT as i32 * s, y))
             .map_err(text)?;
         let Content::Lines { series, .. } = &self.content else {
             return Ok(());
         };
-        let (width, _) = head.estimate_text_size(&self.title, &title).map_err(text)?;
+        let (width, _) = head.estimate_text_size(&words, &title).map_err(text)?;
         let mut x = LEFT as i32 * s + width as i32 + 24 * s;
         let label = style(13);
         for line in series.iter().filter(|l| !l.label.is_empty()) {
             let stroke = line.colour.stroke_width((line.width + 1) * scale);
-            let mid = y + 8 * s;
+            let mid = y + 7 * s;
             head.draw(&PathElement::new(vec![(x, mid), (x + 18 * s, mid)], stroke))
                 .map_err(text)?;
             x += 23 * s;
@@ -220,7 +224,6 @@ impl Panel {
         Ok(())
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn lines<B: DrawingBackend>(
         &self,
         body: &DrawingArea<B, Shift>,
@@ -228,7 +231,6 @@ impl Panel {
         axis_px: u32,
         series: &[Series],
         limits: &[Limit],
-        y_label: &str,
         (y0, y1): (f64, f64),
     ) -> Result<(), String> {
         let (x0, x1) = self.x_range;
@@ -248,10 +250,9 @@ impl Panel {
             .label_style(font.clone())
             .axis_desc_style(font)
             .x_labels(11)
-            .y_labels((self.height / 34).clamp(3, 10) as usize)
+            .y_labels((self.height / 28).clamp(3, 11) as usize)
             .y_label_formatter(&|v| tick(*v))
-            .x_label_formatter(&|v| tick(*v))
-            .y_desc(y_label);
+            .x_label_formatter(&|v| tick(*v));
         if axis_px > 0 {
             mesh.x_desc("time [s]");
         }

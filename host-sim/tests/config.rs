@@ -1,0 +1,293 @@
+//! Robot and scenario files: what is wrong with them is said where it is wrong.
+
+use wheeleg_sim::config::{ConfigError, RobotConfig, Scenario, builtin};
+
+const ROBOT: &str = include_str!("../robots/wheeleg-2003.toml");
+const SCENARIO: &str = include_str!("../scenarios/three-step.toml");
+
+/// One line per problem, with its help.
+fn report(error: &ConfigError) -> String {
+    let lines: Vec<String> = error
+        .problems()
+        .iter()
+        .map(|p| format!("{} | {}", p.summary(), p.help_text().unwrap_or("")))
+        .collect();
+    lines.join("\n")
+}
+
+fn robot_with(from: &str, to: &str) -> String {
+    assert_eq!(ROBOT.matches(from).count(), 1, "{from} must occur once");
+    let text = ROBOT.replace(from, to);
+    report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
+}
+
+fn scenario_with(from: &str, to: &str) -> String {
+    assert_eq!(SCENARIO.matches(from).count(), 1, "{from} must occur once");
+    let text = SCENARIO.replace(from, to);
+    report(&Scenario::parse("my.toml", &text).expect_err("must be rejected"))
+}
+
+fn assert_all(report: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(report.contains(part), "`{part}` is not in:\n{report}");
+    }
+}
+
+/// Line of the robot file that holds `text`, from 1.
+fn line_of(text: &str) -> String {
+    let at = ROBOT.find(text).expect("present");
+    format!("my.toml:{}:", ROBOT[..at].matches('\n').count() + 1)
+}
+
+#[test]
+fn every_built_in_file_is_accepted() {
+    for (name, ..) in builtin::ROBOTS {
+        builtin::robot(name).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+    }
+    for (name, ..) in builtin::SCENARIOS {
+        let scenario = builtin::scenario(name).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+        assert_eq!(scenario.name, *name);
+        assert!(builtin::robot(&scenario.robot).is_ok());
+    }
+}
+
+#[test]
+fn every_parameter_is_listed_with_unit_source_and_range() {
+    let robot = builtin::robot("wheeleg-2003").expect("built in");
+    assert!(robot.parameters.len() > 100);
+    for p in &robot.parameters {
+        assert!(
+            !p.unit.is_empty() && !p.source.is_empty() && !p.doc.is_empty(),
+            "{}",
+            p.path
+        );
+        for v in &p.value {
+            assert!((p.min..=p.max).contains(v), "{}: {v}", p.path);
+        }
+    }
+    // Nothing in the file is silently ignored: as many entries as parameters.
+    let entries = ROBOT
+        .lines()
+        .filter(|l| l.contains("value =") && !l.starts_with('#'));
+    assert_eq!(entries.count(), robot.parameters.len());
+}
+
+#[test]
+fn values_arrive_in_si() {
+    let robot = builtin::robot("wheeleg-2003").expect("built in");
+    assert!((robot.bus.baud_bit_s - 1e6).abs() < 1e-9);
+    assert!((robot.bus.cycle_s - 0.010).abs() < 1e-15);
+    assert!((robot.gait.stroke_m - 0.18).abs() < 1e-15);
+    let valve = &robot.plant.cylinders[2].fill_valve;
+    assert!((valve.flow.conductance_m3_s_pa - 0.085e-8).abs() < 1e-18);
+    assert!((robot.plant.motors[0].efficiency - 0.70).abs() < 1e-12);
+}
+
+#[test]
+fn wrong_unit() {
+    let text = robot_with(
+        "bore          = { value = 20.0, unit = \"mm\"",
+        "bore          = { value = 20.0, unit = \"bar\"",
+    );
+    let line = line_of("bore          =");
+    assert_all(
+        &text,
+        &[
+            &line,
+            "`cylinder.bore`",
+            "20.0",
+            "\"bar\"",
+            "\"mm\"",
+            "\"m\"",
+        ],
+    );
+}
+
+#[test]
+fn out_of_range() {
+    let text = robot_with(
+        "bore          = { value = 20.0, unit = \"mm\"",
+        "bore          = { value = 900.0, unit = \"mm\"",
+    );
+    let line = line_of("bore          =");
+    assert_all(
+        &text,
+        &[
+            &line,
+            "`cylinder.bore` = 900 mm",
+            "out of range",
+            "4 to 200 mm",
+        ],
+    );
+}
+
+#[test]
+fn limits_themselves_are_allowed() {
+    for value in ["4.0", "200.0"] {
+        let text = ROBOT.replace(
+            "bore          = { value = 20.0",
+            &format!("bore          = {{ value = {value}"),
+        );
+        assert!(RobotConfig::parse("my.toml", &text).is_ok(), "{value}");
+    }
+}
+
+#[test]
+fn gain_out_of_range_and_in_a_wrong_unit() {
+    let gain = |entry: &str| {
+        let text = ROBOT.replace("[node.joint]\n", &format!("[node.joint]\n{entry}\n"));
+        report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
+    };
+    let text = gain("proportional = { value = 40.0, unit = \"1/mm\", source = \"x\" }");
+    assert_all(
+        &text,
+        &["`node.joint.proportional` = 40 1/mm", "0 to 4 1/mm", "Kp"],
+    );
+    let text = gain("proportional = { value = 0.04, unit = \"1/m\", source = \"x\" }");
+    assert_all(&text, &["`node.joint.proportional`", "0.04", "\"1/mm\""]);
+    let text = gain("proportonal = { value = 0.04, unit = \"1/mm\", source = \"x\" }");
+    assert_all(
+        &text,
+        &[
+            "unknown field `proportonal`",
+            "[node.joint]",
+            "did you mean `proportional`?",
+        ],
+    );
+    let text = gain("velocity_window = { value = 3.5, unit = \"ticks\", source = \"x\" }");
+    assert_all(
+        &text,
+        &["`node.joint.velocity_window` = 3.5", "whole number"],
+    );
+}
+
+#[test]
+fn board_parameters_become_raw_numbers_of_the_wire() {
+    let text = ROBOT.replace(
+        "[node.joint]\n",
+        "[node.joint]\nproportional = { value = 0.5, unit = \"1/mm\", source = \"x\" }\n",
+    ) + "[node.vertical]\nproportional = { value = 0.25, unit = \"1/mm\", source = \"x\" }\n";
+    let robot = RobotConfig::parse("my.toml", &text).expect("accepted");
+    let gain = |joint: usize| {
+        let found = robot.node.joints[joint]
+            .iter()
+            .find(|(id, _)| *id == 0x0101);
+        found.map(|(_, raw)| *raw)
+    };
+    // I8F24.
+    assert_eq!(gain(0), Some(1 << 23));
+    assert_eq!(gain(2), Some(1 << 22));
+    assert_eq!(gain(5), Some(1 << 22));
+}
+
+#[test]
+fn unknown_missing_and_mistyped_fields() {
+    let text = robot_with("bore          =", "boer          =");
+    assert_all(
+        &text,
+        &["unknown field `boer` in [cylinder]", "did you mean `bore`?"],
+    );
+    assert_all(&text, &["[cylinder] lacks bore (m)"]);
+
+    let text = robot_with("[cylinder]", "[cilinder]");
+    assert_all(
+        &text,
+        &[
+            "unknown field `cilinder` at the top",
+            "did you mean `cylinder`?",
+        ],
+    );
+    assert_all(&text, &["section [cylinder] is missing"]);
+
+    let text = robot_with(
+        "steps             = { value = 3,",
+        "steps             = { value = \"three\",",
+    );
+    assert_all(&text, &["`gait.steps`", "\"three\"", "a number"]);
+
+    let text = robot_with(
+        "steps             = { value = 3,",
+        "steps             = { value = 3.5,",
+    );
+    assert_all(&text, &["`gait.steps` = 3.5", "whole number"]);
+}
+
+#[test]
+fn bare_values_and_missing_sources_are_refused() {
+    let text = robot_with(
+        "baud  = { value = 1.0, unit = \"Mbit/s\", source = \"ASSUMED: RS-485, not in the paper\" }",
+        "baud  = 1000000",
+    );
+    assert_all(&text, &["`bus.baud` has no unit", "unit = \"bit/s\""]);
+    let text = robot_with(
+        "baud  = { value = 1.0, unit = \"Mbit/s\", source = \"ASSUMED: RS-485, not in the paper\" }",
+        "baud  = { value = 1.0, unit = \"Mbit/s\" }",
+    );
+    assert_all(&text, &["`bus.baud` has no source", "PAPER"]);
+}
+
+#[test]
+fn all_problems_are_reported_at_once_in_the_order_of_the_file() {
+    let text = ROBOT
+        .replace("baud  = { value = 1.0", "baud  = { value = -1.0")
+        .replace(
+            "bore          = { value = 20.0",
+            "bore          = { value = nan",
+        );
+    let error = RobotConfig::parse("my.toml", &text).expect_err("must be rejected");
+    let text = report(&error);
+    assert_eq!(error.problems().len(), 2, "{text}");
+    assert!(text.find("bus.baud") < text.find("cylinder.bore"), "{text}");
+}
+
+#[test]
+fn broken_toml_names_the_line() {
+    let error = RobotConfig::parse("my.toml", "name = \"x\"\nbroken = = 1\n").expect_err("broken");
+    assert_all(&report(&error), &["my.toml:2:", "not valid TOML"]);
+}
+
+#[test]
+fn scenario_mistakes() {
+    let text = scenario_with("kind = \"square-wave\"", "kind = \"squarewave\"");
+    assert_all(
+        &text,
+        &[
+            "`motion.kind` = \"squarewave\"",
+            "did you mean \"square-wave\"?",
+        ],
+    );
+
+    let text = scenario_with("value = 10.0, unit = \"s\"", "value = 10.0, unit = \"m\"");
+    assert_all(&text, &["`duration`", "10.0", "\"m\"", "\"s\""]);
+
+    let text = scenario_with("value = 10.0, unit = \"s\"", "value = 0.0, unit = \"s\"");
+    assert_all(&text, &["`duration` = 0 s", "0.01 to 3600 s"]);
+
+    let text = scenario_with("seed = 1", "seed = -1");
+    assert_all(&text, &["`seed` = -1", "whole number"]);
+
+    let event = "\n[[events]]\nat = { value = 12.0, unit = \"s\" }\naction = \"kil-master\"\n";
+    let text = report(
+        &Scenario::parse("my.toml", &(SCENARIO.to_owned() + event)).expect_err("wrong event"),
+    );
+    assert_all(&text, &["`events[0].at` = 12 s", "0 to 10 s"]);
+    assert_all(&text, &["\"kil-master\"", "did you mean \"kill-master\"?"]);
+}
+
+#[test]
+fn unknown_names_and_missing_files() {
+    let error = builtin::scenario("three-stp").expect_err("unknown");
+    assert_all(
+        &format!("{error} {}", report(&error)),
+        &[
+            "unknown scenario `three-stp`",
+            "did you mean `three-step`?",
+            "master-lost",
+        ],
+    );
+    let error = builtin::robot("no/such/robot.toml").expect_err("missing");
+    assert_all(
+        &report(&error),
+        &["no/such/robot.toml", "cannot read the robot file"],
+    );
+}
