@@ -1,0 +1,55 @@
+//! Why the dynamics refused a state or a parameter.
+
+use wheeleg_kinematics::KinematicsError;
+
+/// Failure of the rigid-body dynamics.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum DynamicsError {
+    /// A leg in a pose it cannot take.
+    #[error("leg {leg}: {source}")]
+    Leg {
+        /// 0 left, 1 right.
+        leg: usize,
+        /// What the kinematics found.
+        source: KinematicsError<f64>,
+    },
+    /// A coordinate, rate or force that is NaN or infinite.
+    #[error("{name}[{index}] = {value} is not finite")]
+    NonFinite {
+        /// `position`, `velocity`, `force` or `acceleration`.
+        name: &'static str,
+        /// Coordinate number.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The mass matrix is not positive definite.
+    #[error("mass matrix is not positive definite: pivot {pivot}")]
+    Singular {
+        /// The pivot (kg, kg m or kg m²).
+        pivot: f64,
+    },
+    /// A parameter outside its range.
+    #[error("parameter {name} = {value} is outside its range")]
+    Parameter {
+        /// Field of [`super::RobotDynamicsParams`].
+        name: &'static str,
+        /// The value.
+        value: f64,
+    },
+}
+
+/// Passes a finite array, refuses the first value that is not.
+pub(crate) fn finite<const N: usize>(
+    name: &'static str,
+    values: &[f64; N],
+) -> Result<(), DynamicsError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(DynamicsError::NonFinite {
+            name,
+            index,
+            value: values[index],
+        }),
+    }
+}

@@ -1,0 +1,19 @@
+//! Rigid-body dynamics by the natural orthogonal complement.
+//!
+//! * [`noc`]: the readable reference, block by block as in the paper (leg 36 × 3, half robot
+//!   48 × 4), with the corrected equations. [`printed`] holds the paper's printed variants.
+//! * [`robot`]: the engine the simulator steps: the whole robot in eight coordinates, floating in
+//!   pitch on its wheel axle. Same principle, with the zeros left out.
+//!
+//! Positive cylinder forces extend their cylinder. Gravity is a vector, so a slope is a tilted
+//! gravity.
+
+mod error;
+pub mod noc;
+mod params;
+pub mod printed;
+pub mod robot;
+
+pub use error::DynamicsError;
+pub use params::{BodyParams, LegBodies, RobotDynamicsParams};
+pub use robot::{FootKin, RobotDynamics, RobotKin, RobotSide};
