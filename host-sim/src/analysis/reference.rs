@@ -159,8 +159,10 @@ impl ReferenceModel {
     fn within_step(&self, start: &StepStart, u: f64) -> (Motion, Motion, f64) {
         let g = &self.gait;
         let r = &self.reference;
-        let retract = |u: f64| critically_damped(start.b6, 0.0, r.tau_fast_s, u - g.lift_s);
-        let b6 = if u < g.lift_s {
+        // The command comes at `lift`; the model leaves the ground once the foot is unloaded.
+        let lift_s = g.lift_s + r.unload_s;
+        let retract = |u: f64| critically_damped(start.b6, 0.0, r.tau_fast_s, u - lift_s);
+        let b6 = if u < lift_s {
             Motion {
                 x: start.b6.x,
                 ..Motion::default()
