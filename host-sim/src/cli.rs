@@ -72,7 +72,7 @@ struct RunArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of all noise, instead of the scenario's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
@@ -149,7 +149,8 @@ fn print(text: &str) -> Result<ExitCode, SimError> {
 fn run_text(finished: &Finished) -> String {
     let s = &finished.summary;
     let mut out = String::new();
-    if !s.targets.is_empty() {
+    // A part of a run meets or misses nothing.
+    if s.complete && !s.targets.is_empty() {
         out.push_str(&target_table(&s.targets));
         let required = s.targets.iter().filter(|t| t.required);
         let met = required.clone().filter(|t| t.pass).count();

@@ -19,7 +19,7 @@ pub enum SimError {
     Config(#[from] Box<ConfigError>),
 
     /// A file or folder could not be written or created.
-    #[error("cannot {action} `{}`: {source}", path.display())]
+    #[error("cannot {action} `{}`: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::output),
         help("choose another folder with --out DIR, or make this one writable")
@@ -30,7 +30,7 @@ pub enum SimError {
         /// The file or folder.
         path: PathBuf,
         /// What the operating system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
 
     /// The log writer failed after the file had been opened.
@@ -75,11 +75,11 @@ pub enum SimError {
 
 impl SimError {
     /// An output error for `path`.
-    pub fn output(action: &'static str, path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+    pub fn output(action: &'static str, path: impl Into<PathBuf>, reason: std::io::Error) -> Self {
         Self::Output {
             action,
             path: path.into(),
-            source,
+            reason,
         }
     }
 

@@ -206,8 +206,9 @@ impl ReferenceModel {
         let r = &self.reference;
         let share =
             r.gravity_m_s2 * (r.load_moment_kg_m + r.slide_mass_kg * s5_m) / (r.load_arm_m + s5_m);
-        let fraction = if u < r.unload_s {
-            1.0 - u / r.unload_s
+        let unloading = u - self.gait.lift_s;
+        let fraction = if unloading < r.unload_s {
+            1.0 - unloading.max(0.0) / r.unload_s
         } else if u < r.reload_start_s {
             0.0
         } else if u < r.reload_end_s {

@@ -26,18 +26,15 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
         )];
     };
     let joints = || recording.joints.iter().map(Vec::as_slice);
-    let worst = |values: &mut dyn Iterator<Item = Option<f64>>| {
-        values.fold(Some(0.0_f64), |worst, v| Some(worst?.max(v?)))
-    };
-    let shut = worst(&mut joints().map(|rows| shut_after(rows, at_s, commanded_open)));
-    let physical = worst(&mut joints().map(|rows| shut_after(rows, at_s, |s| s.valves_open != 0)));
+    let shut = worst(joints().map(|rows| shut_after(rows, at_s, commanded_open)));
+    let physical = worst(joints().map(|rows| shut_after(rows, at_s, |s| s.valves_open != 0)));
     let wheels = worst(
         &mut recording
             .wheels
             .iter()
             .map(|rows| stopped_after(rows, at_s)),
     );
-    let moved = worst(&mut joints().map(|rows| {
+    let moved = worst(joints().map(|rows| {
         let held = window(rows, at_s + REACTION_S, at_s + STAGE_S);
         extremes(held, |s| s.position_mm).map(|(a, b)| b - a)
     }));
@@ -108,6 +105,11 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
         ));
     }
     targets
+}
+
+/// Largest value; `None` if any is unknown.
+fn worst(mut values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    values.try_fold(0.0_f64, |worst, v| Some(worst.max(v?)))
 }
 
 fn commanded_open(s: &JointSample) -> bool {

@@ -31,20 +31,18 @@ pub(super) fn targets(
     targets
 }
 
-fn after<'a>(rows: &'a [Row<JointSample>], start_s: f64) -> &'a [Row<JointSample>] {
+fn after(rows: &[Row<JointSample>], start_s: f64) -> &[Row<JointSample>] {
     window(rows, start_s, f64::INFINITY)
 }
 
 fn strokes(targets: &mut Vec<Target>, robot: &RobotConfig, parts: &Leg<'_>, start_s: f64) {
     let gait = &robot.gait;
     for (id, name, rows) in [("A19", "b5", parts.b5), ("A20", "b6", parts.b6)] {
-        let per_step = (0..gait.steps).map(|k| {
+        let mut per_step = (0..gait.steps).map(|k| {
             let t = start_s + f64::from(k) * gait.period_s;
             extremes(window(rows, t, t + gait.period_s), |s| s.position_mm).map(|(a, b)| b - a)
         });
-        let smallest = per_step.fold(Some(f64::INFINITY), |least: Option<f64>, range| {
-            Some(least?.min(range?))
-        });
+        let smallest = per_step.try_fold(f64::INFINITY, |least, range| Some(least.min(range?)));
         targets.push(Target::new(
             id,
             format!("{name} stroke covered in every step (smallest of the steps)"),

@@ -106,7 +106,7 @@ impl Reader {
     /// Lifts entry `index` of an array of tables out as its own reader level.
     pub(crate) fn entry(&self, path: &str, index: usize) -> Entry {
         let item = self.item(path);
-        let table: Option<(Vec<(String, Range<usize>, Item)>, Range<usize>)> = item.and_then(|i| {
+        let table: Option<(Vec<Field>, Range<usize>)> = item.and_then(|i| {
             if let Some(tables) = i.as_array_of_tables() {
                 tables
                     .get(index)
@@ -530,11 +530,14 @@ impl Reader {
     }
 }
 
+/// Key, position of the key, and item.
+type Field = (String, Range<usize>, Item);
+
 /// The fields of one table, with the positions of their keys.
 pub(crate) struct Entry {
     /// Dotted path of the table.
     pub(crate) path: String,
-    fields: Vec<(String, Range<usize>, Item)>,
+    fields: Vec<Field>,
     /// Position of the table.
     pub(crate) span: Range<usize>,
 }
@@ -557,7 +560,7 @@ impl Entry {
     }
 }
 
-fn fields(table: &dyn TableLike) -> Vec<(String, Range<usize>, Item)> {
+fn fields(table: &dyn TableLike) -> Vec<Field> {
     table
         .iter()
         .map(|(name, item)| {

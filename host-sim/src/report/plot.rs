@@ -130,12 +130,23 @@ impl Figure {
         Ok(text)
     }
 
-    /// Writes the figure as PNG.
+    /// Writes the figure as PNG. Lines of the bitmap backend have hard edges,
+    /// so it is drawn at twice the size and averaged down.
     pub(crate) fn png(&self, path: &Path) -> Result<(), SimError> {
         fonts();
         let (w, h) = self.size();
-        let root = BitMapBackend::new(path, (w * PNG_SCALE, h * PNG_SCALE)).into_drawing_area();
-        self.draw(&root, PNG_SCALE).map_err(|e| self.failed(&e))
+        let (w, h) = (w * PNG_SCALE, h * PNG_SCALE);
+        let mut fine = vec![0; (2 * w * 2 * h * 3) as usize];
+        {
+            let root = BitMapBackend::with_buffer(&mut fine, (2 * w, 2 * h)).into_drawing_area();
+            self.draw(&root, 2 * PNG_SCALE)
+                .map_err(|e| self.failed(&e))?;
+        }
+        let smooth = halve(&fine, w as usize, h as usize);
+        let mut file = BitMapBackend::new(path, (w, h));
+        file.blit_bitmap((0, 0), (w, h), &smooth)
+            .and_then(|()| file.present())
+            .map_err(|e| self.failed(&text(e)))
     }
 
     fn failed(&self, error: &str) -> SimError {
@@ -283,9 +294,17 @@ impl Panel {
                 .map(|(x, y)| (x, clamp(y)))
                 .collect();
             let stroke = line.colour.stroke_width(line.width * scale);
-            chart
-                .draw_series(LineSeries::new(points, stroke))
-                .map_err(text)?;
+            if scale == 1 {
+                chart
+                    .draw_series(LineSeries::new(points, stroke))
+                    .map_err(text)?;
+            } else {
+                // The bitmap backend's joints shoot far out at sharp turns.
+                let segments = points.windows(2);
+                chart
+                    .draw_series(segments.map(|p| PathElement::new(p.to_vec(), stroke)))
+                    .map_err(text)?;
+            }
         }
         Ok(())
     }
@@ -372,6 +391,22 @@ fn tick(v: f64) -> String {
     format!("{}", rounded + 0.0).replace('-', "−")
 }
 
+/// Averages blocks of two by two pixels; `w` and `h` are those of the result.
+fn halve(fine: &[u8], w: usize, h: usize) -> Vec<u8> {
+    let mut out = Vec::with_capacity(w * h * 3);
+    for rows in fine.chunks_exact(2 * w * 6).take(h) {
+        let (upper, lower) = rows.split_at(w * 6);
+        for (a, b) in upper.chunks_exact(6).zip(lower.chunks_exact(6)) {
+            for c in 0..3 {
+                let sum =
+                    u16::from(a[c]) + u16::from(a[c + 3]) + u16::from(b[c]) + u16::from(b[c + 3]);
+                out.push((sum / 4) as u8);
+            }
+        }
+    }
+    out
+}
+
 /// Keeps the smallest and largest value of each of `columns` columns, so that
 /// a long record draws quickly and no peak is lost.
 fn thin(points: &[(f64, f64)], (x0, x1): (f64, f64), columns: usize) -> Vec<(f64, f64)> {
@@ -434,6 +469,14 @@ mod tests {
         assert!(thin.len() <= 1800);
         assert!(thin.contains(&(51_234.0, 7.0)) && thin.contains(&(77_777.0, -3.0)));
         assert!(thin.windows(2).all(|w| w[0].0 < w[1].0));
+    }
+
+    #[test]
+    fn halving_averages_each_block() {
+        // Two by two pixels become one.
+        let fine = [0, 10, 20, 40, 10, 20, 80, 10, 20, 120, 10, 20];
+        assert_eq!(halve(&fine, 1, 1), [60, 10, 20]);
+        assert_eq!(halve(&[7; 4 * 6 * 3], 3, 2), [7; 18]);
     }
 
     #[test]

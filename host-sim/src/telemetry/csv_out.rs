@@ -48,9 +48,9 @@ fn table<S: Sample>(
         if row.t_ns < next_ns {
             continue;
         }
-        if period_ns > 0 {
-            next_ns = (row.t_ns / period_ns + 1) * period_ns;
-        }
+        // A period of zero keeps every row.
+        let tick = row.t_ns.checked_div(period_ns);
+        next_ns = tick.map_or(0, |n| (n + 1) * period_ns);
         record.clear();
         time.clear();
         super::push_fixed(&mut time, row.t_s(), 6);
