@@ -17,7 +17,7 @@ const SAFE_MODES: [u8; 3] = [4, 5, 6];
 pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> Vec<Target> {
     let Some(at_s) = at_s else {
         return vec![Target::new(
-            "F0",
+            "SS0",
             "the scenario has the event that these targets measure",
             None,
             "s",
@@ -40,7 +40,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
     }));
     let mut targets = vec![
         Target::new(
-            "F1",
+            "SS1",
             "every valve of every cylinder commanded shut (slowest joint)",
             shut.map(|s| s * 1e3),
             "ms",
@@ -48,7 +48,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             Some(REACTION_S * 1e3),
         ),
         Target::new(
-            "F2",
+            "SS2",
             "every valve physically shut (slowest joint; t_off later than commanded)",
             physical.map(|s| s * 1e3),
             "ms",
@@ -56,7 +56,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             Some(REACTION_S * 1e3 + 30.0),
         ),
         Target::new(
-            "F3",
+            "SS3",
             "both wheels at a standstill (slower wheel)",
             wheels.map(|s| s * 1e3),
             "ms",
@@ -64,7 +64,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             Some(WHEEL_STOP_S * 1e3),
         ),
         Target::new(
-            "F4",
+            "SS4",
             "axes in a safe mode at the reaction time and at every sample after it",
             Some(safe_axes(recording, at_s + REACTION_S)),
             "1",
@@ -72,7 +72,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             Some(8.0),
         ),
         Target::new(
-            "F5",
+            "SS5",
             "axes with a latched fault at the end of the run",
             Some(latched_axes(recording)),
             "1",
@@ -80,7 +80,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             Some(8.0),
         ),
         Target::new(
-            "F6",
+            "SS6",
             "largest movement of a held cylinder from 60 to 500 ms after the event",
             moved,
             "mm",
@@ -96,7 +96,7 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             .find(|r| r.t_s() >= at_s - 1e-9 && r.v.dump_open)
             .map(|r| (r.t_s() - at_s) * 1e3);
         targets.push(Target::new(
-            "F7",
+            "SS7",
             "supply dump valve open",
             dump,
             "ms",
@@ -200,19 +200,19 @@ mod tests {
     #[test]
     fn reaction_times_are_measured_from_the_event() {
         let targets = targets(&recording(1055), Some(1.0), false);
-        let (shut, pass) = value(&targets, "F1");
+        let (shut, pass) = value(&targets, "SS1");
         assert!((shut - 55.0).abs() < 1e-6 && pass, "{shut}");
-        let (physical, pass) = value(&targets, "F2");
+        let (physical, pass) = value(&targets, "SS2");
         assert!((physical - 59.0).abs() < 1e-6 && pass);
-        assert!((value(&targets, "F3").0 - 299.0).abs() < 1e-6);
-        assert_eq!(value(&targets, "F4"), (8.0, true));
-        assert_eq!(value(&targets, "F5"), (8.0, true));
+        assert!((value(&targets, "SS3").0 - 299.0).abs() < 1e-6);
+        assert_eq!(value(&targets, "SS4"), (8.0, true));
+        assert_eq!(value(&targets, "SS5"), (8.0, true));
     }
 
     #[test]
     fn a_late_reaction_fails() {
         let targets = targets(&recording(1080), Some(1.0), false);
-        assert!(!value(&targets, "F1").1);
-        assert_eq!(value(&targets, "F4"), (0.0, false));
+        assert!(!value(&targets, "SS1").1);
+        assert_eq!(value(&targets, "SS4"), (0.0, false));
     }
 }

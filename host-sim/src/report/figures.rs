@@ -491,7 +491,7 @@ fn event_figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
         let base = points.get(at).map_or(0.0, |p| p.1);
         points.into_iter().map(|(t, y)| (t, y - base)).collect()
     };
-    let near = |series: &[Series]| {
+    let near = |series: &[Series], span: f64| {
         let inside: Vec<Series> = series
             .iter()
             .map(|l| {
@@ -507,7 +507,7 @@ fn event_figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
                 )
             })
             .collect();
-        fitted((-1.0, 1.0), &inside)
+        fitted((-span, span), &inside)
     };
     let set = |value: fn(&JointSample) -> f64| -> Vec<Series> {
         (0..6)
@@ -554,14 +554,18 @@ fn event_figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
         s.panel(
             "sensed movement since the event",
             150,
-            lines("[mm]", near(&sensed), sensed),
+            lines("[mm]", near(&sensed, 1.0), sensed),
         ),
         s.panel(
             "true movement since the event",
             150,
-            lines("[mm]", near(&physical), physical),
+            lines("[mm]", near(&physical, 1.0), physical),
         ),
-        s.panel("wheel rims", 130, lines("[mm/s]", near(&wheels), wheels)),
+        s.panel(
+            "wheel rims",
+            130,
+            lines("[mm/s]", near(&wheels, 20.0), wheels),
+        ),
     ];
     for panel in &mut panels {
         panel.x_range = window;
