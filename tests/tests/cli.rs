@@ -225,7 +225,7 @@ fn an_out_of_range_gain_is_answered_with_file_field_value_and_range() {
     let robot = source("robots/wheeleg-2003.toml");
     let line = robot
         .lines()
-        .find(|line| line.starts_with("kp") && line.contains("value = "))
+        .find(|line| line.starts_with("proportional") && line.contains("value = "))
         .expect("a proportional gain in the robot file");
     let (key, rest) = line.split_once(" = ").expect("key = value");
     let (head, tail) = rest.split_once("value = ").expect("a value");
