@@ -1,7 +1,7 @@
 //! The one place where left and right differ.
 //!
 //! Both legs have the same model; the right one lives in a frame mirrored in Y
-//! (model.md §1). Foot positions in the robot's axes (X forward, Y left, Z up,
+//! (MODEL.md §1). Foot positions in the robot's axes (X forward, Y left, Z up,
 //! from the leg's yaw axis O4) change the sign of Y on their way into and out
 //! of the right leg's frame; strokes are equal on both sides.
 

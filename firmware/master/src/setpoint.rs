@@ -81,7 +81,7 @@ pub enum Phase {
     Rest = 8,
     /// Last reference of a finished motion held.
     Done = 9,
-    /// Foot trajectory (model.md §6.1).
+    /// Foot trajectory (MODEL.md §6.1).
     Trajectory = 10,
     /// All references frozen at the measured position.
     Hold = 11,
@@ -104,7 +104,7 @@ pub struct Ahead {
     pub cycles: u8,
 }
 
-/// What a node does when the bus falls silent in this phase, product.md §5.2.
+/// What a node does when the bus falls silent in this phase, ARCHITECTURE.md "Safe states".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnLinkLoss {
     /// Valves shut, air trapped: a loaded leg must not collapse.

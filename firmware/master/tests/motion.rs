@@ -1,4 +1,4 @@
-//! Layer 1 against model.md §6: instants, look-ahead, pushes, trajectories.
+//! Layer 1 against MODEL.md §6: instants, look-ahead, pushes, trajectories.
 
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{GaitParams, Pattern};

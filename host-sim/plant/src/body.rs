@@ -6,9 +6,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::assembly::Mechanics;
-use crate::contact::{ContactForce, ContactParams, ContactState, FlatGround, SoleSwitches};
+use crate::contact::{ContactForce, ContactParams, ContactState, SoleSwitches};
 use crate::dynamics::{DynamicsError, FootKin, RobotDynamics, RobotKin, RobotSide};
 use crate::error::{PlantError, check_state};
+use crate::ground::{Ground, Support};
 use crate::hash::StateHasher;
 use crate::motor::{MotorParams, MotorState};
 
@@ -79,6 +80,8 @@ impl BodyMotion {
 pub struct FootOutputs {
     /// Sole centre, ground axes x forward, y left, z up \[m\].
     pub sole_m: [f64; 3],
+    /// Smallest height of the sole's centre and sides over the ground below \[m\].
+    pub clearance_m: f64,
     /// Ground force on the foot.
     pub force: ContactForce,
     /// The four optical switches.
@@ -89,6 +92,7 @@ impl FootOutputs {
     /// A foot whose pose cannot be evaluated: NaN, switches open.
     pub const UNKNOWN: Self = Self {
         sole_m: [f64::NAN; 3],
+        clearance_m: f64::NAN,
         force: ContactForce {
             force_n: [f64::NAN; 3],
             normal_n: f64::NAN,
@@ -109,8 +113,10 @@ impl FootOutputs {
 pub struct BodyMechanics {
     /// The dynamics.
     pub dynamics: RobotDynamics,
-    /// Feet and ground.
+    /// Sole on the ground.
     pub contact: ContactParams,
+    /// Ground under the feet.
+    pub ground: Ground,
     /// Joint lengths at stroke 0 \[m\], joints 1..6.
     pub stroke_zero_m: [f64; 6],
     /// Wheel drives, left and right.
@@ -140,10 +146,12 @@ impl BodyMechanics {
         let kin = self.dynamics.prepare(&motion.position, &motion.velocity)?;
         Ok(std::array::from_fn(|i| {
             let foot = &kin.feet[i];
+            let support = self.support(foot);
             FootOutputs {
                 sole_m: foot.position_m,
-                force: self.contact.force(&motion.contacts[i], foot, &FlatGround),
-                switches: self.contact.switches(foot, &FlatGround),
+                clearance_m: self.ground.clearance_m(foot, self.contact.sole_radius_m),
+                force: self.contact.force(&motion.contacts[i], foot, &support),
+                switches: self.contact.switches(foot, &self.ground),
             }
         }))
     }
@@ -160,14 +168,11 @@ impl BodyMechanics {
         let missing = |pitch: f64, motion: &BodyMotion| -> Result<f64, PlantError> {
             let mut q = motion.position;
             q[1] = pitch;
-            let kin = self.dynamics.prepare(&q, &[0.0; COORDINATES])?;
+            let mut kin = self.dynamics.prepare(&q, &[0.0; COORDINATES])?;
+            let support = kin.feet.map(|foot| self.support(&foot));
             let mut force = [0.0; COORDINATES];
-            for (i, side) in SIDES.into_iter().enumerate() {
-                let ground =
-                    self.contact
-                        .force(&ContactState::default(), &kin.feet[i], &FlatGround);
-                kin.add_foot_force(side, &ground.force_n, &mut force);
-            }
+            let unstretched = [ContactState::default(); 2];
+            self.add_ground_forces(&unstretched, &support, &q, &mut kin, &mut force);
             Ok(force[1] - kin.inverse(&[0.0; COORDINATES])[1])
         };
         let (mut low, mut high) = (-0.3, 0.3);
@@ -197,14 +202,16 @@ impl BodyMechanics {
     /// [`PlantError::Mechanics`] or [`PlantError::NonFinite`] if the pose cannot be.
     pub fn holding_forces_n(&self, motion: &BodyMotion) -> Result<[f64; 6], PlantError> {
         let rest = [0.0; COORDINATES];
-        let kin = self.dynamics.prepare(&motion.position, &rest)?;
+        let mut kin = self.dynamics.prepare(&motion.position, &rest)?;
+        let support = kin.feet.map(|foot| self.support(&foot));
         let mut ground = [0.0; COORDINATES];
-        for (i, side) in SIDES.into_iter().enumerate() {
-            let force = self
-                .contact
-                .force(&motion.contacts[i], &kin.feet[i], &FlatGround);
-            kin.add_foot_force(side, &force.force_n, &mut ground);
-        }
+        self.add_ground_forces(
+            &motion.contacts,
+            &support,
+            &motion.position,
+            &mut kin,
+            &mut ground,
+        );
         let needed = kin.inverse(&rest);
         Ok(std::array::from_fn(|i| needed[i + 2] - ground[i + 2]))
     }
@@ -216,9 +223,39 @@ impl BodyMechanics {
         self.motors[wheel].wheel_torque_n_m(motion.motors[wheel].current_a, rate)
     }
 
+    fn support(&self, foot: &FootKin) -> Support {
+        self.ground.support(foot, self.contact.sole_radius_m)
+    }
+
+    /// Adds the ground's forces on both feet, each at its centre of pressure; the feet's
+    /// Jacobians in `kin` are moved there.
+    fn add_ground_forces(
+        &self,
+        contacts: &[ContactState; 2],
+        support: &[Support; 2],
+        position: &[f64; COORDINATES],
+        kin: &mut RobotKin,
+        force: &mut [f64; COORDINATES],
+    ) {
+        for (i, side) in SIDES.into_iter().enumerate() {
+            let foot = &kin.feet[i];
+            let ground = self.contact.force(&contacts[i], foot, &support[i]);
+            if ground.normal_n > 0.0 {
+                kin.feet[i] = support[i].loaded(foot, position[3 + 3 * i]);
+                kin.add_foot_force(side, &ground.force_n, force);
+            }
+        }
+    }
+
     /// Stretches the bristles under the soles by what the soles really moved,
     /// so that a standing foot has no drift of its own.
-    fn advance_contacts(&self, state: &mut BodyMotion, kin: &RobotKin, step_s: f64) {
+    fn advance_contacts(
+        &self,
+        state: &mut BodyMotion,
+        kin: &RobotKin,
+        support: &[Support; 2],
+        step_s: f64,
+    ) {
         for (i, foot) in kin.feet.iter().enumerate() {
             if step_s > 0.0 {
                 let before = state.sole_m[i];
@@ -229,7 +266,7 @@ impl BodyMechanics {
                     ..*foot
                 };
                 self.contact
-                    .advance(&mut state.contacts[i], &moved, &FlatGround, step_s);
+                    .advance(&mut state.contacts[i], &moved, &support[i], step_s);
             }
             state.sole_m[i] = foot.position_m;
         }
@@ -276,18 +313,22 @@ impl Mechanics<6> for BodyMechanics {
         let ahead_s = 0.5 * step_s;
         let rate: [f64; COORDINATES] =
             std::array::from_fn(|i| state.velocity[i] + ahead_s * state.acceleration[i]);
-        let kin = self.dynamics.prepare(&state.position, &rate)?;
-        self.advance_contacts(state, &kin, step_s);
+        let mut kin = self.dynamics.prepare(&state.position, &rate)?;
+        let support = kin.feet.map(|foot| self.support(&foot));
+        self.advance_contacts(state, &kin, &support, step_s);
         let mut force = [0.0; COORDINATES];
         force[2..].copy_from_slice(piston_n);
-        for (i, side) in SIDES.into_iter().enumerate() {
-            let torque = self.wheel_torque_n_m(state, i, ahead_s);
+        for wheel in 0..2 {
+            let torque = self.wheel_torque_n_m(state, wheel, ahead_s);
             self.dynamics.add_wheel_torque(torque, &mut force);
-            let ground = self
-                .contact
-                .force(&state.contacts[i], &kin.feet[i], &FlatGround);
-            kin.add_foot_force(side, &ground.force_n, &mut force);
         }
+        self.add_ground_forces(
+            &state.contacts,
+            &support,
+            &state.position,
+            &mut kin,
+            &mut force,
+        );
         state.acceleration = kin.solve(&force)?;
         Ok(())
     }

@@ -22,6 +22,7 @@ pub mod endstop;
 pub mod error;
 pub mod flow;
 pub mod friction;
+pub mod ground;
 pub mod hash;
 pub mod motor;
 pub mod robot;

@@ -10,6 +10,7 @@ use crate::cylinder::{CylinderModel, CylinderParams};
 use crate::dynamics::{RobotDynamics, RobotDynamicsParams};
 use crate::error::{PlantError, check};
 use crate::flow::GasParams;
+use crate::ground::Ground;
 use crate::hash::StateHasher;
 use crate::motor::MotorParams;
 use crate::sensors::{AdcParams, AdcState, PotentiometerParams};
@@ -32,8 +33,10 @@ pub struct PlantParams {
     pub stroke_zero_m: [f64; 6],
     /// Masses and dimensions.
     pub body: RobotDynamicsParams,
-    /// Feet and ground.
+    /// Sole on the ground.
     pub contact: ContactParams,
+    /// Ground under the feet.
+    pub ground: Ground,
     /// Wheel drives, left and right. Their reduction must be the body's.
     pub motors: [MotorParams; 2],
     /// Position sensors.
@@ -96,7 +99,12 @@ pub struct Outputs {
     pub foot_normal_n: [f64; 2],
     /// Sole centre of each foot, ground axes \[m\].
     pub sole_m: [[f64; 3]; 2],
-    /// The four optical switches of each foot, `[front, back, left, right]`.
+    /// Smallest height of each sole's centre and sides over the ground below \[m\]; negative
+    /// when pressed in.
+    pub foot_clearance_m: [f64; 2],
+    /// The four optical switches of each foot in the order of a board's inputs,
+    /// counter-clockwise from above: `[front, left, back, right]`, left and right as the
+    /// robot looks, on both legs.
     pub foot_switches: [[bool; 4]; 2],
     /// Reservoir pressure \[Pa absolute\].
     pub supply_pressure_pa: f64,
@@ -147,6 +155,7 @@ impl Plant {
             check("initial_stroke_m", *stroke, 0.0, cylinder.stroke_m)?;
         }
         params.contact.validate()?;
+        params.ground.validate()?;
         for motor in &params.motors {
             // Two names for one gear: a rotor inertia reflected by another ratio
             // than the torque's would be a silent error.
@@ -173,6 +182,7 @@ impl Plant {
                 mechanics: BodyMechanics {
                     dynamics: RobotDynamics::new(&params.body)?,
                     contact: params.contact,
+                    ground: params.ground.clone(),
                     stroke_zero_m: params.stroke_zero_m,
                     motors: params.motors,
                 },
@@ -354,7 +364,11 @@ impl Plant {
             foot_force_n: std::array::from_fn(|i| feet[i].force.force_n),
             foot_normal_n: std::array::from_fn(|i| feet[i].force.normal_n),
             sole_m: std::array::from_fn(|i| feet[i].sole_m),
-            foot_switches: std::array::from_fn(|i| feet[i].switches.to_array()),
+            foot_clearance_m: std::array::from_fn(|i| feet[i].clearance_m),
+            foot_switches: std::array::from_fn(|i| {
+                let sole = feet[i].switches;
+                [sole.front, sole.left, sole.back, sole.right]
+            }),
             supply_pressure_pa: self.assembly.supply.pressure_pa(core.supply.mass_kg),
             pressure_switch: core.supply.pressure_switch,
             dumping: core.supply.dump.is_open(),

@@ -12,6 +12,7 @@ use crate::dynamics::RobotDynamicsParams;
 use crate::endstop::EndStopParams;
 use crate::flow::{GasParams, Iso6358};
 use crate::friction::FrictionParams;
+use crate::ground::Ground;
 use crate::motor::MotorParams;
 use crate::robot::PlantParams;
 use crate::sensors::{AdcNoise, AdcParams, PotentiometerParams};
@@ -247,6 +248,7 @@ pub fn wheeleg_2003() -> PlantParams {
         stroke_zero_m: [0.31, 0.01, 0.01, 0.31, 0.01, 0.01], // m ASSUMED; 0.01 PAPER Table 1
         body: RobotDynamicsParams::wheeleg_2003(),
         contact: ground_contact(),
+        ground: Ground::default(), // flat
         motors: [wheel_motor(); 2],
         potentiometers: [potentiometer(); 6],
         adc: adc(),

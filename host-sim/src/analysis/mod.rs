@@ -1,4 +1,4 @@
-//! Compares a recording with the paper's targets (model.md §11) and with the
+//! Compares a recording with the paper's targets (MODEL.md §11) and with the
 //! project's own (safe states, rest).
 
 mod contact;

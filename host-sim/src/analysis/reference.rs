@@ -1,5 +1,5 @@
 //! The reference model of the paper's figures: square-wave references answered
-//! by critically damped cylinders (model.md §6.2).
+//! by critically damped cylinders (MODEL.md §6.2).
 
 use crate::config::{GaitParams, ReferenceParams};
 
@@ -250,7 +250,7 @@ mod tests {
         );
     }
 
-    /// Ranges of model.md §6.2, last printed digit.
+    /// Ranges of MODEL.md §6.2, last printed digit.
     #[test]
     fn ranges_are_those_of_the_independent_computation() {
         assert_range("v5", range(|p| p.v5_m_s * 1e3), -180.0, 378.4, 0.06);

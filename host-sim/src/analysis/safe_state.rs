@@ -1,4 +1,4 @@
-//! Safe states after the loss of the master or an E-stop (design.md §3).
+//! Safe states after the loss of the master or an E-stop (ARCHITECTURE.md, "Safe states").
 
 use super::{Target, extremes, window};
 use crate::telemetry::{JointSample, Recording, Row, WheelSample};

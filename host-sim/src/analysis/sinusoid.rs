@@ -35,7 +35,7 @@ pub(super) fn targets(recording: &Recording, moving: Option<LegChoice>) -> Vec<T
         ),
         Target::new(
             "A9-span",
-            "b6 span (arch of 160 to 200 mm, model.md 6.1)",
+            "b6 span (arch of 160 to 200 mm, MODEL.md 6.1)",
             b6.map(|r| r.1 - r.0),
             "mm",
             Some(150.0),

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// A target: what was measured, what was asked, and whether it holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Target {
-    /// Identifier, from model.md §11 where there is one.
+    /// Identifier, from MODEL.md §11 where there is one.
     pub id: String,
     /// What is measured and how.
     pub description: String,

@@ -8,6 +8,7 @@ use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
 use wheeleg_plant::endstop::EndStopParams;
 use wheeleg_plant::flow::{GasParams, Iso6358};
 use wheeleg_plant::friction::FrictionParams;
+use wheeleg_plant::ground::Ground;
 use wheeleg_plant::motor::MotorParams;
 use wheeleg_plant::sensors::{AdcNoise, AdcParams, PotentiometerParams};
 use wheeleg_plant::supply::SupplyParams;
@@ -390,6 +391,8 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
         stroke_zero_m: std::array::from_fn(|i| body.stroke_zero[i % 3]),
         body: dynamics_params(&body, &links, motor.reduction),
         contact: contact_params(&contact?),
+        // The ground is the scenario's.
+        ground: Ground::default(),
         motors: [motor_params(&motor); 2],
         potentiometers: [potentiometer_params(&potentiometer?); 6],
         adc: adc_params(&adc?),
@@ -609,7 +612,7 @@ mod tests {
         let b5_zero = robot.plant.stroke_zero_m[1];
         let slide = leg[4].mass_kg + leg[5].mass_kg;
         // First moments about the axle at the home yaw (theta1 = pi, theta4 =
-        // pi/2), frames as in model.md; O1 is p4 behind O4.
+        // pi/2), frames as in MODEL.md; O1 is p4 behind O4.
         let o1 = body.o4_m[0] - body.p4_m[0];
         let fixed = leg[0].mass_kg * (o1 - leg[0].com_m[0])
             + leg[1].mass_kg * (o1 + leg[1].com_m[0])

@@ -47,7 +47,7 @@ params! {
         touchdown_reflex: bool, "touchdown_reflex", Flag, 0.0, 1.0;
     }
 
-    /// Reference model of the paper's curves: a critically damped cylinder (model.md 6.2).
+    /// Reference model of the paper's curves: a critically damped cylinder (MODEL.md 6.2).
     ReferenceParams {
         /// Time constant of the fast strokes (b6 retracting, b5 extending).
         tau_fast_s: f64, "tau_fast", Time, 0.01, 1.0;

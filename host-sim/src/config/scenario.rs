@@ -68,7 +68,7 @@ pub struct ScenarioEvent {
     pub action: EventAction,
 }
 
-/// A rectangle of ground whose top is not at height zero. Axes as model.md:
+/// A rectangle of ground whose top is not at height zero. Axes as MODEL.md:
 /// x forward, y left, origin on the ground below the middle of the wheel axle
 /// at the start.
 #[derive(Debug, Clone, Copy, PartialEq)]

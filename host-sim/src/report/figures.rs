@@ -247,7 +247,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
         ),
         pair(
             "fig15-acceleration", 15, "accelerations a5 and a6", "[m/s²]",
-            "Accelerations after a 20 Hz low-pass. Red lines: the paper's axes, read in m/s² (its mm/s² cannot be: model.md §11).",
+            "Accelerations after a 20 Hz low-pass. Red lines: the paper's axes, read in m/s² (its mm/s² cannot be: MODEL.md §11).",
             vec![
                 ("a5", (-5.0, 10.0), acceleration(b5, |p| p.a5_m_s2)),
                 ("a6", (-10.0, 5.0), acceleration(b6, |p| p.a6_m_s2)),

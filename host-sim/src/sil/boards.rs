@@ -10,8 +10,8 @@ use wheeleg_node::hardware::{
 };
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::{JointParameters, WheelParameters};
-use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::snapshot::TickReport;
+use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{NodeIdentity, Transmission};
 use wheeleg_protocol::{Address, NackReason};
 use wheeleg_units::Micros;
@@ -92,9 +92,10 @@ impl JointBoard {
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        let parameters = stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
-            p.with(id, raw, true)
-        })?;
+        let parameters =
+            stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
+                p.with(id, raw, true)
+            })?;
         let sensor = AdcInput::default();
         let valves: [PwmChannel; 4] = std::array::from_fn(|_| PwmChannel::new(VALVE_COUNTS));
         let foot: [Line; 4] = std::array::from_fn(|_| Line::default());
@@ -106,7 +107,7 @@ impl JointBoard {
             vent_b,
         };
         let who = identity(address);
-        let application = if address.raw() % 3 == 0 {
+        let application = if address.raw().is_multiple_of(3) {
             let [front, back, left, right] = foot.clone();
             let switches = FootSwitches(front, back, left, right);
             JointNode::new(who, parameters, bank, sensor.clone(), switches)
@@ -162,7 +163,9 @@ impl JointBoard {
 /// the dump valve.
 enum WheelApplication {
     Plain(WheelNode<HBridge<PwmChannel, Line>, CounterInput, NoSwitches, NoDumpValve>),
-    WithSupply(WheelNode<HBridge<PwmChannel, Line>, CounterInput, SupplySwitch<Line>, DumpPin<Line>>),
+    WithSupply(
+        WheelNode<HBridge<PwmChannel, Line>, CounterInput, SupplySwitch<Line>, DumpPin<Line>>,
+    ),
 }
 
 macro_rules! each_wheel {
@@ -190,9 +193,10 @@ impl WheelBoard {
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        let parameters = stored_parameters(address, stored, WheelParameters::default(), |p, id, raw| {
-            p.with(id, raw, true)
-        })?;
+        let parameters =
+            stored_parameters(address, stored, WheelParameters::default(), |p, id, raw| {
+                p.with(id, raw, true)
+            })?;
         let encoder = CounterInput::default();
         let pulse = PwmChannel::new(BRIDGE_COUNTS);
         let (sign, supply, dump) = (Line::default(), Line::default(), Line::default());
@@ -207,8 +211,15 @@ impl WheelBoard {
             WheelNode::new(who, parameters, bridge, encoder.clone(), switch, valve)
                 .map(WheelApplication::WithSupply)
         } else {
-            WheelNode::new(who, parameters, bridge, encoder.clone(), NoSwitches, NoDumpValve)
-                .map(WheelApplication::Plain)
+            WheelNode::new(
+                who,
+                parameters,
+                bridge,
+                encoder.clone(),
+                NoSwitches,
+                NoDumpValve,
+            )
+            .map(WheelApplication::Plain)
         };
         Ok(Self {
             application: application.map_err(|e| rejected(address, e))?,
@@ -223,7 +234,11 @@ impl WheelBoard {
     /// Bridge duty that becomes active at this sample edge, −1..=1.
     pub(super) fn active_duty(&self) -> f64 {
         let magnitude = f64::from(self.pulse.preloaded()) / f64::from(BRIDGE_COUNTS);
-        if self.sign.level() { -magnitude } else { magnitude }
+        if self.sign.level() {
+            -magnitude
+        } else {
+            magnitude
+        }
     }
 
     /// Whether the dump valve is driven open.
@@ -237,7 +252,12 @@ impl WheelBoard {
     }
 
     /// Latches the inputs and runs the sample that starts now.
-    pub(super) fn tick(&mut self, now: Micros, encoder_edges: i64, supply_switch: bool) -> TickReport {
+    pub(super) fn tick(
+        &mut self,
+        now: Micros,
+        encoder_edges: i64,
+        supply_switch: bool,
+    ) -> TickReport {
         self.encoder.latch(encoder_edges);
         self.supply.set_level(supply_switch);
         each_wheel!(&mut self.application, node => {

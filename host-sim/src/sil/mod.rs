@@ -67,13 +67,11 @@ pub fn run(
         let happened = world.step()?;
         let now_ns = world.now_ns();
         match (happened, start_ns) {
-            (Happened::JointTick, None) => {
-                if operator.prepare(&mut world)? {
-                    start_ns = Some(now_ns);
-                    operator.report_start_up(recorder);
-                    operator.begin(&mut world)?;
-                    observer.tick(&world, 0, recorder);
-                }
+            (Happened::JointTick, None) if operator.prepare(&mut world)? => {
+                start_ns = Some(now_ns);
+                operator.report_start_up(recorder);
+                operator.begin(&mut world)?;
+                observer.tick(&world, 0, recorder);
             }
             (Happened::JointTick, Some(start_ns)) => {
                 let t_ns = now_ns - start_ns;
@@ -120,16 +118,28 @@ fn act(
     match action {
         EventAction::KillMaster => {
             world.kill_master();
-            recorder.event(t_ns, EventKind::Scenario, "the master dies and stays silent");
+            recorder.event(
+                t_ns,
+                EventKind::Scenario,
+                "the master dies and stays silent",
+            );
             Ok(())
         }
         EventAction::EStop => {
             recorder.event(t_ns, EventKind::Scenario, "E-stop pressed");
-            operator.submit(world, wheeleg_master::command::Command::EmergencyStop, t_ns, recorder)
+            operator.submit(
+                world,
+                wheeleg_master::command::Command::EmergencyStop,
+                t_ns,
+                recorder,
+            )
         }
-        EventAction::ClearFault => {
-            operator.submit(world, wheeleg_master::command::Command::ClearFault, t_ns, recorder)
-        }
+        EventAction::ClearFault => operator.submit(
+            world,
+            wheeleg_master::command::Command::ClearFault,
+            t_ns,
+            recorder,
+        ),
         EventAction::Command {
             name,
             joint,

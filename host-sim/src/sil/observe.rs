@@ -5,7 +5,7 @@ use wheeleg_master::setpoint::Phase;
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
 use wheeleg_plant::robot::Outputs;
-use wheeleg_protocol::{Address, FaultBits, LinkLossAction};
+use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction};
 
 use super::world::World;
 use crate::telemetry::{
@@ -20,6 +20,7 @@ const PA_PER_BAR: f64 = 1e5;
 pub(super) struct Observer {
     modes: [Option<Mode>; 8],
     faults: [FaultBits; 8],
+    grounded: [Option<bool>; 2],
     cycles: u32,
     bus_bytes: u64,
     bus_busy_ns: u64,
@@ -39,6 +40,19 @@ fn bits(levels: impl IntoIterator<Item = bool>) -> u8 {
         .fold(0, |bits, (i, high)| bits | u8::from(high) << i)
 }
 
+/// A board's foot inputs as the log numbers them: bit 0 front, 1 back, 2 left, 3 right.
+fn switch_bits(inputs: u8) -> u8 {
+    bits(
+        [
+            InputBits::FOOT_FRONT,
+            InputBits::FOOT_REAR,
+            InputBits::FOOT_LEFT,
+            InputBits::FOOT_RIGHT,
+        ]
+        .map(|bit| inputs & bit.raw() != 0),
+    )
+}
+
 impl Observer {
     /// Samples everything fast, at the start of a joint tick.
     pub(super) fn tick(&mut self, world: &World, t_ns: u64, recorder: &mut Recorder) {
@@ -53,10 +67,11 @@ impl Observer {
                 FootSample {
                     normal_force_n: out.foot_force_n[foot][2],
                     friction_force_n: out.foot_force_n[foot][0],
-                    clearance_mm: out.sole_m[foot][2] * 1e3,
-                    switches: vertical.switches,
+                    clearance_mm: out.foot_clearance_m[foot] * 1e3,
+                    switches: switch_bits(vertical.switches),
                 },
             );
+            self.notice_contact(foot, out.foot_switches[foot], t_ns, recorder);
         }
         recorder.body(
             t_ns,
@@ -78,7 +93,10 @@ impl Observer {
             },
         );
         if recorder.wants_state(t_ns) {
-            recorder.state(t_ns, blake3::Hash::from(world.state_hash()).to_hex().to_string());
+            recorder.state(
+                t_ns,
+                blake3::Hash::from(world.state_hash()).to_hex().to_string(),
+            );
         }
     }
 
@@ -146,6 +164,34 @@ impl Observer {
         }
     }
 
+    /// Touchdowns and lifts as they physically are become events in words; what the
+    /// master made of its switches stands beside them.
+    fn notice_contact(
+        &mut self,
+        foot: usize,
+        switches: [bool; 4],
+        t_ns: u64,
+        recorder: &mut Recorder,
+    ) {
+        let grounded = switches.contains(&true);
+        let before = self.grounded[foot].replace(grounded);
+        if before.is_none_or(|before| before == grounded) {
+            return;
+        }
+        let side = ["left", "right"][foot];
+        let text = if grounded {
+            let closed: Vec<&str> = ["front", "left", "back", "right"]
+                .into_iter()
+                .zip(switches)
+                .filter_map(|(name, closed)| closed.then_some(name))
+                .collect();
+            format!("ground: {side} foot touches, {}", closed.join(", "))
+        } else {
+            format!("ground: {side} foot free")
+        };
+        recorder.event(t_ns, EventKind::Contact, text);
+    }
+
     /// Changes of mode and fault become events in words.
     fn notice(
         &mut self,
@@ -162,7 +208,11 @@ impl Observer {
         };
         if self.modes[index] != Some(mode) {
             if let Some(before) = self.modes[index] {
-                recorder.event(t_ns, EventKind::Mode, format!("{name}: {before:?} to {mode:?}"));
+                recorder.event(
+                    t_ns,
+                    EventKind::Mode,
+                    format!("{name}: {before:?} to {mode:?}"),
+                );
             }
             self.modes[index] = Some(mode);
         }

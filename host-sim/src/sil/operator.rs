@@ -3,8 +3,9 @@
 
 use wheeleg_master::command::Command;
 use wheeleg_master::contact::Side;
-use wheeleg_master::event::Event;
+use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::layer1::foot::FootShape;
+use wheeleg_protocol::{Address, FaultBits};
 use wheeleg_units::PositionMm;
 
 use super::world::World;
@@ -58,9 +59,15 @@ pub(super) fn command(
             joint: the_joint()?,
             stroke_mm: mm(stroke_m.ok_or_else(|| missing("stroke"))?),
         },
-        "TransmitPosition" => Command::TransmitPosition { joint: the_joint()? },
-        "OpenAllValves" => Command::OpenAllValves { joint: the_joint()? },
-        "EmergencyBrake" => Command::EmergencyBrake { joint: the_joint()? },
+        "TransmitPosition" => Command::TransmitPosition {
+            joint: the_joint()?,
+        },
+        "OpenAllValves" => Command::OpenAllValves {
+            joint: the_joint()?,
+        },
+        "EmergencyBrake" => Command::EmergencyBrake {
+            joint: the_joint()?,
+        },
         "WheelReference" => Command::WheelReference {
             travel_mm: mm(travel_m.ok_or_else(|| missing("travel"))?),
         },
@@ -162,7 +169,11 @@ impl<'a> Operator<'a> {
     pub(super) fn report_start_up(&self, recorder: &mut Recorder) {
         for (us, text) in &self.notes {
             let at_s = *us as f64 * 1e-6;
-            recorder.event(0, EventKind::Info, format!("start-up, {at_s:.3} s after power-up: {text}"));
+            recorder.event(
+                0,
+                EventKind::Info,
+                format!("start-up, {at_s:.3} s after power-up: {text}"),
+            );
         }
     }
 
@@ -223,7 +234,11 @@ impl<'a> Operator<'a> {
     ) -> Result<(), SimError> {
         let name = format!("{:?}", command.code());
         if !world.master_alive() {
-            recorder.event(t_ns, EventKind::Command, format!("{name}: nobody answers, the master is dead"));
+            recorder.event(
+                t_ns,
+                EventKind::Command,
+                format!("{name}: nobody answers, the master is dead"),
+            );
             return Ok(());
         }
         let now_us = world.now_ns() / 1000;
@@ -263,5 +278,58 @@ fn refused(command: &Command, reason: &str) -> SimError {
 
 /// An event of the master in words.
 fn describe(event: &Event) -> String {
-    format!("master: {event:?}")
+    let text = match *event {
+        Event::Done(ticket) => format!("{:?} done", ticket.code),
+        Event::Refused { ticket, reason } => format!("{:?} refused: {reason:?}", ticket.code),
+        Event::NodeReady(node) => format!("{} identified, interface matches", board(node)),
+        Event::SchemaMismatch {
+            node,
+            master,
+            theirs,
+        } => format!(
+            "{} has interface {theirs:016x}, the master has {master:016x}: will not arm",
+            board(node)
+        ),
+        Event::WrongRole(node) => format!("{} answers as another kind of board", board(node)),
+        Event::NodeLost(node) => format!("{} is lost", board(node)),
+        Event::NodeBack(node) => format!("{} answers again", board(node)),
+        Event::Armed => "all axes armed".to_owned(),
+        Event::Disarmed => "all axes disarmed".to_owned(),
+        Event::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
+        Event::Homed => "start pose reached".to_owned(),
+        Event::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
+        Event::GaitDone { steps } => format!("gait over after {steps} steps"),
+        Event::TrajectoryDone => "foot trajectory over".to_owned(),
+        Event::TouchDown { side, sector } => match sector {
+            Some(sector) => format!("{side:?} foot touches with its {sector:?} side"),
+            None => format!("{side:?} foot stands flat"),
+        },
+        Event::LiftOff(side) => format!("{side:?} foot leaves the ground"),
+        Event::Position { joint, stroke_mm } => {
+            format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
+        }
+    };
+    format!("master: {text}")
+}
+
+/// Name of a board by its bus address.
+fn board(address: u8) -> String {
+    Address::new(address).map_or_else(|| format!("address {address}"), |a| a.to_string())
+}
+
+fn hold_reason(reason: &HoldReason) -> String {
+    match *reason {
+        HoldReason::WrongRole(node) => format!("{} is another kind of board", board(node)),
+        HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
+        HoldReason::NodeFault { node, faults } => {
+            let words: Vec<&str> = FaultBits::from_raw(faults)
+                .iter()
+                .map(|fault| fault.sentence())
+                .collect();
+            format!("{} reports: {}", board(node), words.join(" "))
+        }
+        HoldReason::SupplyLost => "supply pressure lost".to_owned(),
+        HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
+        HoldReason::EmergencyStop => "E-stop".to_owned(),
+    }
 }

@@ -5,9 +5,11 @@ use std::f64::consts::TAU;
 
 use fixed::types::I16F16;
 use wheeleg_master::MasterConfig;
+use wheeleg_master::config::SwitchFrame;
 use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::params::{GaitParams, Pattern};
 use wheeleg_plant::PlantParams;
+use wheeleg_plant::ground::{Ground, GroundPatch};
 use wheeleg_protocol::param::WheelParam;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -33,7 +35,7 @@ fn microseconds(s: f64) -> u32 {
     (s * 1e6).round() as u32
 }
 
-/// The plant of the robot, standing in the start pose of the gait.
+/// The plant of the robot, standing on the scenario's ground in the start pose of the gait.
 ///
 /// Powering up in the start pose, chambers at their initial pressures, is the
 /// paper's home position; the start-up then arms and settles there.
@@ -48,6 +50,14 @@ pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
     };
     plant.initial_stroke_m[..3].copy_from_slice(&left);
     plant.initial_stroke_m[3..].copy_from_slice(&right);
+    let patch = |p: &crate::config::GroundPatch| GroundPatch {
+        x_m: p.x_m,
+        y_m: p.y_m,
+        height_m: p.height_m,
+    };
+    plant.ground = Ground {
+        patches: scenario.ground.iter().map(patch).collect(),
+    };
     plant
 }
 
@@ -79,6 +89,8 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
             circumference_um: circumference_um.round() as u32,
         },
         wheel_sample_us: wheel_sample_us(robot),
+        // The plant's soles name left and right as the robot looks, on both legs.
+        switch_frame: SwitchFrame::Robot,
         ..MasterConfig::default()
     }
 }
@@ -86,7 +98,9 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
 /// Sample time of the wheel boards, t = 16 (T + 1) / f (HCTL-1100 data sheet p. 24), µs.
 fn wheel_sample_us(robot: &RobotConfig) -> u32 {
     let id = WheelParam::SampleTimer.id();
-    let stored = robot.node.wheels[0].iter().find(|(number, _)| *number == id);
+    let stored = robot.node.wheels[0]
+        .iter()
+        .find(|(number, _)| *number == id);
     let timer = stored.map_or(WheelParam::SampleTimer.info().default, |(_, raw)| *raw);
     16 * (timer.unsigned_abs() + 1) / (WHEEL_CLOCK_HZ / 1_000_000)
 }

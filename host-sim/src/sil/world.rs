@@ -96,11 +96,16 @@ impl World {
         let refused = |part: &str, e: &dyn std::fmt::Display| {
             SimError::simulation(
                 format!("the {part} refuses its parameters: {e}"),
-                format!("correct the robot `{}`; `wheeleg params` lists it", robot.name),
+                format!(
+                    "correct the robot `{}`; `wheeleg params` lists it",
+                    robot.name
+                ),
             )
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
-        let state = plant.initial_state(seed).map_err(|e| refused("plant", &e))?;
+        let state = plant
+            .initial_state(seed)
+            .map_err(|e| refused("plant", &e))?;
         let stored = &robot.node;
         let address = |n: u8| {
             Address::new(n).ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
@@ -113,7 +118,14 @@ impl World {
             plant,
             state,
             inputs: Inputs::default(),
-            joints: [joint(1)?, joint(2)?, joint(3)?, joint(4)?, joint(5)?, joint(6)?],
+            joints: [
+                joint(1)?,
+                joint(2)?,
+                joint(3)?,
+                joint(4)?,
+                joint(5)?,
+                joint(6)?,
+            ],
             wheels: [wheel(7)?, wheel(8)?],
             bus: Bus::new(robot.bus.baud_bit_s as u32),
             master: Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?,
@@ -206,7 +218,8 @@ impl World {
     fn master_cycle(&mut self) {
         if self.master_alive {
             let bytes = self.master.cycle(self.now_ns / NS_PER_US);
-            self.bus.transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+            self.bus
+                .transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
         }
         self.next_cycle_ns += self.cycle_ns;
     }
@@ -241,7 +254,11 @@ impl World {
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
             let ahead = t.start_at.get().wrapping_sub(now.get());
             // More than half the counter's range ahead means: already past.
-            let ahead_ns = if ahead < 1 << 31 { u64::from(ahead) * NS_PER_US } else { 0 };
+            let ahead_ns = if ahead < 1 << 31 {
+                u64::from(ahead) * NS_PER_US
+            } else {
+                0
+            };
             bus.transmit(from, now_ns + ahead_ns, t.bytes.to_vec());
         };
         for (board, address) in self.joints.iter_mut().zip(1..) {
@@ -258,10 +275,12 @@ impl World {
 
     /// Lets the master use the line for a request while nothing is on it or scheduled.
     fn offer_acyclic(&mut self) {
-        if self.master_alive && self.bus.next_delivery_ns().is_none()
+        if self.master_alive
+            && self.bus.next_delivery_ns().is_none()
             && let Some(bytes) = self.master.next_acyclic(self.now_ns / NS_PER_US)
         {
-            self.bus.transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+            self.bus
+                .transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
         }
     }
 

@@ -17,7 +17,7 @@ use super::samples::{
 use crate::SimError;
 
 /// Corner of the low-pass on force and acceleration signals, Hz
-/// (design.md §3, "Forces in plots").
+/// (ARCHITECTURE.md, "Forces").
 pub const PLOT_CUTOFF_HZ: f64 = 20.0;
 /// Period of the samples that [`Recorder::joint`] is given, s.
 const SAMPLE_PERIOD_S: f64 = 1e-3;

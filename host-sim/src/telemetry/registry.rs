@@ -2,7 +2,7 @@
 
 use super::samples;
 
-/// Which layer of the machine a signal belongs to (design.md §1).
+/// Which layer of the machine a signal belongs to (ARCHITECTURE.md).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layer {
     /// Simulated physics: what really happens.

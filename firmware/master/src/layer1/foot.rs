@@ -1,7 +1,7 @@
 //! Foot trajectory of the paper's §6 ("y = sin²(time/8)", Figs. 5–8) through
 //! inverse kinematics.
 //!
-//! The axes of Figs. 5–8 fit one reading only (model.md §6.1): the abscissa is
+//! The axes of Figs. 5–8 fit one reading only (MODEL.md §6.1): the abscissa is
 //! the argument time/8, the arch takes 8π s, and with rate Ω = 1/8 rad/s
 //!
 //! `x = X t/T,  z = A sin²(Ω t),  T = π/Ω`.

@@ -5,7 +5,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::contact::Side;
 
-/// Stroke of every cylinder in mm (model.md: ASSUMED, fits the axes of Figs. 12–13).
+/// Stroke of every cylinder in mm (MODEL.md: ASSUMED, fits the axes of Figs. 12–13).
 pub const STROKE_MM: PositionMm = PositionMm::from_int(180);
 
 /// Which leg steps when.
@@ -63,7 +63,7 @@ pub struct GaitParams {
 }
 
 impl Default for GaitParams {
-    /// The paper's test: model.md §6.2.
+    /// The paper's test: MODEL.md §6.2.
     fn default() -> Self {
         Self {
             steps: 3,

@@ -1,4 +1,4 @@
-//! The square-wave gait of the paper's Figs. 9 and 12–16 (model.md §6.2).
+//! The square-wave gait of the paper's Figs. 9 and 12–16 (MODEL.md §6.2).
 //!
 //! The references are steps; the smooth curves of the figures are the answers
 //! of the cylinders. Within step `k`, with `u` the time since its start:
