@@ -128,6 +128,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, SimError> {
         print(&run_text(&finished))?;
     }
     Ok(if !finished.summary.complete {
+        eprintln!("interrupted; the files hold what was recorded until then");
         ExitCode::from(INTERRUPTED)
     } else if args.strict && !finished.summary.passed {
         ExitCode::from(TARGETS_MISSED)

@@ -95,8 +95,11 @@ fn json_is_one_object_with_every_key() {
         assert!(object.contains_key(key), "no `{key}` in {json}");
     }
     assert_eq!(json["seed"], 3);
+    let recorded = json["recorded_s"].as_f64().expect("a number");
+    assert!((recorded - 0.5).abs() < 1e-6, "{recorded}");
+    // The start-up is simulated too.
     let simulated = json["simulated_s"].as_f64().expect("a number");
-    assert!((simulated - 0.5).abs() < 1e-6, "{simulated}");
+    assert!((1.0..5.0).contains(&(simulated - recorded)), "{simulated}");
     let hash = json["hash"].as_str().expect("text");
     assert_eq!(hash.len(), 64, "{hash}");
     assert!(hash.chars().all(|c| c.is_ascii_hexdigit()), "{hash}");
@@ -163,9 +166,9 @@ fn list_and_params_tell_what_there_is() {
     // Parameters come with their units.
     let mut params = wheeleg();
     params.arg("params").assert().success().stdout(
-        contains("pwm_period_us")
-            .or(contains("pwm_period"))
-            .and(contains("mm")),
+        contains("pwm_period")
+            .and(contains("slew_rate"))
+            .and(contains("mm/s")),
     );
 }
 

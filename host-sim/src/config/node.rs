@@ -45,7 +45,35 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
             set(wheel, id, raw);
         }
     }
+    list_defaults(r, "node.joint", JOINT_PARAMS);
+    list_defaults(r, "node.wheel", WHEEL_PARAMS);
     params
+}
+
+/// A raw number in its unit without the tail of its binary fraction.
+fn tidy(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+/// Lists what the file leaves at the board's default, so that a listing of the
+/// robot is complete.
+fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
+    let entry = r.table(path);
+    let unset = table
+        .iter()
+        .filter(|p| entry.as_ref().is_none_or(|e| e.get(p.name).is_none()));
+    for info in unset {
+        let scale = scale(info.format);
+        r.list(ParameterInfo {
+            path: format!("{path}.{}", info.name),
+            value: vec![tidy(f64::from(info.default) / scale)],
+            unit: info.unit.to_owned(),
+            min: tidy(f64::from(info.min) / scale),
+            max: tidy(f64::from(info.max) / scale),
+            source: "default of the board (protocol's parameter table)".to_owned(),
+            doc: info.text,
+        });
+    }
 }
 
 fn set(list: &mut Vec<(u16, i32)>, id: u16, raw: i32) {
