@@ -1,0 +1,152 @@
+//! One side of a foot on a ledge: the same side on the ground, in the node and in the master.
+
+use std::ops::ControlFlow;
+
+use wheeleg_sim::config::{Scenario, builtin};
+use wheeleg_sim::sil;
+use wheeleg_sim::telemetry::{Recorder, Recording};
+
+/// Sides with their bit in the log and the master's name for them.
+const SIDES: [(&str, u8, &str); 4] = [
+    ("front", 1, "front"),
+    ("back", 2, "rear"),
+    ("left", 4, "left"),
+    ("right", 8, "right"),
+];
+
+/// A foot that is longer off the ground than this has been lifted, not shaken.
+const LIFTED_NS: u64 = 200_000_000;
+
+/// From the first to the last of the three samples that a node's debounce asks for.
+const DEBOUNCE_NS: u64 = 2_000_000;
+
+fn run(scenario: &Scenario) -> Recording {
+    let robot = builtin::robot(&scenario.robot).expect("the robot is built in");
+    let mut recorder = Recorder::in_memory();
+    let go_on = &mut |_| ControlFlow::Continue(());
+    let outcome = sil::run(scenario, &robot, scenario.seed, &mut recorder, go_on);
+    let outcome = outcome.expect("the run is within the plant's range");
+    assert!((outcome.recorded_s - scenario.duration_s).abs() < 1e-6);
+    recorder.finish().expect("nothing is written")
+}
+
+fn scenario(side: &str) -> Scenario {
+    builtin::scenario(&format!("foot-side-{side}")).expect("the scenario is built in")
+}
+
+/// Time and switches of a foot's first sensed contact after a lift.
+fn touchdown(recording: &Recording, foot: usize) -> (u64, u8) {
+    let mut open_since = None;
+    for row in &recording.feet[foot] {
+        match (row.v.switches, open_since) {
+            (0, None) => open_since = Some(row.t_ns),
+            (0, Some(_)) => {}
+            (switches, Some(since)) if row.t_ns - since > LIFTED_NS => {
+                return (row.t_ns, switches);
+            }
+            _ => open_since = None,
+        }
+    }
+    panic!("the foot is not lifted and put down");
+}
+
+/// Text and time of the first contact event from a source at or after a time.
+fn event<'a>(recording: &'a Recording, source: &str, words: &str, from_ns: u64) -> (u64, &'a str) {
+    let mut contacts = recording.events.iter().filter(|e| {
+        let text = &e.v.text;
+        e.t_ns >= from_ns
+            && e.v.kind == "contact"
+            && text.starts_with(source)
+            && text.to_lowercase().contains(words)
+    });
+    let first = contacts.next();
+    let first = first.unwrap_or_else(|| panic!("no {source} event `{words}` in the log"));
+    (first.t_ns, &first.v.text)
+}
+
+/// Holds one run against the side on which its foot must touch.
+fn assert_side(recording: &Recording, foot: usize, (side, bit, reported): (&str, u8, &str)) {
+    let leg = ["left", "right"][foot];
+    let touches = format!("{leg} foot touches");
+    let (sensed_ns, switches) = touchdown(recording, foot);
+    assert_eq!(switches, bit, "{leg} foot, {side}: sensed at first contact");
+
+    // What physically is: the node follows when the level has stood for its debounce, the
+    // last of whose samples is the one that counts.
+    let (ground_ns, text) = event(recording, "ground:", &touches, sensed_ns - 5_000_000);
+    assert_eq!(text, format!("ground: {leg} foot touches, {side}"));
+    let lag_ns = sensed_ns.abs_diff(ground_ns);
+    assert_eq!(lag_ns, DEBOUNCE_NS, "{leg} foot, {side}");
+
+    // What the master makes of the replies of the next cycles.
+    let (master_ns, text) = event(recording, "master:", &touches, sensed_ns);
+    assert!(
+        text.to_lowercase().contains(&format!("{reported} side")),
+        "{leg} foot, {side}: {text}"
+    );
+    let late_ns = master_ns - sensed_ns;
+    assert!(late_ns <= 30_000_000, "{side}: reported {late_ns} ns late");
+
+    // The foot is carried there, and the side across from the ledge stays in the air.
+    let across = if bit & 0b0011 != 0 {
+        bit ^ 0b0011
+    } else {
+        bit ^ 0b1100
+    };
+    let after = |row: &&wheeleg_sim::telemetry::Row<_>| {
+        (sensed_ns..sensed_ns + 100_000_000).contains(&row.t_ns)
+    };
+    let rows: Vec<_> = recording.feet[foot].iter().filter(after).collect();
+    assert!(
+        rows.iter().all(|row| row.v.switches & across == 0),
+        "{side}"
+    );
+    let heaviest = rows
+        .iter()
+        .map(|row| row.v.normal_force_n)
+        .fold(0.0, f64::max);
+    assert!(heaviest > 5.0, "{side}: {heaviest} N");
+    assert!(rows.iter().all(|row| row.v.clearance_mm < 1.0), "{side}");
+}
+
+#[test]
+fn each_side_of_the_left_foot_is_felt_as_that_side() {
+    for side in SIDES {
+        let scenario = scenario(side.0);
+        let recording = run(&scenario);
+        assert_side(&recording, 0, side);
+    }
+}
+
+/// The right leg is the mirror image of the left, its board's inputs are not: left and right
+/// must not change places on the way.
+#[test]
+fn each_side_of_the_right_foot_is_felt_as_that_side() {
+    for side in SIDES {
+        let mut scenario = scenario(side.0);
+        scenario.motion = wheeleg_sim::config::Motion::SquareWave {
+            leg: wheeleg_sim::config::LegChoice::Right,
+        };
+        // The right foot comes down where the left one would, less the track of the feet.
+        for patch in &mut scenario.ground {
+            patch.y_m = patch.y_m.map(|y| y - 0.40);
+        }
+        let recording = run(&scenario);
+        assert_side(&recording, 1, side);
+    }
+}
+
+/// Without the ledge the same foot comes down later, and on its whole sole.
+#[test]
+fn without_the_ledge_the_foot_comes_down_flat_and_later() {
+    let mut scenario = scenario("left");
+    let (ledge_ns, _) = touchdown(&run(&scenario), 0);
+    scenario.ground.clear();
+    let recording = run(&scenario);
+    let (flat_ns, _) = touchdown(&recording, 0);
+    assert!(flat_ns > ledge_ns + 30_000_000, "{flat_ns} {ledge_ns}");
+    let flat = recording.feet[0]
+        .iter()
+        .any(|row| row.t_ns < flat_ns + 100_000_000 && row.t_ns >= flat_ns && row.v.switches == 15);
+    assert!(flat, "four switches within 100 ms of touchdown");
+}
