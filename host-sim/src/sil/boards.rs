@@ -108,8 +108,8 @@ impl JointBoard {
         };
         let who = identity(address);
         let application = if address.raw().is_multiple_of(3) {
-            let [front, back, left, right] = foot.clone();
-            let switches = FootSwitches(front, back, left, right);
+            let [front, left, rear, right] = foot.clone();
+            let switches = FootSwitches(front, left, rear, right);
             JointNode::new(who, parameters, bank, sensor.clone(), switches)
                 .map(JointApplication::WithFoot)
         } else {
