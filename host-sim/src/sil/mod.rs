@@ -56,7 +56,7 @@ pub fn run(
     let plant = setup::plant(scenario, robot);
     let master = setup::master(scenario, robot);
     let mut world = World::new(robot, &plant, master, seed)?;
-    let mut operator = Operator::new(scenario);
+    let mut operator = Operator::new(scenario, &robot.start_up);
     let mut observer = Observer::default();
     let cycle_ns = (robot.bus.cycle_s * 1e9).round() as u64;
     let duration_ns = (scenario.duration_s * 1e9).round() as u64;

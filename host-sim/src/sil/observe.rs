@@ -28,11 +28,6 @@ pub(super) struct Observer {
     step: u16,
 }
 
-/// Number of a mode in the log: that of the wire.
-fn mode_code(mode: Mode) -> u8 {
-    mode.code()
-}
-
 fn bits(levels: impl IntoIterator<Item = bool>) -> u8 {
     levels
         .into_iter()
@@ -88,6 +83,7 @@ impl Observer {
             SupplySample {
                 pressure_bar: out.supply_pressure_pa / PA_PER_BAR,
                 air_used_dm3: out.air_used_kg / gas.reference_density_kg_m3 * 1e3,
+                dump_commanded: world.wheels()[0].dumps(),
                 dump_open: out.dumping,
                 pressure_switch: world.wheels()[0].snapshot().supply_present,
             },
@@ -110,8 +106,10 @@ impl Observer {
                 t_ns,
                 i,
                 JointSample {
+                    commanded_mm: node.commanded.to_f64(),
                     reference_mm: node.reference.to_f64(),
                     sensed_mm: node.measured.to_f64(),
+                    sensed_velocity_mm_s: node.velocity.to_f64(),
                     position_mm: c.stroke_m * 1e3,
                     velocity_mm_s: c.velocity_m_s * 1e3,
                     acceleration_raw_m_s2: c.acceleration_m_s2,
@@ -128,7 +126,8 @@ impl Observer {
                     vent_b_us,
                     valves_open: bits(c.valve_open),
                     valve_edges: inputs.edges[i],
-                    mode: mode_code(node.mode),
+                    limits: node.limits.raw(),
+                    mode: node.mode.code(),
                     faults: u32::from(node.faults.raw()),
                 },
             );
@@ -156,7 +155,8 @@ impl Observer {
                     current_a: out.motor_current_a[i],
                     torque_n_m: out.wheel_torque_n_m[i],
                     count: node.count.get(),
-                    mode: mode_code(node.mode),
+                    limits: node.limits.raw(),
+                    mode: node.mode.code(),
                     faults: u32::from(node.faults.raw()),
                 },
             );
@@ -253,6 +253,7 @@ impl Observer {
                 bytes: bytes as u32,
                 load: busy_ns as f64 / cycle_ns as f64,
                 replies: last.map_or(0, |r| r.replies.iter().flatten().count() as u8),
+                collisions: line.collisions as u32,
                 errors: self.last.map_or(0, |r| r.counters.link.errors()),
             },
         );
@@ -289,7 +290,6 @@ impl Observer {
                 .map(|slot| u8::from(slot.on_link_loss != LinkLossAction::Hold))
                 .max()
                 .unwrap_or(0),
-            fifo_depth: 0,
             fifo_drops: counters.lost_setpoints
                 + counters.lost_feedback
                 + counters.lost_records

@@ -10,14 +10,8 @@ use wheeleg_units::PositionMm;
 
 use super::world::World;
 use crate::SimError;
-use crate::config::{LegChoice, Motion, Scenario, ScenarioEvent};
+use crate::config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
 use crate::telemetry::{EventKind, Recorder};
-
-/// Longest start-up, simulated ns: enumeration, homing and settling.
-const START_UP_LIMIT_NS: u64 = 40_000_000_000;
-/// Rest at the start pose before the record begins, ns: all valves have
-/// settled and trapped pressures stand.
-const SETTLE_NS: u64 = 1_000_000_000;
 
 /// How far the start-up has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +25,8 @@ enum Stage {
 /// The operator of one run.
 pub(super) struct Operator<'a> {
     scenario: &'a Scenario,
+    rest_ns: u64,
+    limit_ns: u64,
     stage: Stage,
     notes: Vec<(u64, String)>,
     next_event: usize,
@@ -98,9 +94,12 @@ pub(super) fn side(leg: LegChoice) -> Side {
 
 impl<'a> Operator<'a> {
     /// An operator at a robot that is just being switched on.
-    pub(super) fn new(scenario: &'a Scenario) -> Self {
+    pub(super) fn new(scenario: &'a Scenario, start_up: &StartUpParams) -> Self {
+        let ns = |s: f64| (s * 1e9).round() as u64;
         Self {
             scenario,
+            rest_ns: ns(start_up.rest_s),
+            limit_ns: ns(start_up.limit_s),
             stage: Stage::Enumerating,
             notes: Vec::new(),
             next_event: 0,
@@ -120,7 +119,7 @@ impl<'a> Operator<'a> {
             match event {
                 Event::Homed if self.stage == Stage::Homing => {
                     self.stage = Stage::Settling {
-                        until_ns: now_ns + SETTLE_NS,
+                        until_ns: now_ns + self.rest_ns,
                     };
                 }
                 Event::HomingFailed { .. }
@@ -134,7 +133,7 @@ impl<'a> Operator<'a> {
             Stage::Enumerating if world.master().is_ready() => (Command::Arm, Stage::Arming),
             Stage::Arming if world.master().is_armed() => (Command::Stand, Stage::Homing),
             Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
-            _ if now_ns > START_UP_LIMIT_NS => return Err(self.not_ready(now_ns)),
+            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns)),
             _ => return Ok(false),
         };
         world
