@@ -80,9 +80,12 @@ pub enum Command {
         /// Which correction.
         correction: CorrectionKind,
     },
-    /// Drive both wheels by a distance from where they are.
+    /// Drive both wheels by a distance from the last reference sent to them, or
+    /// from where they are if there was none since the last stop.
     WheelReference {
-        /// Distance, mm, positive forward, −32 000..=32 000.
+        /// Distance, mm, positive forward, at most 32 000 either way and at most
+        /// 2^22 − 1 encoder counts from where the wheels are: the 24-bit
+        /// counter tells no more apart.
         travel_mm: PositionMm,
     },
     /// Highest speed of a wheel move, mm/s, 1..=400.

@@ -198,7 +198,8 @@ impl Dispatcher {
     /// Checks number and deadline, and uses the number up.
     ///
     /// A number is used up even if the command is refused later: a client that
-    /// tries again sends a new command with a new number.
+    /// tries again sends a new command with a new number. An E-stop of a known
+    /// client is never refused.
     ///
     /// # Errors
     /// See [`Reject`].
@@ -207,6 +208,24 @@ impl Dispatcher {
             .last
             .get_mut(usize::from(request.client))
             .ok_or(Reject::UnknownClient)?;
+        let accepted = Accepted {
+            ticket: Ticket {
+                client: request.client,
+                id: request.id,
+                code: request.command.code(),
+            },
+            deadline_us: request.deadline_us,
+            command: request.command,
+        };
+        if matches!(request.command, Command::EmergencyStop) {
+            // A stop is obeyed however old, repeated or overtaken it is; a number
+            // behind the last one does not turn the count back.
+            let ahead = last.is_none_or(|seen| request.id.wrapping_sub(seen) <= u32::MAX >> 1_u32);
+            if ahead {
+                *last = Some(request.id);
+            }
+            return Ok(accepted);
+        }
         if let Some(seen) = *last {
             let ahead = request.id.wrapping_sub(seen);
             if ahead == 0 {
@@ -217,9 +236,7 @@ impl Dispatcher {
             }
         }
         *last = Some(request.id);
-        // A stop is obeyed however old it is.
-        let stop = matches!(request.command, Command::EmergencyStop);
-        if now_us > request.deadline_us && !stop {
+        if now_us > request.deadline_us {
             return Err(Reject::Expired {
                 late_us: now_us.saturating_sub(request.deadline_us),
             });
@@ -227,15 +244,7 @@ impl Dispatcher {
         if request.deadline_us.saturating_sub(now_us) > DEADLINE_MAX_US {
             return Err(Reject::DeadlineTooFar);
         }
-        Ok(Accepted {
-            ticket: Ticket {
-                client: request.client,
-                id: request.id,
-                code: request.command.code(),
-            },
-            deadline_us: request.deadline_us,
-            command: request.command,
-        })
+        Ok(accepted)
     }
 
     /// Hands an admitted command to the queue of its layer.

@@ -64,7 +64,7 @@ pub const POLICIES: [FifoPolicy; 5] = [
         name: "dispatcher -> layer 0",
         depth: depth(COMMAND_STORAGE),
         when_full: WhenFull::Reject,
-        why: "a command that waits unseen is a command that runs late; stop commands do not queue",
+        why: "a command that waits unseen is a command that runs late; the E-stop does not queue",
     },
     FifoPolicy {
         name: "dispatcher -> layer 1",
@@ -117,11 +117,6 @@ pub fn push_drop_oldest<T, const N: usize>(queue: &mut Queue<T, N>, item: T) -> 
             1
         }
     }
-}
-
-/// Stores `item` unless the queue is full. Returns how many items were lost (0 or 1).
-pub fn push_or_count<T, const N: usize>(queue: &mut Queue<T, N>, item: T) -> u32 {
-    u32::from(queue.enqueue(item).is_err())
 }
 
 /// Takes the newest item and discards older ones. Bounded by the queue's depth.

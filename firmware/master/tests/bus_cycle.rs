@@ -9,6 +9,7 @@ use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::contact::{Sector, Side};
 use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::Event;
+use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{
     Address, BoardKind, InputBits, Message, NackReason, NodeMode, SCHEMA_HASH, SyncFlags,
@@ -128,6 +129,76 @@ fn one_refusal_while_arming_disarms_the_others() {
         assert_eq!(rig.node(node).mode, NodeMode::Idle, "{node}");
     }
     assert!(!rig.master.is_armed());
+}
+
+#[test]
+fn arming_without_room_for_all_requests_arms_nobody() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    rig.node(1).silent = true;
+    let mut tickets = Vec::new();
+    for _ in 0..2 {
+        for _ in 0..8 {
+            tickets.push(rig.submit(Command::TransmitPosition { joint: 1 }));
+        }
+        rig.cycle();
+    }
+    for _ in 0..7 {
+        tickets.push(rig.submit(Command::TransmitPosition { joint: 1 }));
+    }
+    let arm = rig.submit(Command::Arm);
+    rig.cycle();
+    assert_eq!(rig.refusal(arm), Some(Refusal::Busy));
+    rig.node(1).silent = false;
+    rig.run(60);
+    for node in 1..=8 {
+        assert_eq!(rig.node(node).mode, NodeMode::Idle, "{node}");
+    }
+    for ticket in tickets {
+        assert!(rig.done(ticket) || rig.refusal(ticket).is_some());
+    }
+}
+
+#[test]
+fn a_user_command_behind_a_failed_arming_is_answered() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.node(6).refuse_arm = true;
+    rig.run(60);
+    let arm = rig.submit(Command::Arm);
+    let behind = rig.submit(Command::TransmitPosition { joint: 2 });
+    rig.run(40);
+    assert!(rig.refusal(arm).is_some());
+    assert_eq!(rig.refusal(behind), Some(Refusal::Interrupted));
+}
+
+#[test]
+fn a_wheel_move_beyond_the_encoder_circle_is_refused() {
+    // 520 000 counts and 942.478 mm per turn: 2^22 − 1 counts are 7602 mm.
+    let wheels = WheelGeometry {
+        counts_per_revolution: 520_000,
+        circumference_um: 942_478,
+    };
+    let mut rig = Rig::new(MasterConfig {
+        wheels,
+        ..MasterConfig::default()
+    });
+    rig.arm();
+    let go = |rig: &mut Rig, mm| {
+        let travel_mm = PositionMm::from_int(mm);
+        let ticket = rig.submit(Command::WheelReference { travel_mm });
+        rig.cycle();
+        (rig.refusal(ticket), rig.done(ticket))
+    };
+    // 20 m are 11.0 million counts: modulo 2^24 that is 10.4 m backward.
+    for far in [20_000, 7_603, -7_603] {
+        let (refusal, done) = go(&mut rig, far);
+        assert!(matches!(refusal, Some(Refusal::Parameter(_))), "{far}");
+        assert!(!done);
+    }
+    assert_eq!(go(&mut rig, 7_500), (None, true));
+    // A second one would add up to 15 m from where the wheels are.
+    assert_eq!(go(&mut rig, 7_500), (Some(Refusal::Moving), false));
+    assert_eq!(go(&mut rig, -7_500), (None, true));
 }
 
 #[test]

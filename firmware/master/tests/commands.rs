@@ -4,7 +4,7 @@ use wheeleg_master::command::{Command, CommandCode, CorrectionKind, Layer, TABLE
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject, Request};
 use wheeleg_master::event::{EVENT_DEPTH, Event, Events, HoldReason};
-use wheeleg_master::fifo::{POLICIES, WhenFull, push_drop_oldest, push_or_count, take_newest};
+use wheeleg_master::fifo::{POLICIES, WhenFull, push_drop_oldest, take_newest};
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_master::layer1::params::GaitParams;
 use wheeleg_master::{Master, MasterConfig};
@@ -171,6 +171,30 @@ fn an_old_emergency_stop_is_obeyed() {
 }
 
 #[test]
+fn a_repeated_overtaken_or_early_emergency_stop_is_obeyed() {
+    let now = 5_000_000;
+    for (id, deadline_us) in [(10, now), (9, now), (11, now + DEADLINE_MAX_US + 1)] {
+        let mut master = Master::new(MasterConfig::default()).unwrap();
+        master.submit_request(request(1, 10, now), now).unwrap();
+        let stop = Request {
+            command: Command::EmergencyStop,
+            ..request(1, id, deadline_us)
+        };
+        assert!(master.submit_request(stop, now).is_ok(), "{id}");
+        assert_eq!(master.layer0().hold(), Some(HoldReason::EmergencyStop));
+        // The count of the client does not go back.
+        assert_eq!(
+            master.submit_request(request(1, 10, now), now).err(),
+            Some(if id == 11 {
+                Reject::OutOfOrder { last: 11 }
+            } else {
+                Reject::Duplicate
+            })
+        );
+    }
+}
+
+#[test]
 fn what_waited_through_a_stall_expires_in_the_queue() {
     let mut master = Master::new(MasterConfig::default()).unwrap();
     let ticket = master
@@ -201,10 +225,9 @@ fn full_queues_answer_as_documented() {
     let lost: u32 = (0..5).map(|i| push_drop_oldest(&mut queue, i)).sum();
     assert_eq!((lost, queue.len()), (2, 3));
     assert_eq!(queue.iter().copied().collect::<Vec<_>>(), [2, 3, 4]);
-    assert_eq!(push_or_count(&mut queue, 9), 1);
     assert_eq!(take_newest(&mut queue), Some(4));
     assert_eq!(take_newest(&mut queue), None);
-    assert_eq!(push_or_count(&mut queue, 9), 0);
+    assert_eq!(push_drop_oldest(&mut queue, 9), 0);
     assert_eq!(
         POLICIES.map(|policy| (policy.depth, policy.when_full)),
         [

@@ -5,8 +5,11 @@ use wheeleg_protocol::{Address, Message};
 
 use crate::dispatcher::Ticket;
 
-/// Requests that can wait. Arming needs 14, a stop 8.
+/// Requests that can wait. Arming needs [`ARMING_JOBS`], a stop 8, a clear 16.
 pub const JOBS: usize = 32;
+
+/// Requests that arming makes: one to each joint, four to each wheel.
+pub const ARMING_JOBS: usize = 14;
 
 /// Why a request is made; decides what its answer means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +51,12 @@ impl Jobs {
         Self {
             queue: Deque::new(),
         }
+    }
+
+    /// Whether `count` more requests fit.
+    #[must_use]
+    pub fn has_room(&self, count: usize) -> bool {
+        self.queue.len().saturating_add(count) <= self.queue.capacity()
     }
 
     /// Adds a request. `false` if the queue is full; then nothing changed.

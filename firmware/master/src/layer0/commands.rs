@@ -4,7 +4,7 @@ use wheeleg_protocol as proto;
 use wheeleg_protocol::{Address, Correction, Message, OpenMode, WheelControlMode};
 use wheeleg_units::PositionMm;
 
-use super::acyclic::{Job, Purpose};
+use super::acyclic::{ARMING_JOBS, Job, Purpose};
 use super::wheels::Wheels;
 use super::{Group, GroupKind, Layer0, Power};
 use crate::command::{Command, CorrectionKind};
@@ -74,9 +74,16 @@ impl Layer0 {
             }
             Command::WheelReference { travel_mm } => {
                 self.may_lead()?;
-                let limit = const { fixed::types::I16F16::lit("32000") };
-                let least = const { fixed::types::I16F16::lit("-32000") };
-                in_range("travel_mm", travel_mm.get(), least, limit).map_err(Refusal::Parameter)?;
+                let limit = self.units.travel_limit();
+                let least = PositionMm::ZERO.saturating_sub(limit);
+                in_range("travel_mm", travel_mm.get(), least.get(), limit.get())
+                    .map_err(Refusal::Parameter)?;
+                if !self
+                    .wheels
+                    .has_room(&travel_mm, &self.odometry, &self.units)
+                {
+                    return Err(Refusal::Moving);
+                }
                 self.direct_segment = self.direct_segment.wrapping_add(1) | 0x8000;
                 self.direct_travel = Some(Wheels::direct(travel_mm, self.direct_segment));
                 Ok(true)
@@ -195,6 +202,10 @@ impl Layer0 {
         if let Some(bar) = self.nodes.bar_to_arming(alive, self.schema_hash) {
             return Err(bar);
         }
+        // All or nothing: some nodes armed on their own would be no answer.
+        if !self.jobs.has_room(ARMING_JOBS) {
+            return Err(Refusal::Busy);
+        }
         let gait = &self.config.gait;
         let mode = match self.config.wheel_drive {
             WheelDrive::Profile => WheelControlMode::Trapezoidal,
@@ -220,15 +231,13 @@ impl Layer0 {
         for to in Address::nodes() {
             let setup = wheel_setup.iter().filter(|_| to.is_wheel());
             for message in setup.chain(core::iter::once(&arm)) {
-                left = left.saturating_add(1);
                 let job = Job {
                     to,
                     message: *message,
                     purpose: Purpose::Group,
                 };
-                if !self.jobs.push(job) {
-                    return Err(Refusal::Busy);
-                }
+                // They fit: see above.
+                left = left.saturating_add(u8::from(self.jobs.push(job)));
             }
         }
         self.power = Power::Arming;

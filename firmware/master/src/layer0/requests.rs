@@ -146,7 +146,7 @@ impl Layer0 {
         match (kind, failed) {
             (GroupKind::Arm, Some(reason)) => {
                 self.group = None;
-                self.abort_arming();
+                self.abort_arming(now_us, events);
                 events.push(now_us, Event::Refused { ticket, reason });
             }
             // Armed when the replies say so: see `confirm_arming`.
@@ -164,10 +164,13 @@ impl Layer0 {
         }
     }
 
-    /// One node refused or stayed behind: the others are disarmed again.
-    pub(super) fn abort_arming(&mut self) {
+    /// One node refused or stayed behind: the others are disarmed again. What
+    /// else was waiting is dropped, and its users are told.
+    pub(super) fn abort_arming(&mut self, now_us: u64, events: &mut Events) {
         self.power = Power::Disarmed;
-        self.jobs.clear(|_ticket| {});
+        let reason = Refusal::Interrupted;
+        self.jobs
+            .clear(|ticket| events.push(now_us, Event::Refused { ticket, reason }));
         let liveness = &self.liveness;
         self.jobs
             .ask_all(Disarm {}.into(), |index| liveness.alive(index));

@@ -92,7 +92,7 @@ impl Layer0 {
             events.push(now_us, Event::Done(ticket));
         } else if waited > CONFIRM_CYCLES {
             self.group = None;
-            self.abort_arming();
+            self.abort_arming(now_us, events);
             let reason = Refusal::NotConfirmed;
             events.push(now_us, Event::Refused { ticket, reason });
         }

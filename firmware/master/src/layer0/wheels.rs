@@ -6,7 +6,7 @@ use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
 use super::odometry::{Odometry, WheelGeometry};
 use crate::config::WheelDrive;
 use crate::contact::Side;
-use crate::layer1::units::mm_to_um;
+use crate::layer1::units::{mm_to_um, um_to_mm};
 use crate::setpoint::{TravelSetpoint, WHEELS};
 
 /// Conversions between distance and the wheel controller's counts and samples.
@@ -42,12 +42,25 @@ impl WheelUnits {
         Acceleration8p8::new(libm::roundf(raw).clamp(1.0, 32767.0) as u16).unwrap_or_default()
     }
 
+    /// Longest move of a single command: [`REACH_COUNTS`], at most 32 m.
+    #[must_use]
+    pub fn travel_limit(&self) -> PositionMm {
+        let reach_um = self.geometry.counts_to_um(i64::from(REACH_COUNTS));
+        um_to_mm(reach_um.min(32_000_000))
+    }
+
     /// Velocity in 12.4 counts per sample, nearest, saturating.
     #[must_use]
     pub fn velocity_raw(&self, speed: VelocityMmS) -> i16 {
         libm::roundf(self.per_sample(speed) * 16.0) as i16
     }
 }
+
+/// Longest distance between a wheel and its reference, counts: half of what
+/// the 24-bit circle tells apart. A profile that still runs to one such
+/// reference can then be followed by one to any other without going the wrong
+/// way round.
+const REACH_COUNTS: i32 = (1 << 22) - 1;
 
 /// References sent to the wheels.
 #[derive(Clone, Copy, Debug, Default)]
@@ -103,6 +116,26 @@ impl Wheels {
             reference,
             velocity_raw,
             track: true,
+        })
+    }
+
+    /// Whether a new motion of `travel_mm`, which begins at the last reference,
+    /// ends within the reach of both wheels from where they are.
+    #[must_use]
+    pub fn has_room(
+        &self,
+        travel_mm: &PositionMm,
+        odometry: &Odometry,
+        units: &WheelUnits,
+    ) -> bool {
+        let counts = units.geometry.um_to_counts(mm_to_um(*travel_mm));
+        [Side::Left, Side::Right].into_iter().all(|side| {
+            let sent = self.sent.get(side.index()).copied().flatten();
+            let open = match (sent, odometry.raw(side)) {
+                (Some(sent), Some(here)) => i64::from(sent.wrapping_difference(here)),
+                _ => 0,
+            };
+            open.saturating_add(counts).unsigned_abs() <= u64::from(REACH_COUNTS.unsigned_abs())
         })
     }
 
