@@ -68,7 +68,8 @@ struct RunArgs {
     /// Built-in scenario or path of a TOML file.
     #[arg(default_value = run::DEFAULT_SCENARIO)]
     scenario: String,
-    /// Folder for the results [default: runs/<scenario>-seed<N>].
+    /// Folder for the results [default: runs/<scenario>-seed<N>]. Results of an
+    /// earlier run in it move to its folder `previous`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of all noise, instead of the scenario's.

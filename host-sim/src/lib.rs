@@ -10,6 +10,7 @@ pub mod analysis;
 pub mod cli;
 pub mod config;
 pub mod error;
+mod output;
 pub mod report;
 pub mod run;
 pub mod sil;

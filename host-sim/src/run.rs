@@ -11,7 +11,7 @@ use crate::config::{RobotConfig, Scenario, builtin};
 use crate::report::{self, RunInfo, Summary};
 use crate::sil;
 use crate::telemetry::Recorder;
-use crate::{SimError, analysis};
+use crate::{SimError, analysis, output};
 
 /// Scenario of a bare `wheeleg`.
 pub const DEFAULT_SCENARIO: &str = "three-step";
@@ -44,7 +44,8 @@ pub struct Finished {
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// Runs a scenario: log, tables, figures, summary, report. Ctrl-C stops it at
-/// the next bus cycle and the files are finished all the same.
+/// the next bus cycle and the files are finished all the same. Results of an
+/// earlier run in the same folder are set aside in its folder `previous`.
 ///
 /// # Errors
 /// Any [`SimError`]. A log that was begun is closed and stays readable.
@@ -56,8 +57,7 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
         .out
         .clone()
         .unwrap_or_else(|| crate::cli::default_out(&scenario.name, seed));
-    std::fs::create_dir_all(&folder)
-        .map_err(|e| SimError::output("create the folder", &folder, e))?;
+    output::prepare(&folder)?;
     let mut recorder = Recorder::create(&folder.join("log.mcap"))?;
     provenance(&mut recorder, &scenario, &robot, seed);
 

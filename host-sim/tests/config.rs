@@ -1,5 +1,6 @@
 //! Robot and scenario files: what is wrong with them is said where it is wrong.
 
+use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
 use wheeleg_sim::config::{ConfigError, RobotConfig, Scenario, builtin};
 
 const ROBOT: &str = include_str!("../robots/wheeleg-2003.toml");
@@ -19,6 +20,12 @@ fn robot_with(from: &str, to: &str) -> String {
     assert_eq!(ROBOT.matches(from).count(), 1, "{from} must occur once");
     let text = ROBOT.replace(from, to);
     report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
+}
+
+/// The robot without its own board parameters, and these instead.
+fn robot_with_node(sections: &str) -> String {
+    let own = ROBOT.find("\n[node.joint]\n").expect("present");
+    format!("{}\n{sections}", &ROBOT[..own])
 }
 
 fn scenario_with(from: &str, to: &str) -> String {
@@ -69,7 +76,18 @@ fn every_parameter_is_listed_with_unit_source_and_range() {
     let entries = ROBOT
         .lines()
         .filter(|l| l.contains("value =") && !l.starts_with('#'));
-    assert_eq!(entries.count(), robot.parameters.len());
+    let written = robot
+        .parameters
+        .iter()
+        .filter(|p| !p.source.starts_with("default of the board"));
+    assert_eq!(entries.count(), written.count());
+    // What the file leaves out is listed too: the boards' whole tables.
+    let listed = |section: &str| {
+        let names = robot.parameters.iter().map(|p| p.path.as_str());
+        names.filter(|path| path.starts_with(section)).count()
+    };
+    assert_eq!(listed("node.joint."), JOINT_PARAMS.len());
+    assert_eq!(listed("node.wheel."), WHEEL_PARAMS.len());
 }
 
 #[test]
@@ -135,7 +153,7 @@ fn limits_themselves_are_allowed() {
 #[test]
 fn gain_out_of_range_and_in_a_wrong_unit() {
     let gain = |entry: &str| {
-        let text = ROBOT.replace("[node.joint]\n", &format!("[node.joint]\n{entry}\n"));
+        let text = robot_with_node(&format!("[node.joint]\n{entry}\n"));
         report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
     };
     let text = gain("proportional = { value = 40.0, unit = \"1/mm\", source = \"x\" }");
@@ -163,10 +181,10 @@ fn gain_out_of_range_and_in_a_wrong_unit() {
 
 #[test]
 fn board_parameters_become_raw_numbers_of_the_wire() {
-    let text = ROBOT.replace(
-        "[node.joint]\n",
-        "[node.joint]\nproportional = { value = 0.5, unit = \"1/mm\", source = \"x\" }\n",
-    ) + "[node.vertical]\nproportional = { value = 0.25, unit = \"1/mm\", source = \"x\" }\n";
+    let text = robot_with_node(
+        "[node.joint]\nproportional = { value = 0.5, unit = \"1/mm\", source = \"x\" }\n\
+         [node.vertical]\nproportional = { value = 0.25, unit = \"1/mm\", source = \"x\" }\n",
+    );
     let robot = RobotConfig::parse("my.toml", &text).expect("accepted");
     let gain = |joint: usize| {
         let found = robot.node.joints[joint]
@@ -178,6 +196,22 @@ fn board_parameters_become_raw_numbers_of_the_wire() {
     assert_eq!(gain(0), Some(1 << 23));
     assert_eq!(gain(2), Some(1 << 22));
     assert_eq!(gain(5), Some(1 << 22));
+}
+
+/// The boards' reply slots are built for one rate and one cycle; a robot file
+/// that says otherwise would be simulated wrongly, so it is refused.
+#[test]
+fn bus_is_that_of_the_boards() {
+    let text = robot_with(
+        "value = 1.0, unit = \"Mbit/s\"",
+        "value = 2.0, unit = \"Mbit/s\"",
+    );
+    assert_all(&text, &["`bus.baud` = 2 Mbit/s", "allowed 1 to 1 Mbit/s"]);
+    let text = robot_with(
+        "cycle = { value = 10.0, unit = \"ms\"",
+        "cycle = { value = 5.0, unit = \"ms\"",
+    );
+    assert_all(&text, &["`bus.cycle` = 5 ms", "allowed 10 to 10 ms"]);
 }
 
 #[test]

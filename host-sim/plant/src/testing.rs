@@ -133,7 +133,7 @@ pub fn wheeleg_2003_cylinder() -> CylinderParams {
         line_flow: Some(Iso6358::new(1.20 * DM3_S_BAR, 0.35)), // DERIVED Eckersten, 4 mm x 1 m
         line_delay_s: 2.9e-3,                                  // s DERIVED 1 m at 343 m/s
         dead_wall_area_m2: 0.0135,                             // m2 DERIVED tube wall and port
-        piston_leak_m3_s_pa: 5e-14, // m3/(s Pa) ASSUMED: about 70 mm3/s ANR at 6 bar g
+        piston_leak_m3_s_pa: 5e-14, // m3/(s Pa) ASSUMED: about 120 mm3/s ANR at 6 bar g
         rod_leak_m3_s_pa: 2e-14,    // m3/(s Pa) ASSUMED
         fill_valve: wheeleg_2003_valve(),
         vent_valve: wheeleg_2003_valve(),

@@ -11,20 +11,24 @@ pub struct StartDelay {
     pub step: u16,
     /// Which move.
     pub move_name: &'static str,
-    /// Time of the reference step at the node, s on the recording's clock.
+    /// Time at which the node latched the step of the command, s on the recording's clock.
     pub at_s: f64,
-    /// From the reference step at the node to the first millimetre in the new
-    /// direction, s; `None` if it never moved.
+    /// From the step of the command at the node to the first millimetre in the
+    /// new direction, s; `None` if it never moved.
     pub delay_s: Option<f64>,
 }
 
 /// A move has started once the piston is this far from where it turned, mm.
 const STARTED_MM: f64 = 1.0;
-/// A reference step is a jump of more than this, mm.
+/// How long before its time in the gait a step of the command is looked for, s:
+/// two bus cycles.
+const BEFORE_S: f64 = 0.02;
+/// A step of the command is a jump of more than this, mm.
 const STEP_MM: f64 = 5.0;
 
-/// Delays of all square-wave moves. The clock starts when the node's reference
-/// jumps, so bus and gait latency are not in it.
+/// Delays of all square-wave moves. The clock starts when the node latches the
+/// commanded step, so bus and gait latency are not in it, and what the board's
+/// slew limit and controller make of the step is.
 pub(crate) fn start_delays(leg: &Leg<'_>, gait: &GaitParams, start_s: f64) -> Vec<StartDelay> {
     let mut delays = Vec::new();
     for step in 0..gait.steps {
@@ -35,7 +39,7 @@ pub(crate) fn start_delays(leg: &Leg<'_>, gait: &GaitParams, start_s: f64) -> Ve
             ("b6 extends", leg.b6, gait.lower_s, gait.push_s, 1.0),
         ];
         for (move_name, rows, from, to, sign) in moves {
-            let rows = window(rows, t + from - 0.005, t + to);
+            let rows = window(rows, t + from - BEFORE_S, t + to);
             if let Some((at_s, delay_s)) = one_delay(rows, sign) {
                 delays.push(StartDelay {
                     step: step + 1,
@@ -49,13 +53,13 @@ pub(crate) fn start_delays(leg: &Leg<'_>, gait: &GaitParams, start_s: f64) -> Ve
     delays
 }
 
-/// Time of the reference step and delay to the first millimetre in the
-/// direction `sign`; `None` if the reference does not jump in this window.
+/// Time of the commanded step and delay to the first millimetre in the
+/// direction `sign`; `None` if the command does not jump in this window.
 fn one_delay(rows: &[Row<JointSample>], sign: f64) -> Option<(f64, Option<f64>)> {
-    let before = rows.first()?.v.reference_mm;
+    let before = rows.first()?.v.commanded_mm;
     let jump = rows
         .iter()
-        .position(|r| sign * (r.v.reference_mm - before) > STEP_MM)?;
+        .position(|r| sign * (r.v.commanded_mm - before) > STEP_MM)?;
     let at_s = rows[jump].t_s();
     // Measured from the turning point: the move before may still be ending.
     let mut turned = f64::INFINITY;
@@ -155,6 +159,30 @@ mod tests {
             let shift = velocity_shift_s(&leg, &model, 0.0).expect("long enough");
             assert!((shift - delay_s).abs() < 2e-3, "{delay_s}: {shift}");
         }
+    }
+
+    /// A board that slews its reference starts later than its command; the
+    /// delay is that of the command.
+    #[test]
+    fn a_slewed_reference_does_not_hide_the_delay() {
+        let rows: Vec<Row<JointSample>> = (0..1000_u64)
+            .map(|ms| {
+                let since = ms.saturating_sub(100) as f64;
+                let v = JointSample {
+                    commanded_mm: if ms < 100 { 0.0 } else { 180.0 },
+                    reference_mm: (0.3 * since).min(180.0),
+                    // Moves 80 ms after the command, at 0.5 mm/ms.
+                    position_mm: (0.5 * (since - 80.0)).clamp(0.0, 180.0),
+                    ..JointSample::default()
+                };
+                let t_ns = ms * 1_000_000;
+                Row { t_ns, v }
+            })
+            .collect();
+        let (at_s, delay_s) = one_delay(&rows, 1.0).expect("a step");
+        assert!((at_s - 0.100).abs() < 1e-9, "{at_s}");
+        let delay_s = delay_s.expect("it moves");
+        assert!((delay_s - 0.082).abs() < 1e-9, "{delay_s}");
     }
 
     #[test]

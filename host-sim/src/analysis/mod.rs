@@ -33,7 +33,7 @@ pub struct Analysis {
     pub start_s: f64,
     /// The stepping or moving leg.
     pub leg: Option<LegChoice>,
-    /// Delay from reference step to motion, per move.
+    /// Delay from commanded step to motion, per move.
     pub start_delays: Vec<StartDelay>,
     /// Shift between reference model and simulated robot, s.
     pub shift_s: Option<f64>,
@@ -102,7 +102,7 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
             let at = event_time(scenario, |a| matches!(a, EventAction::EStop));
             safe_state::targets(recording, at, true)
         }
-        TargetSet::Sinusoid => sinusoid::targets(recording, moving),
+        TargetSet::Sinusoid => sinusoid::targets(robot, recording, moving),
         TargetSet::FootSide { bit } => contact::side_targets(&analysis.contacts, bit),
         TargetSet::None => Vec::new(),
     };

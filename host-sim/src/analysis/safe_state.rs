@@ -1,7 +1,7 @@
 //! Safe states after the loss of the master or an E-stop (ARCHITECTURE.md, "Safe states").
 
 use super::{Target, extremes, window};
-use crate::telemetry::{JointSample, Recording, Row, WheelSample};
+use crate::telemetry::{JointSample, Recording, Row, SupplySample, WheelSample};
 
 /// Valves must be commanded shut, and wheel ramps begun, within this, s.
 const REACTION_S: f64 = 0.060;
@@ -57,7 +57,10 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
         ),
         Target::new(
             "SS3",
-            "both wheels at a standstill (slower wheel)",
+            format!(
+                "both wheels at a standstill (slower wheel; the rims ran at {:.0} mm/s at the event)",
+                rim_speed_at(recording, at_s)
+            ),
             wheels.map(|s| s * 1e3),
             "ms",
             None,
@@ -89,20 +92,36 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
         )
         .info(),
     ];
+    let ramps = worst(recording.wheels.iter().map(|rows| ramp_after(rows, at_s)));
+    targets.push(Target::new(
+        "SS8",
+        "ramp of the wheels begun: the board has left tracking (slower wheel)",
+        ramps.map(|s| s * 1e3),
+        "ms",
+        None,
+        Some(REACTION_S * 1e3),
+    ));
     if estop {
-        let dump = recording
-            .supply
-            .iter()
-            .find(|r| r.t_s() >= at_s - 1e-9 && r.v.dump_open)
-            .map(|r| (r.t_s() - at_s) * 1e3);
-        targets.push(Target::new(
-            "SS7",
-            "supply dump valve open",
-            dump,
-            "ms",
-            None,
-            Some(REACTION_S * 1e3),
-        ));
+        let first = |dumps: fn(&SupplySample) -> bool| {
+            let rows = recording.supply.iter();
+            let mut after = rows.filter(|r| r.t_s() >= at_s - 1e-9);
+            after.find(|r| dumps(&r.v)).map(|r| (r.t_s() - at_s) * 1e3)
+        };
+        for (id, what, value) in [
+            (
+                "SS7",
+                "supply dump valve commanded open",
+                first(|v| v.dump_commanded),
+            ),
+            (
+                "SS7-open",
+                "supply dump valve physically open",
+                first(|v| v.dump_open),
+            ),
+        ] {
+            let limit = Some(REACTION_S * 1e3);
+            targets.push(Target::new(id, what, value, "ms", None, limit));
+        }
     }
     targets
 }
@@ -139,6 +158,21 @@ fn stopped_after(rows: &[Row<WheelSample>], at_s: f64) -> Option<f64> {
         .iter()
         .rfind(|r| r.v.velocity_mm_s.abs() > STANDING_MM_S);
     Some(last_moving.map_or(0.0, |r| r.t_s() - at_s))
+}
+
+/// Time from the event to the last sample of a wheel that still tracks.
+fn ramp_after(rows: &[Row<WheelSample>], at_s: f64) -> Option<f64> {
+    let rows = window(rows, at_s, f64::INFINITY);
+    rows.last()?;
+    let last = rows.iter().rfind(|r| !SAFE_MODES.contains(&r.v.mode));
+    Some(last.map_or(0.0, |r| r.t_s() + 0.001 - at_s))
+}
+
+/// Speed of the faster rim at the event, mm/s.
+fn rim_speed_at(recording: &Recording, at_s: f64) -> f64 {
+    let wheels = recording.wheels.iter();
+    let speeds = wheels.filter_map(|rows| window(rows, at_s, f64::INFINITY).first());
+    speeds.fold(0.0, |fastest, r| r.v.velocity_mm_s.abs().max(fastest))
 }
 
 fn safe_axes(recording: &Recording, from_s: f64) -> f64 {
@@ -205,14 +239,42 @@ mod tests {
         let (physical, pass) = value(&targets, "SS2");
         assert!((physical - 59.0).abs() < 1e-6 && pass);
         assert!((value(&targets, "SS3").0 - 299.0).abs() < 1e-6);
+        let (ramp, pass) = value(&targets, "SS8");
+        assert!((ramp - 55.0).abs() < 1e-6 && pass, "{ramp}");
+        let ss3 = targets.iter().find(|t| t.id == "SS3").expect("present");
+        assert!(ss3.description.contains("180 mm/s"), "{}", ss3.description);
         assert_eq!(value(&targets, "SS4"), (8.0, true));
         assert_eq!(value(&targets, "SS5"), (8.0, true));
+    }
+
+    /// The dump valve is commanded 20 ms after the event and opens 25 ms later.
+    #[test]
+    fn dump_is_measured_as_commanded_and_as_it_is() {
+        let mut recording = recording(1055);
+        for ms in 0..2000_u64 {
+            let v = SupplySample {
+                dump_commanded: ms >= 1020,
+                dump_open: ms >= 1045,
+                ..SupplySample::default()
+            };
+            let t_ns = ms * 1_000_000;
+            recording.supply.push(Row { t_ns, v });
+        }
+        let targets = targets(&recording, Some(1.0), true);
+        let (commanded, pass) = value(&targets, "SS7");
+        assert!((commanded - 20.0).abs() < 1e-6 && pass, "{commanded}");
+        let (open, pass) = value(&targets, "SS7-open");
+        assert!((open - 45.0).abs() < 1e-6 && pass, "{open}");
+        recording.supply.clear();
+        let without = super::targets(&recording, Some(1.0), true);
+        assert!(without.iter().any(|t| t.id == "SS7" && !t.pass));
     }
 
     #[test]
     fn a_late_reaction_fails() {
         let targets = targets(&recording(1080), Some(1.0), false);
         assert!(!value(&targets, "SS1").1);
+        assert!(!value(&targets, "SS8").1);
         assert_eq!(value(&targets, "SS4"), (0.0, false));
     }
 }

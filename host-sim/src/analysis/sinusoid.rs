@@ -1,18 +1,24 @@
 //! Targets of the paper's section 6 (Figs. 5–8): A8, A9, A11 and tracking.
 
 use super::{Target, extremes, leg};
-use crate::config::LegChoice;
+use crate::config::{LegChoice, RobotConfig};
 use crate::telemetry::{JointSample, Recording, Row};
 
-pub(super) fn targets(recording: &Recording, moving: Option<LegChoice>) -> Vec<Target> {
+pub(super) fn targets(
+    robot: &RobotConfig,
+    recording: &Recording,
+    moving: Option<LegChoice>,
+) -> Vec<Target> {
     let parts = leg(recording, moving.unwrap_or(LegChoice::Left));
     let stroke = |rows: &[Row<JointSample>]| extremes(rows, |s| s.position_mm);
     let (b5, b6) = (stroke(parts.b5), stroke(parts.b6));
+    // The paper's axes are joint lengths.
+    let zero_mm = robot.plant.stroke_zero_m.map(|m| m * 1e3);
     let mut targets = vec![
         Target::new(
             "A8",
             "b5 smallest (axis −100 … 300)",
-            b5.map(|r| r.0 + 10.0),
+            b5.map(|r| r.0 + zero_mm[1]),
             "mm",
             Some(-100.0),
             Some(300.0),
@@ -28,14 +34,14 @@ pub(super) fn targets(recording: &Recording, moving: Option<LegChoice>) -> Vec<T
         Target::new(
             "A9",
             "b6 smallest (axis 0 … 200)",
-            b6.map(|r| r.0 + 10.0),
+            b6.map(|r| r.0 + zero_mm[2]),
             "mm",
             Some(0.0),
             Some(200.0),
         ),
         Target::new(
             "A9-span",
-            "b6 span (arch of 160 to 200 mm, MODEL.md 6.1)",
+            "b6 span (more than 150 for this axis)",
             b6.map(|r| r.1 - r.0),
             "mm",
             Some(150.0),

@@ -34,8 +34,11 @@ pub(crate) fn record_reference(
         let lifted = started && (gait.lift_s..gait.lower_s).contains(&u);
         let reached = started && (gait.reach_s..gait.push_s).contains(&u);
         // A reference that is still at zero in the push: the model has no node.
+        let b5_mm = if reached { stroke_mm } else { p.s5_m * 1e3 };
+        let b6_mm = if lifted { 0.0 } else { stroke_mm };
         let b5 = JointSample {
-            reference_mm: if reached { stroke_mm } else { p.s5_m * 1e3 },
+            commanded_mm: b5_mm,
+            reference_mm: b5_mm,
             sensed_mm: p.s5_m * 1e3,
             position_mm: p.s5_m * 1e3,
             velocity_mm_s: p.v5_m_s * 1e3,
@@ -44,7 +47,8 @@ pub(crate) fn record_reference(
             ..JointSample::default()
         };
         let b6 = JointSample {
-            reference_mm: if lifted { 0.0 } else { stroke_mm },
+            commanded_mm: b6_mm,
+            reference_mm: b6_mm,
             sensed_mm: p.s6_m * 1e3,
             position_mm: p.s6_m * 1e3,
             velocity_mm_s: p.v6_m_s * 1e3,
@@ -55,6 +59,7 @@ pub(crate) fn record_reference(
             ..JointSample::default()
         };
         let held = JointSample {
+            commanded_mm: 90.0,
             reference_mm: 90.0,
             sensed_mm: 90.0,
             position_mm: 90.0,

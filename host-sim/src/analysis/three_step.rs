@@ -208,7 +208,7 @@ fn delays(targets: &mut Vec<Target>, robot: &RobotConfig, analysis: &Analysis) {
             Target::new(
                 format!("A26-start-{suffix}"),
                 format!(
-                    "start delay, {suffix} of {} moves: reference step at the node to the first 1 mm",
+                    "start delay, {suffix} of {} moves: command step latched by the node to the first 1 mm",
                     known.len()
                 ),
                 value,

@@ -17,7 +17,7 @@ pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg-2003");
 
 /// Scenarios: name, file name for messages, text.
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
-    "three-step", "stand", "sinusoid", "master-lost", "estop",
+    "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
 );
 

@@ -1,6 +1,7 @@
 //! A robot: everything about the machine that a run needs, in SI units.
 
 use wheeleg_plant::PlantParams;
+use wheeleg_protocol::link::{BAUD, CYCLE_US};
 
 use super::error::ConfigError;
 use super::node::{self, NodeParams};
@@ -9,12 +10,32 @@ use super::plant;
 use super::reader::Reader;
 
 params! {
-    /// Serial bus.
+    /// Serial bus. The reply slots of the boards are built for one rate and one cycle.
     BusParams {
-        /// Line rate of the RS-485 bus.
-        baud_bit_s: f64, "baud", BitRate, 9_600.0, 12e6;
-        /// Period of the SYNC frame.
-        cycle_s: f64, "cycle", Time, 1e-3, 0.1;
+        /// Line rate of the RS-485 bus; what the boards are built for.
+        baud_bit_s: f64, "baud", BitRate, BAUD as f64, BAUD as f64;
+        /// Period of the SYNC frame; what the boards are built for.
+        cycle_s: f64, "cycle", Time, CYCLE_US as f64 * 1e-6, CYCLE_US as f64 * 1e-6;
+    }
+
+    /// Move to the start pose after arming.
+    HomingParams {
+        /// Speed of the references.
+        slew_m_s: f64, "slew", Velocity, 1e-3, 0.4;
+        /// Largest distance from the pose that counts as settled.
+        tolerance_m: f64, "tolerance", Length, 1e-4, 0.05;
+        /// Time within the tolerance before the pose is reached.
+        settle_s: f64, "settle", Time, 0.01, 10.0;
+        /// Longest duration of the whole move.
+        timeout_s: f64, "timeout", Time, 0.1, 600.0;
+    }
+
+    /// From power-up to the start of a scenario.
+    StartUpParams {
+        /// Rest in the start pose before the record begins.
+        rest_s: f64, "rest", Time, 0.0, 60.0;
+        /// Longest simulated time from power-up to rest in the start pose.
+        limit_s: f64, "limit", Time, 1.0, 3600.0;
     }
 
     /// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
@@ -85,6 +106,10 @@ pub struct RobotConfig {
     pub description: String,
     /// Serial bus.
     pub bus: BusParams,
+    /// Move to the start pose.
+    pub homing: HomingParams,
+    /// From power-up to the start of a scenario.
+    pub start_up: StartUpParams,
     /// Gait.
     pub gait: GaitParams,
     /// Reference model of the paper's figures.
@@ -108,13 +133,24 @@ impl RobotConfig {
         let mut r = Reader::parse(&what, file, text, true)?;
         let top = r.table("");
         if let Some(top) = &top {
-            let mut known = vec!["name", "description", "bus", "gait", "reference", "node"];
+            let mut known = vec![
+                "name",
+                "description",
+                "bus",
+                "homing",
+                "start_up",
+                "gait",
+                "reference",
+                "node",
+            ];
             known.extend(plant::SECTIONS);
             r.reject_unknown(top, &known);
         }
         let name = top.as_ref().and_then(|t| r.text(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let bus = r.section::<BusParams>("bus");
+        let homing = r.section::<HomingParams>("homing");
+        let start_up = r.section::<StartUpParams>("start_up");
         let gait = r.section::<GaitParams>("gait");
         let reference = r.section::<ReferenceParams>("reference");
         let plant = plant::read(&mut r);
@@ -124,6 +160,8 @@ impl RobotConfig {
                 name: name?,
                 description: description?,
                 bus: bus?,
+                homing: homing?,
+                start_up: start_up?,
                 gait: gait?,
                 reference: reference?,
                 plant: plant?,

@@ -109,6 +109,7 @@ pub(super) fn render(
         met => met,
         shift => source.analysis.shift_s.map(|s| format!("{:.0}", s * 1e3)),
         messages => source.recording.messages,
+        start => format!("{start:.3}"),
         targets => targets,
         figures => figures,
         delays => delays,

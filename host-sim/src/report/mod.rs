@@ -114,7 +114,7 @@ mod tests {
             assert!(page.contains(&target.id), "{}", target.id);
         }
         assert!(page.contains(&summary.hash) && page.contains("cylinder.bore"));
-        assert!(page.contains("reference step at the node"));
+        assert!(page.contains("latched the step of the command"));
     }
 
     #[test]

@@ -229,15 +229,18 @@ impl Observer {
     }
 
     /// Samples bus and master, once per bus cycle. `record` is the master's own
-    /// record of the cycle that has just ended, if it lives.
+    /// record of the cycle that has just ended, if it lives; it is logged at the
+    /// time that this cycle began.
     pub(super) fn cycle(
         &mut self,
         world: &World,
         record: Option<Record>,
-        t_ns: u64,
+        (start_ns, now_ns): (u64, u64),
         cycle_ns: u64,
         recorder: &mut Recorder,
     ) {
+        let t_ns = now_ns - start_ns;
+        let began_ns = record.map_or(now_ns, |r| r.time_us * 1_000);
         let line = world.bus().counters();
         let bytes = line.bytes - self.bus_bytes;
         let busy_ns = line.busy_ns - self.bus_busy_ns;
@@ -258,7 +261,10 @@ impl Observer {
             },
         );
         self.cycles += 1;
-        recorder.master(t_ns, self.master_sample(world.master_alive()));
+        recorder.master(
+            began_ns.saturating_sub(start_ns),
+            self.master_sample(world.master_alive()),
+        );
     }
 
     fn master_sample(&mut self, alive: bool) -> MasterSample {

@@ -1,7 +1,7 @@
 //! The person at the console: gets the robot ready, starts the motion, and
 //! carries out the scenario's events, all through the master's dispatcher.
 
-use wheeleg_master::command::Command;
+use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_master::contact::Side;
 use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::layer1::foot::FootShape;
@@ -63,6 +63,15 @@ pub(super) fn command(
         },
         "EmergencyBrake" => Command::EmergencyBrake {
             joint: the_joint()?,
+        },
+        // The argument is part of the name: an event has no field for it.
+        "SelectCorrectionPd" => Command::SelectCorrection {
+            joint: the_joint()?,
+            correction: CorrectionKind::Pd,
+        },
+        "SelectCorrectionId" => Command::SelectCorrection {
+            joint: the_joint()?,
+            correction: CorrectionKind::Id,
         },
         "WheelReference" => Command::WheelReference {
             travel_mm: mm(travel_m.ok_or_else(|| missing("travel"))?),

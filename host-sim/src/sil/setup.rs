@@ -5,19 +5,16 @@ use std::f64::consts::TAU;
 
 use fixed::types::I16F16;
 use wheeleg_master::MasterConfig;
-use wheeleg_master::config::SwitchFrame;
+use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::layer0::odometry::WheelGeometry;
+use wheeleg_master::layer1::homing::HomingConfig;
 use wheeleg_master::layer1::params::{GaitParams, Pattern};
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::ground::{Ground, GroundPatch};
-use wheeleg_protocol::param::WheelParam;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::operator::side;
 use crate::config::{LegChoice, Motion, RobotConfig, Scenario};
-
-/// Clock of the HCTL-1100 that the wheel boards stand in for, Hz.
-const WHEEL_CLOCK_HZ: u32 = 2_000_000;
 
 /// The leg that moves; the left one where the scenario does not say.
 fn stepping_leg(scenario: &Scenario) -> LegChoice {
@@ -61,9 +58,11 @@ pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
     plant
 }
 
-/// The master's configuration.
+/// The master's configuration; [`super::world::World`] adds the sample time of
+/// the wheel boards.
 pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
     let gait = &robot.gait;
+    let cycles = |s: f64| (s / robot.bus.cycle_s).round() as u16;
     let motor = &robot.plant.motors[0];
     let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
     let circumference_um = robot.plant.body.wheel_radius_m * TAU * 1e6;
@@ -84,23 +83,20 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
             pattern: Pattern::Single(side(stepping_leg(scenario))),
             touchdown_reflex: gait.touchdown_reflex,
         },
+        homing: HomingConfig {
+            slew_mm_s: VelocityMmS::from_f64(robot.homing.slew_m_s * 1e3),
+            tolerance_mm: millimetres(robot.homing.tolerance_m),
+            settle_cycles: cycles(robot.homing.settle_s),
+            timeout_cycles: cycles(robot.homing.timeout_s),
+        },
         wheels: WheelGeometry {
             counts_per_revolution: counts.round() as u32,
             circumference_um: circumference_um.round() as u32,
         },
-        wheel_sample_us: wheel_sample_us(robot),
+        // The paper's wheel boards make the trapezoid themselves.
+        wheel_drive: WheelDrive::Profile,
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
         ..MasterConfig::default()
     }
-}
-
-/// Sample time of the wheel boards, t = 16 (T + 1) / f (HCTL-1100 data sheet p. 24), µs.
-fn wheel_sample_us(robot: &RobotConfig) -> u32 {
-    let id = WheelParam::SampleTimer.id();
-    let stored = robot.node.wheels[0]
-        .iter()
-        .find(|(number, _)| *number == id);
-    let timer = stored.map_or(WheelParam::SampleTimer.info().default, |(_, raw)| *raw);
-    16 * (timer.unsigned_abs() + 1) / (WHEEL_CLOCK_HZ / 1_000_000)
 }

@@ -113,6 +113,12 @@ impl World {
         let joint = |n: u8| JointBoard::new(address(n)?, &stored.joints[usize::from(n) - 1]);
         let wheel = |n: u8| WheelBoard::new(address(n)?, &stored.wheels[usize::from(n) - 7]);
         let outputs = plant.outputs(&state);
+        let wheels = [wheel(7)?, wheel(8)?];
+        // Both ends count speeds per sample, so the master must know the board's.
+        let master = MasterConfig {
+            wheel_sample_us: wheels[0].period_us(),
+            ..master
+        };
         Ok(Self {
             outputs,
             plant,
@@ -126,7 +132,7 @@ impl World {
                 joint(5)?,
                 joint(6)?,
             ],
-            wheels: [wheel(7)?, wheel(8)?],
+            wheels,
             bus: Bus::new(robot.bus.baud_bit_s as u32),
             master: Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?,
             master_alive: true,

@@ -97,10 +97,14 @@ macro_rules! samples {
 samples! {
     /// One pneumatic joint: command, sensor, physics and node state, 1 kHz.
     JointSample = "wheeleg.Joint" {
-        /// Reference stroke that the node is tracking.
+        /// Reference stroke of the newest SYNC slot: what the master commands. The measured stroke while not driving.
+        commanded_mm: f64, "mm", 4, Node;
+        /// Reference stroke that the control law is given, after the board's slew limit.
         reference_mm: f64, "mm", 4, Node;
         /// Stroke as the node measures it.
         sensed_mm: f64, "mm", 4, Node;
+        /// Piston speed as the node estimates it.
+        sensed_velocity_mm_s: f64, "mm/s", 3, Node;
         /// True stroke.
         position_mm: f64, "mm", 4, Plant;
         /// True piston speed, positive when extending.
@@ -133,13 +137,15 @@ samples! {
         valves_open: u8, "bits", 0, Plant;
         /// Commanded valve edges (on or off, all four valves) since the start.
         valve_edges: u32, "1", 0, Node;
+        /// Limits that shaped the output in this tick, as in the protocol's table of limits.
+        limits: u8, "bits", 0, Node;
         /// Node mode: 0 boot, 1 idle, 2 armed, 3 tracking, 4 hold, 5 exhaust, 6 fault.
         mode: u8, "code", 0, Node;
         /// Latched fault bits of the node, as in the protocol's fault table.
         faults: u32, "bits", 0, Node;
     }
 
-    /// One wheel drive, 1 kHz.
+    /// One wheel drive.
     WheelSample = "wheeleg.Wheel" {
         /// Reference position of the profile, at the wheel rim.
         reference_mm: f64, "mm", 3, Node;
@@ -157,6 +163,8 @@ samples! {
         torque_n_m: f64, "N m", 4, Plant;
         /// Encoder position, 24-bit wrapping count.
         count: i32, "count", 0, Node;
+        /// Limits that shaped the output in this sample, as for joints.
+        limits: u8, "bits", 0, Node;
         /// Node mode, as for joints.
         mode: u8, "code", 0, Node;
         /// Latched fault bits of the node.
@@ -197,8 +205,10 @@ samples! {
         load: f64, "1", 5, Bus;
         /// Nodes that answered in their slot.
         replies: u8, "1", 0, Bus;
-        /// Frames rejected since the start (all receivers, all reasons).
-        errors: u32, "1", 0, Bus;
+        /// Transmissions that overlapped another one since the start.
+        collisions: u32, "1", 0, Bus;
+        /// Frames that the master rejected since the start, all reasons.
+        errors: u32, "1", 0, Master;
     }
 
     /// Air supply.
@@ -207,7 +217,9 @@ samples! {
         pressure_bar: f64, "bar", 5, Plant;
         /// Air taken from the source since the start, at reference conditions (ANR).
         air_used_dm3: f64, "dm3", 5, Plant;
-        /// Dump valve open.
+        /// Dump valve commanded open.
+        dump_commanded: bool, "flag", 0, Node;
+        /// Dump valve physically open.
         dump_open: bool, "flag", 0, Plant;
         /// Supply-pressure switch as the node sees it.
         pressure_switch: bool, "flag", 0, Node;
@@ -223,8 +235,6 @@ samples! {
         phase: u8, "code", 0, Master;
         /// Link-loss action sent for the stepping leg: 0 hold, 1 hold then exhaust.
         link_loss_action: u8, "code", 0, Master;
-        /// Records waiting in the fullest RT-FIFO.
-        fifo_depth: u32, "1", 0, Master;
         /// Records dropped by full queues since the start.
         fifo_drops: u32, "1", 0, Master;
     }
@@ -339,7 +349,7 @@ mod tests {
         assert_eq!(value["valves_open"], 9);
         let text = String::from_utf8(out).expect("UTF-8");
         assert!(
-            text.starts_with("{\"reference_mm\":90,\"sensed_mm\":0,"),
+            text.starts_with("{\"commanded_mm\":0,\"reference_mm\":90,"),
             "{text}"
         );
     }

@@ -1,5 +1,7 @@
 //! The figures of a run, built from its recording.
 
+mod event;
+
 use super::plot::{Content, Figure, Limit, Panel, RasterRow, Series, colour, runs};
 use crate::analysis::{Analysis, ReferencePoint};
 use crate::config::{EventAction, LegChoice, RobotConfig, Scenario};
@@ -130,7 +132,7 @@ pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
         figures.push(strokes(s));
     }
     if let Some(event) = s.marks().first() {
-        figures.extend(event_figures(s, *event));
+        figures.extend(event::figures(s, *event));
     }
     figures.push(pressures(s, first));
     figures.push(valves(s, s.x_range(), "valves", "Valves"));
@@ -142,32 +144,38 @@ pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
 fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
     let delay = s.robot.reference.delay_s;
     let delayed = format!("model, {delay} s later (the paper's experiment)");
-    let stroke =
-        |id: &str, number: u8, name: &str, joint: usize, model: fn(&ReferencePoint) -> f64| {
-            let series = vec![
-                line(
-                    "command at the node",
-                    colour::COMMAND,
-                    1,
-                    s.joint(joint, |j| j.reference_mm),
-                ),
-                line(&delayed, colour::DELAYED, 1, s.model(delay, model)),
-                line("reference model", colour::MODEL, 2, s.model(0.0, model)),
-                line(
-                    "simulated robot",
-                    colour::ROBOT,
-                    2,
-                    s.joint(joint, |j| j.position_mm),
-                ),
-            ];
-            let range = fitted((0.0, 180.0), &series);
-            Figure {
-                id: id.into(),
-                title: format!("Fig. {number}: {name}"),
-                caption: format!("Stroke of {name}. The paper's axis is 0 to 180 mm over 10 s."),
-                panels: vec![s.panel(name, 300, lines("[mm]", range, series))],
-            }
-        };
+    let stroke = |id: &str,
+                  number: u8,
+                  name: &str,
+                  joint: usize,
+                  model: fn(&ReferencePoint) -> f64| {
+        let series = vec![
+            line(
+                "command",
+                colour::COMMAND,
+                1,
+                s.joint(joint, |j| j.commanded_mm),
+            ),
+            line(&delayed, colour::DELAYED, 1, s.model(delay, model)),
+            line("reference model", colour::MODEL, 2, s.model(0.0, model)),
+            line(
+                "simulated robot",
+                colour::ROBOT,
+                2,
+                s.joint(joint, |j| j.position_mm),
+            ),
+        ];
+        let range = fitted((0.0, 180.0), &series);
+        Figure {
+            id: id.into(),
+            title: format!("Fig. {number}: {name}"),
+            caption: format!(
+                "Stroke of {name}. Command: as the node gets it from the bus, before its slew limit. \
+                     The paper's axis is 0 to 180 mm over 10 s."
+            ),
+            panels: vec![s.panel(name, 300, lines("[mm]", range, series))],
+        }
+    };
     let pair = |id: &str,
                 number: u8,
                 what: &str,
@@ -274,7 +282,7 @@ fn strokes(s: &Source<'_>) -> Figure {
         let series: Vec<Series> = (first..first + 3)
             .flat_map(|j| {
                 [
-                    line("", colour::COMMAND, 1, s.joint(j, |v| v.reference_mm)),
+                    line("", colour::COMMAND, 1, s.joint(j, |v| v.commanded_mm)),
                     line(
                         JOINTS[j],
                         colour::AXES[j % 3],
@@ -291,7 +299,7 @@ fn strokes(s: &Source<'_>) -> Figure {
     Figure {
         id: "strokes".into(),
         title: "Strokes of all cylinders".into(),
-        caption: "True strokes in colour, references in grey.".into(),
+        caption: "True strokes in colour, commands in grey.".into(),
         panels: panels.into(),
     }
 }
@@ -479,110 +487,4 @@ fn body(s: &Source<'_>) -> Figure {
             s.panel("pitch", 120, lines("[deg]", pitch_range, pitch)),
         ],
     }
-}
-
-/// What every axis did around an event, on commanded, sensed and physical signals.
-fn event_figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
-    let (_, end) = s.x_range();
-    let window = (event - 0.15, (event + 0.85).min(end));
-    let change = |joint: usize, value: fn(&JointSample) -> f64| -> Points {
-        let points = s.joint(joint, value);
-        let at = points.partition_point(|p| p.0 < event);
-        let base = points.get(at).map_or(0.0, |p| p.1);
-        points.into_iter().map(|(t, y)| (t, y - base)).collect()
-    };
-    let near = |series: &[Series], span: f64| {
-        let inside: Vec<Series> = series
-            .iter()
-            .map(|l| {
-                line(
-                    "",
-                    l.colour,
-                    1,
-                    l.points
-                        .iter()
-                        .copied()
-                        .filter(|p| (window.0..window.1).contains(&p.0))
-                        .collect(),
-                )
-            })
-            .collect();
-        fitted((-span, span), &inside)
-    };
-    let set = |value: fn(&JointSample) -> f64| -> Vec<Series> {
-        (0..6)
-            .map(|j| line(JOINTS[j], colour::AXES[j], 2, change(j, value)))
-            .collect()
-    };
-    let physical = set(|v| v.position_mm);
-    let sensed = set(|v| v.sensed_mm);
-    let wheels: Vec<Series> = (0..2)
-        .map(|w| {
-            let points = s.recording.wheels[w]
-                .iter()
-                .map(|r| (s.t(r.t_s()), r.v.velocity_mm_s));
-            line(
-                ["7 left", "8 right"][w],
-                colour::AXES[6 + w],
-                2,
-                points.collect(),
-            )
-        })
-        .collect();
-    let modes: Vec<Series> = (0..6)
-        .map(|j| {
-            // A small offset keeps equal modes apart.
-            let points = s.joint(j, |v| f64::from(v.mode)).into_iter();
-            line(
-                JOINTS[j],
-                colour::AXES[j],
-                1,
-                points
-                    .map(|(t, y)| (t, y + 0.05 * (j as f64 - 2.5)))
-                    .collect(),
-            )
-        })
-        .chain((0..2).map(|w| {
-            let points = s.recording.wheels[w]
-                .iter()
-                .map(|r| (s.t(r.t_s()), f64::from(r.v.mode) + 0.05 * (w as f64 + 3.5)));
-            line(["7", "8"][w], colour::AXES[6 + w], 1, points.collect())
-        }))
-        .collect();
-    let mut panels = vec![
-        s.panel("mode", 150, lines("", (-0.5, 6.5), modes)),
-        s.panel(
-            "sensed movement since the event",
-            150,
-            lines("[mm]", near(&sensed, 1.0), sensed),
-        ),
-        s.panel(
-            "true movement since the event",
-            150,
-            lines("[mm]", near(&physical, 1.0), physical),
-        ),
-        s.panel(
-            "wheel rims",
-            130,
-            lines("[mm/s]", near(&wheels, 20.0), wheels),
-        ),
-    ];
-    for panel in &mut panels {
-        panel.x_range = window;
-        if let Content::Lines { series, .. } = &mut panel.content {
-            // One legend is enough.
-            if panel.title != "mode" && panel.title != "wheel rims" {
-                series.iter_mut().for_each(|l| l.label.clear());
-            }
-        }
-    }
-    vec![
-        Figure {
-            id: "event".into(),
-            title: "All axes around the event".into(),
-            caption: "Red line: the event. Modes: 0 boot, 1 idle, 2 armed, 3 tracking, 4 hold, 5 exhaust, 6 fault (set apart slightly).".into(),
-            panels,
-        },
-        valves(s, window, "event-valves", "Valves around the event"),
-    ]
 }
