@@ -35,7 +35,8 @@ pub struct Analysis {
     pub leg: Option<LegChoice>,
     /// Delay from commanded step to motion, per move.
     pub start_delays: Vec<StartDelay>,
-    /// Shift between reference model and simulated robot, s.
+    /// Shift between reference model and simulated robot, s; only where no event
+    /// of the scenario disturbs the motion.
     pub shift_s: Option<f64>,
     /// Lifts and touchdowns of the stepping foot.
     pub contacts: Vec<Contact>,
@@ -87,7 +88,10 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
         let parts = leg(recording, choice);
         let model = ReferenceModel::new(robot.reference, robot.gait);
         analysis.start_delays = start_delays(&parts, &robot.gait, start_s);
-        analysis.shift_s = velocity_shift_s(&parts, &model, start_s);
+        // The model knows nothing of what a scenario does to the robot.
+        if scenario.events.is_empty() {
+            analysis.shift_s = velocity_shift_s(&parts, &model, start_s);
+        }
         analysis.contacts = contacts(&recording.feet[parts.foot]);
         analysis.reference = Some(model);
     }

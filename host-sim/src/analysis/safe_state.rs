@@ -92,15 +92,6 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
         )
         .info(),
     ];
-    let ramps = worst(recording.wheels.iter().map(|rows| ramp_after(rows, at_s)));
-    targets.push(Target::new(
-        "SS8",
-        "ramp of the wheels begun: the board has left tracking (slower wheel)",
-        ramps.map(|s| s * 1e3),
-        "ms",
-        None,
-        Some(REACTION_S * 1e3),
-    ));
     if estop {
         let first = |dumps: fn(&SupplySample) -> bool| {
             let rows = recording.supply.iter();
@@ -123,6 +114,15 @@ pub(super) fn targets(recording: &Recording, at_s: Option<f64>, estop: bool) -> 
             targets.push(Target::new(id, what, value, "ms", None, limit));
         }
     }
+    let ramps = worst(recording.wheels.iter().map(|rows| ramp_after(rows, at_s)));
+    targets.push(Target::new(
+        "SS8",
+        "ramp of the wheels begun: the board has left tracking (slower wheel)",
+        ramps.map(|s| s * 1e3),
+        "ms",
+        None,
+        Some(REACTION_S * 1e3),
+    ));
     targets
 }
 

@@ -6,8 +6,42 @@ use super::Summary;
 use super::figures::Source;
 use super::plot::Figure;
 use crate::SimError;
+use crate::telemetry::{EventSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
+
+/// Events as lines of a table: time, kind, text. What several boards report at
+/// the same time in the same words becomes one line that names them all.
+fn grouped(events: &[Row<EventSample>]) -> Vec<(f64, &str, String)> {
+    // Time, kind, boards, words.
+    let mut lines: Vec<(u64, &str, Vec<&str>, &str)> = Vec::new();
+    for row in events {
+        let (kind, text) = (row.v.kind.as_str(), row.v.text.as_str());
+        let (board, words) = match text.split_once(": ") {
+            Some((board, words)) if board.starts_with("joint ") || board.starts_with("wheel ") => {
+                (Some(board), words)
+            }
+            _ => (None, text),
+        };
+        let same = lines.iter_mut().rev().take_while(|l| l.0 == row.t_ns);
+        let mut same = same.filter(|l| l.1 == kind && l.3 == words && !l.2.is_empty());
+        match (board, same.next()) {
+            (Some(board), Some(line)) => line.2.push(board),
+            _ => lines.push((row.t_ns, kind, board.into_iter().collect(), words)),
+        }
+    }
+    lines
+        .into_iter()
+        .map(|(t_ns, kind, boards, words)| {
+            let text = if boards.is_empty() {
+                words.to_owned()
+            } else {
+                format!("{}: {words}", boards.join(", "))
+            };
+            (t_ns as f64 * 1e-9, kind, text)
+        })
+        .collect()
+}
 
 /// Renders the page: no scripts, no links to anywhere else.
 pub(super) fn render(
@@ -63,15 +97,13 @@ pub(super) fn render(
             }
         })
         .collect();
-    let events: Vec<Value> = source
-        .recording
-        .events
-        .iter()
-        .map(|r| {
+    let events: Vec<Value> = grouped(&source.recording.events)
+        .into_iter()
+        .map(|(t_s, kind, text)| {
             context! {
-                t => format!("{:.3}", r.t_s() - start).replace('-', "−"),
-                kind => &*r.v.kind,
-                text => &*r.v.text,
+                t => format!("{:.3}", t_s - start).replace('-', "−"),
+                kind => kind,
+                text => text,
             }
         })
         .collect();
@@ -117,4 +149,40 @@ pub(super) fn render(
         parameters => parameters,
     })?;
     Ok(page)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boards_that_say_the_same_share_a_line() {
+        let row = |ms: u64, kind: &str, text: &str| Row {
+            t_ns: ms * 1_000_000,
+            v: EventSample {
+                kind: kind.to_owned(),
+                text: text.to_owned(),
+            },
+        };
+        let events = [
+            row(10, "mode", "joint 1: Tracking to Hold"),
+            row(10, "fault", "joint 1: no SYNC: check the cable"),
+            row(10, "mode", "wheel 7: Tracking to Hold"),
+            row(10, "fault", "wheel 7: no SYNC: check the cable"),
+            row(10, "info", "master: a thing"),
+            row(10, "info", "master: a thing"),
+            row(11, "mode", "joint 2: Tracking to Hold"),
+        ];
+        let lines = grouped(&events);
+        let texts: Vec<&str> = lines.iter().map(|l| l.2.as_str()).collect();
+        let expected = [
+            "joint 1, wheel 7: Tracking to Hold",
+            "joint 1, wheel 7: no SYNC: check the cable",
+            "master: a thing",
+            "master: a thing",
+            "joint 2: Tracking to Hold",
+        ];
+        assert_eq!(texts, expected);
+        assert!((lines[4].0 - 0.011).abs() < 1e-12);
+    }
 }

@@ -309,15 +309,20 @@ fn describe(event: &Event) -> String {
         Event::GaitDone { steps } => format!("gait over after {steps} steps"),
         Event::TrajectoryDone => "foot trajectory over".to_owned(),
         Event::TouchDown { side, sector } => match sector {
-            Some(sector) => format!("{side:?} foot touches with its {sector:?} side"),
-            None => format!("{side:?} foot stands flat"),
+            Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
+            None => format!("{} foot stands flat", word(side)),
         },
-        Event::LiftOff(side) => format!("{side:?} foot leaves the ground"),
+        Event::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
         Event::Position { joint, stroke_mm } => {
             format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
         }
     };
     format!("master: {text}")
+}
+
+/// Name of a side or sector inside a sentence.
+fn word(name: impl std::fmt::Debug) -> String {
+    format!("{name:?}").to_lowercase()
 }
 
 /// Name of a board by its bus address.
