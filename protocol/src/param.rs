@@ -2,10 +2,11 @@
 //! limits and defaults.
 //!
 //! Every value travels as a raw `i32` in the format of its row. Numbers are
-//! permanent: 0x0101–0x01FF joint boards, 0x0201–0x02FF wheel boards. Names,
-//! ranges and defaults of the control parameters are those of the control
-//! crate's `JointGains`; the board checks a set value against `min..=max` here
-//! and against the relations between parameters there.
+//! permanent: 0x0101–0x01FF joint boards, 0x0201–0x02FF wheel boards. Names
+//! and defaults of the control parameters are those of the control crate's
+//! `JointGains`, their ranges lie within those of it (tests of the node crate
+//! hold both); the board checks a set value against `min..=max` here and against
+//! the relations between parameters there.
 //!
 //! Bounds and defaults are written in the unit of the row, as decimal text, and
 //! converted to raw numbers at compile time, so the table reads like a data sheet.
@@ -252,8 +253,8 @@ parameters! {
             "The integral advances only while the error is at most this.";
         DutyLimit = 0x0109, "duty_limit", "1", I2F30, "0" ..= "1", default "1", any_time,
             "Largest duty.";
-        DeadZoneDuty = 0x010A, "dead_zone_duty", "1", I2F30, "0" ..= "0.5", default "0.1", any_time,
-            "Duty added to every acting duty to bridge friction and shortest opening.";
+        DeadZoneDuty = 0x010A, "dead_zone_duty", "1", I2F30, "0" ..= "0.5", default "0.12", any_time,
+            "Duty added to a duty that drives, to bridge friction and shortest opening: (t_off + margin) / PWM period.";
         MinimumDuty = 0x010B, "minimum_duty", "1", I2F30, "0" ..= "0.5", default "0.01", any_time,
             "Duty of the law below which the valves stay shut.";
         SettleBand = 0x010C, "settle_band", "mm", I16F16, "0" ..= "100", default "0.8", any_time,

@@ -45,7 +45,7 @@ pub enum PwmError {
 }
 
 /// Timing of the valves: what it takes to turn an opening into a pulse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PwmTiming {
     period: u32,
     tick: u32,
@@ -131,7 +131,7 @@ impl PwmTiming {
 }
 
 /// One valve: where it is in its period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 struct Channel {
     /// In a period: from the start of a pulse until a new one may begin.
     running: bool,
@@ -198,7 +198,7 @@ impl Channel {
 }
 
 /// The sliced PWM of the four valves of a cylinder.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],

@@ -38,7 +38,7 @@ const CAPACITY: usize = MAX_WINDOW as usize;
 const SCALE_BITS: u32 = 24;
 
 /// The window: its length and the factor from the sum to raw mm/s.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct VelocityWindow {
     length: u8,
     scale: u32,
@@ -105,7 +105,7 @@ const fn quotient(dividend: u64, divisor: u64) -> u64 {
 }
 
 /// The last positions and their sums.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct VelocityEstimator {
     samples: [i32; CAPACITY],
     newest: u8,

@@ -2,11 +2,11 @@
 
 use proptest::prelude::*;
 use wheeleg_control::joint::{
-    ConfigError, Correction, Gain, JointConfig, JointController, JointGains, JointInput,
+    Announced, ConfigError, Correction, Gain, JointConfig, JointController, JointGains, JointInput,
     JointOutput, JointParameter,
 };
 use wheeleg_control::valve::ValveOpenings;
-use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS};
+use wheeleg_units::{Duty, Micros, PositionMm, Ticks, VelocityMmS};
 
 const TICK: Micros = Micros(1000);
 
@@ -98,7 +98,7 @@ fn each_parameter_is_refused_by_name_just_outside_its_range() {
     rejects(&|g| g.pwm_period = Micros(20_500), relation(P::PwmPeriod));
     rejects(&|g| g.pwm_period = Micros(999), range(P::PwmPeriod));
     rejects(
-        &|g| g.duty_limit = Duty::from_per_mille(200),
+        &|g| g.duty_limit = Duty::from_per_mille(120),
         relation(P::DeadZoneDuty),
     );
     rejects(
@@ -471,5 +471,22 @@ proptest! {
         };
         let (low, high) = (a.min(b), a.max(b));
         prop_assert!(duty(low) <= duty(high));
+    }
+}
+
+#[test]
+fn an_announced_reference_does_not_change_the_output_of_this_law() {
+    let config = JointConfig::new(&JointGains::default(), TICK).unwrap();
+    let (mut told, mut untold) = (JointController::new(config), JointController::new(config));
+    for tick in 0..400_u32 {
+        let plain = at(f64::from(tick) * 0.05, 20.0);
+        let ahead = JointInput {
+            announced: Some(Announced {
+                reference: PositionMm::from_int(150),
+                after: Ticks(400 - tick),
+            }),
+            ..plain
+        };
+        assert_eq!(told.step(&ahead), untold.step(&plain), "{tick}");
     }
 }

@@ -3,20 +3,22 @@
 use wheeleg_units::Micros;
 
 /// Unwraps the 32-bit microsecond counter; must be asked at least every 35 min.
+/// It starts with the first instant, whatever the counter shows then.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
-    time_us: u64,
+    time_us: Option<u64>,
 }
 
 impl Clock {
     /// The unwrapped time of `now`.
     pub fn unwrap(&mut self, now: Micros) -> u64 {
+        let newest = self.time_us.unwrap_or(u64::from(now.get()));
         // Low word of the newest time; the shorter way round is taken, so an
         // instant slightly in the past is in the past.
-        let low = (self.time_us & 0xFFFF_FFFF) as u32;
+        let low = (newest & 0xFFFF_FFFF) as u32;
         let step = now.get().wrapping_sub(low) as i32;
-        let time = self.time_us.saturating_add_signed(i64::from(step));
-        self.time_us = self.time_us.max(time);
+        let time = newest.saturating_add_signed(i64::from(step));
+        self.time_us = Some(newest.max(time));
         time
     }
 }
@@ -36,5 +38,16 @@ mod tests {
         }
         assert_eq!(clock.unwrap(Micros(u32::MAX)), (40 << 30) - 1);
         assert_eq!(clock.unwrap(Micros(5)), (40 << 30) + 5);
+    }
+
+    #[test]
+    fn a_counter_that_starts_in_its_upper_half_runs() {
+        let mut clock = Clock::default();
+        let start = 0x9000_0000_u32;
+        assert_eq!(clock.unwrap(Micros(start)), u64::from(start));
+        assert_eq!(
+            clock.unwrap(Micros(start + 50_000)),
+            u64::from(start) + 50_000
+        );
     }
 }

@@ -344,3 +344,18 @@ fn board_without_a_sound_sensor_never_leaves_its_self_test_well() {
     assert_eq!(rig.node.mode(), Mode::Fault);
     assert!(rig.node.faults().contains(Fault::SensorRange));
 }
+
+#[test]
+fn the_watchdog_works_whatever_the_counter_shows_at_reset() {
+    for start in [0x7FFF_0000_u32, 0x8000_0000, 0x9000_0000, 0xFFFF_FF00] {
+        let mut rig = JointRig::new();
+        rig.now = start;
+        rig.run_cycles(3, None);
+        assert!(matches!(rig.request(&ARM), Message::Ack(_)), "{start:#X}");
+        rig.run_cycles(5, Some(setpoint(100.0, Hold)));
+        assert_eq!(rig.node.mode(), Mode::Tracking);
+        rig.run(60);
+        assert_eq!(rig.node.mode(), Mode::Hold, "{start:#X}");
+        assert!(rig.node.faults().contains(Fault::LinkLost));
+    }
+}

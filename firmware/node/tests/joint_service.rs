@@ -267,3 +267,22 @@ fn every_request_is_answered_once_with_its_own_type_or_a_nack() {
         assert!(rig.node.take_transmission().is_none());
     }
 }
+
+#[test]
+fn a_new_calibration_is_no_sensor_fault_and_has_to_prove_itself() {
+    let mut rig = JointRig::new();
+    rig.run_cycles(3, None);
+    assert_eq!(rig.node.mode(), Mode::Idle);
+    // 1 000 codes are 3.05 mm, more than a piston moves in a tick.
+    let zero = JointParam::SensorZero.info().default + 1_000;
+    let answer = rig.request(&set(JointParam::SensorZero, zero));
+    assert!(matches!(answer, Message::ParamValue(_)));
+    rig.run(9);
+    let refused = rig.request(&ARM);
+    assert!(matches!(refused, Message::Nack(nack) if nack.reason == NackReason::NotReady));
+    rig.run(11);
+    assert!(rig.node.faults().is_empty());
+    assert!((rig.node.snapshot().measured.to_f64() - 96.95).abs() < 0.01);
+    assert_eq!(rig.node.snapshot().velocity.raw(), 0);
+    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+}

@@ -18,7 +18,7 @@ pub type JointRules = GridRules<7, 7>;
 /// [`JointGains::default`] is a cautious start for a bore 20 mm, stroke 180 mm
 /// cylinder with throttled valves; each field says what it does and
 /// where it is sensible.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JointGains {
     /// Kp, duty per millimetre of error. Range 0…4; sensible 0.005…0.1. Larger is
     /// faster and stiffer, until the pressure lag makes it overshoot.
@@ -42,10 +42,11 @@ pub struct JointGains {
     /// The integral advances only while |error| is at most this. 0…1000 mm;
     /// sensible 5…30: outside it, the proportional term does the work.
     pub integral_zone: PositionMm,
-    /// Largest |duty|. 0…1, above `minimum_duty`.
+    /// Largest |duty|. 0…1, above `minimum_duty` and `dead_zone_duty`.
     pub duty_limit: Duty,
-    /// Duty added, with its sign, to a duty that drives: bridges the static
-    /// friction and the shortest opening that a valve can make. 0…0.5; sensible
+    /// Duty added, with its sign, to a duty that drives towards the reference
+    /// from outside the settle band, or along a moving reference; one that brakes
+    /// goes out without it. Bridges the static friction and the shortest opening that a valve can make. 0…0.5; sensible
     /// (t_off + margin) / PWM period, 0.05…0.25; below it, small duties give
     /// pulses that [`crate::pwm`] can not send.
     pub dead_zone_duty: Duty,
@@ -92,7 +93,7 @@ impl Default for JointGains {
             integral_scale: PositionMm::from_int(4),
             integral_zone: PositionMm::from_int(15),
             duty_limit: Duty::ONE,
-            dead_zone_duty: Duty::from_per_mille(230),
+            dead_zone_duty: Duty::from_per_mille(120),
             minimum_duty: Duty::from_per_mille(10),
             settle_band: PositionMm::from_raw(52_429),
             settle_velocity: VelocityMmS::from_int(10),
@@ -163,12 +164,15 @@ pub enum ConfigError {
     /// The parameter is outside the range of its documentation.
     OutOfRange(JointParameter),
     /// The parameter contradicts another one: the release band does not exceed
-    /// the settle band, the minimum duty is not below the limit, the stroke is
+    /// the settle band, the minimum or the dead-zone duty is not below the limit, the stroke is
     /// empty, or the PWM period is not a whole number of ticks.
     Inconsistent(JointParameter),
 }
 
 /// A validated configuration: raw coefficients for one tick length.
+///
+/// Its `Hash` is for sealing memory: rule bases, which are constants, count by
+/// their address.
 #[derive(Clone, Copy, Debug)]
 pub struct JointConfig {
     gains: JointGains,
@@ -254,6 +258,32 @@ impl JointConfig {
     #[must_use]
     pub const fn tick(&self) -> Micros {
         self.tick
+    }
+}
+
+impl core::hash::Hash for JointConfig {
+    fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            gains,
+            tick,
+            rules_pd,
+            rules_id,
+            error_to_input,
+            velocity_to_input,
+            integral_to_input,
+            integral_limit,
+            window,
+            settle_ticks,
+            release_ticks,
+            bumpless_ticks,
+        } = self;
+        (gains, tick, window).hash(state);
+        core::ptr::hash(*rules_pd, state);
+        core::ptr::hash(*rules_id, state);
+        (error_to_input, velocity_to_input).hash(state);
+        (integral_to_input, integral_limit).hash(state);
+        (settle_ticks, release_ticks, bumpless_ticks).hash(state);
     }
 }
 

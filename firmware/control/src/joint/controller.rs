@@ -17,8 +17,9 @@ const FADE_LIMIT: i64 = 4 << 30;
 /// Controller of one joint: configuration and state.
 ///
 /// Call [`JointController::step`] once per control tick while the joint tracks,
-/// and [`JointController::observe`] once per tick while it does not.
-#[derive(Clone, Debug)]
+/// and [`JointController::observe`] once per tick while it does not. Its `Hash`
+/// covers configuration and state, so that a board can seal both.
+#[derive(Clone, Debug, Hash)]
 pub struct JointController {
     config: JointConfig,
     correction: Correction,

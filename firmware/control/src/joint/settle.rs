@@ -4,7 +4,7 @@ use super::config::JointConfig;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 /// Whether the joint is at rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Settle {
     settled: bool,
     /// Ticks for which the condition to change has held.

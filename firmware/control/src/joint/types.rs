@@ -24,11 +24,14 @@ pub struct JointInput {
     /// Velocity of the reference; zero for a step.
     pub reference_velocity: VelocityMmS,
     /// The reference announced for later, and when it becomes the reference.
+    /// The present law does not use it: with or without it the output is the
+    /// same. It is carried to here for a law that vents the counter chamber
+    /// ahead of a known move.
     pub announced: Option<Announced>,
 }
 
 /// A reference known ahead of time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Announced {
     /// The reference to come.
     pub reference: PositionMm,

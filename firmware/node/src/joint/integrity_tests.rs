@@ -1,12 +1,14 @@
 //! A flipped bit in what a joint board keeps between two ticks means Hold.
 
 use super::node::JointNode;
+use super::reference::Target;
 use crate::NodeIdentity;
 use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, ValveBank};
 use crate::mode::{Event, Mode};
 use crate::parameters::JointParameters;
-use wheeleg_control::joint::{JointConfig, JointGains};
+use wheeleg_control::joint::{Correction, JointConfig, JointGains};
 use wheeleg_control::pwm::PwmTiming;
+use wheeleg_control::valve::ValveMode;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{Address, Fault};
 use wheeleg_units::{AdcCode, Micros, PositionMm};
@@ -75,6 +77,38 @@ fn every_flipped_bit_of_the_reference_is_seen() {
             node.state.reference = PositionMm::from_raw(node.state.reference.raw() ^ (1 << bit));
         }));
     }
+}
+
+#[test]
+fn damaged_controller_valve_and_target_state_is_seen() {
+    // One hidden sample of position in the history of the velocity estimate.
+    assert!(holds_after(|node| {
+        node.controller.observe(PositionMm::from_int(50));
+    }));
+    assert!(holds_after(|node| {
+        node.controller.set_correction(Correction::Id);
+    }));
+    assert!(holds_after(|node| {
+        let push = ValveMode::Push.openings(Micros(10_000));
+        let _ = node.pwm.tick(&push);
+    }));
+    assert!(holds_after(|node| {
+        node.target = Target::at(PositionMm::from_raw(1));
+    }));
+    assert!(holds_after(|node| {
+        node.settings.staged_exhaust = ValveMode::BlowThrough.openings(Micros(10_000));
+    }));
+}
+
+#[test]
+fn a_request_does_not_hide_earlier_damage() {
+    assert!(holds_after(|node| {
+        node.state.reference = PositionMm::from_raw(node.state.reference.raw() ^ 1);
+        node.change(|node| node.controller.set_correction(Correction::Id));
+    }));
+    assert!(!holds_after(|node| {
+        node.change(|node| node.controller.set_correction(Correction::Id));
+    }));
 }
 
 #[test]

@@ -15,8 +15,9 @@ use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
 use wheeleg_control::joint::JointController;
 use wheeleg_control::pwm::ValvePwm;
+use wheeleg_control::valve::ValveOpenings;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits};
-use wheeleg_units::{Micros, PositionMm, Ticks};
+use wheeleg_units::{Micros, PositionMm, Ticks, VelocityMmS};
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -33,8 +34,8 @@ type Sealed<'a> = (
     &'a SensorMonitor,
     &'a SensorConfig,
     &'a SupervisionTimes,
-    [i32; 2],
-    Ticks,
+    ([PositionMm; 2], VelocityMmS, Ticks, ValveOpenings, Micros),
+    (&'a JointController, &'a ValvePwm, &'a Target),
 );
 
 /// Application of one joint board: sense, control, valves.
@@ -148,6 +149,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 .supervisor
                 .fault(Fault::StateCorrupt, Event::BoardFault, now);
             let _ = self.write([0; 4]);
+            self.snapshot.mode = self.core.mode();
+            self.snapshot.faults = self.faults();
+            self.snapshot.pulses = [Micros::ZERO; 4];
         }
         self.reseal();
         TickReport {
@@ -188,17 +192,25 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    /// What the checksum covers. Gains and valve timing are not in it: they
-    /// stand in memory twice and are compared.
+    /// What the checksum covers: everything that shapes the outputs of the next
+    /// tick. The gains and the valve timing of the settings are not in it: the
+    /// controller and the PWM hold the same, and are compared.
     fn sealed(&self) -> Sealed<'_> {
+        let settings = &self.settings;
         (
             &self.parameters,
             &self.state,
             &self.monitor,
-            &self.settings.sensor,
+            &settings.sensor,
             &self.core.times,
-            [self.settings.slew_step, self.settings.following_error].map(PositionMm::raw),
-            self.settings.following_ticks,
+            (
+                [settings.slew_step, settings.following_error],
+                settings.slew_rate,
+                settings.following_ticks,
+                settings.staged_exhaust,
+                settings.full_period,
+            ),
+            (&self.controller, &self.pwm, &self.target),
         )
     }
 
@@ -209,8 +221,19 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             && *self.pwm.timing() == self.settings.timing
     }
 
-    pub(super) fn reseal(&mut self) {
+    fn reseal(&mut self) {
         self.seal = Seal::of(&self.sealed());
+    }
+
+    /// A change of sealed state between two ticks. State that was damaged before
+    /// keeps its broken seal, so that the next tick still sees the damage.
+    pub(super) fn change<R>(&mut self, change: impl FnOnce(&mut Self) -> R) -> R {
+        let intact = self.is_intact();
+        let result = change(self);
+        if intact {
+            self.reseal();
+        }
+        result
     }
 
     pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {

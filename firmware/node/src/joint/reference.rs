@@ -10,6 +10,9 @@
 //! reference follows the measured stroke; so the first reference after arming
 //! is the actual position, and from there the slew limit holds: no jump after
 //! an arm, wherever the set-point is.
+//!
+//! The next reference of a slot is counted down to the tick and handed to the
+//! control law, which does not use it yet.
 
 use super::settings::JointSettings;
 use crate::JOINT_TICK;
@@ -22,7 +25,7 @@ use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
 const CYCLE_TICKS: u32 = CYCLE_US / JOINT_TICK.get();
 
 /// What the bus wants.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Target {
     reference: PositionMm,
     velocity: VelocityMmS,

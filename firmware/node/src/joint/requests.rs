@@ -6,6 +6,7 @@ use super::settings::JointSettings;
 use crate::board::{Application, BoardCore, ack};
 use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
+use crate::sensor::SensorMonitor;
 use wheeleg_control::joint::Correction;
 use wheeleg_protocol::{
     Correction as WireCorrection, InputBits, LimitBits, LinkLossAction, Message, NackReason,
@@ -23,7 +24,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     }
 
     fn armed(&mut self) {
-        self.target = Target::at(self.state.measured);
+        self.change(|node| node.target = Target::at(node.state.measured));
     }
 
     fn sync(&mut self, sync: &Sync, at: Micros) {
@@ -36,13 +37,13 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
             Some(setpoint) => {
                 // Refused unless armed: a set-point moves nothing by itself.
                 if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
-                    self.target = Target::from_setpoint(&setpoint);
+                    self.change(|node| node.target = Target::from_setpoint(&setpoint));
                 }
             }
             None => {
                 let withdrawn = self.core.supervisor.apply(Event::SetpointWithdrawn, at);
                 if withdrawn.is_ok() && was_tracking {
-                    self.target = Target::at(self.state.reference);
+                    self.change(|node| node.target = Target::at(node.state.reference));
                 }
             }
         }
@@ -75,10 +76,11 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
                 self.core.supervisor.apply(event, at)?;
             }
             Message::SelectCorrection(command) => {
-                self.controller.set_correction(match command.correction {
+                let correction = match command.correction {
                     WireCorrection::Pd => Correction::Pd,
                     WireCorrection::Id => Correction::Id,
-                });
+                };
+                self.change(|node| node.controller.set_correction(correction));
             }
             Message::ParamGet(command) => {
                 return Ok(ParamValue {
@@ -131,7 +133,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if reference < gains.stroke_min || reference > gains.stroke_max {
             return Err(NackReason::OutOfRange);
         }
-        self.target = Target::at(reference);
+        self.change(|node| node.target = Target::at(reference));
         Ok(())
     }
 
@@ -140,15 +142,23 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let disarmed = self.core.mode().is_disarmed();
         let trial = self.parameters.with(id, raw, disarmed)?;
         let settings = JointSettings::new(&trial).ok_or(NackReason::OutOfRange)?;
-        if settings.correction != self.settings.correction {
-            self.controller.set_correction(settings.correction);
-        }
-        self.controller.retune(settings.control);
-        self.pwm.set_timing(settings.timing);
-        self.core.times = settings.times;
-        self.settings = settings;
-        self.parameters = trial;
-        self.reseal();
+        self.change(|node| {
+            if settings.sensor != node.settings.sensor {
+                // Another calibration moves the stroke without a motion: neither
+                // a rate fault nor a velocity. The new one has to prove itself
+                // before the board may arm.
+                node.monitor = SensorMonitor::new();
+                node.controller.reset();
+            }
+            if settings.correction != node.settings.correction {
+                node.controller.set_correction(settings.correction);
+            }
+            node.controller.retune(settings.control);
+            node.pwm.set_timing(settings.timing);
+            node.core.times = settings.times;
+            node.settings = settings;
+            node.parameters = trial;
+        });
         Ok(())
     }
 }

@@ -79,7 +79,7 @@ impl JointSettings {
         let exhaust_duty = Duty::from_raw(raw(P::ExhaustDuty));
         let [opening, ..] = allocate(exhaust_duty, gains.pwm_period).0;
         // A pulse too short for the valve would never exhaust at all.
-        let opening = opening.max(shortest_opening(&timing, gains.pwm_period));
+        let opening = opening.max(timing.shortest_opening());
         Some(Self {
             control,
             timing,
@@ -145,11 +145,55 @@ fn per_tick(rate_raw: i32) -> PositionMm {
     PositionMm::from_raw(i32::try_from(step).unwrap_or(i32::MAX).max(1))
 }
 
-/// Smallest opening, in steps of 100 µs, that gives a pulse at all.
-fn shortest_opening(timing: &PwmTiming, period: Micros) -> Micros {
-    let mut opening = Micros(100);
-    while opening < period && timing.pulse(opening) == Micros::ZERO {
-        opening = opening.saturating_add(Micros(100));
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_control::joint::ConfigError;
+
+    #[test]
+    fn defaults_of_the_table_are_those_of_the_control_law() {
+        assert_eq!(gains(&JointParameters::default()), JointGains::default());
     }
-    opening
+
+    #[test]
+    fn the_default_dead_zone_bridges_the_shortest_opening_and_not_much_more() {
+        let settings = JointSettings::new(&JointParameters::default()).unwrap();
+        let gains = settings.control.gains();
+        let [added, ..] = allocate(gains.dead_zone_duty, gains.pwm_period).0;
+        let shortest = settings.timing.shortest_opening();
+        assert!(added >= shortest, "{added:?} {shortest:?}");
+        assert!(
+            added.get() <= shortest.get() * 5 / 4,
+            "{added:?} {shortest:?}"
+        );
+    }
+
+    #[test]
+    fn bounds_of_the_table_are_accepted_by_the_control_law() {
+        // Rows of the law, each at both ends, with their partners out of the way.
+        for parameter in JointParam::ALL {
+            let row = parameter.info();
+            for raw in [row.min, row.max] {
+                let mut trial = JointParameters::default();
+                for (id, partner) in [
+                    (JointParam::MinimumDuty, 0),
+                    (JointParam::DeadZoneDuty, 0),
+                    (JointParam::SettleBand, 0),
+                    (JointParam::ReleaseBand, JointParam::ReleaseBand.info().max),
+                    (JointParam::StrokeMin, JointParam::StrokeMin.info().min),
+                    (JointParam::StrokeMax, JointParam::StrokeMax.info().max),
+                ] {
+                    trial = trial.with(id.id(), partner, true).unwrap();
+                }
+                trial = trial.with(row.id, raw, true).unwrap();
+                let result = JointConfig::new(&gains(&trial), JOINT_TICK);
+                let contradiction = matches!(result, Err(ConfigError::Inconsistent(_)));
+                assert!(
+                    result.is_ok() || contradiction,
+                    "{} {raw}: {result:?}",
+                    row.name
+                );
+            }
+        }
+    }
 }

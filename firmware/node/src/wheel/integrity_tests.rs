@@ -1,5 +1,6 @@
 //! A flipped bit in what a wheel board keeps between two samples means Hold.
 
+use super::motion::Target;
 use super::node::WheelNode;
 use crate::NodeIdentity;
 use crate::hardware::{Encoder, MotorDrive, NoDumpValve, NoSwitches, PinError};
@@ -47,7 +48,7 @@ fn armed() -> Node {
     }
     let now = Micros(20 * 520);
     node.core.supervisor.apply(Event::Arm, now).unwrap();
-    node.engage();
+    node.change(Node::engage);
     node.tick(now);
     assert_eq!(node.mode(), Mode::Armed);
     node
@@ -74,6 +75,13 @@ fn damaged_controller_settings_and_state_are_seen() {
     }));
     assert!(holds_after(|node| node.settings.max_speed ^= 1));
     assert!(holds_after(|node| node.state.drive ^= 1));
+    assert!(holds_after(|node| {
+        node.target = Target::at(WheelCount::wrapping_new(1));
+    }));
+    assert!(holds_after(|node| {
+        node.state.drive ^= 1;
+        node.change(|node| node.target = Target::at(WheelCount::ZERO));
+    }));
     assert!(holds_after(|node| {
         node.core.times.tick = Micros(node.core.times.tick.get() ^ 1);
     }));

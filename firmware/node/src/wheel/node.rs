@@ -97,6 +97,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             dump_valve,
         };
         node.tune();
+        node.reseal();
         Ok(node)
     }
 
@@ -125,7 +126,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.seal.holds(&self.sealed()) || self.shadow != self.controller {
+        if !self.is_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -215,7 +216,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         &self.parameters
     }
 
-    /// Hands parameters to the controller; then seals.
+    /// Hands parameters to the controller.
     pub(super) fn tune(&mut self) {
         let settings = &self.settings;
         // Speed and acceleration are refused while a profile runs; `drive`
@@ -225,7 +226,6 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             .controller
             .apply(WheelCommand::SampleTimer(settings.timer));
         self.tune_profile();
-        self.reseal();
     }
 
     pub(super) fn tune_profile(&mut self) {
@@ -242,18 +242,37 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         &TickState,
         &WheelSettings,
         &SupervisionTimes,
+        &Target,
+        WheelControlMode,
     ) {
         (
             &self.parameters,
             &self.state,
             &self.settings,
             &self.core.times,
+            &self.target,
+            self.control_mode,
         )
     }
 
-    pub(super) fn reseal(&mut self) {
+    fn is_intact(&self) -> bool {
+        self.seal.holds(&self.sealed()) && self.shadow == self.controller
+    }
+
+    fn reseal(&mut self) {
         self.shadow = self.controller.clone();
         self.seal = Seal::of(&self.sealed());
+    }
+
+    /// A change of sealed state between two samples. State that was damaged
+    /// before keeps its broken seal, so that the next sample still sees it.
+    pub(super) fn change<R>(&mut self, change: impl FnOnce(&mut Self) -> R) -> R {
+        let intact = self.is_intact();
+        let result = change(self);
+        if intact {
+            self.reseal();
+        }
+        result
     }
 
     pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {

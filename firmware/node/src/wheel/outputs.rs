@@ -78,7 +78,6 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     pub(super) fn engage(&mut self) {
         self.target = Target::at(self.state.actual);
         engage(&mut self.controller, self.control_mode, self.state.actual);
-        self.reseal();
     }
 }
 

@@ -24,7 +24,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
     }
 
     fn armed(&mut self) {
-        self.engage();
+        self.change(Self::engage);
     }
 
     fn sync(&mut self, sync: &Sync, at: Micros) {
@@ -36,13 +36,13 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
             Some(setpoint) => {
                 // Refused unless armed: a set-point moves nothing by itself.
                 if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
-                    self.target = Target::from_setpoint(&setpoint);
+                    self.change(|node| node.target = Target::from_setpoint(&setpoint));
                 }
             }
             None => {
                 let withdrawn = self.core.supervisor.apply(Event::SetpointWithdrawn, at);
                 if withdrawn.is_ok() && was_tracking {
-                    self.target = Target::at(self.controller.command());
+                    self.change(|node| node.target = Target::at(node.controller.command()));
                 }
             }
         }
@@ -82,12 +82,15 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
                     WheelControlMode::Position | WheelControlMode::Trapezoidal => {}
                     _ => return Err(NackReason::WrongMode),
                 }
-                self.target = Target::at(command.position.get());
+                self.change(|node| node.target = Target::at(command.position.get()));
             }
             Message::WheelVelocity(command) => {
                 self.check_motion(command.deadline_cycle)?;
                 self.check_velocity(command.velocity_raw)?;
-                self.target = Target::turning(self.state.actual, command.velocity_raw);
+                let velocity_raw = command.velocity_raw;
+                self.change(|node| {
+                    node.target = Target::turning(node.state.actual, velocity_raw);
+                });
             }
             Message::WheelMode(command) => self.select_mode(command.mode)?,
             Message::WheelMaxSpeed(command) => {
@@ -176,17 +179,20 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         }
     }
 
-    /// Changes the controller mode, at standstill or disarmed.
+    /// Changes the controller mode, unless the wheel tracks. An armed wheel then
+    /// stops and keeps its place.
     fn select_mode(&mut self, mode: WheelControlMode) -> Result<(), NackReason> {
         if self.core.mode() == Mode::Tracking {
             return Err(NackReason::WrongMode);
         }
-        self.settings = WheelSettings::new(&self.parameters, mode).ok_or(NackReason::OutOfRange)?;
-        self.control_mode = mode;
-        if self.core.mode() == Mode::Armed {
-            self.engage();
-        }
-        self.reseal();
+        let settings = WheelSettings::new(&self.parameters, mode).ok_or(NackReason::OutOfRange)?;
+        self.change(|node| {
+            node.settings = settings;
+            node.control_mode = mode;
+            if node.core.mode() == Mode::Armed {
+                node.engage();
+            }
+        });
         Ok(())
     }
 
@@ -197,14 +203,17 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         for (id, raw) in changes {
             trial = trial.with(*id, *raw, disarmed)?;
         }
-        self.settings =
+        let settings =
             WheelSettings::new(&trial, self.control_mode).ok_or(NackReason::OutOfRange)?;
-        self.parameters = trial;
-        if self.core.times.tick != self.settings.times.tick {
-            self.core.supervisor.restart_timing();
-        }
-        self.core.times = self.settings.times;
-        self.tune();
+        self.change(|node| {
+            node.settings = settings;
+            node.parameters = trial;
+            if node.core.times.tick != settings.times.tick {
+                node.core.supervisor.restart_timing();
+            }
+            node.core.times = settings.times;
+            node.tune();
+        });
         Ok(())
     }
 }
