@@ -88,6 +88,8 @@ pub fn run(
                 let record = world.master().take_telemetry();
                 if let Some(start_ns) = started {
                     observer.cycle(&world, record, (start_ns, now_ns), cycle_ns, recorder);
+                } else {
+                    observer.pass(&world);
                 }
                 let t_s = started.map_or(-1.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9);
                 if progress(t_s).is_break() {

@@ -228,6 +228,13 @@ impl Observer {
         }
     }
 
+    /// Passes over a bus cycle of the start-up, so that the first sample shows
+    /// the traffic of its own cycle alone.
+    pub(super) fn pass(&mut self, world: &World) {
+        let line = world.bus().counters();
+        (self.bus_bytes, self.bus_busy_ns) = (line.bytes, line.busy_ns);
+    }
+
     /// Samples bus and master, once per bus cycle. `record` is the master's own
     /// record of the cycle that has just ended, if it lives; it is logged at the
     /// time that this cycle began.
