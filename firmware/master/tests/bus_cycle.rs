@@ -50,12 +50,12 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
         assert_eq!(rig.node(node).mode, NodeMode::Armed);
     }
     // 180 mm/s and 600 mm/s² in the chip's units at 520 µs a sample:
-    // 99 314 counts/s → 51.64 → 52; 331 045 counts/s² → 0.08951·256 = 22.9 → 23.
+    // 19 863 counts/s → 10.33 → 10; 66 209 counts/s² → 0.017903·256 = 4.58 → 5.
     let requests = rig.node(7).requests.clone();
     assert!(requests.iter().any(|m| matches!(m,
-        Message::WheelMaxSpeed(speed) if speed.speed.get() == 52)));
+        Message::WheelMaxSpeed(speed) if speed.speed.get() == 10)));
     assert!(requests.iter().any(|m| matches!(m,
-        Message::WheelAcceleration(a) if a.acceleration.raw() == 23)));
+        Message::WheelAcceleration(a) if a.acceleration.raw() == 5)));
     assert!(
         !rig.node(1)
             .requests
@@ -258,8 +258,8 @@ fn wheel_moves_start_at_the_last_reference_and_wrap() {
                 travel_mm: PositionMm::from_int(100),
             });
             let sync = rig.cycle();
-            // 100 mm = 55 174.2 counts.
-            let expected = 8_388_000 + k * 55_174 - (1 << 24);
+            // 100 mm = 11 034.8 counts.
+            let expected = 8_388_000 + k * 11_035 - (1 << 24);
             for wheel in [7, 8] {
                 let slot = sync.slots.wheel(Address::wheel(wheel).unwrap()).unwrap();
                 assert!(

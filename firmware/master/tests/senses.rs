@@ -88,7 +88,7 @@ proptest! {
             total += i64::from(step);
             odometry.update(Side::Left, count);
         }
-        let exact_um = total as f64 * 942_478.0 / 520_000.0;
+        let exact_um = total as f64 * 942_478.0 / 104_000.0;
         let found = odometry.wheel_um(Side::Left) as f64;
         prop_assert!((found - exact_um).abs() <= 0.51, "{found} {exact_um}");
         // Distance to counts and back is within half a µm either way.
@@ -104,14 +104,14 @@ fn odometry_mean_and_rebase() {
     for side in [Side::Left, Side::Right] {
         odometry.update(side, WheelCount::MAX);
     }
-    odometry.update(Side::Left, WheelCount::MAX.wrapping_add(520_000));
+    odometry.update(Side::Left, WheelCount::MAX.wrapping_add(104_000));
     assert_eq!(odometry.wheel_um(Side::Left), 942_478);
     assert_eq!(odometry.travel_um(), 471_239);
     // A node that was reset starts at another count: no jump.
     odometry.rebase(Side::Left);
     odometry.update(Side::Left, WheelCount::ZERO);
     assert_eq!(odometry.travel_um(), 471_239);
-    odometry.update(Side::Left, WheelCount::ZERO.wrapping_add(-520_000));
+    odometry.update(Side::Left, WheelCount::ZERO.wrapping_add(-104_000));
     assert_eq!(odometry.travel_um(), 0);
 }
 

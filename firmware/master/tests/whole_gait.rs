@@ -68,7 +68,7 @@ fn three_steps_cover_three_strokes() {
             // Leg–wheel co-operation: b5 gives way by what the wheels measured
             // in the last cycle.
             let b5 = sync.slots.joint(Address::joint(2).unwrap()).unwrap();
-            let pushed = (counts - start_counts) as f64 * 942.478 / 520_000.0;
+            let pushed = (counts - start_counts) as f64 * 942.478 / 104_000.0;
             let found = b5.reference.to_f64();
             assert!(
                 (found - (180.0 - pushed)).abs() < 0.01,
@@ -109,9 +109,9 @@ fn profile_drive_sends_the_end_of_the_push() {
     rig.run(200);
     let before = rig.last_sync.unwrap().slots.wheel(wheel).unwrap().reference;
     let push = rig.cycle().slots.wheel(wheel).unwrap();
-    // 180 mm = 99 313.5 counts, at once: the board makes the trapezoid.
+    // 180 mm = 19 862.7 counts, at once: the board makes the trapezoid.
     let distance = push.reference.wrapping_difference(before);
-    assert!((distance - 99_314).abs() <= 1, "{distance}");
+    assert!((distance - 19_863).abs() <= 1, "{distance}");
     assert_eq!(push.velocity_raw, 0);
 }
 
@@ -262,5 +262,5 @@ fn a_wheel_that_stays_behind_does_not_shift_the_next_move() {
     let slot = sync.slots.wheel(Address::wheel(7).unwrap()).unwrap();
     // Two moves of 55 174 counts from the start, not from where it was pushed.
     let origin = wheeleg_units::WheelCount::wrapping_new(start as i32);
-    assert_eq!(slot.reference.wrapping_difference(origin), 2 * 55_174);
+    assert_eq!(slot.reference.wrapping_difference(origin), 2 * 11_035);
 }

@@ -16,11 +16,11 @@ pub struct WheelGeometry {
 }
 
 impl Default for WheelGeometry {
-    /// 500 lines, times 4, times 260 (130:1 gear and 2:1 chain, PAPER); wheel
-    /// radius 0.15 m (ASSUMED): 942 478 µm.
+    /// 100 lines (ASSUMED, as in `robots/wheeleg-2003.toml`), times 4, times 260
+    /// (130:1 gear and 2:1 chain, PAPER); wheel radius 0.15 m (ASSUMED): 942 478 µm.
     fn default() -> Self {
         Self {
-            counts_per_revolution: 520_000,
+            counts_per_revolution: 104_000,
             circumference_um: 942_478,
         }
     }
@@ -55,8 +55,8 @@ impl WheelGeometry {
 
 /// Odometry of both wheels since start-up.
 ///
-/// Right as long as a wheel turns less than 2^23 counts (16 revolutions) between two
-/// replies; at 0.4 m/s that is 38 s.
+/// Right as long as a wheel turns less than 2^23 counts (80 revolutions with 100
+/// encoder lines) between two replies; at 0.4 m/s that is 190 s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Odometry {
     geometry: WheelGeometry,
