@@ -6,6 +6,7 @@ use super::Summary;
 use super::figures::Source;
 use super::plot::Figure;
 use crate::SimError;
+use crate::sil::START_UP;
 use crate::telemetry::{EventSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
@@ -97,7 +98,14 @@ pub(super) fn render(
             }
         })
         .collect();
-    let events: Vec<Value> = grouped(&source.recording.events)
+    // The start-up is a story of its own, told at time zero.
+    let all = &source.recording.events;
+    let begin = all.partition_point(|r| r.v.text.starts_with(START_UP));
+    let start_up: Vec<String> = all[..begin]
+        .iter()
+        .map(|r| r.v.text.trim_start_matches(START_UP).to_owned())
+        .collect();
+    let events: Vec<Value> = grouped(&all[begin..])
         .into_iter()
         .map(|(t_s, kind, text)| {
             context! {
@@ -146,6 +154,7 @@ pub(super) fn render(
         figures => figures,
         delays => delays,
         events => events,
+        start_up => start_up,
         parameters => parameters,
     })?;
     Ok(page)

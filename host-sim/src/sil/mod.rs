@@ -23,6 +23,9 @@ use crate::SimError;
 use crate::config::{EventAction, RobotConfig, Scenario};
 use crate::telemetry::{EventKind, Recorder};
 
+/// Beginning of every event in the record that tells of the time before it.
+pub(crate) const START_UP: &str = "start-up, ";
+
 /// Whether to go on, as the caller of [`run`] decides at every bus cycle.
 pub type Control = ControlFlow<()>;
 

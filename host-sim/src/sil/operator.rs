@@ -8,6 +8,7 @@ use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_protocol::{Address, FaultBits};
 use wheeleg_units::PositionMm;
 
+use super::START_UP;
 use super::world::World;
 use crate::SimError;
 use crate::config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
@@ -180,7 +181,7 @@ impl<'a> Operator<'a> {
             recorder.event(
                 0,
                 EventKind::Info,
-                format!("start-up, {at_s:.3} s after power-up: {text}"),
+                format!("{START_UP}{at_s:.3} s after power-up: {text}"),
             );
         }
     }

@@ -79,7 +79,7 @@ fn modes(s: &Source<'_>) -> Vec<Series> {
 fn rims(s: &Source<'_>) -> [Vec<Series>; 3] {
     let set = |points: &dyn Fn(usize) -> Points| -> Vec<Series> {
         (0..2)
-            .map(|w| line(WHEELS[w], colour::AXES[6 + w], 2, points(w)))
+            .map(|w| line(WHEELS[w], colour::AXES[6 + w], 4 - 3 * w as u32, points(w)))
             .collect()
     };
     [
