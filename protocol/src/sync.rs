@@ -107,7 +107,8 @@ const ACTION_MASK: u8 = 0b11;
 const TRACK: u8 = 1 << 3;
 const RESERVED: u8 = 0xF0;
 
-/// A coming change of the reference, for control ahead of a known move.
+/// A coming change of the reference, for control ahead of a known move. The
+/// boards of this version count it down and do not act on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NextReference {
     /// The reference after the change: I10F6 mm.
