@@ -17,12 +17,8 @@ pub enum Dimension {
     Area,
     /// Volume.
     Volume,
-    /// Plane angle.
-    Angle,
     /// Time.
     Time,
-    /// Events per second.
-    Frequency,
     /// Bits per second.
     BitRate,
     /// Speed.
@@ -45,48 +41,26 @@ pub enum Dimension {
     Temperature,
     /// Sonic conductance of ISO 6358.
     SonicConductance,
-    /// Mass flow.
-    MassFlow,
-    /// Volume flow.
-    VolumeFlow,
     /// Density.
     Density,
     /// Linear stiffness.
     Stiffness,
     /// Linear viscous damping.
     Damping,
-    /// Damping per depth of penetration (Hunt–Crossley and alike).
-    DampingPerLength,
-    /// Rotary viscous damping.
-    RotaryDamping,
-    /// Reciprocal length: gain from position to a pure number.
-    PerLength,
     /// Gain from speed to a pure number.
     PerVelocity,
-    /// Gain from the integral of position to a pure number.
-    PerLengthTime,
     /// Angular velocity.
     AngularVelocity,
     /// Voltage.
     Voltage,
-    /// Current.
-    Current,
-    /// Power.
-    Power,
     /// Electrical resistance.
     Resistance,
     /// Inductance.
     Inductance,
     /// Torque constant of a motor.
     TorqueConstant,
-    /// Back-EMF constant of a motor.
-    BackEmf,
     /// Specific gas constant or heat capacity.
     SpecificHeat,
-    /// Thermal conductance.
-    ThermalConductance,
-    /// Heat transfer coefficient.
-    HeatTransfer,
 }
 
 impl Dimension {
@@ -103,9 +77,7 @@ impl Dimension {
             Self::Length => &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)],
             Self::Area => &[("m2", 1.0), ("cm2", 1e-4), ("mm2", 1e-6)],
             Self::Volume => &[("m3", 1.0), ("dm3", 1e-3), ("cm3", 1e-6), ("mm3", 1e-9)],
-            Self::Angle => &[("rad", 1.0), ("deg", PI / 180.0)],
             Self::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)],
-            Self::Frequency => &[("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6), ("1/s", 1.0)],
             Self::BitRate => &[("bit/s", 1.0), ("kbit/s", 1e3), ("Mbit/s", 1e6)],
             Self::Velocity => &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)],
             Self::Acceleration => &[("m/s2", 1.0), ("mm/s2", 1e-3)],
@@ -117,27 +89,16 @@ impl Dimension {
             Self::Pressure => &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("bar", 1e5)],
             Self::Temperature => &[("K", 1.0)],
             Self::SonicConductance => &[("m3/(s Pa)", 1.0), ("dm3/(s bar)", 1e-8)],
-            Self::MassFlow => &[("kg/s", 1.0), ("g/s", 1e-3)],
-            Self::VolumeFlow => &[("m3/s", 1.0), ("dm3/s", 1e-3), ("dm3/min", 1e-3 / 60.0)],
             Self::Density => &[("kg/m3", 1.0)],
             Self::Stiffness => &[("N/m", 1.0), ("N/mm", 1e3), ("kN/m", 1e3)],
             Self::Damping => &[("N s/m", 1.0), ("N s/mm", 1e3)],
-            Self::DampingPerLength => &[("N s/m2", 1.0)],
-            Self::RotaryDamping => &[("N m s/rad", 1.0), ("N m s", 1.0)],
-            Self::PerLength => &[("1/m", 1.0), ("1/mm", 1e3)],
             Self::PerVelocity => &[("s/m", 1.0), ("s/mm", 1e3)],
-            Self::PerLengthTime => &[("1/(m s)", 1.0), ("1/(mm s)", 1e3)],
             Self::AngularVelocity => &[("rad/s", 1.0), ("deg/s", PI / 180.0), ("rpm", PI / 30.0)],
             Self::Voltage => &[("V", 1.0), ("mV", 1e-3)],
-            Self::Current => &[("A", 1.0), ("mA", 1e-3)],
-            Self::Power => &[("W", 1.0), ("kW", 1e3)],
             Self::Resistance => &[("ohm", 1.0), ("kohm", 1e3)],
             Self::Inductance => &[("H", 1.0), ("mH", 1e-3), ("uH", 1e-6)],
             Self::TorqueConstant => &[("N m/A", 1.0), ("mN m/A", 1e-3)],
-            Self::BackEmf => &[("V s/rad", 1.0), ("mV s/rad", 1e-3)],
             Self::SpecificHeat => &[("J/(kg K)", 1.0), ("kJ/(kg K)", 1e3)],
-            Self::ThermalConductance => &[("W/K", 1.0)],
-            Self::HeatTransfer => &[("W/(m2 K)", 1.0)],
         }
     }
 

@@ -266,12 +266,6 @@ impl Recorder {
         self.log(index::RUN, 0, &sample);
     }
 
-    /// What has been recorded so far (its `hash` is filled in at the end).
-    #[must_use]
-    pub fn recording(&self) -> &Recording {
-        &self.data
-    }
-
     /// The first I/O error, if there was one.
     ///
     /// # Errors
