@@ -9,11 +9,6 @@ use crate::dispatcher::{Refusal, Ticket};
 /// Why all axes were told to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HoldReason {
-    /// A node is not the kind of board its address stands for.
-    WrongRole(
-        /// Bus address.
-        u8,
-    ),
     /// A node missed three cycles in a row.
     NodeLost(
         /// Bus address.

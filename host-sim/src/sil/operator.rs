@@ -333,7 +333,6 @@ fn board(address: u8) -> String {
 
 fn hold_reason(reason: &HoldReason) -> String {
     match *reason {
-        HoldReason::WrongRole(node) => format!("{} is another kind of board", board(node)),
         HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
         HoldReason::NodeFault { node, faults } => {
             let words: Vec<&str> = FaultBits::from_raw(faults)

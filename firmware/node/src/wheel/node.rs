@@ -26,7 +26,9 @@ pub(super) struct TickState {
     pub(super) actual: WheelCount,
     /// Drive written last, per cent.
     pub(super) drive: i8,
-    /// Drive from which the ramp of a stop starts.
+    /// Mean drive of the last samples, per cent × 2^8.
+    pub(super) drive_mean: i32,
+    /// Drive from which the ramp of a stop starts, per cent.
     pub(super) ramp_from: i8,
     pub(super) following: Ticks,
     boot_ticks: Ticks,

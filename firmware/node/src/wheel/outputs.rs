@@ -8,6 +8,33 @@ use wheeleg_control::wheel::{WheelCommand, WheelInput, WheelMode, WheelOutput, W
 use wheeleg_protocol::{DisarmReason, Fault, Limit, LimitBits};
 use wheeleg_units::{Micros, Ticks};
 
+/// Fractional bits of the mean drive.
+const MEAN_FRACTION_BITS: u32 = 8;
+/// Samples over which the drive is averaged, as a power of two: 64, or 33 ms at
+/// the default sample time. The lead filter answers one encoder edge with up
+/// to 16 counts, so a single sample says little about the drive that keeps the
+/// wheel turning, and a ramp from it could speed a wheel up.
+const MEAN_SHIFT: u32 = 6;
+
+/// Exponential mean of the drive, per cent × 2^8, rounded towards −∞.
+const fn mean(mean: i32, percent: i8) -> i32 {
+    // |mean| ≤ 128 × 2^8, so nothing here comes near the limits.
+    let newest = (percent as i32).wrapping_shl(MEAN_FRACTION_BITS);
+    mean.saturating_add(newest.saturating_sub(mean) >> MEAN_SHIFT)
+}
+
+/// Drive from which the ramp of a stop starts, per cent: the smaller of the mean
+/// and the newest drive, and none where they disagree on the direction. So the
+/// ramp neither follows a single sample nor undoes braking that has begun.
+fn ramp_from(mean: i32, newest: i8) -> i8 {
+    let mean = i8::try_from(mean >> MEAN_FRACTION_BITS).unwrap_or(0);
+    match (mean > 0, newest > 0) {
+        (true, true) => mean.min(newest),
+        (false, false) => mean.max(newest),
+        _ => 0,
+    }
+}
+
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, D> {
     /// Closed loop.
     pub(super) fn drive(&mut self, limits: &mut LimitBits, now: Micros) -> WheelOutput {
@@ -26,7 +53,8 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             stop: false,
         });
         self.state.drive = output.pwm;
-        self.state.ramp_from = output.pwm;
+        self.state.drive_mean = mean(self.state.drive_mean, output.pwm);
+        self.state.ramp_from = ramp_from(self.state.drive_mean, output.pwm);
         *limits = limit_bits(&output, motion.rate);
         let has_position = output.mode != WheelMode::ProportionalVelocity;
         let beyond = has_position && output.error.unsigned_abs() > self.settings.following_error;
@@ -62,6 +90,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             let drive = scaled.checked_div(ramp).unwrap_or(0);
             i8::try_from(drive).unwrap_or(0)
         } else {
+            self.state.drive_mean = 0;
             self.state.ramp_from = 0;
             0
         };
@@ -95,4 +124,28 @@ fn limit_bits(output: &WheelOutput, rate: bool) -> LimitBits {
     .into_iter()
     .filter(|(active, _)| *active)
     .fold(LimitBits::NONE, |bits, (_, limit)| bits.with(limit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{mean, ramp_from};
+
+    #[test]
+    fn one_wild_sample_does_not_set_the_ramp() {
+        let mut steady = 0;
+        for _ in 0..1000 {
+            steady = mean(steady, 40);
+        }
+        assert_eq!(steady >> 8, 39, "rounded down");
+        assert_eq!(ramp_from(mean(steady, 100), 100), 40);
+        assert_eq!(ramp_from(mean(steady, -100), -100), 0);
+        assert_eq!(ramp_from(mean(steady, 10), 10), 10);
+        let mut backward = 0;
+        for _ in 0..1000 {
+            backward = mean(backward, -100);
+        }
+        assert_eq!(ramp_from(backward, -128), -100);
+        assert_eq!(ramp_from(backward, -3), -3);
+        assert_eq!(ramp_from(0, 0), 0);
+    }
 }
