@@ -1,5 +1,6 @@
 //! What layers 0 and 1 tell each other once per bus cycle.
 
+use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::contact::{FootSwitches, Side};
@@ -171,6 +172,18 @@ pub struct Setpoints {
     pub joints: [Option<JointSetpoint>; JOINTS],
     /// Reference of the wheels; `None` withdraws them.
     pub travel: Option<TravelSetpoint>,
+    /// Speed and acceleration of the pushes to come, for wheel boards that make
+    /// their own profile; `None` leaves them as they are.
+    pub push: Option<PushProfile>,
+}
+
+/// Shape of a push of the wheels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PushProfile {
+    /// Largest speed, mm/s.
+    pub speed_mm_s: VelocityMmS,
+    /// Acceleration, mm/s².
+    pub acceleration_mm_s2: I16F16,
 }
 
 impl Setpoints {
@@ -184,6 +197,7 @@ impl Setpoints {
             stepping: None,
             joints: [None; JOINTS],
             travel: None,
+            push: None,
         }
     }
 }

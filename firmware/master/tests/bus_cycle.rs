@@ -3,6 +3,7 @@
 mod common;
 
 use common::{CYCLE_US, Rig, decode, emit};
+use fixed::types::I16F16;
 use proptest::prelude::*;
 use wheeleg_master::command::Command;
 use wheeleg_master::config::{SwitchFrame, WheelDrive};
@@ -10,11 +11,12 @@ use wheeleg_master::contact::{Sector, Side};
 use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer0::odometry::WheelGeometry;
+use wheeleg_master::layer1::params::GaitParams;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{
     Address, BoardKind, InputBits, Message, NackReason, NodeMode, SCHEMA_HASH, SyncFlags,
 };
-use wheeleg_units::PositionMm;
+use wheeleg_units::{PositionMm, VelocityMmS};
 
 #[test]
 fn cycle_counter_and_time_advance_and_wrap() {
@@ -61,6 +63,47 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
             .requests
             .iter()
             .any(|m| matches!(m, Message::WheelMode(_)))
+    );
+}
+
+/// Speeds and accelerations that both wheels were told, in order.
+fn profiles(rig: &mut Rig) -> [Vec<u16>; 2] {
+    [7, 8].map(|node| {
+        let told = rig.node(node).requests.iter().filter_map(|m| match m {
+            Message::WheelMaxSpeed(speed) => Some(u16::from(speed.speed.get())),
+            Message::WheelAcceleration(a) => Some(a.acceleration.raw()),
+            _ => None,
+        });
+        told.collect()
+    })
+}
+
+#[test]
+fn new_gait_parameters_reach_the_wheels_profiles() {
+    let gait = |speed: i16, acceleration: i16| GaitParams {
+        push_speed_mm_s: VelocityMmS::from_int(speed),
+        push_acceleration_mm_s2: I16F16::from_num(acceleration),
+        ..GaitParams::default()
+    };
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    assert_eq!(profiles(&mut rig), [[10, 5], [10, 5]]);
+    // Armed: told at once, once, and only where something changed.
+    let set = rig.submit(Command::SetGait(gait(360, 1200)));
+    rig.run(20);
+    assert!(rig.done(set));
+    assert_eq!(profiles(&mut rig), [[10, 5, 21, 9], [10, 5, 21, 9]]);
+    // Disarmed: told with the next arming.
+    rig.submit(Command::Disarm);
+    rig.run(20);
+    rig.submit(Command::SetGait(gait(180, 600)));
+    rig.run(20);
+    assert_eq!(profiles(&mut rig), [[10, 5, 21, 9], [10, 5, 21, 9]]);
+    rig.submit(Command::Arm);
+    rig.run(20);
+    assert_eq!(
+        profiles(&mut rig),
+        [[10, 5, 21, 9, 10, 5], [10, 5, 21, 9, 10, 5]]
     );
 }
 

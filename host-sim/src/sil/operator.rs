@@ -301,7 +301,7 @@ fn describe(event: &Event) -> String {
         ),
         Event::WrongRole(node) => format!("{} answers as another kind of board", board(node)),
         Event::NodeLost(node) => format!("{} is lost", board(node)),
-        Event::NodeBack(node) => format!("{} answers again", board(node)),
+        Event::NodeBack(node) => format!("{} answers", board(node)),
         Event::Armed => "all axes armed".to_owned(),
         Event::Disarmed => "all axes disarmed".to_owned(),
         Event::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),

@@ -10,6 +10,8 @@ pub const JOBS: usize = 32;
 
 /// Requests that arming makes: one to each joint, four to each wheel.
 pub const ARMING_JOBS: usize = 14;
+/// Requests that change the profile of both wheels.
+pub const PROFILE_JOBS: usize = 4;
 
 /// Why a request is made; decides what its answer means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +22,8 @@ pub enum Purpose {
     Group,
     /// Part of a HOLD of all axes; nobody waits for it.
     Stop,
+    /// New speed and acceleration of a wheel's profile; nobody waits for it.
+    Profile,
     /// A user command to one node.
     User(
         /// Whom to answer.

@@ -4,7 +4,7 @@ use wheeleg_protocol as proto;
 use wheeleg_protocol::{Address, Correction, Message, OpenMode, WheelControlMode};
 use wheeleg_units::PositionMm;
 
-use super::acyclic::{ARMING_JOBS, Job, Purpose};
+use super::acyclic::{ARMING_JOBS, Job, PROFILE_JOBS, Purpose};
 use super::wheels::Wheels;
 use super::{Group, GroupKind, Layer0, Power};
 use crate::command::{Command, CorrectionKind};
@@ -13,6 +13,7 @@ use crate::contact::Side;
 use crate::dispatcher::{Accepted, Refusal};
 use crate::event::{Event, Events};
 use crate::layer1::params::{STROKE_MM, in_range};
+use crate::setpoint::PushProfile;
 
 impl Layer0 {
     /// Carries out a command or starts to; reports to `events`.
@@ -206,22 +207,12 @@ impl Layer0 {
         if !self.jobs.has_room(ARMING_JOBS) {
             return Err(Refusal::Busy);
         }
-        let gait = &self.config.gait;
         let mode = match self.config.wheel_drive {
             WheelDrive::Profile => WheelControlMode::Trapezoidal,
             WheelDrive::Stream => WheelControlMode::Position,
         };
-        let wheel_setup: [Message; 3] = [
-            proto::WheelMaxSpeed {
-                speed: self.units.speed(gait.push_speed_mm_s),
-            }
-            .into(),
-            proto::WheelAcceleration {
-                acceleration: self.units.acceleration(gait.push_acceleration_mm_s2),
-            }
-            .into(),
-            proto::WheelMode { mode }.into(),
-        ];
+        let [speed, acceleration] = self.profile_messages();
+        let wheel_setup = [speed, acceleration, proto::WheelMode { mode }.into()];
         let arm = Message::from(proto::Arm {
             schema_hash: self.schema_hash,
         });
@@ -249,6 +240,47 @@ impl Layer0 {
             waited: 0,
         });
         Ok(false)
+    }
+
+    /// What tells a wheel board the speed and acceleration of its profiles.
+    fn profile_messages(&self) -> [Message; 2] {
+        [
+            proto::WheelMaxSpeed {
+                speed: self.units.speed(self.push.speed_mm_s),
+            }
+            .into(),
+            proto::WheelAcceleration {
+                acceleration: self.units.acceleration(self.push.acceleration_mm_s2),
+            }
+            .into(),
+        ]
+    }
+
+    /// Takes over the profile that layer 1 wants for its pushes. Armed wheels
+    /// that make their own profile are told at once; the others when they arm.
+    pub(super) fn shape_pushes(&mut self, push: PushProfile) {
+        if push == self.push {
+            return;
+        }
+        let tell = self.power == Power::Armed && self.config.wheel_drive == WheelDrive::Profile;
+        // Not now is not never: layer 1 asks again in every cycle.
+        if tell && !self.jobs.has_room(PROFILE_JOBS) {
+            return;
+        }
+        self.push = push;
+        if !tell {
+            return;
+        }
+        for to in Address::nodes().filter(|node| node.is_wheel()) {
+            for message in self.profile_messages() {
+                // They fit: see above.
+                let _fits = self.jobs.push(Job {
+                    to,
+                    message,
+                    purpose: Purpose::Profile,
+                });
+            }
+        }
     }
 
     fn begin_group(

@@ -94,6 +94,9 @@ impl Layer0 {
             self.direct = [None; JOINTS];
             self.direct_travel = None;
         }
+        if let Some(push) = setpoints.push {
+            self.shape_pushes(push);
+        }
         if self.frozen.is_none() {
             self.setpoints = setpoints;
         }

@@ -28,7 +28,7 @@ use crate::config::MasterConfig;
 use crate::contact::FootSwitches;
 use crate::dispatcher::{Refusal, Ticket};
 use crate::event::HoldReason;
-use crate::setpoint::{JOINTS, Phase, Setpoints, TravelSetpoint, WHEELS};
+use crate::setpoint::{JOINTS, Phase, PushProfile, Setpoints, TravelSetpoint, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
 use liveness::Liveness;
@@ -90,6 +90,8 @@ pub struct Layer0 {
     emergency_stop: bool,
     group: Option<Group>,
     setpoints: Setpoints,
+    /// Profile of the wheels' pushes, as last told to their boards.
+    push: PushProfile,
     stale_cycles: u16,
     /// Strokes at which all joints are kept after a stop.
     frozen: Option<[Option<PositionMm>; JOINTS]>,
@@ -107,6 +109,10 @@ impl Layer0 {
     #[must_use]
     pub fn new(config: MasterConfig) -> Self {
         Self {
+            push: PushProfile {
+                speed_mm_s: config.gait.push_speed_mm_s,
+                acceleration_mm_s2: config.gait.push_acceleration_mm_s2,
+            },
             config,
             units: WheelUnits {
                 geometry: config.wheels,

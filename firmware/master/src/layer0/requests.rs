@@ -106,6 +106,8 @@ impl Layer0 {
             // A node that does not brake is frozen by its set-point all the same;
             // its own supervision stops it when it stops hearing SYNC.
             Purpose::Stop => {}
+            // A wheel that kept its old profile still arrives; its speed shows it.
+            Purpose::Profile => {}
             Purpose::User(ticket) => self.user_answer(ticket, job, result, now_us, events),
         }
     }

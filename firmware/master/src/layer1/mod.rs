@@ -20,7 +20,9 @@ use crate::command::Command;
 use crate::contact::Side;
 use crate::dispatcher::{Accepted, Refusal, Ticket};
 use crate::event::{Event, Events};
-use crate::setpoint::{Feedback, JOINTS, JointSetpoint, Phase, Setpoints, TravelSetpoint};
+use crate::setpoint::{
+    Feedback, JOINTS, JointSetpoint, Phase, PushProfile, Setpoints, TravelSetpoint,
+};
 use foot::FootTrajectory;
 use homing::{Homing, HomingConfig, HomingStep};
 use params::GaitParams;
@@ -133,7 +135,11 @@ impl Layer1 {
                 ),
             }
         }
-        let out = self.advance(now_us, events);
+        let mut out = self.advance(now_us, events);
+        out.push = Some(PushProfile {
+            speed_mm_s: self.params.push_speed_mm_s,
+            acceleration_mm_s2: self.params.push_acceleration_mm_s2,
+        });
         if setpoints.enqueue(out).is_err() {
             self.lost_setpoints = self.lost_setpoints.wrapping_add(1);
         }
