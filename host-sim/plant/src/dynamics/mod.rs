@@ -15,5 +15,5 @@ pub mod printed;
 pub mod robot;
 
 pub use error::DynamicsError;
-pub use params::{BodyParams, LegBodies, RobotDynamicsParams};
+pub use params::{BodyParams, HalfRobotParams, LegBodies, RobotDynamicsParams};
 pub use robot::{FootKin, RobotDynamics, RobotKin, RobotSide};

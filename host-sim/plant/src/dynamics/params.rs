@@ -120,11 +120,25 @@ impl RobotDynamicsParams {
     /// defaults stand in for them.
     #[must_use]
     pub fn leg_parameters(&self) -> LegParameters<f64> {
-        LegParameters {
+        leg_parameters(self.crank_m, self.p4_m, self.min_cos_theta3)
+    }
+
+    /// Half of the robot: the left leg, half the chassis and its friction, one wheel.
+    #[must_use]
+    pub fn half(&self) -> HalfRobotParams {
+        let [s, _, b2, b5, b6, ..] = self.viscous;
+        HalfRobotParams {
             crank_m: self.crank_m,
             p4_m: self.p4_m,
             min_cos_theta3: self.min_cos_theta3,
-            ..LegParameters::wheeleg_2003()
+            leg_bodies: self.leg_bodies,
+            chassis_mass_kg: 0.5 * self.chassis_mass_kg,
+            wheel_mass_kg: self.wheel_mass_kg,
+            wheel_radius_m: self.wheel_radius_m,
+            wheel_inertia_kg_m2: self.wheel_inertia_kg_m2,
+            rotor_inertia_kg_m2: self.rotor_inertia_kg_m2,
+            gear_ratio: self.gear_ratio,
+            viscous_n_s_m: [0.5 * s, b2, b5, b6],
         }
     }
 
@@ -186,5 +200,49 @@ impl RobotDynamicsParams {
             }
         }
         Ok(())
+    }
+}
+
+/// One leg, half the chassis, one wheel: the paper's 7.2.3 for [`super::noc::HalfRobot`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HalfRobotParams {
+    /// Crank ℓ (m).
+    pub crank_m: f64,
+    /// O4 − O1, forward and left (m).
+    pub p4_m: [f64; 2],
+    /// Smallest cos θ3 accepted.
+    pub min_cos_theta3: f64,
+    /// Bodies of the leg.
+    pub leg_bodies: LegBodies,
+    /// Half the chassis's mass (kg).
+    pub chassis_mass_kg: f64,
+    /// Mass of the wheel (kg).
+    pub wheel_mass_kg: f64,
+    /// Wheel radius r_w (m).
+    pub wheel_radius_m: f64,
+    /// Inertia of the wheel about its axle (kg m²).
+    pub wheel_inertia_kg_m2: f64,
+    /// Inertia of the motor's rotor (kg m²).
+    pub rotor_inertia_kg_m2: f64,
+    /// Motor turns per wheel turn.
+    pub gear_ratio: f64,
+    /// Viscous friction of s, b2, b5, b6 (N s/m).
+    pub viscous_n_s_m: [f64; 4],
+}
+
+impl HalfRobotParams {
+    /// Dimensions for the leg kinematics, as [`RobotDynamicsParams::leg_parameters`].
+    #[must_use]
+    pub fn leg_parameters(&self) -> LegParameters<f64> {
+        leg_parameters(self.crank_m, self.p4_m, self.min_cos_theta3)
+    }
+}
+
+fn leg_parameters(crank_m: f64, p4_m: [f64; 2], min_cos_theta3: f64) -> LegParameters<f64> {
+    LegParameters {
+        crank_m,
+        p4_m,
+        min_cos_theta3,
+        ..LegParameters::wheeleg_2003()
     }
 }
