@@ -73,7 +73,7 @@ struct RunArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of all noise, instead of the scenario's.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_seed)]
     seed: Option<u64>,
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
@@ -113,6 +113,11 @@ pub fn main() -> ExitCode {
         eprintln!("{:?}", miette::Report::new(error));
         ExitCode::from(FAILED)
     })
+}
+
+fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("a seed is a whole number from 0 to {}", u64::MAX))
 }
 
 fn run_command(args: &RunArgs) -> Result<ExitCode, SimError> {
@@ -165,6 +170,7 @@ fn run_text(finished: &Finished) -> String {
             s.simulated_s
         );
     }
+    let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);
     let _ = writeln!(out, "hash    {}", s.hash);
     let _ = writeln!(
         out,

@@ -1,10 +1,10 @@
 //! The folder of a run's results.
 //!
-//! New results never mix with old ones: what an earlier run left in the folder
-//! is set aside in `previous`, where the results of one run are kept. Files
-//! that are no results of ours stay untouched.
+//! New results never mix with old ones: what stands where they go is set aside
+//! in `previous`, or `previous-2` and so on where that is taken. Nothing is
+//! deleted, and files with other names stay untouched.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::SimError;
 
@@ -12,6 +12,16 @@ use crate::SimError;
 const RESULTS: [&str; 5] = ["log.mcap", "summary.json", "report.html", "csv", "figures"];
 /// Where the results of the run before stay.
 const PREVIOUS: &str = "previous";
+
+/// The first of `previous`, `previous-2`, … that does not exist.
+fn free_place(folder: &Path) -> PathBuf {
+    let numbered = (2_u32..).map(|n| format!("{PREVIOUS}-{n}"));
+    std::iter::once(PREVIOUS.to_owned())
+        .chain(numbered)
+        .map(|name| folder.join(name))
+        .find(|place| !place.exists())
+        .unwrap_or_else(|| folder.join(PREVIOUS))
+}
 
 /// Creates the folder, or sets aside the results in it.
 ///
@@ -24,12 +34,9 @@ pub(crate) fn prepare(folder: &Path) -> Result<(), SimError> {
     if !old.iter().any(|path| path.exists()) {
         return Ok(());
     }
-    let previous = folder.join(PREVIOUS);
+    let previous = free_place(folder);
     std::fs::create_dir_all(&previous)
         .map_err(|e| SimError::output("create the folder", &previous, e))?;
-    for name in RESULTS {
-        remove(&previous.join(name))?;
-    }
     for (name, path) in RESULTS.iter().zip(&old) {
         if path.exists() {
             std::fs::rename(path, previous.join(name))
@@ -42,17 +49,6 @@ pub(crate) fn prepare(folder: &Path) -> Result<(), SimError> {
         previous.display()
     );
     Ok(())
-}
-
-fn remove(path: &Path) -> Result<(), SimError> {
-    let removed = if path.is_dir() {
-        std::fs::remove_dir_all(path)
-    } else if path.exists() {
-        std::fs::remove_file(path)
-    } else {
-        return Ok(());
-    };
-    removed.map_err(|e| SimError::output("remove", path, e))
 }
 
 #[cfg(test)]
@@ -81,12 +77,14 @@ mod tests {
         assert!(previous.join("figures/event.png").exists());
         assert!(folder.join("notes.txt").exists());
 
-        // One run is kept, whole: nothing of the first one is left beside the second.
+        // Every run is kept, each in a place of its own.
         run(2, "other.png");
         prepare(&folder).expect("set aside");
-        assert_eq!(fs::read(previous.join("log.mcap")).expect("kept"), [2]);
-        assert!(previous.join("figures/other.png").exists());
-        assert!(!previous.join("figures/event.png").exists());
+        let second = folder.join("previous-2");
+        assert_eq!(fs::read(previous.join("log.mcap")).expect("kept"), [1]);
+        assert_eq!(fs::read(second.join("log.mcap")).expect("kept"), [2]);
+        assert!(second.join("figures/other.png").exists());
+        assert!(!second.join("figures/event.png").exists());
     }
 
     #[test]

@@ -45,13 +45,17 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// Runs a scenario: log, tables, figures, summary, report. Ctrl-C stops it at
 /// the next bus cycle and the files are finished all the same. Results of an
-/// earlier run in the same folder are set aside in its folder `previous`.
+/// earlier run in the same folder are set aside in its folders `previous`,
+/// `previous-2`, …
 ///
 /// # Errors
 /// Any [`SimError`]. A log that was begun is closed and stays readable.
 pub fn run(options: &Options) -> Result<Finished, SimError> {
     let scenario = builtin::scenario(&options.scenario)?;
-    let robot = builtin::robot(options.robot.as_deref().unwrap_or(&scenario.robot))?;
+    let robot = match &options.robot {
+        Some(robot) => builtin::robot(robot)?,
+        None => builtin::robot_of(&scenario.robot, &options.scenario)?,
+    };
     let seed = options.seed.unwrap_or(scenario.seed);
     let folder = options
         .out

@@ -237,7 +237,7 @@ fn unknown_missing_and_mistyped_fields() {
         "steps             = { value = 3,",
         "steps             = { value = \"three\",",
     );
-    assert_all(&text, &["`gait.steps`", "\"three\"", "a number"]);
+    assert_all(&text, &["`gait.steps`", "\"three\"", "a finite number"]);
 
     let text = robot_with(
         "steps             = { value = 3,",

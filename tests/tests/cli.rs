@@ -301,6 +301,36 @@ fn a_bad_seed_is_refused() {
 /// then opens whole.
 #[cfg(unix)]
 #[test]
+fn a_scenario_finds_its_robot_beside_it_and_the_summary_tells_it_from_the_original() {
+    let dir = folder();
+    let sub = dir.path().join("sub");
+    fs::create_dir(&sub).expect("folder");
+    let robot = source("robots/wheeleg-2003.toml");
+    let changed = robot.replacen(
+        "value = 0.010, unit = \"1/mm\"",
+        "value = 0.011, unit = \"1/mm\"",
+        1,
+    );
+    assert_ne!(robot, changed);
+    write(&sub, "mine.toml", &changed);
+    let short = with_line(
+        &source("scenarios/stand.toml"),
+        "duration",
+        "duration = { value = 0.2, unit = \"s\" }",
+    );
+    let scenario = write(
+        &sub,
+        "scenario.toml",
+        &with_line(&short, "robot", "robot = \"mine.toml\""),
+    );
+    let original = write(&sub, "original.toml", &short);
+    let changed = summary(&scenario, &dir.path().join("a"), "1");
+    let original = summary(&original, &dir.path().join("b"), "1");
+    assert_eq!(changed["robot"], original["robot"]);
+    assert_ne!(changed["robot_hash"], original["robot_hash"]);
+}
+
+#[test]
 fn an_interrupted_run_leaves_a_readable_log() {
     let dir = folder();
     let scenario = scenario_file(dir.path(), 3600.0);

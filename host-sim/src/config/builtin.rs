@@ -30,6 +30,25 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
     RobotConfig::parse(&file, &text)
 }
 
+/// The robot that a scenario names. A relative path counts from the folder of
+/// the scenario's file, so that the two can be kept together.
+///
+/// # Errors
+/// As [`robot`].
+pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig, ConfigError> {
+    let built_in = |list: &[(&str, &str, &str)], name: &str| list.iter().any(|(n, ..)| *n == name);
+    if built_in(ROBOTS, robot_name_or_path)
+        || built_in(SCENARIOS, scenario)
+        || !is_path(robot_name_or_path)
+    {
+        return robot(robot_name_or_path);
+    }
+    let beside = Path::new(scenario)
+        .with_file_name("")
+        .join(robot_name_or_path);
+    robot(&beside.to_string_lossy())
+}
+
 /// A scenario by built-in name, or by path to a TOML file.
 ///
 /// # Errors
@@ -37,6 +56,14 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
 pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
     Scenario::parse(&file, &text)
+}
+
+/// Whether a name is that of a file.
+fn is_path(name_or_path: &str) -> bool {
+    name_or_path.contains(['/', '\\'])
+        || Path::new(name_or_path)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
 /// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
@@ -49,11 +76,7 @@ fn find(
     if let Some((_, file, text)) = builtin.iter().find(|(n, ..)| *n == name_or_path) {
         return Ok(((*file).to_owned(), (*text).to_owned()));
     }
-    let is_path = name_or_path.contains(['/', '\\'])
-        || Path::new(name_or_path)
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    if is_path {
+    if is_path(name_or_path) {
         return std::fs::read_to_string(name_or_path)
             .map(|text| (name_or_path.to_owned(), text))
             .map_err(|e| {

@@ -318,8 +318,13 @@ impl Reader {
         let source = self.source(&inner);
         let value = inner.get("value");
         let number_found = value.as_ref().and_then(|(_, v)| number(v.as_value()));
+        let found = value.as_ref().map_or_else(
+            || "nothing".to_owned(),
+            |(_, v)| v.to_string().trim().to_owned(),
+        );
         let Some((value, number_found)) = value.zip(number_found) else {
-            let message = format!("`{path}` needs a number as its value, in {unit}");
+            let message =
+                format!("`{path}` needs a finite number in {unit} as its value, not {found}");
             self.problem(
                 Some(inner.span.clone()),
                 message,
@@ -447,8 +452,8 @@ impl Reader {
             _ => {
                 let expected = match (spec.dimension, spec.components) {
                     (Dimension::Flag, _) => "true or false".to_owned(),
-                    (_, 1) => format!("a number in {unit}"),
-                    (_, n) => format!("a list of {n} numbers in {unit}"),
+                    (_, 1) => format!("a finite number in {unit}"),
+                    (_, n) => format!("a list of {n} finite numbers in {unit}"),
                 };
                 self.problem(
                     Some(span),

@@ -173,4 +173,15 @@ impl RobotConfig {
         robot.parameters = parameters;
         Ok(robot)
     }
+
+    /// Fingerprint of all parameters: BLAKE3 over name, value and unit, in the
+    /// order of the listing, 64 hexadecimal digits.
+    #[must_use]
+    pub fn fingerprint(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for p in &self.parameters {
+            hasher.update(format!("{} = {} {}\n", p.path, p.value_text(), p.unit).as_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
+    }
 }

@@ -28,6 +28,9 @@ pub struct Summary {
     pub scenario: String,
     /// Name of the robot.
     pub robot: String,
+    /// Fingerprint of the robot's parameters (BLAKE3 over name, value and unit,
+    /// hexadecimal): tells a changed robot from the original of the same name.
+    pub robot_hash: String,
     /// Version of the program.
     pub version: &'static str,
     /// Seed used.
@@ -63,6 +66,7 @@ impl Summary {
         Self {
             scenario: scenario.name.clone(),
             robot: robot.name.clone(),
+            robot_hash: robot.fingerprint(),
             version: env!("CARGO_PKG_VERSION"),
             seed: info.seed,
             hash: recording.hash.clone(),
