@@ -134,7 +134,6 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
             }
             let grid_ns = (state.time_ns / self.step_ns + 1).saturating_mul(self.step_ns);
             let end_ns = grid_ns.min(edge_ns).min(to_ns);
-            #[allow(clippy::cast_precision_loss)]
             let h = (end_ns - state.time_ns) as f64 * 1e-9;
             self.step(state, h)?;
             state.time_ns = end_ns;

@@ -125,7 +125,6 @@ impl Axis {
         )?;
         params.potentiometer.validate()?;
         params.adc.validate()?;
-        #[allow(clippy::cast_precision_loss)]
         check("step_ns", params.step_ns as f64, 1e3, 1e6)?;
         Ok(Self {
             params: params.clone(),

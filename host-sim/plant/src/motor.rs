@@ -118,7 +118,6 @@ impl MotorParams {
     /// Encoder edges counted for a wheel angle \[rad\], 4 per line, exact floor.
     #[must_use]
     #[inline]
-    #[allow(clippy::cast_possible_truncation)]
     pub fn encoder_edges(&self, wheel_rad: f64) -> i64 {
         let per_rad = 4.0 * f64::from(self.encoder_lines) * self.reduction / std::f64::consts::TAU;
         (wheel_rad * per_rad).floor() as i64

@@ -149,7 +149,6 @@ impl Plant {
             .iter()
             .try_for_each(PotentiometerParams::validate)?;
         params.motors.iter().try_for_each(MotorParams::validate)?;
-        #[allow(clippy::cast_precision_loss)]
         check("step_ns", params.step_ns as f64, 1e3, 1e6)?;
         for (stroke, cylinder) in params.initial_stroke_m.iter().zip(&params.cylinders) {
             check("initial_stroke_m", *stroke, 0.0, cylinder.stroke_m)?;

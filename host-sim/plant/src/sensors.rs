@@ -154,7 +154,6 @@ impl AdcState {
     /// All conversions see the input as it is at the sampling instant; motion
     /// within a reading (0.4 µm per µs at full speed) is far below one LSB.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn read(&mut self, params: &AdcParams, ratio: f64) -> u16 {
         let ratio = match self.fault {
             SensorFault::None => ratio,

@@ -74,7 +74,6 @@ pub struct ValveTiming {
 /// Seconds to whole nanoseconds, rounded; for non-negative times far below
 /// the range of u64.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn seconds_to_ns(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
