@@ -322,6 +322,24 @@ fn blow_through_is_refused_unless_disarmed_and_ends_by_itself() {
     assert_eq!((fill_a, fill_b), (0, 0), "inlets shut on link loss");
 }
 
+/// Found by the random sequences of `fuzz.rs`: a fault latched in Idle leaves
+/// the mode as it is, and the request was carried out over it.
+#[test]
+fn blow_through_is_refused_over_a_latched_fault() {
+    let mut rig = JointRig::new();
+    rig.run_cycles(3, None);
+    rig.sensor.set(Err(SensorError::Converter));
+    rig.run_cycles(1, None);
+    assert_eq!(rig.node.mode(), Mode::Idle);
+    assert!(!rig.node.faults().is_empty());
+    let blow = Message::OpenAllValves(OpenAllValves {
+        mode: OpenMode::BlowThrough,
+    });
+    assert_eq!(refusal(&rig.request(&blow)), Some(NackReason::FaultLatched));
+    rig.run(2);
+    assert!(!rig.any_open());
+}
+
 #[test]
 fn another_board_with_this_address_is_seen() {
     let mut rig = JointRig::pushing(Hold);

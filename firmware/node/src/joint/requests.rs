@@ -71,6 +71,12 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
             Message::OpenAllValves(command) => {
                 let event = match command.mode {
                     OpenMode::Exhaust => Event::OpenAllValves,
+                    // Inlets never open over something that went wrong.
+                    OpenMode::BlowThrough
+                        if !self.core.supervisor.faults().latched().is_empty() =>
+                    {
+                        return Err(NackReason::FaultLatched);
+                    }
                     OpenMode::BlowThrough => Event::BlowThrough,
                 };
                 self.core.supervisor.apply(event, at)?;
