@@ -1,0 +1,88 @@
+//! The command line: one file per command.
+
+mod channels;
+mod list;
+mod params;
+mod run;
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::SimError;
+
+/// Exit code when `--strict` is given and a required target is not met.
+const TARGETS_MISSED: u8 = 1;
+/// Exit code of any error (wrong input, unwritable output, failed simulation).
+const FAILED: u8 = 2;
+/// Exit code after Ctrl-C, as shells expect it.
+const INTERRUPTED: u8 = 130;
+
+/// Simulator and control stack of the hybrid robot Wheeleg.
+///
+/// Without a command, runs the three-step test of the 2003 paper.
+#[derive(Debug, Parser)]
+#[command(name = "wheeleg", version, about, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
+1 a required target is not met (--strict only); 2 error; 130 stopped with Ctrl-C.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a scenario; writes log, tables, figures, summary and report.
+    Run(run::RunArgs),
+    /// List the built-in scenarios and robots.
+    List(list::ListArgs),
+    /// Print every parameter of a robot: value, unit, range, source, meaning.
+    Params(params::ParamsArgs),
+    /// Print the telemetry channels: signals, units, rates, meaning.
+    Channels(channels::ChannelsArgs),
+}
+
+/// Parses the command line, does what it says, and returns the exit code.
+#[must_use]
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        None => run::command(&run::RunArgs::default()),
+        Some(Command::Run(args)) => run::command(&args),
+        Some(Command::List(args)) => list::command(&args),
+        Some(Command::Params(args)) => params::command(&args),
+        Some(Command::Channels(args)) => channels::command(&args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("{:?}", miette::Report::new(error));
+        ExitCode::from(FAILED)
+    })
+}
+
+/// Writes to stdout. A reader that has gone away (`| head`) is no error.
+fn print(text: &str) -> Result<ExitCode, SimError> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(SimError::output("write to", "standard output", e))
+        }
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+/// Default folder of a run.
+pub(crate) fn default_out(scenario: &str, seed: u64) -> PathBuf {
+    Path::new("runs").join(format!("{scenario}-seed{seed}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_line_is_consistent() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+    }
+}

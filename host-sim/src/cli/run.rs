@@ -1,0 +1,158 @@
+//! `wheeleg run`: one scenario on one robot.
+
+use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::{INTERRUPTED, TARGETS_MISSED, print};
+use crate::SimError;
+use crate::analysis::Target;
+use crate::run::{self, Finished, Options};
+
+/// Arguments of `wheeleg run`.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    /// Built-in scenario or path of a TOML file.
+    #[arg(default_value = run::DEFAULT_SCENARIO)]
+    scenario: String,
+    /// Folder for the results [default: runs/<scenario>-seed<N>]. Results of an
+    /// earlier run in it move to its folder `previous`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of all noise, instead of the scenario's.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_seed)]
+    seed: Option<u64>,
+    /// Robot (built in, or path of a TOML file), instead of the scenario's.
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+    /// Exit with code 1 if a required target is not met.
+    #[arg(long)]
+    strict: bool,
+}
+
+impl Default for RunArgs {
+    fn default() -> Self {
+        Self {
+            scenario: run::DEFAULT_SCENARIO.to_owned(),
+            out: None,
+            seed: None,
+            robot: None,
+            json: false,
+            strict: false,
+        }
+    }
+}
+
+fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("a seed is a whole number from 0 to {}", u64::MAX))
+}
+
+/// Runs the scenario and prints its verdicts.
+pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
+    let options = Options {
+        scenario: args.scenario.clone(),
+        robot: args.robot.clone(),
+        seed: args.seed,
+        out: args.out.clone(),
+    };
+    let finished = run::run(&options)?;
+    if args.json {
+        print(&finished.summary.to_json())?;
+    } else {
+        print(&run_text(&finished))?;
+    }
+    Ok(if !finished.summary.complete {
+        eprintln!("interrupted; the files hold what was recorded until then");
+        ExitCode::from(INTERRUPTED)
+    } else if args.strict && !finished.summary.passed {
+        ExitCode::from(TARGETS_MISSED)
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+fn run_text(finished: &Finished) -> String {
+    let s = &finished.summary;
+    let mut out = String::new();
+    // A part of a run meets or misses nothing.
+    if s.complete && !s.targets.is_empty() {
+        out.push_str(&target_table(&s.targets));
+        let required = s.targets.iter().filter(|t| t.required);
+        let met = required.clone().filter(|t| t.pass).count();
+        let _ = writeln!(out, "\n{met} of {} required targets met", required.count());
+    }
+    if !s.complete {
+        let _ = writeln!(
+            out,
+            "\nstopped after {:.2} s of simulated time; what was recorded is complete up to there",
+            s.simulated_s
+        );
+    }
+    let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);
+    let _ = writeln!(out, "hash    {}", s.hash);
+    let _ = writeln!(
+        out,
+        "time    {:.2} s simulated in {:.2} s, {:.1} times faster than real time",
+        s.simulated_s, s.wall_s, s.realtime_factor
+    );
+    let _ = writeln!(out, "report  {}", finished.report.display());
+    out
+}
+
+fn target_table(targets: &[Target]) -> String {
+    let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let cells: Vec<[String; 5]> = targets
+        .iter()
+        .map(|t| {
+            [
+                t.verdict().to_owned(),
+                t.id.clone(),
+                t.value_text(),
+                t.unit.to_owned(),
+                t.band_text(),
+            ]
+        })
+        .collect();
+    let head = ["verdict", "target", "value", "unit", "band"].map(str::to_owned);
+    let width = |i: usize| {
+        let widths = cells
+            .iter()
+            .chain([&head])
+            .map(|row| row[i].chars().count());
+        widths.max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..5).map(width).collect();
+    let mut out = String::new();
+    let mut row = |c: &[String; 5], description: &str| {
+        let verdict = format!("{:w$}", c[0], w = widths[0]);
+        let verdict = match (colour, c[0].as_str()) {
+            (true, "PASS") => format!("\x1b[32m{verdict}\x1b[0m"),
+            (true, "FAIL") => format!("\x1b[1;31m{verdict}\x1b[0m"),
+            _ => verdict,
+        };
+        let _ = writeln!(
+            out,
+            "{verdict}  {:b$}  {:>c$} {:d$}  {:e$}  {description}",
+            c[1],
+            c[2],
+            c[3],
+            c[4],
+            b = widths[1],
+            c = widths[2],
+            d = widths[3],
+            e = widths[4],
+        );
+    };
+    row(&head, "what");
+    for (c, t) in cells.iter().zip(targets) {
+        row(c, &t.description);
+    }
+    out
+}
