@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 11] = [
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
     ("wheeleg-control", &["wheeleg-units"]),
@@ -24,16 +24,18 @@ const ARROWS: [(&str, &[&str]); 10] = [
         &["wheeleg-kinematics", "wheeleg-protocol", "wheeleg-units"],
     ),
     ("wheeleg-plant", &["wheeleg-kinematics"]),
+    ("wheeleg-pil-link", &[]),
     ("wheeleg-sim", &LIBRARIES),
     ("wheeleg-tests", &TESTED),
     ("xtask", &[]),
 ];
 
-const LIBRARIES: [&str; 7] = [
+const LIBRARIES: [&str; 8] = [
     "wheeleg-control",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
+    "wheeleg-pil-link",
     "wheeleg-plant",
     "wheeleg-protocol",
     "wheeleg-units",

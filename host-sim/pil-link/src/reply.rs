@@ -1,0 +1,137 @@
+//! From a board to the simulator.
+
+use heapless::{String, Vec};
+use serde::{Deserialize, Serialize};
+
+use crate::{Inputs, MAX_SENT, MAX_TRANSMISSIONS, Nonvolatile, Text};
+
+/// What a board answers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a message is built where it is sent; boxes need a heap that a board lacks"
+)]
+pub enum Reply {
+    /// Who answers.
+    Hello(Hello),
+    /// Done, nothing to tell.
+    Done,
+    /// The board ran.
+    Ran(Ran),
+    /// Contents of the parameter store.
+    Nonvolatile(Nonvolatile),
+    /// The request cannot be carried out; the board goes on as before.
+    Refused(Text),
+    /// The emulation has come to an end, with the reason: an access that no
+    /// model knows, a hard fault, a frame that cannot be read. Nothing but
+    /// [`crate::Request::Bye`] is answered otherwise from then on.
+    Halted(Halt),
+}
+
+/// Identity of a board outside.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// [`crate::LINK_VERSION`] of the board's side.
+    pub version: u16,
+    /// The image.
+    pub image: Image,
+    /// What it runs on, for the report: "STM32G431, Unicorn 2.1.5".
+    pub host: String<48>,
+    /// The valves of this board can never be real ones.
+    pub outputs_are_virtual: bool,
+}
+
+/// Identity of a firmware image.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Image {
+    /// Name: `joint` or `wheel`.
+    pub name: String<24>,
+    /// First 16 bytes of a digest over the image's bytes, zero where the
+    /// board does not know it.
+    pub digest: [u8; 16],
+    /// Processor clock \[Hz\], 0 where unknown.
+    pub clock_hz: u32,
+}
+
+/// State after a [`crate::Run`] or power-up.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Ran {
+    /// Outputs that act from the next tick edge on.
+    pub outputs: Outputs,
+    /// Inputs as the processor read them in this tick; after a `Run` without
+    /// an edge those of the last one. Equal to the inputs latched unless the
+    /// board support is wrong.
+    pub seen: Inputs,
+    /// Period of the tick timer from now on \[µs\]: 1000 on a joint board, the
+    /// sample time on a wheel board, 0 while no tick timer runs.
+    pub period_us: u32,
+    /// What the board has scheduled to send since the last reply.
+    pub sent: Vec<Sent, MAX_TRANSMISSIONS>,
+    /// Measurements.
+    pub figures: Figures,
+    /// A reset within this run.
+    pub trip: Option<Trip>,
+}
+
+/// Outputs of either kind of board; those it does not have are off.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Outputs {
+    /// Energised time of each valve in one tick \[µs\], 0…1000, `[fill A, vent A,
+    /// fill B, vent B]`.
+    pub valve_on_us: [u16; 4],
+    /// Motor drive, per cent of the bridge's PWM period, 0…100.
+    pub bridge_percent: u8,
+    /// Motor driven backward.
+    pub bridge_backward: bool,
+    /// Supply dump valve open.
+    pub dump: bool,
+}
+
+/// A frame put on the line or scheduled for it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sent {
+    /// First bit on the line \[ns\].
+    pub start_ns: u64,
+    /// The bytes.
+    pub bytes: Vec<u8, MAX_SENT>,
+}
+
+/// Measurements of the processor; zero where a board cannot take them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Instructions from the tick edge until the processor slept again,
+    /// interrupt entry and main loop included; 0 without an edge.
+    pub tick_instructions: u32,
+    /// Instructions since the last reply, all told.
+    pub instructions: u32,
+    /// Deepest stack so far \[bytes\].
+    pub stack_used: u32,
+    /// Room for the stack \[bytes\].
+    pub stack_size: u32,
+    /// Resets since power-up.
+    pub resets: u16,
+    /// Driver-enable time-outs: transmissions that the hardware cut off.
+    pub driver_timeouts: u16,
+}
+
+/// A reset of the processor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Trip {
+    /// When \[ns\]. The outputs are off from then on.
+    pub at_ns: u64,
+    /// When the first tick after it ran \[ns\]; 0 while still starting.
+    pub running_ns: u64,
+    /// Raw reset flags that the board finds: bits as in RCC_CSR.
+    pub cause: u32,
+}
+
+/// Why an emulation ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Halt {
+    /// When \[ns\].
+    pub at_ns: u64,
+    /// Program counter.
+    pub pc: u32,
+    /// The reason in words, with peripheral and register offset.
+    pub reason: Text,
+}
