@@ -167,6 +167,7 @@ mod tests {
             stack_size: u32::MAX,
             resets: u16::MAX,
             driver_timeouts: u16::MAX,
+            late_bytes: u32::MAX,
         };
         let trip = Trip {
             at_ns: u64::MAX,
@@ -183,6 +184,7 @@ mod tests {
                 adc: u16::MAX,
                 switches: Switches(255),
             },
+            seen_at_ns: u64::MAX,
             period_us: u32::MAX,
             sent: heapless::Vec::from_slice(&[sent.clone(), sent]).expect("fits"),
             figures,

@@ -15,8 +15,9 @@
 //!    edge of the board's tick timer.
 //! 4. [`Request::Run`] at every event that concerns the board: bytes that have
 //!    arrived, or a tick edge with the inputs latched at it. The board runs to
-//!    the instant named and then on until it sleeps, and answers with what its
-//!    outputs will be from the next edge on and what it has scheduled to send.
+//!    the instant named and answers with its outputs from then on (after an
+//!    edge: those that the tick before prepared) and with what it has
+//!    scheduled to send.
 //! 5. [`Request::Hook`] for fault injection, [`Request::Bye`] at the end.
 //!
 //! In one `Run`, bytes come before the edge: a byte whose end falls on the

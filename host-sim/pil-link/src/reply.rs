@@ -56,12 +56,16 @@ pub struct Image {
 /// State after a [`crate::Run`] or power-up.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ran {
-    /// Outputs that act from the next tick edge on.
+    /// Outputs as they act now. After a `Run` with an edge that is: from this
+    /// edge on, as the tick *before* it prepared them, so that a board need
+    /// not have worked off the new tick when it answers.
     pub outputs: Outputs,
-    /// Inputs as the processor read them in this tick; after a `Run` without
-    /// an edge those of the last one. Equal to the inputs latched unless the
-    /// board support is wrong.
+    /// Inputs as the application read them in the last tick that was worked
+    /// off, which may be the one before the newest edge. Equal to what was
+    /// latched unless the board support is wrong.
     pub seen: Inputs,
+    /// Edge of the tick that `seen` and `figures` belong to \[ns\].
+    pub seen_at_ns: u64,
     /// Period of the tick timer from now on \[µs\]: 1000 on a joint board, the
     /// sample time on a wheel board, 0 while no tick timer runs.
     pub period_us: u32,
@@ -99,8 +103,8 @@ pub struct Sent {
 /// Measurements of the processor; zero where a board cannot take them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Figures {
-    /// Instructions from the tick edge until the processor slept again,
-    /// interrupt entry and main loop included; 0 without an edge.
+    /// Instructions of the last tick that was worked off: from its edge until
+    /// the processor slept again, interrupt entry and main loop included.
     pub tick_instructions: u32,
     /// Instructions since the last reply, all told.
     pub instructions: u32,
@@ -112,6 +116,9 @@ pub struct Figures {
     pub resets: u16,
     /// Driver-enable time-outs: transmissions that the hardware cut off.
     pub driver_timeouts: u16,
+    /// Bytes that came after the processor had already run past their end; the
+    /// time stamps of their frames are late by up to 50 µs.
+    pub late_bytes: u32,
 }
 
 /// A reset of the processor.

@@ -61,7 +61,10 @@ pub struct Straps {
 /// One stretch of the board's life.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Run {
-    /// Run to this instant, then until the processor sleeps \[ns\].
+    /// Run to this instant \[ns\]. With an edge, the edge's inputs are latched
+    /// and the outputs prepared for it act; the tick itself may be worked off
+    /// later. Without an edge, run on until all that was received is worked
+    /// off, so that the reply holds the transmissions it has led to.
     pub until_ns: u64,
     /// A tick edge falls on `until_ns`, with these inputs latched. Without an
     /// edge the inputs stay as they are.
