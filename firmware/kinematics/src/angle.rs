@@ -1,6 +1,6 @@
 //! The two angles that the paper calls θ3, as two types, and angle wrapping.
 
-use crate::{Scalar, lit};
+use crate::Scalar;
 
 /// Relative Denavit–Hartenberg angle between yaw rod and crank (rad), in (−π, π].
 ///
@@ -59,27 +59,37 @@ impl<T: Scalar> Phi<T> {
     }
 }
 
-/// Wraps an angle (rad) to (−π, π]. Exact for angles already inside.
+/// Wraps an angle (rad) to (−π, π]. Exact for angles already inside; NaN and infinity stay what
+/// they are, for the next function to refuse.
 pub fn wrap_pi<T: Scalar>(rad: T) -> T {
-    if rad > -T::pi() && rad <= T::pi() {
+    if !rad.is_finite() || (rad > -T::pi() && rad <= T::pi()) {
         return rad;
     }
+    // The remainder is exact however many turns there are, and has the sign of the angle.
     let two_pi = T::two_pi();
-    let wrapped = rad - two_pi * (rad / two_pi + lit(0.5)).floor();
-    if wrapped <= -T::pi() {
-        wrapped + two_pi
+    let rest = rad % two_pi;
+    if rest <= -T::pi() {
+        rest + two_pi
+    } else if rest > T::pi() {
+        rest - two_pi
     } else {
-        wrapped
+        rest
     }
 }
 
-/// Wraps an angle (rad) to [0, 2π). Exact for angles already inside.
+/// Wraps an angle (rad) to [0, 2π). Exact for angles already inside; NaN and infinity stay what
+/// they are.
 pub fn wrap_two_pi<T: Scalar>(rad: T) -> T {
     let two_pi = T::two_pi();
-    if rad >= T::zero() && rad < two_pi {
+    if !rad.is_finite() || (rad >= T::zero() && rad < two_pi) {
         return rad;
     }
-    let wrapped = rad - two_pi * (rad / two_pi).floor();
+    let rest = rad % two_pi;
+    let wrapped = if rest < T::zero() {
+        rest + two_pi
+    } else {
+        rest
+    };
     // A tiny negative angle rounds up to 2π itself.
     if wrapped >= two_pi {
         T::zero()

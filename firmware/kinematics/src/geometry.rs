@@ -96,14 +96,19 @@ impl<T: Scalar> LegGeometry<T> {
         if p.crank_m >= reach_m {
             return Err(KinematicsError::BadParameter { value: p.crank_m });
         }
-        Ok(Self {
+        let geometry = Self {
             parameters,
             reach_m,
             cos_beta: x / reach_m,
             sin_beta: y / reach_m,
             sum_squares: reach_m * reach_m + p.crank_m * p.crank_m,
             half_inverse_product: lit::<T>(0.5) / (p.crank_m * reach_m),
-        })
+        };
+        // Squares and products of absurd dimensions overflow or vanish.
+        for value in [geometry.sum_squares, geometry.half_inverse_product] {
+            finite(Quantity::Parameter, value)?;
+        }
+        Ok(geometry)
     }
 
     /// The parameters this geometry was built from.
@@ -170,13 +175,13 @@ impl<T: Scalar> LegGeometry<T> {
     /// Refuses a moment arm below the limit.
     pub(crate) fn check_arm(&self, cos_theta3: T) -> Result<(), KinematicsError<T>> {
         let minimum = self.parameters.min_cos_theta3;
-        if cos_theta3 < minimum {
-            return Err(KinematicsError::NoMomentArm {
-                cos_theta3,
-                minimum,
-            });
+        if cos_theta3 >= minimum {
+            return Ok(());
         }
-        Ok(())
+        Err(KinematicsError::NoMomentArm {
+            cos_theta3,
+            minimum,
+        })
     }
 
     /// Closes the loop at a crank angle, (A1): regular everywhere on the assembled branch.
@@ -217,7 +222,8 @@ impl<T: Scalar> LegGeometry<T> {
         let (min_m, max_m) = self.closing_interval_m();
         let cos_arc = (self.sum_squares - b2_m * b2_m) * self.half_inverse_product;
         let sin_squared = T::one() - cos_arc * cos_arc;
-        if b2_m <= min_m || b2_m >= max_m || sin_squared <= T::zero() {
+        let closes = b2_m > min_m && b2_m < max_m && sin_squared > T::zero();
+        if !closes {
             return Err(KinematicsError::LoopOpen { b2_m, min_m, max_m });
         }
         Ok((cos_arc, sin_squared.sqrt()))

@@ -139,7 +139,7 @@ impl<T: Scalar> LegGeometry<T> {
         let phi_prime = -inv_cos3 / crank;
         let theta1_prime = tan3 * inv_b2;
         let theta3_prime = phi_prime - theta1_prime;
-        Ok(LegPosture {
+        let posture = LegPosture {
             lengths: *lengths,
             sin4: cos_phi,
             cos4: -sin_phi,
@@ -151,7 +151,19 @@ impl<T: Scalar> LegGeometry<T> {
             theta1_prime,
             theta1_second: inv_b2 * (theta3_prime * inv_cos3 * inv_cos3 - theta1_prime),
             phi_second: tan3 * theta3_prime * phi_prime,
-        })
+        };
+        // What the accessors multiply without a way to refuse: N, Ṅ and the foot Jacobian.
+        let yaw_arm = lengths.b5_m * phi_prime;
+        let terms = [
+            theta1_prime,
+            theta3_prime,
+            yaw_arm,
+            posture.theta1_second,
+            posture.phi_second,
+            posture.phi_second - posture.theta1_second,
+        ];
+        all_finite(Quantity::Result, &terms)?;
+        Ok(posture)
     }
 
     /// The leg with its foot at a position in F4 (m): (7*), then (A1).

@@ -25,8 +25,10 @@
 //!
 //! # Errors
 //!
-//! No function returns NaN: a non-finite argument or result, an open loop, a crank without moment
-//! arm or a foot on the yaw axis is a [`KinematicsError`] that carries the offending value.
+//! No function returns NaN in an `Ok`: a non-finite argument or result, an open loop, a crank
+//! without moment arm or a foot on the yaw axis is a [`KinematicsError`] that carries the offending
+//! value. Functions without a `Result` (angle wrapping, strokes to lengths and back, [`printed`])
+//! pass NaN and infinity on to the next one that has it.
 //!
 //! Source: Lacagnina, Muscato, Sinatra, *Kinematics, dynamics and control of a hybrid robot
 //! Wheeleg*, Robotics and Autonomous Systems 45 (2003) 161–180, equations (1)–(39), corrected

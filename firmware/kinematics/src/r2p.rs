@@ -50,6 +50,7 @@ impl<T: Scalar> R2p<T> {
     /// the axis than `minimum_m` (less a few roundings, so that the limit itself is accepted).
     pub fn from_foot(foot: &Vector3<T>, minimum_m: T) -> Result<Self, KinematicsError<T>> {
         all_finite(Quantity::FootPosition, foot.iter())?;
+        finite(Quantity::Parameter, minimum_m)?;
         let radius_m = finite(Quantity::Result, foot.x.hypot(foot.y))?;
         let rounding = minimum_m * T::default_epsilon() * crate::lit(16.0);
         if radius_m <= T::zero() || radius_m < minimum_m - rounding {

@@ -35,14 +35,16 @@ impl<T: Scalar> Rpr<T> {
         let (sin1, cos1) = theta1_rad.sin_cos();
         // φ = θ1 + θ3 − π: both functions change sign.
         let (sin13, cos13) = (theta1_rad + theta3.rad()).sin_cos();
-        Ok(Self {
+        let chain = Self {
             crank_m,
             b2_m,
             sin1,
             cos1,
             sin_phi: -sin13,
             cos_phi: -cos13,
-        })
+        };
+        all_finite(Quantity::Result, chain.tip().iter())?;
+        Ok(chain)
     }
 
     /// Tip position in F1 (m), (23).

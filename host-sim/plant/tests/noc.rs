@@ -453,7 +453,14 @@ fn impossible_states_are_named() {
         .unwrap();
     let lost = system.inverse(&Vector4::from_element(f64::INFINITY), &still, &still);
     assert!(
-        matches!(lost, Err(DynamicsError::NonFinite { name: "force", .. })),
+        matches!(
+            lost,
+            Err(DynamicsError::NonFinite {
+                name: "acceleration",
+                index: 0,
+                value: f64::INFINITY
+            })
+        ),
         "{lost:?}"
     );
 }

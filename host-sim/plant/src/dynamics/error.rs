@@ -16,9 +16,9 @@ pub enum DynamicsError {
     /// A coordinate, rate or force that is NaN or infinite.
     #[error("{name}[{index}] = {value} is not finite")]
     NonFinite {
-        /// `position`, `velocity`, `force` or `acceleration`.
+        /// `position`, `velocity`, `force`, `acceleration`, or what overflowed.
         name: &'static str,
-        /// Coordinate number.
+        /// Coordinate number; body or leg number for what overflowed there.
         index: usize,
         /// The value.
         value: f64,

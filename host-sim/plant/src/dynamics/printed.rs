@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::error::DynamicsError;
-use super::noc::{Leg, SlideRates};
+use super::noc::{Leg, SlideRates, checked};
 
 /// τ_l = I q̈ + C q̇ of the leg (N) with Ṫ from the printed (58) and (64): lengths (m), rates
 /// (m/s), accelerations (m/s²) of b2, b5, b6.
@@ -20,5 +20,6 @@ pub fn tau_l_printed_58_64(
     accelerations: &Vector3<f64>,
 ) -> Result<Vector3<f64>, DynamicsError> {
     let system = leg.at_with(SlideRates::Omitted, q, rates)?;
-    Ok(system.inertial_force(accelerations))
+    checked("acceleration", *accelerations)?;
+    checked("force", system.inertial_force(accelerations))
 }

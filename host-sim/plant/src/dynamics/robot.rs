@@ -252,7 +252,7 @@ impl RobotDynamics {
             legs[0].moment[1] - legs[1].moment[1],
             m * cz + legs[0].moment[2] + legs[1].moment[2],
         ];
-        Ok(RobotKin {
+        let kin = RobotKin {
             feet: [
                 self.foot(0, &postures[0], q, qd, sin_p, cos_p),
                 self.foot(1, &postures[1], q, qd, sin_p, cos_p),
@@ -269,7 +269,9 @@ impl RobotDynamics {
                 p.wheel_radius_m + (sin_p * moment[0] + cos_p * moment[2]) / mass,
             ],
             legs,
-        })
+        };
+        kin.overflow()?;
+        Ok(kin)
     }
 
     /// Accelerations (m/s², rad/s²) for a generalised force (N, N m).
@@ -456,6 +458,34 @@ impl RobotDynamics {
 }
 
 impl RobotKin {
+    /// Refuses what finite positions and rates overflowed to.
+    fn overflow(&self) -> Result<(), DynamicsError> {
+        finite(
+            "mass matrix and bias of the chassis",
+            &[self.ss, self.sp, self.pp, self.h_s, self.h_p],
+        )?;
+        finite("centre of mass", &self.com_m)?;
+        finite("damping", &self.damping)?;
+        for (index, (leg, foot)) in self.legs.iter().zip(&self.feet).enumerate() {
+            let leg = [leg.s, leg.p]
+                .into_iter()
+                .flatten()
+                .chain(leg.d)
+                .chain(leg.h);
+            let foot = [foot.position_m, foot.velocity_m_s].into_iter();
+            let jacobian = self.feet[index].jacobian.into_iter();
+            let all = leg.chain(foot.chain(jacobian).flatten());
+            if let Some(value) = all.into_iter().find(|v| !v.is_finite()) {
+                return Err(DynamicsError::NonFinite {
+                    name: "mass matrix, bias or foot of leg",
+                    index,
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Accelerations (m/s², rad/s²) for a generalised force (N, N m); gravity, bias and viscous
     /// friction are added here.
     ///

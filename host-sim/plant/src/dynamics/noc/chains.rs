@@ -38,7 +38,7 @@ pub(super) fn r2p_with(
     let (r44_dot, r54_dot) = (omega.cross(&rho4), omega.cross(&rho5) + slide5);
     let r64_dot = omega.cross(&r64) + slide5 + slide6;
     let f_dot = omega.cross(&f);
-    Ok(chain(
+    chain(
         rates,
         [
             block(
@@ -63,7 +63,7 @@ pub(super) fn r2p_with(
                 [twist(O, K.cross(&r64_dot)), twist(O, f_dot), twist(O, O)],
             ),
         ],
-    ))
+    )
 }
 
 /// Bodies 4–6 from O4.
@@ -118,7 +118,7 @@ pub(super) fn rpr_with(
     let r33_dot = omega3.cross(&r33);
     let r31_dot = omega1.cross(&a2) + slide2 + r33_dot;
     let u_dot = omega1.cross(&u);
-    Ok(chain(
+    chain(
         rates,
         [
             block(
@@ -147,7 +147,7 @@ pub(super) fn rpr_with(
                 ],
             ),
         ],
-    ))
+    )
 }
 
 /// Bodies 1–3 from O1.
@@ -180,13 +180,14 @@ fn placed(body: &BodyParams, rotation: Matrix3<f64>, origin: Vector3<f64>) -> Pl
     }
 }
 
-fn chain(rates: &Vector3<f64>, bodies: [BodyBlock<3>; 3]) -> System<3, 3> {
+fn chain(rates: &Vector3<f64>, bodies: [BodyBlock<3>; 3]) -> Result<System<3, 3>, DynamicsError> {
     System {
         bodies,
         rates: *rates,
         viscous: Vector3::zeros(),
         foot_jacobian: Matrix3::zeros(),
     }
+    .finite()
 }
 
 fn block(

@@ -17,8 +17,22 @@ impl HalfRobot {
     /// The half robot.
     ///
     /// # Errors
-    /// As [`Leg::new`].
+    /// As [`Leg::new`]; [`DynamicsError::Parameter`] for a wheel radius that is not positive, or a
+    /// mass, inertia or ratio that is not finite.
     pub fn new(params: &HalfRobotParams) -> Result<Self, DynamicsError> {
+        let p = params;
+        for (name, value, fits) in [
+            ("wheel_radius_m", p.wheel_radius_m, p.wheel_radius_m > 0.0),
+            ("chassis_mass_kg", p.chassis_mass_kg, true),
+            ("wheel_mass_kg", p.wheel_mass_kg, true),
+            ("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2, true),
+            ("rotor_inertia_kg_m2", p.rotor_inertia_kg_m2, true),
+            ("gear_ratio", p.gear_ratio, true),
+        ] {
+            if !(fits && value.is_finite()) {
+                return Err(DynamicsError::Parameter { name, value });
+            }
+        }
         let [_, v2, v5, v6] = params.viscous_n_s_m;
         finite("viscous", &params.viscous_n_s_m)?;
         Ok(Self {
@@ -67,12 +81,13 @@ impl HalfRobot {
                 t_dot: SMatrix::zeros(),
             },
         });
-        Ok(System {
+        System {
             bodies,
             rates: *rates,
             viscous: p.viscous_n_s_m.into(),
             foot_jacobian: beside(&I, &leg.foot_jacobian),
-        })
+        }
+        .finite()
     }
 }
 

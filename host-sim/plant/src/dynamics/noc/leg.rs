@@ -20,13 +20,25 @@ impl Leg {
     /// Dimensions, bodies and viscous friction of b2, b5, b6 (N s/m).
     ///
     /// # Errors
-    /// [`DynamicsError::Leg`] for impossible dimensions; [`DynamicsError::NonFinite`].
+    /// [`DynamicsError::Leg`] for impossible dimensions; [`DynamicsError::NonFinite`] for friction
+    /// and [`DynamicsError::Parameter`] for a body that is not finite.
     pub fn new(
         dimensions: LegParameters<f64>,
         bodies: &LegBodies,
         viscous_n_s_m: [f64; 3],
     ) -> Result<Self, DynamicsError> {
         finite("viscous", &viscous_n_s_m)?;
+        for body in bodies {
+            for (name, values) in [
+                ("leg_bodies.mass_kg", &[body.mass_kg][..]),
+                ("leg_bodies.com_m", &body.com_m),
+                ("leg_bodies.inertia_kg_m2", &body.inertia_kg_m2),
+            ] {
+                if let Some(&value) = values.iter().find(|v| !v.is_finite()) {
+                    return Err(DynamicsError::Parameter { name, value });
+                }
+            }
+        }
         let geometry = LegGeometry::new(dimensions).map_err(refused)?;
         Ok(Self {
             geometry,
@@ -50,7 +62,7 @@ impl Leg {
     /// The six bodies at lengths (m); mass centres from O4.
     ///
     /// # Errors
-    /// [`DynamicsError::Leg`].
+    /// [`DynamicsError::Leg`]; [`DynamicsError::NonFinite`] if a place overflows.
     pub fn placements(&self, q: &Vector3<f64>) -> Result<[Placement; 6], DynamicsError> {
         let posture = self.posture(q)?;
         let (yaw, foot) = chain_coordinates(&posture);
@@ -63,7 +75,11 @@ impl Leg {
             com_m: o1 + c.com_m,
             ..c
         };
-        Ok([from_o4(c1), from_o4(c2), from_o4(c3), c4, c5, c6])
+        let placements = [from_o4(c1), from_o4(c2), from_o4(c3), c4, c5, c6];
+        for placement in &placements {
+            checked("centre of mass", placement.com_m)?;
+        }
+        Ok(placements)
     }
 
     /// Foot point P from O4 (m).
@@ -119,12 +135,13 @@ impl Leg {
                 ..body
             }
         });
-        Ok(System {
+        System {
             bodies,
             rates: *rates,
             viscous: self.viscous,
             foot_jacobian: posture.foot_jacobian(),
-        })
+        }
+        .finite()
     }
 }
 

@@ -70,6 +70,25 @@ pub struct System<const B: usize, const N: usize> {
 }
 
 impl<const B: usize, const N: usize> System<B, N> {
+    /// Passes a system whose blocks are finite; finite states so large that they overflowed are
+    /// refused with the number of the body.
+    pub(super) fn finite(self) -> Result<Self, DynamicsError> {
+        for (index, b) in self.bodies.iter().enumerate() {
+            let parts = [
+                ("mass of body", b.m.as_slice()),
+                ("spin of body", b.w.as_slice()),
+                ("twist of body", b.t.as_slice()),
+                ("twist rate of body", b.t_dot.as_slice()),
+            ];
+            for (name, values) in parts {
+                if let Some(&value) = values.iter().find(|v| !v.is_finite()) {
+                    return Err(DynamicsError::NonFinite { name, index, value });
+                }
+            }
+        }
+        Ok(self)
+    }
+
     /// Generalised inertia I = TᵀMT.
     #[must_use]
     pub fn inertia(&self) -> SMatrix<f64, N, N> {
@@ -120,6 +139,9 @@ impl<const B: usize, const N: usize> System<B, N> {
         gravity_m_s2: &Vector3<f64>,
         foot_force_n: &Vector3<f64>,
     ) -> Result<SVector<f64, N>, DynamicsError> {
+        checked("acceleration", *accelerations)?;
+        checked("gravity", *gravity_m_s2)?;
+        checked("foot force", *foot_force_n)?;
         let force = self.inertial_force(accelerations)
             - self.gravity_force(gravity_m_s2)
             - self.dissipation()
@@ -137,6 +159,9 @@ impl<const B: usize, const N: usize> System<B, N> {
         gravity_m_s2: &Vector3<f64>,
         foot_force_n: &Vector3<f64>,
     ) -> Result<SVector<f64, N>, DynamicsError> {
+        checked("actuator force", *actuators)?;
+        checked("gravity", *gravity_m_s2)?;
+        checked("foot force", *foot_force_n)?;
         let force = actuators
             + self.gravity_force(gravity_m_s2)
             + self.dissipation()
