@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
     ("wheeleg-control", &["wheeleg-units"]),
@@ -23,6 +23,16 @@ const ARROWS: [(&str, &[&str]); 11] = [
         "wheeleg-master",
         &["wheeleg-kinematics", "wheeleg-protocol", "wheeleg-units"],
     ),
+    (
+        "wheeleg-remote",
+        &[
+            "wheeleg-node",
+            "wheeleg-pil-link",
+            "wheeleg-protocol",
+            "wheeleg-units",
+        ],
+    ),
+    ("wheeleg-board-qemu", &["wheeleg-remote", "wheeleg-units"]),
     ("wheeleg-plant", &["wheeleg-kinematics"]),
     ("wheeleg-pil-link", &[]),
     ("wheeleg-sim", &LIBRARIES),
@@ -52,8 +62,8 @@ const TESTED: [&str; 8] = [
     "wheeleg-units",
 ];
 
-/// Folders in which `unsafe` may stand: board glue, of which there is none yet.
-const UNSAFE_ALLOWED: [&str; 0] = [];
+/// Folders in which `unsafe` may stand: board glue.
+const UNSAFE_ALLOWED: [&str; 1] = ["firmware/board-qemu/"];
 
 /// Longest source file, in lines.
 const LINES_MAX: usize = 800;

@@ -18,13 +18,14 @@ use crate::report::{Report, StepError, StepResult};
 use crate::tools::{apt_install, have, may_apt};
 
 /// The `no_std` crates.
-const CRATES: [&str; 6] = [
+const CRATES: [&str; 7] = [
     "wheeleg-units",
     "wheeleg-control",
     "wheeleg-kinematics",
     "wheeleg-protocol",
     "wheeleg-node",
     "wheeleg-master",
+    "wheeleg-remote",
 ];
 
 /// Cortex-M4 is the part on the boards; Cortex-M0+ is the poorest core that
@@ -170,6 +171,7 @@ mod tests {
         let members = ["protocol", "firmware/units", "firmware/control"]
             .into_iter()
             .chain(["firmware/kinematics", "firmware/node", "firmware/master"])
+            .chain(["firmware/remote"])
             .chain(["host-sim", "host-sim/plant", "tests", "xtask"]);
         let mut found = Vec::new();
         for member in members {

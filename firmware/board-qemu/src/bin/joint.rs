@@ -1,0 +1,12 @@
+//! The joint application on QEMU.
+#![no_std]
+#![no_main]
+
+use wheeleg_board_qemu::run_on_semihosting;
+use wheeleg_remote::{JointPins, RemoteJoint};
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let pins = JointPins::default();
+    run_on_semihosting::<RemoteJoint<'_>>(&pins)
+}

@@ -1,0 +1,41 @@
+//! Board support for QEMU's `mps2-an386` (Cortex-M4).
+//!
+//! The images run the applications of `wheeleg-node` on a CPU model that is
+//! independent of the one that runs the images of the real board. Sensors and
+//! outputs travel in messages (`wheeleg-remote`); this crate adds the way the
+//! messages take and the clock that times the work of a tick:
+//!
+//! * `joint` and `wheel` exchange messages by semihosting on standard input and
+//!   output of the emulator. The CPU stands still in a semihosting call, so that
+//!   waiting costs no instruction and a run is the same every time.
+//! * `hil-joint` exchanges them through a UART of the machine, as a
+//!   hardware-in-the-loop image does on a bench board.
+//!
+//! An image in which a panic can be reached does not link: the panic handler
+//! calls a function that exists nowhere.
+#![no_std]
+#![allow(
+    unsafe_code,
+    reason = "semihosting calls, registers of the machine, the panic handler that must not link"
+)]
+#![deny(
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic
+)]
+
+#[cfg(target_os = "none")]
+mod never_panics;
+#[cfg(target_os = "none")]
+pub mod semihosting;
+#[cfg(target_os = "none")]
+pub mod stopwatch;
+#[cfg(target_os = "none")]
+pub mod uart;
+
+#[cfg(target_os = "none")]
+mod image;
+#[cfg(target_os = "none")]
+pub use image::{run_on_semihosting, run_on_uart};

@@ -1,0 +1,41 @@
+//! Board applications whose sensors and outputs travel in messages.
+//!
+//! The applications of `wheeleg-node` run here unchanged. What differs from a
+//! board is what stands behind their hardware traits: the inputs of a tick come
+//! with the request that starts it, and the outputs that the tick presets go
+//! back with the reply. Nothing here can reach a pin.
+//!
+//! Two kinds of images are built on it: the ones for QEMU, where the messages go
+//! through a pair of pipes, and hardware-in-the-loop images, where they go over a
+//! serial port.
+//!
+//! The messages are those of `wheeleg-pil-link`, one reply to every request.
+//! Simulated time is an argument of the request: a board waits for as long as
+//! its partner likes, and the partner decides how fast time runs. A board whose
+//! partner falls silent stands still, and it has no output that could move
+//! anything.
+//!
+//! No floating point, no heap, and no panic for any input.
+#![cfg_attr(not(test), no_std)]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::arithmetic_side_effects,
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic
+    )
+)]
+
+pub mod board;
+pub mod frame;
+pub mod pins;
+pub mod serve;
+pub mod session;
+pub mod store;
+
+pub use board::{Board, RemoteJoint, RemoteWheel};
+pub use pins::{JointPins, WheelPins};
+pub use serve::{Stream, serve};
+pub use session::{Session, Stopwatch};

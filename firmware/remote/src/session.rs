@@ -1,0 +1,260 @@
+//! From a request to its reply.
+
+use heapless::{String, Vec};
+use wheeleg_node::{ConfigError, NodeIdentity};
+use wheeleg_pil_link::{
+    Figures, Hello, Image, LINK_VERSION, Nonvolatile, Outputs, Power, Ran, Reply, Request, Run,
+    Sent, Straps, Trip, text,
+};
+use wheeleg_protocol::Address;
+use wheeleg_units::Micros;
+
+use crate::board::Board;
+use crate::store::entries;
+
+/// Brown-out flag of RCC_CSR (DATASHEET RM0440, BORRSTF), as a real board
+/// would find it after the supply has come back.
+const BROWN_OUT: u32 = 1 << 27;
+
+const NS_PER_US: u64 = 1_000;
+
+/// How the work of the board is timed, on the board's own clock.
+pub trait Stopwatch {
+    /// The work of a tick begins.
+    fn tick_begins(&mut self);
+
+    /// The work of a tick has ended; gives its duration.
+    fn tick_ended(&mut self) -> Micros;
+
+    /// The work on received bytes begins.
+    fn bytes_begin(&mut self) {}
+
+    /// The work on received bytes has ended.
+    fn bytes_ended(&mut self) {}
+
+    /// Deepest stack so far and room for the stack, bytes; zeros if unknown.
+    fn stack(&mut self) -> (u32, u32) {
+        (0, 0)
+    }
+}
+
+/// One board and its course of a session.
+#[derive(Debug)]
+pub struct Session<'p, B: Board<'p>> {
+    pins: &'p B::Pins,
+    host: &'static str,
+    clock_hz: u32,
+    parameters: B::Parameters,
+    identity: Option<NodeIdentity>,
+    board: Option<B>,
+    /// Outputs that act since the last tick edge.
+    active: Outputs,
+    /// The last tick edge.
+    edge_ns: u64,
+    resets: u16,
+    over: bool,
+}
+
+impl<'p, B: Board<'p>> Session<'p, B> {
+    /// A board without supply. `host` names what it runs on, `clock_hz` is the
+    /// clock of its processor, 0 if unknown.
+    pub fn new(pins: &'p B::Pins, host: &'static str, clock_hz: u32) -> Self {
+        Self {
+            pins,
+            host,
+            clock_hz,
+            parameters: B::Parameters::default(),
+            identity: None,
+            board: None,
+            active: Outputs::default(),
+            edge_ns: 0,
+            resets: 0,
+            over: false,
+        }
+    }
+
+    /// Whether the partner has said goodbye.
+    pub const fn is_over(&self) -> bool {
+        self.over
+    }
+
+    /// Carries out a request.
+    pub fn answer(&mut self, request: &Request, stopwatch: &mut impl Stopwatch) -> Reply {
+        let result = match request {
+            // A new partner, or the old one once more: the board starts afresh.
+            Request::Hello { .. } => {
+                self.forget();
+                Ok(self.hello())
+            }
+            Request::Store(stretch) => self.store(stretch),
+            Request::PowerUp(straps) => self.power_up(straps).map(Reply::Ran),
+            Request::Run(run) => self.run(run, stopwatch).map(Reply::Ran),
+            Request::Hook(_) => Err("this board has no fault injection"),
+            Request::ReadStore { .. } => Err("this board has no parameter memory"),
+            Request::Bye => {
+                self.over = true;
+                self.forget();
+                Ok(Reply::Done)
+            }
+        };
+        result.unwrap_or_else(|why| Reply::Refused(text(why)))
+    }
+
+    fn forget(&mut self) {
+        self.parameters = B::Parameters::default();
+        self.identity = None;
+        self.board = None;
+        self.resets = 0;
+    }
+
+    fn hello(&self) -> Reply {
+        Reply::Hello(Hello {
+            version: LINK_VERSION,
+            image: Image {
+                name: String::try_from(B::NAME).unwrap_or_default(),
+                digest: [0; 16],
+                clock_hz: self.clock_hz,
+            },
+            host: String::try_from(self.host).unwrap_or_default(),
+            outputs_are_virtual: true,
+        })
+    }
+
+    fn store(&mut self, stretch: &Nonvolatile) -> Result<Reply, &'static str> {
+        if self.identity.is_some() {
+            return Err("parameters are stored before power-up");
+        }
+        let entries = entries(&stretch.bytes).ok_or("an entry of the store is cut off")?;
+        for (id, raw) in entries {
+            self.parameters =
+                B::with(&self.parameters, id, raw).map_err(wheeleg_protocol::NackReason::text)?;
+        }
+        Ok(Reply::Done)
+    }
+
+    fn power_up(&mut self, straps: &Straps) -> Result<Ran, &'static str> {
+        let address = Address::new(straps.address).ok_or("no board has this address")?;
+        let identity = NodeIdentity {
+            address,
+            unique_id: straps.unique_id,
+        };
+        self.start(identity)?;
+        self.identity = Some(identity);
+        Ok(Ran::default()).map(|ran| self.report(ran))
+    }
+
+    /// The board leaves reset.
+    fn start(&mut self, identity: NodeIdentity) -> Result<(), &'static str> {
+        let board =
+            B::new(identity, self.parameters.clone(), self.pins).map_err(|error| match error {
+                ConfigError::Address => "the address is none of this image's boards",
+                ConfigError::Parameters => "the stored parameters contradict each other",
+            })?;
+        self.board = Some(board);
+        self.active = Outputs::default();
+        Ok(())
+    }
+
+    fn run(&mut self, run: &Run, stopwatch: &mut impl Stopwatch) -> Result<Ran, &'static str> {
+        let identity = self.identity.ok_or("the board has no power yet")?;
+        if run.power == Power::BrownOut {
+            let trip = self.board.take().map(|_| Trip {
+                at_ns: run.until_ns,
+                running_ns: 0,
+                cause: BROWN_OUT,
+            });
+            return Ok(Ran {
+                trip,
+                figures: self.figures(stopwatch),
+                ..Ran::default()
+            });
+        }
+        if self.board.is_none() {
+            self.resets = self.resets.saturating_add(1);
+            self.start(identity)?;
+        }
+        let board = self.board.as_mut().ok_or("the board has no power yet")?;
+        if !run.received.is_empty() {
+            stopwatch.bytes_begin();
+            board.on_bus_bytes(&run.received, micros(run.received_end_ns));
+            stopwatch.bytes_ended();
+        }
+        if let Some(inputs) = &run.edge {
+            let now = micros(run.until_ns);
+            // What the last tick preset takes effect, then the new tick runs.
+            self.active = board.outputs();
+            self.edge_ns = run.until_ns;
+            stopwatch.tick_begins();
+            board.latch(inputs);
+            board.tick(now);
+            let took = stopwatch.tick_ended();
+            board.tick_done(Micros(now.get().wrapping_add(took.get())));
+        }
+        let mut sent = Vec::new();
+        while !sent.is_full()
+            && let Some(transmission) = board.take_transmission()
+        {
+            let start_ns = start_ns(transmission.start_at, run.until_ns);
+            let sent_bytes = Vec::from_slice(&transmission.bytes).unwrap_or_default();
+            // There is room: asked above.
+            let _ = sent.push(Sent {
+                start_ns,
+                bytes: sent_bytes,
+            });
+        }
+        let figures = self.figures(stopwatch);
+        Ok(self.report(Ran {
+            sent,
+            figures,
+            ..Ran::default()
+        }))
+    }
+
+    /// Adds what can be seen of the board.
+    fn report(&self, ran: Ran) -> Ran {
+        match &self.board {
+            Some(board) => Ran {
+                outputs: Outputs {
+                    // A plain pin, without a preset value.
+                    dump: board.outputs().dump,
+                    ..self.active
+                },
+                seen: board.seen(),
+                seen_at_ns: self.edge_ns,
+                period_us: board.period_us(),
+                ..ran
+            },
+            None => ran,
+        }
+    }
+
+    fn figures(&self, stopwatch: &mut impl Stopwatch) -> Figures {
+        let (stack_used, stack_size) = stopwatch.stack();
+        Figures {
+            stack_used,
+            stack_size,
+            resets: self.resets,
+            ..Figures::default()
+        }
+    }
+}
+
+/// The board's microsecond counter at an instant.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the counter has 32 bits and wraps"
+)]
+fn micros(ns: u64) -> Micros {
+    Micros((ns.wrapping_div(NS_PER_US)) as u32)
+}
+
+/// Instant at which the board's counter stands at `at`, seen from `now_ns`;
+/// what lies in the past starts now.
+fn start_ns(at: Micros, now_ns: u64) -> u64 {
+    let ahead = at.get().wrapping_sub(micros(now_ns).get());
+    if ahead < 1 << 31 {
+        now_ns.saturating_add(u64::from(ahead).saturating_mul(NS_PER_US))
+    } else {
+        now_ns
+    }
+}
