@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
     ("wheeleg-control", &["wheeleg-units"]),
@@ -37,6 +37,16 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("wheeleg-pil-link", &[]),
     ("wheeleg-sim", &LIBRARIES),
     ("wheeleg-tests", &TESTED),
+    (
+        "wheeleg-fuzz-targets",
+        &[
+            "wheeleg-master",
+            "wheeleg-node",
+            "wheeleg-protocol",
+            "wheeleg-sim",
+            "wheeleg-units",
+        ],
+    ),
     ("xtask", &[]),
 ];
 

@@ -71,7 +71,7 @@ impl FakeNode {
         self.position as f64 / 65_536.0
     }
 
-    fn on_sync(&mut self, sync: &Sync) -> SlotReply {
+    pub(crate) fn on_sync(&mut self, sync: &Sync) -> SlotReply {
         if sync.flags.contains(wheeleg_protocol::SyncFlags::ESTOP) && self.mode != NodeMode::Idle {
             self.mode = NodeMode::Hold;
         }
@@ -107,7 +107,7 @@ impl FakeNode {
         }
     }
 
-    fn on_request(&mut self, message: &Message) -> Message {
+    pub(crate) fn on_request(&mut self, message: &Message) -> Message {
         self.requests.push(*message);
         let request = message.message_type().code();
         let nack = |reason| Message::from(Nack { request, reason });

@@ -1,0 +1,30 @@
+//! The second engine: bolero draws the inputs, under plain `cargo test`. The
+//! number of inputs is small here; `BOLERO_RANDOM_ITERATIONS` and
+//! `BOLERO_RANDOM_TEST_TIME_MS` make it larger, and `cargo xtask deep` does.
+//! No assertion stands here: the targets assert.
+
+macro_rules! engine {
+    ($($name:ident: $iterations:literal, $length:literal;)*) => { $(
+        #[test]
+        fn $name() {
+            bolero::check!()
+                .with_iterations($iterations)
+                .with_max_len($length)
+                .for_each(|data: &[u8]| wheeleg_fuzz_targets::$name::run(data));
+        }
+    )* };
+}
+
+engine! {
+    decoder: 20_000, 2_000;
+    frames: 5_000, 4_000;
+    parse: 20_000, 200;
+    joint: 1_500, 2_000;
+    wheel: 700, 2_000;
+    master: 400, 1_000;
+}
+
+#[cfg(feature = "sim")]
+engine! {
+    scenario: 2_000, 400;
+}
