@@ -23,6 +23,12 @@ pub enum DynamicsError {
         /// The value.
         value: f64,
     },
+    /// A quaternion that is no rotation.
+    #[error("orientation has norm {norm}, not 1")]
+    NotUnit {
+        /// The norm.
+        norm: f64,
+    },
     /// The mass matrix is not positive definite.
     #[error("mass matrix is not positive definite: pivot {pivot}")]
     Singular {

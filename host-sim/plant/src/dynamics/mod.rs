@@ -5,10 +5,14 @@
 //! * [`robot`]: the engine the simulator steps: the whole robot in eight coordinates, floating in
 //!   pitch on its wheel axle. Same principle, with the zeros left out.
 //!
+//! * [`floating`]: the whole robot with a floating chassis, fourteen velocities, both ways.
+//!
 //! Positive cylinder forces extend their cylinder. Gravity is a vector, so a slope is a tilted
 //! gravity.
 
+pub mod chain;
 mod error;
+pub mod floating;
 pub mod noc;
 mod params;
 pub mod printed;

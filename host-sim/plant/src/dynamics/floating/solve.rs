@@ -1,0 +1,133 @@
+//! The arrow-shaped mass matrix: chassis 6 × 6, a leg 3 × 3 each, a wheel 1 × 1 each, and nothing
+//! between legs and wheels.
+//!
+//! Within a leg b6 couples with neither b2 nor b5, and the (b5, b5) and (b6, b6) entries are
+//! constant masses, so a leg is eliminated by three rank-one updates of the chassis block.
+
+use super::leg::LegTerms;
+use super::state::{DOF, LEG, Velocity, WHEEL};
+use crate::dynamics::error::DynamicsError;
+
+/// Lower triangle of a symmetric 6 × 6, row by row.
+pub(super) type Packed = [f64; 21];
+
+/// Index in [`Packed`]; row ≥ column.
+#[inline]
+pub(super) const fn at(row: usize, column: usize) -> usize {
+    row * (row + 1) / 2 + column
+}
+
+/// Sign of a chassis entry under the mirror: \[moment, force\].
+pub(super) const MIRROR: [f64; 6] = [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
+
+/// A leg taken out of the equations.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Eliminated {
+    /// D⁻¹ of the columns.
+    gain: [[f64; 6]; 3],
+    /// D⁻¹ of the leg's right side.
+    free: [f64; 3],
+}
+
+/// Takes a leg out: subtracts its share from the chassis block and from the right side, both in
+/// the leg's (mirrored) axes. `right` is force less bias of b2, b5, b6.
+#[inline]
+pub(super) fn eliminate(
+    t: &LegTerms,
+    [m56, m6]: [f64; 2],
+    right: [f64; 3],
+    block: &mut Packed,
+    side: &mut [f64; 6],
+) -> Result<Eliminated, DynamicsError> {
+    let [c2, c5, c6] = &t.columns;
+    let ratio = t.d25 / m56;
+    let d22 = t.d22 - ratio * t.d25;
+    if d22.is_nan() || d22 <= 0.0 {
+        return Err(DynamicsError::Singular { pivot: d22 });
+    }
+    let (inv2, inv5, inv6) = (1.0 / d22, 1.0 / m56, 1.0 / m6);
+    let mut gain = [[0.0; 6]; 3];
+    let rest: [f64; 6] = std::array::from_fn(|i| c2[i] - ratio * c5[i]);
+    for i in 0..6 {
+        gain[0][i] = rest[i] * inv2;
+        gain[1][i] = c5[i] * inv5;
+        gain[2][i] = c6[i] * inv6;
+    }
+    let free2 = (right[0] - ratio * right[1]) * inv2;
+    let (part5, free6) = (right[1] * inv5, right[2] * inv6);
+    for i in 0..6 {
+        for j in 0..=i {
+            block[at(i, j)] -= gain[0][i] * rest[j] + gain[1][i] * c5[j] + gain[2][i] * c6[j];
+        }
+        side[i] -= rest[i] * free2 + c5[i] * part5 + c6[i] * free6;
+    }
+    // b5 follows b2.
+    for i in 0..6 {
+        gain[1][i] -= ratio * gain[0][i];
+    }
+    Ok(Eliminated {
+        gain,
+        free: [free2, part5 - ratio * free2, free6],
+    })
+}
+
+impl Eliminated {
+    /// Accelerations of the leg for a chassis acceleration in the leg's axes.
+    #[inline]
+    pub(super) fn follow(&self, base: &[f64; 6]) -> [f64; 3] {
+        std::array::from_fn(|k| {
+            let taken: f64 = self.gain[k].iter().zip(base).map(|(g, a)| g * a).sum();
+            self.free[k] - taken
+        })
+    }
+}
+
+/// Solves the symmetric positive definite 6 × 6 in place by L D Lᵀ.
+#[inline]
+pub(super) fn solve_block(block: &mut Packed, x: &mut [f64; 6]) -> Result<(), DynamicsError> {
+    let mut inverse = [0.0; 6];
+    for j in 0..6 {
+        let pivot = block[at(j, j)];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return Err(DynamicsError::Singular { pivot });
+        }
+        inverse[j] = 1.0 / pivot;
+        for i in j + 1..6 {
+            let factor = block[at(i, j)] * inverse[j];
+            for k in j + 1..=i {
+                block[at(i, k)] -= factor * block[at(k, j)];
+            }
+            x[i] -= factor * x[j];
+        }
+    }
+    // block now holds L D below the diagonal.
+    for j in (0..6).rev() {
+        let mut value = x[j];
+        for i in j + 1..6 {
+            value -= block[at(i, j)] * x[i];
+        }
+        x[j] = value * inverse[j];
+    }
+    Ok(())
+}
+
+/// Chassis block of a leg into the robot's: signs under the mirror.
+#[inline]
+pub(super) fn add_mirrored(total: &mut Packed, leg: &Packed) {
+    for i in 0..6 {
+        for j in 0..=i {
+            total[at(i, j)] += MIRROR[i] * MIRROR[j] * leg[at(i, j)];
+        }
+    }
+}
+
+/// Puts chassis, legs and wheels in the order of a velocity.
+#[inline]
+pub(super) fn assemble(base: &[f64; 6], legs: &[[f64; 3]; 2], wheels: [f64; 2]) -> Velocity {
+    let mut v = [0.0; DOF];
+    v[..6].copy_from_slice(base);
+    v[LEG..LEG + 3].copy_from_slice(&legs[0]);
+    v[LEG + 3..LEG + 6].copy_from_slice(&legs[1]);
+    v[WHEEL..].copy_from_slice(&wheels);
+    Velocity::from(v)
+}
