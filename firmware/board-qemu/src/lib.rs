@@ -5,10 +5,10 @@
 //! outputs travel in messages (`wheeleg-remote`); this crate adds the way the
 //! messages take and the clock that times the work of a tick:
 //!
-//! * `joint` and `wheel` exchange messages by semihosting on standard input and
+//! * `qemu-joint` and `qemu-wheel` exchange messages by semihosting on standard input and
 //!   output of the emulator. The CPU stands still in a semihosting call, so that
 //!   waiting costs no instruction and a run is the same every time.
-//! * `hil-joint` exchanges them through a UART of the machine, as a
+//! * `qemu-hil-joint` exchanges them through a UART of the machine, as a
 //!   hardware-in-the-loop image does on a bench board.
 //!
 //! An image in which a panic can be reached does not link: the panic handler
