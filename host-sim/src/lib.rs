@@ -11,6 +11,7 @@ pub mod cli;
 pub mod config;
 pub mod error;
 mod output;
+pub mod pil;
 pub mod report;
 pub mod run;
 pub mod sil;

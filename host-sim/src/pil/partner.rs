@@ -1,0 +1,176 @@
+//! A board outside of this process, over any stream of bytes.
+
+use wheeleg_pil_link::frame::MAX_FRAME;
+use wheeleg_pil_link::{Deframer, FrameError, Hello, LINK_VERSION, Reply, Request, encode};
+
+use crate::SimError;
+
+/// A stream of bytes to one board. It knows what it is connected to and says
+/// so in its errors.
+pub trait Stream {
+    /// Who is at the other end, for messages: "QEMU (qemu-joint)".
+    fn name(&self) -> String;
+
+    /// Sends all bytes.
+    ///
+    /// # Errors
+    /// [`SimError`] when the other end has gone.
+    fn send(&mut self, bytes: &[u8]) -> Result<(), SimError>;
+
+    /// Waits for bytes; gives how many came, at least one.
+    ///
+    /// # Errors
+    /// [`SimError`] when the other end has gone or stays silent for too long.
+    fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, SimError>;
+}
+
+impl<S: Stream + ?Sized> Stream for Box<S> {
+    fn name(&self) -> String {
+        (**self).name()
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), SimError> {
+        (**self).send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, SimError> {
+        (**self).receive(buffer)
+    }
+}
+
+/// One board at the other end of a stream of its own. Requests and replies
+/// are two calls, so that several boards can work at the same time: send to all,
+/// then receive from all.
+#[derive(Debug)]
+pub struct Partner<S> {
+    stream: S,
+    deframer: Deframer,
+    buffer: [u8; MAX_FRAME],
+    /// Stretch of the buffer that is not yet read.
+    unread: std::ops::Range<usize>,
+    /// Requests without a reply.
+    waiting: u32,
+}
+
+impl<S: Stream> Partner<S> {
+    /// Nothing said yet.
+    pub fn new(stream: S) -> Self {
+        Self {
+            stream,
+            deframer: Deframer::new(),
+            buffer: [0; MAX_FRAME],
+            unread: 0..0,
+            waiting: 0,
+        }
+    }
+
+    /// Who is at the other end.
+    pub fn name(&self) -> String {
+        self.stream.name()
+    }
+
+    /// The stream.
+    pub fn stream(&mut self) -> &mut S {
+        &mut self.stream
+    }
+
+    /// Opens the session and checks that the board speaks our version.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`]: no answer, another version, no such board.
+    pub fn hello(&mut self) -> Result<Hello, SimError> {
+        // Ends whatever a former partner left half said.
+        self.stream.send(&[0])?;
+        let version = LINK_VERSION;
+        match self.ask(&Request::Hello { version })? {
+            Reply::Hello(hello) if hello.version == version => Ok(hello),
+            Reply::Hello(hello) => Err(SimError::simulation(
+                format!(
+                    "{} speaks version {} of the board link, this program version {version}",
+                    self.name(),
+                    hello.version
+                ),
+                "build image and program from the same sources",
+            )),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    /// Sends a request; its reply is [`Self::receive`]d later.
+    ///
+    /// # Errors
+    /// [`SimError`] when the board has gone.
+    pub fn send(&mut self, request: &Request) -> Result<(), SimError> {
+        let mut frame = [0; MAX_FRAME];
+        // A frame of this length holds any request (tested with the link).
+        let bytes = encode(0, request, &mut frame).map_err(|e| self.damaged(e))?;
+        self.stream.send(bytes)?;
+        self.waiting += 1;
+        Ok(())
+    }
+
+    /// Waits for the reply to the oldest request.
+    ///
+    /// # Errors
+    /// [`SimError`] when the board has gone, stays silent or sends rubbish.
+    pub fn receive(&mut self) -> Result<Reply, SimError> {
+        debug_assert!(self.waiting > 0, "nothing was asked");
+        loop {
+            let mut input = &self.buffer[self.unread.clone()];
+            let before = input.len();
+            let found = self.deframer.next::<Reply>(&mut input);
+            self.unread.start += before - input.len();
+            match found {
+                Ok(Some((_, reply))) => {
+                    self.waiting -= 1;
+                    return Ok(reply);
+                }
+                Ok(None) => {
+                    let count = self.stream.receive(&mut self.buffer)?;
+                    self.unread = 0..count;
+                }
+                Err(error) => return Err(self.damaged(error)),
+            }
+        }
+    }
+
+    /// Sends a request and waits for its reply.
+    ///
+    /// # Errors
+    /// As [`Self::send`] and [`Self::receive`].
+    pub fn ask(&mut self, request: &Request) -> Result<Reply, SimError> {
+        self.send(request)?;
+        self.receive()
+    }
+
+    /// An answer that does not belong to the request.
+    pub fn unexpected(&self, reply: &Reply) -> SimError {
+        let (what, help) = match reply {
+            Reply::Refused(why) => (format!("refuses: {why}"), "see the help of --nodes"),
+            Reply::Halted(halt) => (
+                format!(
+                    "has stopped at {:.6} s, program counter 0x{:08X}: {}",
+                    halt.at_ns as f64 * 1e-9,
+                    halt.pc,
+                    halt.reason
+                ),
+                "what was logged up to here is complete",
+            ),
+            other => (
+                format!("answers out of turn: {other:?}"),
+                "build image and program from the same sources",
+            ),
+        };
+        SimError::simulation(format!("{} {what}", self.name()), help)
+    }
+
+    fn damaged(&self, error: FrameError) -> SimError {
+        SimError::simulation(
+            format!(
+                "{} sends what is no message of the board link: {error}",
+                self.name()
+            ),
+            "build image and program from the same sources; on a serial port, check baud rate and cable",
+        )
+    }
+}
