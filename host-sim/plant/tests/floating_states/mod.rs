@@ -123,12 +123,19 @@ pub(crate) fn along(state: &FloatingState, acceleration: &Velocity, t: f64) -> F
     at(state.moved(&change, &still), t)
 }
 
-/// Derivative at 0, sixth-order central differences.
+/// Derivative at 0, sixth-order central differences 1 ms apart.
 pub(crate) fn derivative<T>(f: impl Fn(f64) -> T) -> T
 where
     T: std::ops::Add<Output = T> + std::ops::Sub<Output = T> + std::ops::Mul<f64, Output = T>,
 {
-    let h = 1e-3;
+    derivative_over(1e-3, f)
+}
+
+/// The same with the differences `h` apart.
+pub(crate) fn derivative_over<T>(h: f64, f: impl Fn(f64) -> T) -> T
+where
+    T: std::ops::Add<Output = T> + std::ops::Sub<Output = T> + std::ops::Mul<f64, Output = T>,
+{
     let pair = |k: f64| f(k * h) - f(-k * h);
     (pair(1.0) * 45.0 - pair(2.0) * 9.0 + pair(3.0)) * (1.0 / (60.0 * h))
 }
