@@ -1,0 +1,19 @@
+//! Links only if nothing in the wheel image can panic: the same image, whose panic
+//! handler calls a function that does not exist. A panic that can be reached
+//! leaves the linker with an undefined symbol of a telling name.
+#![no_std]
+#![no_main]
+#![allow(unsafe_code)]
+
+#[path = "../image/wheel.rs"]
+mod image;
+
+unsafe extern "C" {
+    fn this_image_can_panic() -> !;
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    // SAFETY: never linked, so never called.
+    unsafe { this_image_can_panic() }
+}

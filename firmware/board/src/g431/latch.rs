@@ -1,0 +1,122 @@
+//! What an interrupt handler latched at a tick edge, until the main loop takes it.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use wheeleg_node::hardware::{PinError, PositionSensor, SensorError, SwitchBank};
+use wheeleg_units::{AdcCode, Micros};
+
+/// Set by every handler, cleared by the main loop before it looks for work.
+static WAKE: AtomicBool = AtomicBool::new(false);
+static PENDING: AtomicBool = AtomicBool::new(false);
+static EDGE: AtomicU32 = AtomicU32::new(0);
+static SAMPLE: AtomicU32 = AtomicU32::new(0);
+static PORT_A: AtomicU32 = AtomicU32::new(0);
+
+/// Copies of the three above for the tick that runs, so that a tick that runs
+/// into the next edge still sees one set of inputs.
+static RUNNING_SAMPLE: AtomicU32 = AtomicU32::new(0);
+static RUNNING_PORT_A: AtomicU32 = AtomicU32::new(0);
+
+/// Bit of a sample that is valid; its low 16 bits are the value.
+const VALID: u32 = 1 << 16;
+
+/// Work for the main loop.
+#[inline]
+pub fn wake() {
+    WAKE.store(true, Ordering::Release);
+}
+
+/// Whether a handler has run since the last call.
+#[inline]
+pub fn take_wake() -> bool {
+    // Called with interrupts masked: load and store are one.
+    let wake = WAKE.load(Ordering::Acquire);
+    WAKE.store(false, Ordering::Relaxed);
+    wake
+}
+
+/// Latches a tick; called by a handler. One that the main loop has not taken yet
+/// is lost, which the application sees as an overrun by the time of the next.
+#[inline]
+pub fn post(edge: u32, sample: Option<u16>, port_a: u32) {
+    EDGE.store(edge, Ordering::Relaxed);
+    SAMPLE.store(
+        sample.map_or(0, |sample| VALID | u32::from(sample)),
+        Ordering::Relaxed,
+    );
+    PORT_A.store(port_a, Ordering::Relaxed);
+    PENDING.store(true, Ordering::Release);
+    wake();
+}
+
+/// The edge of the tick that waits, if one does.
+#[inline]
+pub fn pending() -> Option<Micros> {
+    PENDING
+        .load(Ordering::Acquire)
+        .then(|| Micros(EDGE.load(Ordering::Relaxed)))
+}
+
+/// Takes the waiting tick; its inputs are now those of the sensors below.
+#[inline]
+pub fn take() -> Micros {
+    cortex_m::interrupt::free(|_| {
+        PENDING.store(false, Ordering::Relaxed);
+        RUNNING_SAMPLE.store(SAMPLE.load(Ordering::Relaxed), Ordering::Relaxed);
+        RUNNING_PORT_A.store(PORT_A.load(Ordering::Relaxed), Ordering::Relaxed);
+        Micros(EDGE.load(Ordering::Relaxed))
+    })
+}
+
+/// Low 16 bits of the running tick's sample, if there was one.
+#[inline]
+pub fn sample() -> Option<u16> {
+    let sample = RUNNING_SAMPLE.load(Ordering::Relaxed);
+    (sample & VALID != 0).then_some(sample as u16)
+}
+
+/// Port A at the running tick's edge.
+#[inline]
+pub fn port_a() -> u32 {
+    RUNNING_PORT_A.load(Ordering::Relaxed)
+}
+
+/// The potentiometer.
+#[derive(Debug)]
+pub struct Potentiometer;
+
+impl PositionSensor for Potentiometer {
+    fn read(&mut self) -> Result<AdcCode, SensorError> {
+        // The sum of 16 conversions of 12 bits is left-aligned in 16 bits.
+        sample().map(AdcCode::new).ok_or(SensorError::NotReady)
+    }
+}
+
+/// The four foot switches, where they are fitted.
+#[derive(Debug)]
+pub struct Feet {
+    /// Joints 3 and 6 have them.
+    pub fitted: bool,
+}
+
+impl SwitchBank for Feet {
+    fn read(&mut self) -> Result<u8, PinError> {
+        Ok(if self.fitted {
+            super::pins::feet(port_a())
+        } else {
+            0
+        })
+    }
+}
+
+/// The supply-pressure switch, where it is fitted.
+#[derive(Debug)]
+pub struct Supply {
+    /// Wheel 7 has it.
+    pub fitted: bool,
+}
+
+impl SwitchBank for Supply {
+    fn read(&mut self) -> Result<u8, PinError> {
+        Ok(u8::from(self.fitted && super::pins::supply(port_a())))
+    }
+}

@@ -1,0 +1,38 @@
+//! The STM32G431CB. Register names as in RM0440; what is used and why stands in
+//! `BOARD.md`.
+#![allow(unsafe_code)]
+
+#[cfg(feature = "outputs")]
+pub mod adc;
+#[cfg(feature = "outputs")]
+pub mod board;
+#[cfg(feature = "outputs")]
+pub mod bridge;
+#[cfg(feature = "outputs")]
+pub mod bus;
+pub mod clock;
+#[cfg(feature = "outputs")]
+pub mod encoder;
+pub mod fatal;
+pub mod flash;
+#[cfg(feature = "hil")]
+pub mod hil;
+pub mod identity;
+pub mod inhibit;
+#[cfg(feature = "outputs")]
+pub mod latch;
+pub mod parameters;
+pub mod pins;
+pub mod power;
+pub mod start;
+pub mod timebase;
+#[cfg(feature = "outputs")]
+pub mod valves;
+pub mod watchdog;
+
+#[cfg(feature = "outputs")]
+pub use board::G431;
+pub use stm32_metapac as pac;
+
+#[cfg(all(feature = "outputs", feature = "hil"))]
+compile_error!("a hardware-in-the-loop image must not contain the code that drives outputs");

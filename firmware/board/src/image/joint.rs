@@ -1,0 +1,67 @@
+//! The joint image: everything but its panic handler.
+
+use cortex_m_rt::{entry, exception};
+use wheeleg_board::executive;
+use wheeleg_board::g431::{self, adc, board, bus, fatal, pac, power, start};
+use wheeleg_board::reset::Note;
+use wheeleg_node::joint::JointNode;
+use wheeleg_node::parameters::JointParameters;
+
+use pac::interrupt;
+
+#[entry]
+fn main() -> ! {
+    let start = start::start();
+    let Some(identity) = start.identity else {
+        start.halt();
+    };
+    let (valves, potentiometer, feet) = start.joint_hardware();
+    let parameters = g431::parameters::load(JointParameters::default(), |held, id, raw| {
+        held.with(id, raw, true)
+    });
+    let Ok(mut node) = JointNode::new(identity, parameters, valves, potentiometer, feet) else {
+        start.halt();
+    };
+    let mut board = start.joint_board();
+    executive::run(&mut node, &mut board)
+}
+
+#[interrupt]
+fn ADC1_2() {
+    adc::on_conversion();
+}
+
+#[interrupt]
+fn TIM2() {
+    board::on_joint_timer();
+}
+
+#[interrupt]
+fn USART1() {
+    bus::on_usart();
+}
+
+#[interrupt]
+fn DMA1_CHANNEL1() {
+    bus::on_ring();
+}
+
+#[interrupt]
+fn PVD_PVM() {
+    power::on_sag();
+}
+
+#[exception]
+unsafe fn NonMaskableInt() {
+    fatal::on_nmi();
+}
+
+#[exception(trampoline = false)]
+unsafe fn HardFault() -> ! {
+    fatal::reset(Note::ProcessorFault)
+}
+
+#[exception]
+unsafe fn DefaultHandler(_number: i16) {
+    fatal::reset(Note::ProcessorFault)
+}

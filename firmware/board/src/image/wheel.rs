@@ -1,0 +1,65 @@
+//! The wheel image: everything but its panic handler.
+
+use cortex_m_rt::{entry, exception};
+use wheeleg_board::executive;
+use wheeleg_board::g431::{self, board, bus, fatal, pac, power, start};
+use wheeleg_board::reset::Note;
+use wheeleg_node::hardware::DumpPin;
+use wheeleg_node::parameters::WheelParameters;
+use wheeleg_node::wheel::WheelNode;
+use wheeleg_units::Micros;
+
+use pac::interrupt;
+
+#[entry]
+fn main() -> ! {
+    let start = start::start();
+    let Some(identity) = start.identity else {
+        start.halt();
+    };
+    let (motor, encoder, supply, dump) = start.wheel_hardware();
+    let parameters = g431::parameters::load(WheelParameters::default(), |held, id, raw| {
+        held.with(id, raw, true)
+    });
+    let Ok(mut node) = WheelNode::new(identity, parameters, motor, encoder, supply, DumpPin(dump))
+    else {
+        start.halt();
+    };
+    let mut board = start.wheel_board(Micros(node.tick_period_us()));
+    executive::run(&mut node, &mut board)
+}
+
+#[interrupt]
+fn TIM2() {
+    board::on_wheel_timer();
+}
+
+#[interrupt]
+fn USART1() {
+    bus::on_usart();
+}
+
+#[interrupt]
+fn DMA1_CHANNEL1() {
+    bus::on_ring();
+}
+
+#[interrupt]
+fn PVD_PVM() {
+    power::on_sag();
+}
+
+#[exception]
+unsafe fn NonMaskableInt() {
+    fatal::on_nmi();
+}
+
+#[exception(trampoline = false)]
+unsafe fn HardFault() -> ! {
+    fatal::reset(Note::ProcessorFault)
+}
+
+#[exception]
+unsafe fn DefaultHandler(_number: i16) {
+    fatal::reset(Note::ProcessorFault)
+}

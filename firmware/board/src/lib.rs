@@ -1,0 +1,37 @@
+//! Board support of the joint and wheel boards, and what every board shares.
+//!
+//! `BOARD.md` beside this crate holds the pin table and says which register is
+//! used for what. The modules outside [`g431`] know no register: they build and
+//! are tested on the host, and serve any other board as well.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`executive`] | the main loop: events in the order of their time stamps |
+//! | [`marks`], [`ring`] | received bytes from interrupt to main loop |
+//! | [`straps`], [`reset`], [`led`] | address, cause of reset, status light |
+//! | [`store`] | parameters in two flash pages |
+//! | `g431` | the STM32G431CB: the only place with registers and `unsafe` |
+#![no_std]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::arithmetic_side_effects,
+        clippy::indexing_slicing,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic
+    )
+)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod executive;
+#[cfg(all(target_os = "none", feature = "g431"))]
+pub mod g431;
+pub mod led;
+pub mod marks;
+pub mod reset;
+pub mod ring;
+pub mod store;
+pub mod straps;

@@ -1,0 +1,142 @@
+//! Time stamps of received bytes, from the interrupt handler to the main loop.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use wheeleg_units::Micros;
+
+/// Marks that fit; a power of two. Two delimiters a frame and at most four
+/// frames a millisecond leave more than a tick of time to the main loop.
+const CAPACITY: usize = 16;
+
+/// Everything in the receive buffer before `position` had arrived at `time`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Index of the next byte in the receive buffer.
+    pub position: u16,
+    /// End of the byte before it.
+    pub time: Micros,
+}
+
+/// Queue with one producer and one consumer.
+///
+/// When full, a new mark replaces none and is counted: its bytes are handed over
+/// with the next mark, and the frame check decides about them.
+#[derive(Debug)]
+pub struct Marks {
+    times: [AtomicU32; CAPACITY],
+    positions: [AtomicU32; CAPACITY],
+    head: AtomicU32,
+    tail: AtomicU32,
+    lost: AtomicU32,
+}
+
+impl Default for Marks {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Marks {
+    /// An empty queue.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            times: [const { AtomicU32::new(0) }; CAPACITY],
+            positions: [const { AtomicU32::new(0) }; CAPACITY],
+            head: AtomicU32::new(0),
+            tail: AtomicU32::new(0),
+            lost: AtomicU32::new(0),
+        }
+    }
+
+    fn index(counter: u32) -> usize {
+        counter as usize % CAPACITY
+    }
+
+    /// Adds a mark; the interrupt handler alone calls this.
+    pub fn push(&self, mark: Mark) {
+        let head = self.head.load(Ordering::Relaxed);
+        if head.wrapping_sub(self.tail.load(Ordering::Acquire)) >= CAPACITY as u32 {
+            let lost = self.lost.load(Ordering::Relaxed);
+            self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
+            return;
+        }
+        let index = Self::index(head);
+        if let (Some(time), Some(position)) = (self.times.get(index), self.positions.get(index)) {
+            time.store(mark.time.get(), Ordering::Relaxed);
+            position.store(u32::from(mark.position), Ordering::Relaxed);
+        }
+        self.head.store(head.wrapping_add(1), Ordering::Release);
+    }
+
+    /// The oldest mark; the main loop alone calls this and [`Marks::pop`].
+    #[must_use]
+    pub fn peek(&self) -> Option<Mark> {
+        let tail = self.tail.load(Ordering::Relaxed);
+        if tail == self.head.load(Ordering::Acquire) {
+            return None;
+        }
+        let index = Self::index(tail);
+        let time = self.times.get(index)?.load(Ordering::Relaxed);
+        let position = self.positions.get(index)?.load(Ordering::Relaxed);
+        Some(Mark {
+            position: position as u16,
+            time: Micros(time),
+        })
+    }
+
+    /// Takes the oldest mark.
+    pub fn pop(&self) -> Option<Mark> {
+        let mark = self.peek()?;
+        let tail = self.tail.load(Ordering::Relaxed);
+        self.tail.store(tail.wrapping_add(1), Ordering::Release);
+        Some(mark)
+    }
+
+    /// Marks that found the queue full.
+    #[must_use]
+    pub fn lost(&self) -> u32 {
+        self.lost.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mark(n: u32) -> Mark {
+        Mark {
+            position: (n % 256) as u16,
+            time: Micros(n.wrapping_mul(0x0101_0101)),
+        }
+    }
+
+    #[test]
+    fn first_in_first_out_over_many_laps() {
+        let marks = Marks::new();
+        assert_eq!(marks.pop(), None);
+        let (mut pushed, mut popped) = (0, 0);
+        for round in 0..1000_u32 {
+            for _ in 0..=round % CAPACITY as u32 {
+                marks.push(mark(pushed));
+                pushed += 1;
+            }
+            while let Some(seen) = marks.peek() {
+                assert_eq!(seen, mark(popped));
+                assert_eq!(marks.pop(), Some(seen));
+                popped += 1;
+            }
+        }
+        assert_eq!((pushed, marks.lost()), (popped, 0));
+    }
+
+    #[test]
+    fn a_full_queue_keeps_the_old_and_counts_the_new() {
+        let marks = Marks::new();
+        for n in 0..CAPACITY as u32 + 3 {
+            marks.push(mark(n));
+        }
+        assert_eq!(marks.lost(), 3);
+        let kept: Vec<Mark> = std::iter::from_fn(|| marks.pop()).collect();
+        assert_eq!(kept, (0..CAPACITY as u32).map(mark).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,195 @@
+//! Parameters in two flash pages, of which one is always whole.
+//!
+//! # Format of a page
+//!
+//! 64-bit words, little-endian:
+//!
+//! | word | content |
+//! |---|---|
+//! | 0 | magic `0x5757`, number of records (16 bit), sequence number (32 bit), from the low end |
+//! | 1…n | one record: parameter number (16 bit), zero (16 bit), raw value (32 bit, signed) |
+//! | n + 1 | CRC-32C of the words before it, and its complement |
+//!
+//! A save goes to the page that does not hold the newest set: erase, records,
+//! and last of all the word with the CRC. So a power cut at any instant leaves
+//! either the old set or the new one. Words torn by the cut are unreadable or
+//! anything at all; the CRC decides.
+
+#[cfg(test)]
+mod tests;
+
+use crc::{CRC_32_ISCSI, Crc, NoTable};
+
+/// Pages of the store.
+pub const PAGES: usize = 2;
+/// 64-bit words of a page.
+pub const WORDS: usize = 256;
+/// Records that a page holds.
+pub const RECORDS_MAX: usize = WORDS - 2;
+
+const MAGIC: u16 = 0x5757;
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
+
+/// The flash did not do what it was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlashError;
+
+/// Two pages of flash with 64-bit words that can be written once per erasure.
+pub trait Flash {
+    /// A word; `None` if it cannot be read (torn by a power cut) or does not exist.
+    fn read(&self, page: usize, word: usize) -> Option<u64>;
+
+    /// Erases a page: all words read as all ones.
+    ///
+    /// # Errors
+    /// [`FlashError`] if the hardware reports one.
+    fn erase(&mut self, page: usize) -> Result<(), FlashError>;
+
+    /// Writes an erased word.
+    ///
+    /// # Errors
+    /// [`FlashError`] if the hardware reports one.
+    fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError>;
+}
+
+/// One stored parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Number of the parameter.
+    pub id: u16,
+    /// Its raw value.
+    pub raw: i32,
+}
+
+impl Record {
+    const fn to_word(self) -> u64 {
+        self.id as u64 | (self.raw as u32 as u64) << 32
+    }
+
+    const fn from_word(word: u64) -> Option<Self> {
+        if word >> 16 & 0xFFFF != 0 {
+            return None;
+        }
+        Some(Self {
+            id: word as u16,
+            raw: (word >> 32) as i32,
+        })
+    }
+}
+
+/// Why a set was not saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveError {
+    /// More than [`RECORDS_MAX`] records.
+    TooMany,
+    /// The flash failed; the old set is still there.
+    Flash,
+}
+
+impl From<FlashError> for SaveError {
+    fn from(_: FlashError) -> Self {
+        Self::Flash
+    }
+}
+
+/// A whole set in one of the pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Whole {
+    page: usize,
+    count: usize,
+    sequence: u32,
+}
+
+/// The parameter store.
+#[derive(Debug)]
+pub struct Store<F> {
+    flash: F,
+}
+
+impl<F: Flash> Store<F> {
+    /// A store in these pages, whatever they hold.
+    pub const fn new(flash: F) -> Self {
+        Self { flash }
+    }
+
+    /// Hands every record of the newest whole set to `take`, in the order in
+    /// which they were saved; gives the set's sequence number, or `None` if there
+    /// is no whole set.
+    pub fn load(&self, mut take: impl FnMut(Record)) -> Option<u32> {
+        let newest = self.newest()?;
+        for word in 1..=newest.count {
+            let record = self
+                .flash
+                .read(newest.page, word)
+                .and_then(Record::from_word);
+            // A set that was whole a moment ago and now is not: none of the rest.
+            take(record?);
+        }
+        Some(newest.sequence)
+    }
+
+    /// Saves a set. Erasing takes about 22 ms on the board's part, in which the
+    /// processor stands still.
+    ///
+    /// # Errors
+    /// [`SaveError::TooMany`] before anything is erased, [`SaveError::Flash`] with
+    /// the old set still in place.
+    pub fn save(&mut self, records: &[Record]) -> Result<u32, SaveError> {
+        if records.len() > RECORDS_MAX {
+            return Err(SaveError::TooMany);
+        }
+        let newest = self.newest();
+        let page = newest.map_or(0, |copy| 1_usize.saturating_sub(copy.page));
+        let sequence = newest.map_or(0, |copy| copy.sequence.wrapping_add(1));
+        self.flash.erase(page)?;
+        let mut digest = CRC.digest();
+        let header = u64::from(MAGIC) | (records.len() as u64) << 16 | u64::from(sequence) << 32;
+        let words = core::iter::once(header).chain(records.iter().map(|r| r.to_word()));
+        let mut end = 0_usize;
+        for (index, word) in words.enumerate() {
+            digest.update(&word.to_le_bytes());
+            self.flash.write(page, index, word)?;
+            end = index.saturating_add(1);
+        }
+        let crc = digest.finalize();
+        let commit = u64::from(crc) | u64::from(!crc) << 32;
+        self.flash.write(page, end, commit)?;
+        // What hardware reports is believed only as far as it can be read back.
+        match self.whole(page) {
+            Some(copy) if copy.sequence == sequence => Ok(sequence),
+            _ => Err(SaveError::Flash),
+        }
+    }
+
+    fn newest(&self) -> Option<Whole> {
+        match (self.whole(0), self.whole(1)) {
+            (Some(first), Some(second)) => {
+                // Consecutive numbers, compared modulo 2^32.
+                let ahead = second.sequence.wrapping_sub(first.sequence) as i32;
+                Some(if ahead > 0 { second } else { first })
+            }
+            (first, second) => first.or(second),
+        }
+    }
+
+    /// The set in a page, if it is whole.
+    fn whole(&self, page: usize) -> Option<Whole> {
+        let header = self.flash.read(page, 0)?;
+        let count = usize::from((header >> 16) as u16);
+        if header as u16 != MAGIC || count > RECORDS_MAX {
+            return None;
+        }
+        let mut digest = CRC.digest();
+        for word in 0..=count {
+            digest.update(&self.flash.read(page, word)?.to_le_bytes());
+        }
+        let crc = digest.finalize();
+        let commit = self.flash.read(page, count.saturating_add(1))?;
+        let agrees = commit as u32 == crc && (commit >> 32) as u32 == !crc;
+        agrees.then_some(Whole {
+            page,
+            count,
+            sequence: (header >> 32) as u32,
+        })
+    }
+}

@@ -1,0 +1,227 @@
+//! The store under power cuts at every word.
+
+use super::*;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+/// How far the operation that the power cut hits gets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Torn {
+    /// It has not begun.
+    Nothing,
+    /// A word reads as some of the new bits; half of a page is erased.
+    Half,
+    /// A word has a double error; half of a page does.
+    Unreadable,
+    /// It was just complete.
+    All,
+}
+
+const TORN: [Torn; 4] = [Torn::Nothing, Torn::Half, Torn::Unreadable, Torn::All];
+
+#[derive(Clone, Debug)]
+struct Mock {
+    pages: [Vec<Option<u64>>; PAGES],
+    /// Operations until the power is cut, and what becomes of the last one.
+    cut: Option<(usize, Torn)>,
+    erasures: usize,
+}
+
+impl Mock {
+    fn new() -> Self {
+        Self {
+            pages: core::array::from_fn(|_| std::vec![Some(u64::MAX); WORDS]),
+            cut: None,
+            erasures: 0,
+        }
+    }
+
+    /// Whether the operation is done; `Err` with what is left of it at the cut.
+    fn power(&mut self) -> Result<(), Torn> {
+        match &mut self.cut {
+            None => Ok(()),
+            Some((0, torn)) => {
+                let torn = *torn;
+                // Everything after the cut does nothing.
+                self.cut = Some((0, Torn::Nothing));
+                Err(torn)
+            }
+            Some((left, _)) => {
+                *left -= 1;
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Flash for Mock {
+    fn read(&self, page: usize, word: usize) -> Option<u64> {
+        *self.pages.get(page)?.get(word)?
+    }
+
+    fn erase(&mut self, page: usize) -> Result<(), FlashError> {
+        let (reach, value) = match self.power() {
+            Ok(()) | Err(Torn::All) => (WORDS, Some(u64::MAX)),
+            Err(Torn::Nothing) => (0, None),
+            Err(Torn::Half) => (WORDS / 2, Some(u64::MAX)),
+            Err(Torn::Unreadable) => (WORDS / 2, None),
+        };
+        self.erasures += 1;
+        self.pages[page][..reach].fill(value);
+        Ok(())
+    }
+
+    fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError> {
+        let power = self.power();
+        let cell = &mut self.pages[page][word];
+        if matches!(power, Ok(()) | Err(Torn::All)) && *cell != Some(u64::MAX) {
+            // A word may be written once per erasure (RM0440 §3.3.7).
+            return Err(FlashError);
+        }
+        *cell = match power {
+            Ok(()) | Err(Torn::All) => Some(value),
+            Err(Torn::Nothing) => *cell,
+            Err(Torn::Half) => Some(value | 0xAAAA_AAAA_AAAA_AAAA),
+            Err(Torn::Unreadable) => None,
+        };
+        Ok(())
+    }
+}
+
+fn set(seed: i32, count: usize) -> Vec<Record> {
+    (0..count)
+        .map(|n| Record {
+            id: 0x0100 + n as u16,
+            raw: seed.wrapping_mul(7919).wrapping_add(n as i32) ^ i32::MIN,
+        })
+        .collect()
+}
+
+fn loaded(flash: &Mock) -> (Option<u32>, Vec<Record>) {
+    let mut records = Vec::new();
+    let sequence = Store::new(flash.clone()).load(|record| records.push(record));
+    (sequence, records)
+}
+
+/// A flash that has seen `saves` saves, and the newest set.
+fn after(saves: i32) -> (Mock, Vec<Record>) {
+    let mut store = Store::new(Mock::new());
+    for seed in 0..saves {
+        assert_eq!(store.save(&set(seed, 30)), Ok(seed as u32));
+    }
+    (store.flash, set(saves - 1, 30))
+}
+
+#[test]
+fn an_erased_flash_holds_nothing() {
+    assert_eq!(loaded(&Mock::new()), (None, Vec::new()));
+}
+
+#[test]
+fn the_newest_set_is_loaded_and_pages_take_turns() {
+    for saves in 1..=5 {
+        let (flash, newest) = after(saves);
+        assert_eq!(loaded(&flash), (Some(saves as u32 - 1), newest));
+        assert_eq!(flash.erasures, saves as usize);
+    }
+    let (flash, _) = after(2);
+    assert!(flash.pages.iter().all(|page| page[0] != Some(u64::MAX)));
+}
+
+#[test]
+fn sequence_numbers_wrap() {
+    let mut store = Store::new(Mock::new());
+    store.save(&set(1, 3)).unwrap();
+    // The first save had number 0; give it the last one there is.
+    let page = &mut store.flash.pages[0];
+    let header = page[0].unwrap() & 0xFFFF_FFFF | 0xFFFF_FFFF << 32;
+    page[0] = Some(header);
+    let mut digest = CRC.digest();
+    for word in &page[..4] {
+        digest.update(&word.unwrap().to_le_bytes());
+    }
+    let crc = digest.finalize();
+    page[4] = Some(u64::from(crc) | u64::from(!crc) << 32);
+    assert_eq!(loaded(&store.flash).0, Some(u32::MAX));
+    assert_eq!(store.save(&set(2, 3)), Ok(0));
+    assert_eq!(loaded(&store.flash), (Some(0), set(2, 3)));
+}
+
+#[test]
+fn a_power_cut_at_any_word_leaves_the_old_set_or_the_new_one() {
+    let new = set(99, 30);
+    // Erasure, header, 30 records, commit word.
+    let operations = 33;
+    for saves in [0, 1, 2, 3] {
+        let (before, old) = after(saves);
+        let old = (saves > 0).then_some(old).unwrap_or_default();
+        let (mut kept, mut replaced) = (0, 0);
+        for at in 0..operations {
+            for torn in TORN {
+                let mut store = Store::new(before.clone());
+                store.flash.cut = Some((at, torn));
+                let result = store.save(&new);
+                let flash = Mock {
+                    cut: None,
+                    ..store.flash
+                };
+                let (_, found) = loaded(&flash);
+                let complete = at == operations - 1 && torn == Torn::All;
+                assert_eq!(result.is_ok(), complete, "{saves} {at} {torn:?}");
+                let expected = if complete { &new } else { &old };
+                assert_eq!(&found, expected, "{saves} {at} {torn:?}");
+                if complete {
+                    replaced += 1;
+                } else {
+                    kept += 1;
+                }
+                // The board starts again and saves as if nothing had been.
+                let mut store = Store::new(flash);
+                store.save(&new).unwrap();
+                assert_eq!(loaded(&store.flash).1, new);
+            }
+        }
+        assert_eq!((kept, replaced), (operations * 4 - 1, 1));
+    }
+}
+
+#[test]
+fn a_full_page_is_used_and_more_is_refused_untouched() {
+    let (flash, old) = after(1);
+    let mut store = Store::new(flash);
+    assert_eq!(
+        store.save(&set(5, RECORDS_MAX + 1)),
+        Err(SaveError::TooMany)
+    );
+    assert_eq!((loaded(&store.flash).1, store.flash.erasures), (old, 1));
+    store.save(&set(5, RECORDS_MAX)).unwrap();
+    assert_eq!(loaded(&store.flash).1, set(5, RECORDS_MAX));
+    store.save(&[]).unwrap();
+    assert_eq!(loaded(&store.flash), (Some(2), Vec::new()));
+}
+
+#[test]
+fn one_flipped_bit_anywhere_makes_the_copy_worthless() {
+    let (flash, old) = after(2);
+    // Page 1 holds the newest set; without it, the first one is used.
+    let first = set(0, 30);
+    assert_ne!(old, first);
+    for word in 0..32 {
+        for bit in 0..64 {
+            let mut flash = flash.clone();
+            flash.pages[1][word] = flash.pages[1][word].map(|w| w ^ 1 << bit);
+            assert_eq!(loaded(&flash), (Some(0), first.clone()), "{word} {bit}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn pages_full_of_anything_are_no_set(words in proptest::collection::vec(any::<u64>(), 2 * WORDS)) {
+        let mut flash = Mock::new();
+        for (page, chunk) in flash.pages.iter_mut().zip(words.chunks(WORDS)) {
+            *page = chunk.iter().copied().map(Some).collect();
+        }
+        prop_assert_eq!(loaded(&flash), (None, Vec::new()));
+    }
+}
