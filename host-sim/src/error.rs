@@ -18,6 +18,11 @@ pub enum SimError {
     #[diagnostic(transparent)]
     Config(#[from] Box<ConfigError>),
 
+    /// A file of reference vectors cannot be compared.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Vectors(#[from] crate::check::vectors::VectorsError),
+
     /// A file or folder could not be written or created.
     #[error("cannot {action} `{}`: {reason}", path.display())]
     #[diagnostic(

@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod channels;
+mod check;
 mod list;
 mod params;
 mod run;
@@ -31,7 +32,7 @@ struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
-1 a required target is not met (--strict only); 2 error; 130 stopped with Ctrl-C.";
+1 a required target is not met (--strict only), or a checked quantity beyond tolerance; 2 error; 130 stopped with Ctrl-C.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -43,6 +44,8 @@ enum Command {
     Params(params::ParamsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
+    /// Check the model against numbers that others computed.
+    Check(check::CheckArgs),
 }
 
 /// Parses the command line, does what it says, and returns the exit code.
@@ -54,6 +57,7 @@ pub fn main() -> ExitCode {
         Some(Command::List(args)) => list::command(&args),
         Some(Command::Params(args)) => params::command(&args),
         Some(Command::Channels(args)) => channels::command(&args),
+        Some(Command::Check(args)) => check::command(&args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("{:?}", miette::Report::new(error));

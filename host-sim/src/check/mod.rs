@@ -1,0 +1,3 @@
+//! Checks of the model against numbers that others computed.
+
+pub mod vectors;
