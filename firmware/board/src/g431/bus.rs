@@ -66,11 +66,13 @@ impl Bus {
     /// Starts reception.
     pub(super) fn start() -> Self {
         let (usart, dma) = (pac::USART1, pac::DMA1);
-        for (channel, request) in [RX, TX, START] {
-            pac::DMAMUX1
-                .ccr(channel)
-                .write(|r| r.set_dmareq_id(request));
-        }
+        let route = |(channel, request): (usize, u8)| {
+            let mux = pac::DMAMUX1.ccr(channel & 7);
+            mux.write(|r| r.set_dmareq_id(request));
+        };
+        route(RX);
+        route(TX);
+        route(START);
         let rx = dma.ch(RX.0);
         rx.par().write_value(usart.rdr().as_ptr() as u32);
         rx.mar().write_value(RING_BYTES.0.get() as u32);

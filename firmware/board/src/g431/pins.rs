@@ -12,8 +12,10 @@ enum Mode {
     Alternate(u8, Pupdr),
 }
 
-/// Sets up one pin. Outputs keep the level that ODR holds.
+/// Sets up one pin, 0…15. Outputs keep the level that ODR holds.
 fn configure(port: Gpio, pin: usize, mode: Mode) {
+    // So that the compiler sees that the register crate's bounds hold.
+    let pin = pin & 15;
     let (moder, pull) = match mode {
         Mode::Input(pull) => (Moder::INPUT, pull),
         Mode::Output => (Moder::OUTPUT, Pupdr::FLOATING),
