@@ -23,9 +23,9 @@ use crate::observer::parse;
 use crate::reference;
 
 /// Longest run, in bus cycles.
-const CYCLES_MAX: u32 = 400;
+const CYCLES_MAX: u32 = 200;
 /// Cycles at the end in which every node behaves.
-const QUIET: u32 = 120;
+const QUIET: u32 = 50;
 /// Requests per cycle that fit the line: none is shorter than 0.35 ms with its answer.
 const REQUESTS_MAX: u32 = 20;
 
@@ -235,7 +235,7 @@ pub fn run(data: &[u8]) {
     }
     if start % 4 > 1 {
         play.command(Command::Stand, 0, 0);
-        play.cycles(60);
+        play.cycles(30);
         assert!(play.open.is_empty(), "healthy nodes stand");
     }
     if start % 4 > 2 {
