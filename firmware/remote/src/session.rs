@@ -10,7 +10,7 @@ use wheeleg_protocol::Address;
 use wheeleg_units::Micros;
 
 use crate::board::Board;
-use crate::store::entries;
+use crate::store::{BadStore, StoreReader};
 
 /// Brown-out flag of RCC_CSR (DATASHEET RM0440, BORRSTF), as a real board
 /// would find it after the supply has come back.
@@ -44,6 +44,7 @@ pub struct Session<'p, B: Board<'p>> {
     pins: &'p B::Pins,
     host: &'static str,
     clock_hz: u32,
+    store: StoreReader,
     parameters: B::Parameters,
     identity: Option<NodeIdentity>,
     board: Option<B>,
@@ -63,6 +64,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             pins,
             host,
             clock_hz,
+            store: StoreReader::default(),
             parameters: B::Parameters::default(),
             identity: None,
             board: None,
@@ -101,6 +103,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
     }
 
     fn forget(&mut self) {
+        self.store = StoreReader::default();
         self.parameters = B::Parameters::default();
         self.identity = None;
         self.board = None;
@@ -124,8 +127,11 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         if self.identity.is_some() {
             return Err("parameters are stored before power-up");
         }
-        let entries = entries(&stretch.bytes).ok_or("an entry of the store is cut off")?;
-        for (id, raw) in entries {
+        let records = self
+            .store
+            .records(stretch.offset, &stretch.bytes)
+            .map_err(BadStore::text)?;
+        for (id, raw) in records {
             self.parameters =
                 B::with(&self.parameters, id, raw).map_err(wheeleg_protocol::NackReason::text)?;
         }

@@ -69,9 +69,9 @@ impl<S: Stream> Partner<S> {
         self.stream.name()
     }
 
-    /// The stream.
-    pub fn stream(&mut self) -> &mut S {
-        &mut self.stream
+    /// The stream, at the end of the session.
+    pub fn into_stream(self) -> S {
+        self.stream
     }
 
     /// Opens the session and checks that the board speaks our version.
