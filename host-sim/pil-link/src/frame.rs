@@ -162,6 +162,7 @@ mod tests {
         };
         let figures = Figures {
             tick_instructions: u32::MAX,
+            longest_awake: u32::MAX,
             instructions: u32::MAX,
             stack_used: u32::MAX,
             stack_size: u32::MAX,

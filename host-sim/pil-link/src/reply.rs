@@ -106,6 +106,8 @@ pub struct Figures {
     /// Instructions of the last tick that was worked off: from its edge until
     /// the processor slept again, interrupt entry and main loop included.
     pub tick_instructions: u32,
+    /// Most instructions between two sleeps so far, whatever caused them.
+    pub longest_awake: u32,
     /// Instructions since the last reply, all told.
     pub instructions: u32,
     /// Deepest stack so far \[bytes\].

@@ -1,0 +1,77 @@
+//! Emulated STM32G431 boards, as a program of its own (GPL-2.0-only, see
+//! `LICENSE.md`).
+//!
+//!     wheeleg-pil-unicorn IMAGE.elf…
+//!
+//! hosts one board per image, numbered from 0, and answers the requests of the
+//! simulator (crate `wheeleg-pil-link`) that come on standard input on standard
+//! output, in order. Nothing here reads a clock or a random number: equal
+//! requests get equal replies.
+
+mod board;
+mod image;
+mod machine;
+mod nvic;
+mod soc;
+mod time;
+mod wiring;
+
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+use std::process::ExitCode;
+
+use wheeleg_pil_link::frame::MAX_FRAME;
+use wheeleg_pil_link::{Deframer, Reply, Request, encode, text};
+
+use crate::board::Board;
+use crate::image::Image;
+
+fn main() -> ExitCode {
+    match serve() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(what) => {
+            eprintln!("wheeleg-pil-unicorn: {what}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Answers requests until the input ends or every board has said good-bye.
+fn serve() -> Result<(), String> {
+    let paths: Vec<_> = std::env::args_os().skip(1).collect();
+    if paths.is_empty() {
+        return Err("give the ELF image of each board".to_owned());
+    }
+    let mut boards = Vec::new();
+    for path in &paths {
+        boards.push(Board::new(Image::read(Path::new(path))?));
+    }
+    let mut input = std::io::stdin().lock();
+    let mut output = std::io::stdout().lock();
+    let mut deframer = Deframer::new();
+    let mut chunk = vec![0; 64 << 10];
+    let mut replies = Vec::new();
+    loop {
+        let length = input.read(&mut chunk).map_err(|e| e.to_string())?;
+        if length == 0 {
+            return Ok(());
+        }
+        let mut rest = chunk.get(..length).unwrap_or_default();
+        loop {
+            let reply = match deframer.next::<Request>(&mut rest) {
+                Ok(None) => break,
+                Ok(Some((index, request))) => match boards.get_mut(usize::from(index)) {
+                    Some(board) => (index, board.answer(request)),
+                    None => (index, Reply::Refused(text("no board of this number"))),
+                },
+                Err(e) => (u8::MAX, Reply::Refused(text(&e.to_string()))),
+            };
+            let mut buffer = [0; MAX_FRAME];
+            let frame = encode(reply.0, &reply.1, &mut buffer).map_err(|e| e.to_string())?;
+            replies.extend_from_slice(frame);
+        }
+        output.write_all(&replies).map_err(|e| e.to_string())?;
+        output.flush().map_err(|e| e.to_string())?;
+        replies.clear();
+    }
+}

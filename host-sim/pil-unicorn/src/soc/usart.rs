@@ -1,0 +1,270 @@
+//! USART1: 8N1, reception by DMA with character match, transmission by DMA.
+
+use std::collections::VecDeque;
+
+use super::Refusal;
+
+const UE: u32 = 1;
+const RE: u32 = 1 << 2;
+const TE: u32 = 1 << 3;
+const RXNEIE: u32 = 1 << 5;
+const TCIE: u32 = 1 << 6;
+const CMIE: u32 = 1 << 14;
+const DMAR: u32 = 1 << 6;
+const DMAT: u32 = 1 << 7;
+
+const RXNE: u32 = 1 << 5;
+const TC: u32 = 1 << 6;
+const TXE: u32 = 1 << 7;
+const CMF: u32 = 1 << 17;
+const ORE: u32 = 1 << 3;
+const TEACK: u32 = 1 << 21;
+const REACK: u32 = 1 << 22;
+
+/// Bits of one byte on the line.
+const BITS: u64 = 10;
+
+/// The interface.
+#[derive(Debug, Clone)]
+pub(crate) struct Usart {
+    cr1: u32,
+    cr2: u32,
+    cr3: u32,
+    brr: u32,
+    isr: u32,
+    rdr: u8,
+    tdr: Option<u8>,
+    /// Byte in the shift register: its end.
+    shifting_until: Option<u64>,
+    /// Bytes on their way in: end of each and the byte.
+    incoming: VecDeque<(u64, u8)>,
+    /// Bytes that went out since the transmitter was last idle: start of the
+    /// first, and all.
+    pub(crate) burst: Option<(u64, Vec<u8>)>,
+}
+
+impl Default for Usart {
+    fn default() -> Self {
+        Self {
+            cr1: 0,
+            cr2: 0,
+            cr3: 0,
+            brr: 0,
+            isr: TXE | TC,
+            rdr: 0,
+            tdr: None,
+            shifting_until: None,
+            incoming: VecDeque::new(),
+            burst: None,
+        }
+    }
+}
+
+impl Usart {
+    /// A byte will have arrived at `cycle`.
+    pub(crate) fn expect(&mut self, cycle: u64, byte: u8) {
+        self.incoming.push_back((cycle, byte));
+    }
+
+    /// Duration of a byte in cycles.
+    pub(crate) fn byte_cycles(&self) -> u64 {
+        BITS * u64::from(self.brr)
+    }
+
+    /// Cycle of the next event.
+    pub(crate) fn next(&self) -> Option<u64> {
+        let arrival = self.incoming.front().map(|(at, _)| *at);
+        arrival.into_iter().chain(self.shifting_until).min()
+    }
+
+    /// Carries out what is due at `cycle`. `deaf`: the transceiver's receiver is off.
+    pub(crate) fn happen(&mut self, cycle: u64, deaf: bool) {
+        if let Some((at, byte)) = self.incoming.front().copied()
+            && at <= cycle
+        {
+            self.incoming.pop_front();
+            if !deaf && self.cr1 & (UE | RE) == UE | RE {
+                if self.isr & RXNE != 0 && self.cr3 & 1 << 12 == 0 {
+                    self.isr |= ORE;
+                } else {
+                    self.rdr = byte;
+                    self.isr |= RXNE;
+                }
+                if u32::from(byte) == self.cr2 >> 24 {
+                    self.isr |= CMF;
+                }
+            }
+        }
+        if self.shifting_until.is_some_and(|end| end <= cycle) {
+            self.shifting_until = None;
+            self.shift(cycle);
+            if self.shifting_until.is_none() {
+                self.isr |= TC;
+            }
+        }
+    }
+
+    /// Moves a waiting byte to the shift register.
+    fn shift(&mut self, cycle: u64) {
+        if self.shifting_until.is_none()
+            && self.cr1 & (UE | TE) == UE | TE
+            && let Some(byte) = self.tdr.take()
+        {
+            self.isr |= TXE;
+            self.isr &= !TC;
+            self.shifting_until = Some(cycle + self.byte_cycles());
+            let (_, bytes) = self.burst.get_or_insert_with(|| (cycle, Vec::new()));
+            bytes.push(byte);
+        }
+    }
+
+    /// The burst that has ended, with its start.
+    pub(crate) fn take_burst(&mut self) -> Option<(u64, Vec<u8>)> {
+        if self.shifting_until.is_none() && self.tdr.is_none() {
+            self.burst.take()
+        } else {
+            None
+        }
+    }
+
+    /// A reset or a driver that was switched off cuts what is under way.
+    pub(crate) fn cut(&mut self) -> bool {
+        let under_way = self.shifting_until.take().is_some();
+        self.tdr = None;
+        self.burst = None;
+        under_way
+    }
+
+    /// DMA takes the received byte.
+    pub(crate) fn dma_receive(&mut self) -> Option<u8> {
+        if self.cr3 & DMAR != 0 && self.isr & RXNE != 0 {
+            self.isr &= !RXNE;
+            Some(self.rdr)
+        } else {
+            None
+        }
+    }
+
+    /// Whether DMA may hand over a byte to send.
+    pub(crate) fn wants_byte(&self) -> bool {
+        self.cr3 & DMAT != 0 && self.isr & TXE != 0 && self.cr1 & (UE | TE) == UE | TE
+    }
+
+    /// A byte to send.
+    pub(crate) fn send(&mut self, byte: u8, cycle: u64) {
+        self.tdr = Some(byte);
+        self.isr &= !(TXE | TC);
+        self.shift(cycle);
+    }
+
+    /// Interrupt line.
+    pub(crate) fn line(&self) -> bool {
+        let on = |enable: u32, flag: u32| self.cr1 & enable != 0 && self.isr & flag != 0;
+        on(RXNEIE, RXNE | ORE) || on(TCIE, TC) || on(CMIE, CMF)
+    }
+
+    pub(crate) fn read(&mut self, offset: usize) -> Result<u32, Refusal> {
+        Ok(match offset {
+            0x00 => self.cr1,
+            0x04 => self.cr2,
+            0x08 => self.cr3,
+            0x0C => self.brr,
+            0x1C => {
+                let ready = |bit, flag| {
+                    if self.cr1 & (UE | bit) == UE | bit {
+                        flag
+                    } else {
+                        0
+                    }
+                };
+                self.isr | ready(TE, TEACK) | ready(RE, REACK)
+            }
+            0x24 => {
+                self.isr &= !RXNE;
+                u32::from(self.rdr)
+            }
+            _ => return Err(Refusal::Register),
+        })
+    }
+
+    pub(crate) fn write(&mut self, offset: usize, value: u32, cycle: u64) -> Result<(), Refusal> {
+        let only = |mask: u32| {
+            if value & !mask == 0 {
+                Ok(())
+            } else {
+                Err(Refusal::Bits(value & !mask))
+            }
+        };
+        match offset {
+            0x00 => {
+                only(UE | RE | TE | RXNEIE | TCIE | CMIE)?;
+                self.cr1 = value;
+            }
+            0x04 => {
+                only(0xFF00_0000)?;
+                self.cr2 = value;
+            }
+            0x08 => {
+                only(DMAR | DMAT | 1 << 12)?;
+                self.cr3 = value;
+            }
+            0x0C => {
+                only(0xFFFF)?;
+                self.brr = value;
+            }
+            // Requests to flush: nothing is kept that could be flushed but RDR.
+            0x18 => {
+                only(1 << 3)?;
+                self.isr &= !RXNE;
+            }
+            0x20 => self.isr &= !(value & (TC | CMF | ORE)),
+            0x28 => self.send(value as u8, cycle),
+            _ => return Err(Refusal::Register),
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_delimiter_matches_and_the_driver_hears_nothing_of_itself() {
+        let mut usart = Usart::default();
+        usart.write(0x00, UE | RE | TE | CMIE, 0).expect("modelled");
+        usart.write(0x08, DMAR | 1 << 12, 0).expect("modelled");
+        usart.expect(1700, 7);
+        usart.expect(3400, 0);
+        usart.expect(5100, 0);
+        usart.happen(1700, false);
+        assert!(!usart.line());
+        assert_eq!(usart.dma_receive(), Some(7));
+        usart.happen(3400, false);
+        assert!(usart.line());
+        usart.write(0x20, CMF, 3500).expect("modelled");
+        assert_eq!(usart.dma_receive(), Some(0));
+        usart.happen(5100, true);
+        assert!(!usart.line());
+        assert_eq!(usart.dma_receive(), None);
+    }
+
+    #[test]
+    fn bytes_follow_each_other_without_a_gap() {
+        let mut usart = Usart::default();
+        usart.write(0x0C, 170, 0).expect("modelled");
+        usart.write(0x00, UE | TE, 0).expect("modelled");
+        assert!(!usart.wants_byte());
+        usart.write(0x08, DMAT, 100).expect("modelled");
+        assert!(usart.wants_byte());
+        usart.send(1, 100);
+        usart.send(2, 100);
+        assert!(!usart.wants_byte());
+        usart.happen(1800, false);
+        assert!(usart.wants_byte());
+        assert_eq!(usart.take_burst(), None);
+        usart.happen(3500, false);
+        assert_eq!(usart.take_burst(), Some((100, vec![1, 2])));
+        assert_eq!(usart.next(), None);
+    }
+}

@@ -1,0 +1,82 @@
+//! Processor cycles against the simulator's nanoseconds.
+
+/// The clock has had `hz` since `cycle`, which was `ns`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Time {
+    cycle: u64,
+    ns: i64,
+    hz: u64,
+}
+
+impl Time {
+    /// Cycle 0 is 0 ns.
+    pub(crate) fn new(hz: u64) -> Self {
+        Self {
+            cycle: 0,
+            ns: 0,
+            hz,
+        }
+    }
+
+    /// Clock [Hz].
+    pub(crate) fn hz(&self) -> u64 {
+        self.hz
+    }
+
+    /// The clock changes.
+    pub(crate) fn clock(&mut self, cycle: u64, hz: u64) {
+        self.ns = self.signed_ns(cycle);
+        self.cycle = cycle;
+        self.hz = hz;
+    }
+
+    /// Cycle `cycle` is from now on `ns`; gives by how much the scale moved.
+    pub(crate) fn align(&mut self, cycle: u64, ns: u64) -> i64 {
+        let moved = ns as i64 - self.signed_ns(cycle);
+        self.cycle = cycle;
+        self.ns = ns as i64;
+        moved
+    }
+
+    /// Time of a cycle, negative before time zero [ns].
+    pub(crate) fn signed_ns(&self, cycle: u64) -> i64 {
+        let cycles = i128::from(cycle) - i128::from(self.cycle);
+        (i128::from(self.ns) + cycles * 1_000_000_000 / i128::from(self.hz)) as i64
+    }
+
+    /// Time of a cycle, 0 before time zero [ns].
+    pub(crate) fn ns_of(&self, cycle: u64) -> u64 {
+        self.signed_ns(cycle).max(0) as u64
+    }
+
+    /// First cycle that is not before `ns`.
+    pub(crate) fn cycle_of(&self, ns: u64) -> u64 {
+        let ahead = i128::from(ns) - i128::from(self.ns);
+        let hz = i128::from(self.hz);
+        let cycles = (ahead * hz + 999_999_999).div_euclid(1_000_000_000);
+        (i128::from(self.cycle) + cycles).max(0) as u64
+    }
+
+    /// Cycles in `ns` nanoseconds.
+    pub(crate) fn cycles(&self, ns: u64) -> u64 {
+        (u128::from(ns) * u128::from(self.hz) / 1_000_000_000) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn microseconds_are_whole_cycles_at_170_mhz_and_alignment_is_exact() {
+        let mut time = Time::new(16_000_000);
+        assert_eq!(time.ns_of(16), 1_000);
+        time.clock(1_600, 170_000_000);
+        assert_eq!(time.ns_of(1_770), 101_000);
+        time.align(5_000, 0);
+        assert_eq!(time.cycle_of(3_000), 5_510);
+        assert_eq!(time.ns_of(5_510), 3_000);
+        assert_eq!(time.ns_of(4_000), 0, "before time zero");
+        assert_eq!(time.cycles(22_588), 3_839);
+    }
+}

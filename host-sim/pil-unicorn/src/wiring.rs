@@ -1,0 +1,27 @@
+//! What is soldered to which pin (firmware/board/BOARD.md, table of pins).
+
+/// Port A: potentiometer wiper.
+pub(crate) const WIPER: u32 = 0;
+/// Port A: foot switches front, left, rear, right.
+pub(crate) const FOOT: [u32; 4] = [1, 4, 5, 7];
+/// Port A: 24 V present.
+pub(crate) const POWER_OK: u32 = 6;
+/// Port A: valves fill A, vent A, fill B, vent B, each with the alternate
+/// function that is its channel of TIM1.
+pub(crate) const VALVES: [(u32, u32); 4] = [(8, 6), (9, 6), (10, 6), (11, 11)];
+/// Port A: supply-pressure switch.
+pub(crate) const SUPPLY: u32 = 12;
+/// Port B: address straps, bit 0 to 3.
+pub(crate) const STRAPS: [u32; 4] = [0, 1, 2, 10];
+/// Port B: parity strap.
+pub(crate) const PARITY: u32 = 11;
+/// Port B: motor direction, high = backward.
+pub(crate) const DIRECTION: u32 = 13;
+/// Port B: bus driver enable, TIM15_CH1.
+pub(crate) const DRIVER_ENABLE: u32 = 14;
+/// Port B: dump valve, high = open.
+pub(crate) const DUMP: u32 = 15;
+/// Port C: motor pulse, TIM8_CH1.
+pub(crate) const PULSE: u32 = 6;
+/// Alternate function of the motor pulse.
+pub(crate) const PULSE_FUNCTION: u32 = 4;
