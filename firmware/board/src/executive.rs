@@ -156,3 +156,156 @@ pub fn run<A: Application, B: Board>(application: &mut A, board: &mut B) -> ! {
         step(application, board);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::VecDeque;
+    use wheeleg_node::mode::Mode;
+    use wheeleg_protocol::FaultBits;
+
+    /// What happened, in order.
+    #[derive(Clone, Debug, PartialEq)]
+    enum Did {
+        Bytes(Vec<u8>, u32),
+        Tick(u32),
+        Done(u32),
+        Finished(u32),
+        Sent(u32),
+        Idle,
+    }
+
+    #[derive(Default)]
+    struct Rig {
+        bytes: VecDeque<(u32, Vec<u8>)>,
+        ticks: VecDeque<u32>,
+        sending: bool,
+        did: Vec<Did>,
+    }
+
+    impl Board for Rig {
+        fn next_event(&mut self) -> Option<Event> {
+            let bytes = self.bytes.front().map(|(t, _)| Micros(*t));
+            let event = older(bytes, self.ticks.front().map(|t| Micros(*t)));
+            if let Some(Event::Tick(_)) = event {
+                self.ticks.pop_front();
+            }
+            event
+        }
+
+        fn receive(&mut self, mut take: impl FnMut(&[u8], Micros)) {
+            let (t_end, bytes) = self.bytes.pop_front().expect("an event was given");
+            take(&bytes, Micros(t_end));
+        }
+
+        fn now(&self) -> Micros {
+            Micros(777)
+        }
+
+        fn tick_finished(&mut self, _: &TickReport, period: Micros) {
+            self.did.push(Did::Finished(period.get()));
+        }
+
+        fn transmitter_is_free(&self) -> bool {
+            !self.sending
+        }
+
+        fn transmit(&mut self, transmission: &Transmission) {
+            self.sending = true;
+            self.did.push(Did::Sent(transmission.start_at.get()));
+        }
+
+        fn idle(&mut self) {
+            self.did.push(Did::Idle);
+        }
+    }
+
+    /// Two frames wait from the start.
+    #[derive(Default)]
+    struct Echo {
+        did: Vec<Did>,
+        frames: VecDeque<u32>,
+    }
+
+    impl Application for Echo {
+        fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+            self.did.push(Did::Bytes(bytes.to_vec(), t_end.get()));
+        }
+
+        fn tick(&mut self, now: Micros) -> TickReport {
+            self.did.push(Did::Tick(now.get()));
+            TickReport {
+                mode: Mode::Boot,
+                faults: FaultBits::NONE,
+                overran: false,
+            }
+        }
+
+        fn tick_done(&mut self, end: Micros) {
+            self.did.push(Did::Done(end.get()));
+        }
+
+        fn take_transmission(&mut self) -> Option<Transmission> {
+            self.frames.pop_front().map(|start| Transmission {
+                start_at: Micros(start),
+                bytes: Default::default(),
+            })
+        }
+
+        fn period(&self) -> Micros {
+            Micros(520)
+        }
+    }
+
+    #[test]
+    fn events_run_in_the_order_of_their_times_whatever_was_pending() {
+        let mut board = Rig {
+            bytes: [(999, vec![1]), (1000, vec![2]), (1001, vec![3])].into(),
+            ticks: [1000, 2000].into(),
+            ..Rig::default()
+        };
+        let mut application = Echo::default();
+        for _ in 0..6 {
+            step(&mut application, &mut board);
+        }
+        let expected = [
+            Did::Bytes(vec![1], 999),
+            Did::Bytes(vec![2], 1000),
+            Did::Tick(1000),
+            Did::Done(777),
+            Did::Bytes(vec![3], 1001),
+            Did::Tick(2000),
+            Did::Done(777),
+        ];
+        assert_eq!(application.did, expected);
+        assert_eq!(
+            board.did,
+            [Did::Finished(520), Did::Finished(520), Did::Idle]
+        );
+    }
+
+    #[test]
+    fn order_holds_where_the_clock_wraps() {
+        let (before, after) = (Micros(u32::MAX - 3), Micros(2));
+        assert_eq!(older(Some(before), Some(after)), Some(Event::Bytes(before)));
+        assert_eq!(older(Some(after), Some(before)), Some(Event::Tick(before)));
+        assert_eq!(older(Some(after), None), Some(Event::Bytes(after)));
+        assert_eq!(older(None, Some(after)), Some(Event::Tick(after)));
+        assert_eq!(older(None, None), None);
+    }
+
+    #[test]
+    fn a_second_frame_waits_for_the_transmitter() {
+        let mut board = Rig::default();
+        let mut application = Echo {
+            frames: [50, 400].into(),
+            ..Echo::default()
+        };
+        step(&mut application, &mut board);
+        step(&mut application, &mut board);
+        assert_eq!(board.did, [Did::Idle, Did::Sent(50), Did::Idle]);
+        board.sending = false;
+        step(&mut application, &mut board);
+        assert_eq!(board.did[3..], [Did::Idle, Did::Sent(400)]);
+    }
+}

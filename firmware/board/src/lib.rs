@@ -11,7 +11,7 @@
 //! | [`straps`], [`reset`], [`led`] | address, cause of reset, status light |
 //! | [`store`] | parameters in two flash pages |
 //! | `g431` | the STM32G431CB: the only place with registers and `unsafe` |
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),
     deny(
@@ -22,9 +22,6 @@
         clippy::panic
     )
 )]
-
-#[cfg(test)]
-extern crate std;
 
 pub mod executive;
 #[cfg(all(target_os = "none", feature = "g431"))]

@@ -2,7 +2,6 @@
 
 use super::*;
 use proptest::prelude::*;
-use std::vec::Vec;
 
 /// How far the operation that the power cut hits gets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +29,7 @@ struct Mock {
 impl Mock {
     fn new() -> Self {
         Self {
-            pages: core::array::from_fn(|_| std::vec![Some(u64::MAX); WORDS]),
+            pages: core::array::from_fn(|_| vec![Some(u64::MAX); WORDS]),
             cut: None,
             erasures: 0,
         }
