@@ -5,7 +5,7 @@ use wheeleg_protocol::MAX_ENCODED;
 
 use crate::command::Command;
 use crate::config::MasterConfig;
-use crate::dispatcher::{Dispatcher, Reject, Request, Ticket};
+use crate::dispatcher::{Dispatcher, Refusal, Reject, Request, Ticket};
 use crate::event::{Event, Events};
 use crate::fifo::{
     CommandFifo, FeedbackFifo, FifoLosses, SetpointFifo, TelemetryFifo, push_drop_oldest,
@@ -95,7 +95,18 @@ impl Master {
     pub fn submit_request(&mut self, request: Request, now_us: u64) -> Result<Ticket, Reject> {
         let accepted = self.dispatcher.admit(&request, now_us)?;
         if matches!(request.command, Command::EmergencyStop) {
-            // A stop neither queues nor expires.
+            // A stop neither queues nor expires, and what was queued before it
+            // must not undo it: a clear would take it back in the next cycle.
+            for _ in 0..self.commands0.capacity() {
+                let Some(earlier) = self.commands0.dequeue() else {
+                    break;
+                };
+                let refused = Event::Refused {
+                    ticket: earlier.ticket,
+                    reason: Refusal::Interrupted,
+                };
+                self.events.push(now_us, refused);
+            }
             self.layer0.emergency_stop(now_us, &mut self.events);
             self.events.push(now_us, Event::Done(accepted.ticket));
             return Ok(accepted.ticket);

@@ -14,6 +14,26 @@ use wheeleg_protocol::{
 };
 
 #[test]
+fn a_clear_queued_before_an_e_stop_does_not_take_it_back() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    let clear = rig.submit(Command::ClearFault);
+    let stop = rig.submit(Command::EmergencyStop);
+    for _ in 0..20 {
+        let sync = rig.cycle();
+        assert!(sync.flags.contains(SyncFlags::ESTOP));
+    }
+    assert!(rig.done(stop));
+    assert_eq!(rig.refusal(clear), Some(Refusal::Interrupted));
+    assert_eq!(rig.master.layer0().hold(), Some(HoldReason::EmergencyStop));
+    // A clear that comes after it is obeyed.
+    let clear = rig.submit(Command::ClearFault);
+    rig.run(20);
+    assert!(rig.done(clear));
+    assert_eq!(rig.last_sync.unwrap().flags, SyncFlags::NONE);
+}
+
+#[test]
 fn a_silent_node_is_lost_after_three_cycles_and_the_rest_hold() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.stand();
