@@ -16,7 +16,9 @@ pub use error::{ConfigError, Problem};
 pub use node::NodeParams;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
-pub use robot::{BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, StartUpParams};
+pub use robot::{
+    BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
+};
 pub use scenario::{
     EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet,
 };

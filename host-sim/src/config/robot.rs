@@ -1,6 +1,7 @@
 //! A robot: everything about the machine that a run needs, in SI units.
 
 use wheeleg_plant::PlantParams;
+use wheeleg_plant::dynamics::floating::FloatingParams;
 use wheeleg_protocol::link::{BAUD, CYCLE_US};
 
 use super::error::ConfigError;
@@ -95,6 +96,22 @@ params! {
         /// Distance of the drawn-back foot ahead of the axle.
         load_arm_m: f64, "load_arm", Length, 0.01, 5.0;
     }
+
+    /// What only the robot with a floating chassis and its drawing need.
+    SpatialParams {
+        /// Inertia of the chassis about its centre of mass, roll axis.
+        chassis_roll_inertia_kg_m2: f64, "chassis_roll_inertia", Inertia, 1e-4, 1000.0;
+        /// Inertia of the chassis about its centre of mass, yaw axis.
+        chassis_yaw_inertia_kg_m2: f64, "chassis_yaw_inertia", Inertia, 1e-4, 1000.0;
+        /// Inertia of one wheel about a diameter, at its centre.
+        wheel_transverse_inertia_kg_m2: f64, "wheel_transverse_inertia", Inertia, 1e-6, 100.0;
+        /// Distance between the middle planes of the wheels.
+        track_m: f64, "track", Length, 0.05, 5.0;
+        /// Chassis box: length, width, height. For the drawing.
+        chassis_size_m: [f64; 3], "chassis_size", Length, 0.01, 5.0;
+        /// Width of a wheel. For the drawing.
+        wheel_width_m: f64, "wheel_width", Length, 1e-3, 1.0;
+    }
 }
 
 /// A robot file, checked and converted to SI.
@@ -116,6 +133,8 @@ pub struct RobotConfig {
     pub reference: ReferenceParams,
     /// Plant: pneumatics, motors, sensors, mechanism.
     pub plant: PlantParams,
+    /// Masses and sizes beyond those of the plant.
+    pub spatial: SpatialParams,
     /// Board parameters that differ from the boards' defaults.
     pub node: NodeParams,
     /// Every parameter as written, for listings and reports.
@@ -141,6 +160,7 @@ impl RobotConfig {
                 "start_up",
                 "gait",
                 "reference",
+                "spatial",
                 "node",
             ];
             known.extend(plant::SECTIONS);
@@ -154,6 +174,7 @@ impl RobotConfig {
         let gait = r.section::<GaitParams>("gait");
         let reference = r.section::<ReferenceParams>("reference");
         let plant = plant::read(&mut r);
+        let spatial = r.section::<SpatialParams>("spatial");
         let node = node::read(&mut r);
         let robot = (|| {
             Some(Self {
@@ -165,6 +186,7 @@ impl RobotConfig {
                 gait: gait?,
                 reference: reference?,
                 plant: plant?,
+                spatial: spatial?,
                 node,
                 parameters: Vec::new(),
             })
@@ -172,6 +194,19 @@ impl RobotConfig {
         let (mut robot, parameters) = r.finish(&what, robot)?;
         robot.parameters = parameters;
         Ok(robot)
+    }
+
+    /// Parameters of the robot with a floating chassis.
+    #[must_use]
+    pub fn floating_params(&self) -> FloatingParams {
+        let s = &self.spatial;
+        FloatingParams {
+            robot: self.plant.body.clone(),
+            chassis_roll_inertia_kg_m2: s.chassis_roll_inertia_kg_m2,
+            chassis_yaw_inertia_kg_m2: s.chassis_yaw_inertia_kg_m2,
+            wheel_transverse_inertia_kg_m2: s.wheel_transverse_inertia_kg_m2,
+            track_m: s.track_m,
+        }
     }
 
     /// Fingerprint of all parameters: BLAKE3 over name, value and unit, in the
