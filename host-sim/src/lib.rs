@@ -11,6 +11,8 @@ pub mod check;
 pub mod cli;
 pub mod config;
 pub mod error;
+pub mod export;
+pub mod faults;
 mod output;
 pub mod pil;
 pub mod report;

@@ -11,6 +11,7 @@ use crate::config::{RobotConfig, Scenario, builtin};
 use crate::report::{self, RunInfo, Summary};
 use crate::sil;
 use crate::telemetry::Recorder;
+use crate::faults::{self, FaultSpec};
 use crate::{SimError, analysis, output};
 
 /// Scenario of a bare `wheeleg`.
@@ -27,6 +28,8 @@ pub struct Options {
     pub robot: Option<String>,
     /// Seed instead of the scenario's.
     pub seed: Option<u64>,
+    /// Faults beside the scenario's own.
+    pub faults: Vec<FaultSpec>,
     /// Folder for the results instead of `runs/<scenario>-seed<N>`.
     pub out: Option<PathBuf>,
 }
@@ -51,7 +54,9 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// # Errors
 /// Any [`SimError`]. A log that was begun is closed and stays readable.
 pub fn run(options: &Options) -> Result<Finished, SimError> {
-    let scenario = builtin::scenario(&options.scenario)?;
+    let mut scenario = builtin::scenario(&options.scenario)?;
+    scenario.faults.extend_from_slice(&options.faults);
+    faults::check(&scenario)?;
     let robot = match &options.robot {
         Some(robot) => builtin::robot(robot)?,
         None => builtin::robot_of(&scenario.robot, &options.scenario)?,
@@ -103,6 +108,9 @@ fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotConfig,
     recorder.provenance("scenario", &scenario.name);
     recorder.provenance("robot", &robot.name);
     recorder.provenance("seed", seed.to_string());
+    for fault in &scenario.faults {
+        recorder.provenance("fault", fault.to_string());
+    }
     for p in &robot.parameters {
         recorder.provenance(
             "parameter",

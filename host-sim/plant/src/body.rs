@@ -121,6 +121,8 @@ pub struct BodyMechanics {
     pub stroke_zero_m: [f64; 6],
     /// Wheel drives, left and right.
     pub motors: [MotorParams; 2],
+    /// Force on each piston from outside \[N\], positive extends.
+    pub load_n: [f64; 6],
 }
 
 impl BodyMechanics {
@@ -317,7 +319,9 @@ impl Mechanics<6> for BodyMechanics {
         let support = kin.feet.map(|foot| self.support(&foot));
         self.advance_contacts(state, &kin, &support, step_s);
         let mut force = [0.0; COORDINATES];
-        force[2..].copy_from_slice(piston_n);
+        for (force, (piston, load)) in force[2..].iter_mut().zip(piston_n.iter().zip(self.load_n)) {
+            *force = piston + load;
+        }
         for wheel in 0..2 {
             let torque = self.wheel_torque_n_m(state, wheel, ahead_s);
             self.dynamics.add_wheel_torque(torque, &mut force);

@@ -184,6 +184,7 @@ impl Plant {
                     ground: params.ground.clone(),
                     stroke_zero_m: params.stroke_zero_m,
                     motors: params.motors,
+                    load_n: [0.0; 6],
                 },
                 step_ns: params.step_ns,
             },
@@ -332,12 +333,16 @@ impl Plant {
     /// that sensor's random stream.
     #[must_use]
     pub fn read_position(&self, state: &mut PlantState, joint: usize) -> u16 {
-        let stroke = {
-            use crate::assembly::Mechanics;
-            self.assembly.mechanics.strokes_m(&state.core.motion)[joint]
-        };
-        let ratio = self.params.potentiometers[joint].ratio(stroke);
+        let ratio = self.position_ratio(state, joint);
         state.adc[joint].read(&self.params.adc, ratio)
+    }
+
+    /// Where a sound potentiometer's wiper stands, as a share of its reference.
+    #[must_use]
+    pub fn position_ratio(&self, state: &PlantState, joint: usize) -> f64 {
+        use crate::assembly::Mechanics;
+        let stroke_m = self.assembly.mechanics.strokes_m(&state.core.motion)[joint];
+        self.params.potentiometers[joint].ratio(stroke_m)
     }
 
     /// Everything that can be seen of the robot.

@@ -2,6 +2,8 @@
 
 mod channels;
 mod check;
+mod export;
+mod faults;
 mod list;
 mod params;
 mod run;
@@ -42,8 +44,12 @@ enum Command {
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
     Params(params::ParamsArgs),
+    /// Faults that can be injected, and what the robot does about them.
+    Faults(faults::FaultsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
+    /// Write the robot for other programs.
+    Export(export::ExportArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
 }
@@ -54,9 +60,11 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         None => run::command(&run::RunArgs::default()),
         Some(Command::Run(args)) => run::command(&args),
+        Some(Command::Faults(args)) => faults::command(&args),
         Some(Command::List(args)) => list::command(&args),
         Some(Command::Params(args)) => params::command(&args),
         Some(Command::Channels(args)) => channels::command(&args),
+        Some(Command::Export(args)) => export::command(&args),
         Some(Command::Check(args)) => check::command(&args),
     };
     result.unwrap_or_else(|error| {

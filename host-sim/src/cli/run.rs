@@ -10,6 +10,7 @@ use clap::Args;
 use super::{INTERRUPTED, TARGETS_MISSED, print};
 use crate::SimError;
 use crate::analysis::Target;
+use crate::faults::FaultSpec;
 use crate::run::{self, Finished, Options};
 
 /// Arguments of `wheeleg run`.
@@ -28,6 +29,10 @@ pub(super) struct RunArgs {
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
+    /// Injects a fault, for example `master-silent@3.2s`; may be given several
+    /// times. `wheeleg faults list` prints them all.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<FaultSpec>,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -43,6 +48,7 @@ impl Default for RunArgs {
             out: None,
             seed: None,
             robot: None,
+            faults: Vec::new(),
             json: false,
             strict: false,
         }
@@ -61,6 +67,7 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
         robot: args.robot.clone(),
         seed: args.seed,
         out: args.out.clone(),
+        faults: args.faults.clone(),
     };
     let finished = run::run(&options)?;
     if args.json {
@@ -93,6 +100,13 @@ fn run_text(finished: &Finished) -> String {
             out,
             "\nstopped after {:.2} s of simulated time; what was recorded is complete up to there",
             s.simulated_s
+        );
+    }
+    if s.dropped_messages > 0 {
+        let _ = writeln!(
+            out,
+            "\n{} messages could not be written to the log",
+            s.dropped_messages
         );
     }
     let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);

@@ -488,6 +488,42 @@ impl Reader {
         }
     }
 
+    /// Reads an optional list of texts, each of which `parse` turns into a value
+    /// or says why not.
+    pub(crate) fn texts<T>(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        parse: impl Fn(&str) -> Result<T, String>,
+    ) -> Vec<T> {
+        let Some((key_span, item)) = entry.get(key) else {
+            return Vec::new();
+        };
+        let path = entry.field_path(key);
+        let Some(list) = item.as_array() else {
+            let message = format!("`{path}` = {} must be a list", item.to_string().trim());
+            let example = format!("write `{key} = [\"…\", \"…\"]`");
+            let span = item.span().or(Some(key_span));
+            self.problem(span, message, "not a list", Some(example));
+            return Vec::new();
+        };
+        let mut values = Vec::new();
+        for (i, element) in list.iter().enumerate() {
+            let parsed = match element.as_str() {
+                Some(text) => parse(text),
+                None => Err(format!("{} is not a text", element.to_string().trim())),
+            };
+            match parsed {
+                Ok(value) => values.push(value),
+                Err(reason) => {
+                    let span = element.span().or_else(|| Some(key_span.clone()));
+                    self.problem(span, format!("`{path}[{i}]`: {reason}"), "not usable", None);
+                }
+            }
+        }
+        values
+    }
+
     /// Reads a text field that must be one of `choices`.
     pub(crate) fn choice<T: Copy>(
         &mut self,

@@ -4,6 +4,7 @@ use super::error::ConfigError;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
+use crate::faults::FaultSpec;
 
 /// A leg.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,11 +123,13 @@ pub struct Scenario {
     pub events: Vec<ScenarioEvent>,
     /// Uneven ground.
     pub ground: Vec<GroundPatch>,
+    /// Faults that are injected; those of the command line are added.
+    pub faults: Vec<FaultSpec>,
     /// What it is held against.
     pub targets: TargetSet,
 }
 
-const TOP: [&str; 9] = [
+const TOP: [&str; 10] = [
     "name",
     "description",
     "robot",
@@ -136,6 +139,7 @@ const TOP: [&str; 9] = [
     "motion",
     "events",
     "ground",
+    "faults",
 ];
 
 const TARGETS: [(&str, TargetSet); 10] = [
@@ -229,6 +233,9 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         let entry = r.entry("ground", i);
         ground.extend(patch(r, &entry));
     }
+    let faults = r.texts(&top, "faults", |text| {
+        text.parse::<FaultSpec>().map_err(|e| e.to_string())
+    });
     Some(Scenario {
         name: name?,
         description: description?,
@@ -238,6 +245,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         motion: motion?,
         events,
         ground,
+        faults,
         targets: targets?,
     })
 }

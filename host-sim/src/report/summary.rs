@@ -37,6 +37,8 @@ pub struct Summary {
     pub seed: u64,
     /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
     pub hash: String,
+    /// Messages that could not be written to the log file.
+    pub dropped_messages: u64,
     /// Simulated time, start-up included, s.
     pub simulated_s: f64,
     /// Scenario time in the record, s.
@@ -70,6 +72,7 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             seed: info.seed,
             hash: recording.hash.clone(),
+            dropped_messages: recording.dropped,
             simulated_s: info.simulated_s,
             recorded_s: info.recorded_s,
             wall_s: info.wall_s,

@@ -21,6 +21,7 @@ use self::operator::Operator;
 use self::world::{Happened, World};
 use crate::SimError;
 use crate::config::{EventAction, RobotConfig, Scenario};
+use crate::faults::Schedule;
 use crate::telemetry::{EventKind, Recorder};
 
 /// Beginning of every event in the record that tells of the time before it.
@@ -61,6 +62,7 @@ pub fn run(
     let mut world = World::new(robot, &plant, master, seed)?;
     let mut operator = Operator::new(scenario, &robot.start_up);
     let mut observer = Observer::default();
+    let mut schedule = Schedule::new(&scenario.faults);
     let cycle_ns = (robot.bus.cycle_s * 1e9).round() as u64;
     let duration_ns = (scenario.duration_s * 1e9).round() as u64;
     let mut start_ns: Option<u64> = None;
@@ -82,6 +84,13 @@ pub fn run(
                 if t_ns >= duration_ns {
                     break;
                 }
+                schedule.due(t_ns, |fault, begin| {
+                    world.strike(fault, begin);
+                    recorder.set_disk_full(!world.faults().can_record());
+                    let what = if begin { "begins" } else { "ends" };
+                    let text = format!("fault {fault} {what}");
+                    recorder.event(t_ns, EventKind::Scenario, text);
+                });
                 for event in operator.due(t_ns) {
                     act(&event.action, &mut world, &operator, t_ns, recorder)?;
                 }
@@ -90,6 +99,7 @@ pub fn run(
             (Happened::MasterCycle, started) => {
                 let record = world.master().take_telemetry();
                 if let Some(start_ns) = started {
+                    operator.flood(&mut world, now_ns - start_ns, recorder);
                     observer.cycle(&world, record, (start_ns, now_ns), cycle_ns, recorder);
                 } else {
                     observer.pass(&world);

@@ -31,6 +31,7 @@ pub(super) struct Operator<'a> {
     stage: Stage,
     notes: Vec<(u64, String)>,
     next_event: usize,
+    flood_refused: bool,
 }
 
 /// A command of a scenario file.
@@ -113,6 +114,7 @@ impl<'a> Operator<'a> {
             stage: Stage::Enumerating,
             notes: Vec::new(),
             next_event: 0,
+            flood_refused: false,
         }
     }
 
@@ -257,6 +259,22 @@ impl<'a> Operator<'a> {
         };
         recorder.event(t_ns, EventKind::Command, text);
         Ok(())
+    }
+
+    /// A user who gives commands without end, as a fault of the run. The first
+    /// refusal is an event; the others are counted by the master.
+    pub(super) fn flood(&mut self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
+        let now_us = world.now_ns() / 1000;
+        for i in 0..world.faults().flood() {
+            let joint = (i % 6) as u8 + 1;
+            let command = Command::TransmitPosition { joint };
+            let answer = world.master().submit(command, now_us);
+            if let (Err(reject), false) = (answer, self.flood_refused) {
+                self.flood_refused = true;
+                let text = format!("flood of commands: number {i} refused, {reject:?}");
+                recorder.event(t_ns, EventKind::Command, text);
+            }
+        }
     }
 
     /// Writes the master's events into the record.

@@ -15,6 +15,7 @@ use super::boards::{JointBoard, WheelBoard};
 use super::bus::Bus;
 use crate::SimError;
 use crate::config::RobotConfig;
+use crate::faults::{FaultSpec, Injector};
 
 /// Joint tick, ns.
 pub(super) const JOINT_TICK_NS: u64 = 1_000_000;
@@ -48,8 +49,10 @@ pub(super) struct World {
     now_ns: u64,
     next_joint_ns: u64,
     next_wheel_ns: [u64; 2],
+    cycles: u64,
     next_cycle_ns: u64,
     tick_inputs: TickInputs,
+    faults: Injector,
 }
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
@@ -140,8 +143,10 @@ impl World {
             now_ns: 0,
             next_joint_ns: 0,
             next_wheel_ns: [0; 2],
+            cycles: 0,
             next_cycle_ns: 0,
             tick_inputs: TickInputs::default(),
+            faults: Injector::new(seed),
         })
     }
 
@@ -191,10 +196,15 @@ impl World {
             .map_err(|e| unphysical(self.now_ns, &e))?;
         self.outputs = self.plant.outputs(&self.state);
         let feet = self.outputs.foot_switches;
-        let now = micros(self.now_ns);
         for (i, board) in self.joints.iter_mut().enumerate() {
             let code = self.plant.read_position(&mut self.state, i);
-            board.tick(now, code, feet[i / 3]);
+            let potentiometer = &self.plant.params().potentiometers[i];
+            let code = self
+                .faults
+                .position_code(i, code, potentiometer.electrical_stroke_m);
+            let feet = self.faults.switches(i / 3, feet[i / 3]);
+            let now = micros(self.faults.clock_ns(i as u8 + 1, self.now_ns));
+            board.tick(now, code, feet);
         }
         self.next_joint_ns += JOINT_TICK_NS;
         self.collect_transmissions();
@@ -214,8 +224,10 @@ impl World {
         let mechanics = &self.plant.assembly.mechanics;
         let angle_rad = mechanics.wheel_angle_rad(&core.motion);
         let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
+        let edges = self.faults.edges(wheel, edges);
         let switch = core.supply.pressure_switch;
-        board.tick(micros(self.now_ns), edges, switch);
+        let now_ns = self.faults.clock_ns(wheel as u8 + 7, self.now_ns);
+        board.tick(micros(now_ns), edges, switch);
         self.next_wheel_ns[wheel] += u64::from(board.period_us()) * NS_PER_US;
         self.collect_transmissions();
         Ok(())
@@ -223,24 +235,30 @@ impl World {
 
     fn master_cycle(&mut self) {
         if self.master_alive {
-            let bytes = self.master.cycle(self.now_ns / NS_PER_US);
-            self.bus
-                .transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+            self.master
+                .set_layer1_enabled(!self.faults.layer_one_stalls());
+            let sync = self.master.cycle(self.now_ns / NS_PER_US);
+            if let Some(bytes) = self.faults.master_sends(&sync) {
+                let master = Address::MASTER.raw();
+                transmit(&mut self.bus, &mut self.faults, master, self.now_ns, bytes);
+            }
         }
-        self.next_cycle_ns += self.cycle_ns;
+        self.cycles += 1;
+        let due_ns = self.cycles * self.cycle_ns;
+        self.next_cycle_ns = due_ns.saturating_add_signed(self.faults.cycle_jitter_ns());
     }
 
     fn deliver(&mut self) {
         while let Some(delivery) = self.bus.take_due(self.now_ns) {
-            let t_end = micros(delivery.end_ns);
+            let t_end = |address| micros(self.faults.clock_ns(address, delivery.end_ns));
             for (board, address) in self.joints.iter_mut().zip(1..) {
                 if delivery.from != address {
-                    board.on_bus_bytes(&delivery.bytes, t_end);
+                    board.on_bus_bytes(&delivery.bytes, t_end(address));
                 }
             }
             for (board, address) in self.wheels.iter_mut().zip(7..) {
                 if delivery.from != address {
-                    board.on_bus_bytes(&delivery.bytes, t_end);
+                    board.on_bus_bytes(&delivery.bytes, t_end(address));
                 }
             }
             if self.master_alive && delivery.from != Address::MASTER.raw() {
@@ -254,10 +272,15 @@ impl World {
 
     /// Puts on the line what the boards want to send, at the times they chose.
     fn collect_transmissions(&mut self) {
-        let now = micros(self.now_ns);
         let now_ns = self.now_ns;
         let bus = &mut self.bus;
+        let faults = &mut self.faults;
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
+            if !faults.can_send(from) {
+                return;
+            }
+            // Start times are on the board's own clock.
+            let now = micros(faults.clock_ns(from, now_ns));
             let ahead = t.start_at.get().wrapping_sub(now.get());
             // More than half the counter's range ahead means: already past.
             let ahead_ns = if ahead < 1 << 31 {
@@ -265,7 +288,7 @@ impl World {
             } else {
                 0
             };
-            bus.transmit(from, now_ns + ahead_ns, t.bytes.to_vec());
+            transmit(bus, faults, from, now_ns + ahead_ns, t.bytes.to_vec());
         };
         for (board, address) in self.joints.iter_mut().zip(1..) {
             while let Some(t) = board.take_transmission() {
@@ -282,12 +305,25 @@ impl World {
     /// Lets the master use the line for a request while nothing is on it or scheduled.
     fn offer_acyclic(&mut self) {
         if self.master_alive
+            && self.faults.master_requests()
             && self.bus.next_delivery_ns().is_none()
             && let Some(bytes) = self.master.next_acyclic(self.now_ns / NS_PER_US)
         {
-            self.bus
-                .transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+            let master = Address::MASTER.raw();
+            let bytes = bytes.to_vec();
+            transmit(&mut self.bus, &mut self.faults, master, self.now_ns, bytes);
         }
+    }
+
+    /// A fault begins, or ends.
+    pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) {
+        self.faults
+            .strike(fault, begin, &mut self.plant, &mut self.state);
+    }
+
+    /// The faults under way.
+    pub(super) fn faults(&self) -> &Injector {
+        &self.faults
     }
 
     /// The master dies: it never sends or hears again.
@@ -344,6 +380,12 @@ impl World {
     pub(super) fn plant(&self) -> &Plant {
         &self.plant
     }
+}
+
+/// Puts bytes on the line as the line lets them through.
+fn transmit(bus: &mut Bus, faults: &mut Injector, from: u8, start_ns: u64, bytes: Vec<u8>) {
+    let (received, late_ns) = faults.transmit(bytes);
+    bus.transmit(from, start_ns + late_ns, received);
 }
 
 fn unphysical(now_ns: u64, error: &wheeleg_plant::PlantError) -> SimError {

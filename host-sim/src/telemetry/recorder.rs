@@ -65,8 +65,10 @@ pub struct Recording {
     pub events: Vec<Row<EventSample>>,
     /// Determinism hash of the log, 64 hexadecimal digits.
     pub hash: String,
-    /// Messages in the log.
+    /// Messages recorded.
     pub messages: u64,
+    /// Messages that could not be written to the log file.
+    pub dropped: u64,
 }
 
 /// Log position of one channel.
@@ -95,6 +97,7 @@ pub struct Recorder {
     flushed_ns: u64,
     data: Recording,
     filters: [JointFilters; 6],
+    disk_full: bool,
 }
 
 #[derive(Clone)]
@@ -145,6 +148,7 @@ impl Recorder {
             hash: TelemetryHash::default(),
             flushed_ns: 0,
             data: Recording::default(),
+            disk_full: false,
             filters: std::array::from_fn(|_| filters.clone()),
         }
     }
@@ -266,6 +270,12 @@ impl Recorder {
         self.log(index::RUN, 0, &sample);
     }
 
+    /// A disk that takes nothing more, or takes again: a fault of the run, not of
+    /// this computer. What is not written is counted; memory and hash go on.
+    pub fn set_disk_full(&mut self, full: bool) {
+        self.disk_full = full;
+    }
+
     /// The first I/O error, if there was one.
     ///
     /// # Errors
@@ -305,6 +315,10 @@ impl Recorder {
         self.hash.update(state.def.topic, t_ns, &self.payload);
         self.data.messages += 1;
         state.sequence += 1;
+        if self.disk_full {
+            self.data.dropped += 1;
+            return;
+        }
         let Some(log) = &mut self.log else { return };
         let header = MessageHeader {
             channel_id: state.mcap_id,

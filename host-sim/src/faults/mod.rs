@@ -1,0 +1,22 @@
+//! Faults: what can go wrong with the robot, how a run is told of it, and how
+//! it is done to the simulated robot.
+//!
+//! * [`kind`]: the catalogue;
+//! * [`spec`]: one fault of a run, with target, value and time;
+//! * [`line`]: errors of the bus line;
+//! * [`admission`]: which faults a run can have;
+//! * [`schedule`]: begins and ends in order;
+//! * [`injector`]: the faults under way, and what they do to signals.
+
+mod admission;
+mod injector;
+mod kind;
+mod line;
+mod schedule;
+mod spec;
+
+pub use admission::{check, not_implemented};
+pub(crate) use injector::Injector;
+pub use kind::{FaultKind, KINDS, KindInfo, Place, ValueSpec};
+pub(crate) use schedule::Schedule;
+pub use spec::{FaultSpec, SpecError, Victim};
