@@ -1,6 +1,6 @@
 //! ADC1: one conversion of the potentiometer per tick, started by the tick edge.
 
-use super::{latch, pac, pins, timebase};
+use super::{latch, pac, pins, tick};
 use pac::adc::vals::{Exten, Ovrmod, SampleTime};
 use pac::adccommon::vals::Ckmode;
 use wheeleg_node::JOINT_TICK;
@@ -49,7 +49,7 @@ pub(super) fn start() {
     adc.ier().write(|r| r.set_eosie(true));
     adc.cr().modify(|r| r.set_adstart(true));
     // The first edge is at time 0.
-    timebase::enable_deadline(DEADLINE_US);
+    tick::enable_deadline(DEADLINE_US);
 }
 
 /// The end of a conversion: latches the tick.
@@ -59,17 +59,17 @@ pub fn on_conversion() {
     // Reading the result clears EOC; EOS is cleared by writing it.
     let code = adc.dr().read().rdata();
     adc.isr().write(|r| r.set_eos(true));
-    let edge = timebase::edge();
-    timebase::set_deadline(next_deadline(edge));
+    let edge = tick::edge();
+    tick::set_deadline(next_deadline(edge));
     latch::post(edge, Some(code), pins::port_a());
 }
 
 /// The deadline has passed without a conversion: the tick runs without it.
 #[inline]
 pub fn on_deadline() {
-    if timebase::take_deadline() {
-        let edge = timebase::edge();
-        timebase::set_deadline(next_deadline(edge));
+    if tick::take_deadline() {
+        let edge = tick::edge();
+        tick::set_deadline(next_deadline(edge));
         latch::post(edge, None, pins::port_a());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::bus::Bus;
 use super::start::Start;
-use super::{adc, bridge, clock, encoder, latch, pac, pins, timebase, watchdog};
+use super::{adc, bridge, clock, encoder, latch, pac, pins, tick, timebase, watchdog};
 use crate::executive::{Board, Event, older};
 use crate::led::Status;
 use pac::Interrupt;
@@ -19,7 +19,7 @@ impl Start {
     pub fn joint_hardware(&self) -> (super::valves::Valves, latch::Potentiometer, latch::Feet) {
         clock::enable_joint();
         pins::configure_joint_inputs();
-        timebase::configure(JOINT_TICK);
+        tick::configure(JOINT_TICK);
         let fitted = self
             .identity
             .is_some_and(|identity| identity.address.raw().is_multiple_of(3));
@@ -43,7 +43,7 @@ impl Start {
             unmask(interrupt);
         }
         super::valves::permit();
-        timebase::start();
+        tick::start();
         G431 {
             bus,
             internal: self.source == clock::Source::Internal,
@@ -73,14 +73,14 @@ impl Start {
 
     /// Runs a wheel board's peripherals; the first sample takes `period`.
     pub fn wheel_board(&self, period: Micros) -> G431<true> {
-        timebase::configure(period);
-        timebase::enable_edge_interrupt();
+        tick::configure(period);
+        tick::enable_edge_interrupt();
         let bus = Bus::start();
         for interrupt in [Interrupt::TIM2, Interrupt::USART1, Interrupt::DMA1_CHANNEL1] {
             unmask(interrupt);
         }
         bridge::permit();
-        timebase::start();
+        tick::start();
         G431 {
             bus,
             internal: self.source == clock::Source::Internal,
@@ -129,7 +129,7 @@ impl<const WHEEL: bool> Board for G431<WHEEL> {
     fn tick_finished(&mut self, report: &TickReport, period: Micros) {
         watchdog::feed();
         if WHEEL {
-            timebase::set_period(period);
+            tick::set_period(period);
             bridge::permit();
         } else {
             super::valves::permit();
@@ -167,8 +167,8 @@ pub fn on_joint_timer() {
 /// TIM2 on a wheel board: the tick edge.
 #[inline]
 pub fn on_wheel_timer() {
-    if timebase::take_edge_interrupt() {
+    if tick::take_edge_interrupt() {
         bridge::apply();
-        latch::post(timebase::edge(), Some(encoder::raw()), pins::port_a());
+        latch::post(tick::edge(), Some(encoder::raw()), pins::port_a());
     }
 }

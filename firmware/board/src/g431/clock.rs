@@ -126,3 +126,15 @@ pub fn enable_wheel() {
     rcc.apb2enr().modify(|r| r.set_tim8en(true));
     let _ = rcc.apb2enr().read();
 }
+
+/// Clocks of the serial line and the microsecond counter.
+#[cfg(feature = "hil")]
+pub fn enable_hil() {
+    let rcc = pac::RCC;
+    rcc.apb2enr().modify(|r| r.set_syscfgen(true));
+    rcc.apb1enr1().modify(|r| {
+        r.set_tim2en(true);
+        r.set_usart2en(true);
+    });
+    let _ = rcc.apb1enr1().read();
+}

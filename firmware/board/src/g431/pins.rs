@@ -205,3 +205,25 @@ pub fn set_led(lit: bool) {
         }
     });
 }
+
+/// The serial line and the Nucleo's LED. PC13, the status LED of the real board,
+/// is left alone: it is the Nucleo's push button.
+#[cfg(feature = "hil")]
+pub fn configure_hil() {
+    let a = pac::GPIOA;
+    configure(a, 2, Mode::Alternate(7, Pupdr::FLOATING));
+    configure(a, 3, Mode::Alternate(7, Pupdr::PULL_UP));
+    configure(a, 5, Mode::Output);
+}
+
+/// The Nucleo's LED on PA5, high = lit.
+#[cfg(feature = "hil")]
+pub fn set_hil_led(lit: bool) {
+    pac::GPIOA.bsrr().write(|r| {
+        if lit {
+            r.set_bs(5, true);
+        } else {
+            r.set_br(5, true);
+        }
+    });
+}
