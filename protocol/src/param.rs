@@ -309,6 +309,40 @@ parameters! {
             "Time in Hold before a staged exhaust.";
         ExhaustDuty = 0x0125, "exhaust_duty", "1", I2F30, "0.02" ..= "1", default "0.2", disarmed,
             "Duty of the outlets in a staged exhaust, so that a loaded leg sinks slowly.";
+        Law = 0x0126, "law", "1", Integer, "0" ..= "5", default "0", disarmed,
+            "Control law: 0 P + fuzzy correction, 1 on/off, 2 P, 3 PID, 4 sliding mode, 5 predictive.";
+        Integral = 0x0127, "integral", "1/(mm s)", I8F24, "0" ..= "100", default "0", any_time,
+            "Ki of the PID law.";
+        Derivative = 0x0128, "derivative", "s/mm", I8F24, "0" ..= "1", default "0", any_time,
+            "Kd of the PID law.";
+        SlidingTime = 0x0129, "sliding_time", "us", Integer, "0" ..= "1000000", default "50000", any_time,
+            "T of the sliding surface e + T de/dt.";
+        Bore = 0x012A, "bore", "mm", I16F16, "4" ..= "100", default "20", disarmed,
+            "Axis data of the predictive law: bore.";
+        Rod = 0x012B, "rod", "mm", I16F16, "0" ..= "90", default "8", disarmed,
+            "Axis data: rod diameter, at most 0.9 of the bore.";
+        DeadVolumeA = 0x012C, "dead_volume_a", "cm3", I16F16, "0.05" ..= "500", default "15.1", disarmed,
+            "Axis data: dead volume of chamber A with its line.";
+        DeadVolumeB = 0x012D, "dead_volume_b", "cm3", I16F16, "0.05" ..= "500", default "15.1", disarmed,
+            "Axis data: dead volume of chamber B with its line.";
+        Conductance = 0x012E, "conductance", "dm3/(s bar)", I8F24, "0.005" ..= "20", default "0.085", disarmed,
+            "Axis data: sonic conductance of one open valve with its line (ISO 6358).";
+        CriticalRatio = 0x012F, "critical_ratio", "1", I8F24, "0" ..= "0.9", default "0.3", disarmed,
+            "Axis data: critical pressure ratio of that path (ISO 6358).";
+        SupplyPressure = 0x0130, "supply_pressure", "kPa", I16F16, "200" ..= "1700", default "701.325", disarmed,
+            "Axis data: supply pressure, absolute.";
+        MovingMass = 0x0131, "moving_mass", "kg", I16F16, "0.02" ..= "200", default "1.5", disarmed,
+            "Axis data: mass that moves with the rod, a first guess.";
+        FrictionCoulomb = 0x0132, "friction_coulomb", "N", I16F16, "0" ..= "500", default "10", disarmed,
+            "Axis data: Coulomb friction.";
+        FrictionBreakaway = 0x0133, "friction_breakaway", "N", I16F16, "0" ..= "500", default "15", disarmed,
+            "Axis data: break-away friction, at least the Coulomb friction.";
+        FrictionViscous = 0x0134, "friction_viscous", "N s/m", I16F16, "0" ..= "1000", default "40", disarmed,
+            "Axis data: viscous friction.";
+        LineDelay = 0x0135, "line_delay", "us", Integer, "0" ..= "20000", default "2900", disarmed,
+            "Axis data: travel time of the pressure wave from a valve to its chamber.";
+        RestBand = 0x0136, "rest_band", "mm", I16F16, "0.02" ..= "5", default "0.12", any_time,
+            "Predictive law: at rest when the error is below this; awake again at three times it.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

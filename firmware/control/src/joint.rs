@@ -29,14 +29,19 @@
 //! The law is odd: inputs of opposite sign give exactly the opposite duty.
 //! A tick makes one 32-bit division (the weighted mean), and one of 64 bits in
 //! the tick of a change of law alone. It reads no clock and never panics; every
-//! intermediate value is bounded as said beside it. The [`JointInput::announced`] reference
-//! does not enter this law.
+//! intermediate value is bounded as said beside it.
+//!
+//! The other laws of [`Law`] share the input, the rest detection and the shaping
+//! of the duty: on/off, P and PID replace Kp e + correction; the sliding law
+//! replaces the duty by one of seven valve modes. The predictive law
+//! ([`crate::axis`]) shares the input alone and times each pulse itself.
 
 mod config;
 mod controller;
+mod modes;
 mod settle;
 mod types;
 
 pub use config::{ConfigError, Gain, JointConfig, JointGains, JointParameter, JointRules};
 pub use controller::JointController;
-pub use types::{Announced, Correction, JointInput, JointLimits, JointOutput};
+pub use types::{Announced, Correction, JointInput, JointLimits, JointOutput, Law};

@@ -6,6 +6,8 @@
 //!   and [`velocity`] (the estimate of ė).
 //! * [`valve`] and [`pwm`]: from a signed duty to the on-times of four on/off
 //!   valves, with their switching delays compensated.
+//! * [`axis`]: the cylinder as the predictive law knows it: pressures, motion and
+//!   load without a pressure sensor.
 //! * [`wheel`]: the HCTL-1100's lead filter and its four modes.
 //!
 //! Cost on a Cortex-M4, as instructions in a linked image (opt-level 2, static
@@ -30,6 +32,7 @@
     )
 )]
 
+pub mod axis;
 pub mod fuzzy;
 pub mod joint;
 pub mod pwm;

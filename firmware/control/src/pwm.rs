@@ -243,6 +243,35 @@ impl ValvePwm {
         self.tick(&ValveOpenings::SHUT)
     }
 
+    /// On-times that a law chose itself: at most a tick each, passed through and
+    /// counted. A pulse that the PWM had under way is theirs to go on with.
+    #[must_use]
+    pub fn direct(&mut self, on: OnTimes) -> OnTimes {
+        let tick = self.timing.tick;
+        on.map({
+            let mut channels = self.channels.iter_mut();
+            move |on| {
+                let on = u32::from(on).min(tick);
+                if let Some(channel) = channels.next() {
+                    let begins = on > 0 && !channel.energised;
+                    *channel = Channel {
+                        running: on > 0,
+                        energised: on == tick,
+                        elapsed: if begins {
+                            on
+                        } else {
+                            channel.elapsed.saturating_add(on)
+                        },
+                        ended_at: 0,
+                        pulses: channel.pulses.wrapping_add(u32::from(begins)),
+                    };
+                }
+                // At most the tick, 2000.
+                on as u16
+            }
+        })
+    }
+
     /// Pulses begun per valve since power-on, wrapping: the switching count.
     /// Periods that follow one another without a gap count as one pulse.
     #[must_use]

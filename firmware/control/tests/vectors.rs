@@ -251,6 +251,7 @@ fn vector_gains() -> JointGains {
         stroke_min: PositionMm::ZERO,
         stroke_max: PositionMm::from_int(180),
         pwm_period: Micros::from_millis(20),
+        ..JointGains::default()
     }
 }
 

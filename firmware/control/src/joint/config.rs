@@ -1,5 +1,7 @@
 //! Gains in physical units, and the validated configuration made of them.
 
+use super::types::Law;
+use crate::axis::{AxisData, AxisField, AxisModel};
 use crate::fuzzy::GridRules;
 use crate::rules;
 use crate::velocity::VelocityWindow;
@@ -76,6 +78,17 @@ pub struct JointGains {
     pub stroke_min: PositionMm,
     /// Upper end of the stroke that the reference is limited to.
     pub stroke_max: PositionMm,
+    /// Control law.
+    pub law: Law,
+    /// Ki of the PID law, duty per mm·s. Range 0…100.
+    pub integral: Gain,
+    /// Kd of the PID law, duty per mm/s of velocity error. Range 0…1.
+    pub derivative: Gain,
+    /// T of the sliding surface e + T ė. 0…1 s; sensible: the time in which the
+    /// axis stops, 30…100 ms.
+    pub sliding_time: Micros,
+    /// Data of the axis, for the predictive law.
+    pub axis: AxisData,
     /// Valve PWM period: 10…20 ms for 50…100 Hz (ASSUMED); any whole number of
     /// ticks in 1 ms…1 s.
     pub pwm_period: Micros,
@@ -104,6 +117,11 @@ impl Default for JointGains {
             velocity_window: 16,
             stroke_min: PositionMm::ZERO,
             stroke_max: PositionMm::from_int(180),
+            law: Law::Fuzzy,
+            integral: Gain::ZERO,
+            derivative: Gain::ZERO,
+            sliding_time: Micros::from_millis(50),
+            axis: AxisData::default(),
             pwm_period: Micros::from_millis(20),
         }
     }
@@ -155,6 +173,14 @@ pub enum JointParameter {
     Stroke,
     /// [`JointGains::pwm_period`].
     PwmPeriod,
+    /// [`JointGains::integral`].
+    Integral,
+    /// [`JointGains::derivative`].
+    Derivative,
+    /// [`JointGains::sliding_time`].
+    SlidingTime,
+    /// [`JointGains::axis`].
+    Axis(AxisField),
 }
 
 /// A parameter outside its range.
@@ -191,6 +217,8 @@ pub struct JointConfig {
     pub(super) settle_ticks: u32,
     pub(super) release_ticks: u32,
     pub(super) bumpless_ticks: u32,
+    /// Coefficients of the predictive law, when it is chosen.
+    pub(super) axis: Option<AxisModel>,
 }
 
 /// Fractional bits of the factors from error and velocity to a fuzzy input.
@@ -228,6 +256,13 @@ impl JointConfig {
         check_ranges(gains)?;
         check_relations(gains, tick)?;
 
+        let axis = match gains.law {
+            Law::Predictive => Some(
+                AxisModel::new(&gains.axis, tick)
+                    .map_err(|field| ConfigError::OutOfRange(P::Axis(field)))?,
+            ),
+            _ => None,
+        };
         let integral_limit = i64::from(gains.integral_scale.raw())
             .saturating_mul(1_000_000)
             .checked_div(i64::from(tick.get()))
@@ -245,6 +280,7 @@ impl JointConfig {
             settle_ticks: gains.settle_dwell.to_ticks_ceil(tick).get(),
             release_ticks: gains.release_dwell.to_ticks_ceil(tick).get(),
             bumpless_ticks: gains.bumpless_time.to_ticks_ceil(tick).get(),
+            axis,
         })
     }
 
@@ -277,13 +313,14 @@ impl core::hash::Hash for JointConfig {
             settle_ticks,
             release_ticks,
             bumpless_ticks,
+            axis,
         } = self;
         (gains, tick, window).hash(state);
         core::ptr::hash(*rules_pd, state);
         core::ptr::hash(*rules_id, state);
         (error_to_input, velocity_to_input).hash(state);
         (integral_to_input, integral_limit).hash(state);
-        (settle_ticks, release_ticks, bumpless_ticks).hash(state);
+        (settle_ticks, release_ticks, bumpless_ticks, axis).hash(state);
     }
 }
 
@@ -389,6 +426,16 @@ fn check_ranges(gains: &JointGains) -> Result<(), ConfigError> {
     )?;
     check(P::Stroke, gains.stroke_min, mm(-1000), mm(1000))?;
     check(P::Stroke, gains.stroke_max, mm(-1000), mm(1000))?;
+    let most = const { Gain::lit("100") };
+    check(P::Integral, gains.integral, zero, most)?;
+    let most = const { Gain::lit("1") };
+    check(P::Derivative, gains.derivative, zero, most)?;
+    check(
+        P::SlidingTime,
+        gains.sliding_time,
+        Micros::ZERO,
+        Micros::from_millis(1000),
+    )?;
     check(
         P::PwmPeriod,
         gains.pwm_period,

@@ -1,9 +1,12 @@
 //! The joint tick.
 
 use super::config::{INPUT_SHIFT, INTEGRAL_SHIFT, JointConfig};
+use super::modes;
 use super::settle::Settle;
-use super::types::{Correction, JointInput, JointLimits, JointOutput};
-use crate::valve::{ValveOpenings, allocate};
+use super::types::{Correction, JointInput, JointLimits, JointOutput, Law};
+use crate::axis::predictive::Predictive;
+use crate::pwm::OnTimes;
+use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS, saturate_i16, shift_right_round};
 
@@ -34,14 +37,17 @@ pub struct JointController {
     /// What is still added to the law after a change, × 2^30, and its decay.
     fade: i64,
     fade_step: i64,
+    /// On-times that were last sent, whoever chose them.
+    sent: OnTimes,
+    /// The predictive law, when it is chosen.
+    predictive: Option<Predictive>,
 }
 
 impl JointController {
     /// A controller at rest with an empty history.
     #[must_use]
-    pub const fn new(config: JointConfig) -> Self {
+    pub fn new(config: JointConfig) -> Self {
         Self {
-            config,
             correction: Correction::Pd,
             velocity: VelocityEstimator::new(),
             settle: Settle::new(),
@@ -50,6 +56,9 @@ impl JointController {
             changed: false,
             fade: 0,
             fade_step: 0,
+            sent: [0; VALVE_COUNT],
+            predictive: config.axis.map(Predictive::new),
+            config,
         }
     }
 
@@ -67,8 +76,24 @@ impl JointController {
 
     /// Whether all valves are held shut because the joint is at rest.
     #[must_use]
-    pub const fn is_settled(&self) -> bool {
-        self.settle.is_settled()
+    pub fn is_settled(&self) -> bool {
+        match &self.predictive {
+            Some(law) => law.is_settled(),
+            None => self.settle.is_settled(),
+        }
+    }
+
+    /// The predictive law's estimates, when it is chosen.
+    #[must_use]
+    pub const fn predictive(&self) -> Option<&Predictive> {
+        self.predictive.as_ref()
+    }
+
+    /// Takes note of the on-times that were sent for the next tick, by whatever
+    /// decided them: once per tick, after [`JointController::step`] or
+    /// [`JointController::observe`]. The predictive law follows the air by them.
+    pub const fn sent(&mut self, on: OnTimes) {
+        self.sent = on;
     }
 
     /// Selects the correction, without a bump. The integral starts from zero.
@@ -88,6 +113,9 @@ impl JointController {
             self.velocity.reset();
         }
         self.integral = within(self.integral, config.integral_limit);
+        if config.axis != self.config.axis {
+            self.predictive = config.axis.map(Predictive::new);
+        }
         self.config = config;
         self.changed = true;
     }
@@ -104,6 +132,11 @@ impl JointController {
     /// measured position, and forgets the integral and the rest state, so that the
     /// next [`JointController::step`] starts afresh with a valid velocity.
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
+        if let Some(law) = &mut self.predictive {
+            let velocity = law.follow(measured, &self.sent);
+            law.release();
+            return velocity;
+        }
         self.settle = Settle::new();
         self.integral = 0;
         self.last_law = None;
@@ -115,10 +148,27 @@ impl JointController {
     /// One control tick. Never panics.
     pub fn step(&mut self, input: &JointInput) -> JointOutput {
         let mut limits = JointLimits::default();
-        let gains = self.config.gains();
+        let gains = *self.config.gains();
         let reference = input.reference.limit(gains.stroke_min, gains.stroke_max);
         limits.reference = reference != input.reference;
         let error = reference.saturating_sub(input.measured);
+        if let Some(law) = &mut self.predictive {
+            let velocity = law.follow(input.measured, &self.sent);
+            let drive = law.drive(&JointInput {
+                reference,
+                ..*input
+            });
+            limits.duty = drive.limited;
+            return JointOutput {
+                duty: law.duty(&drive),
+                openings: ValveOpenings::SHUT,
+                direct: Some(drive.on),
+                error,
+                velocity,
+                limits,
+                settled: drive.settled,
+            };
+        }
         let velocity = self.velocity.update(&self.config.window, input.measured);
         let error_rate = input.reference_velocity.saturating_sub(velocity);
 
@@ -135,16 +185,22 @@ impl JointController {
         } else {
             self.shaped(law, error, input.reference_velocity, &mut limits)
         };
-        if self.correction == Correction::Id && !quiet {
+        let integrates = match gains.law {
+            Law::Fuzzy => self.correction == Correction::Id,
+            Law::Pid => true,
+            _ => false,
+        };
+        if integrates && !quiet {
             self.integrate(error, duty, &mut limits);
         }
         JointOutput {
             duty,
-            openings: if duty == Duty::ZERO {
-                ValveOpenings::SHUT
-            } else {
-                allocate(duty, self.config.gains().pwm_period)
+            openings: match gains.law {
+                Law::Sliding if !quiet => modes::sliding(&gains, error, error_rate, velocity),
+                _ if duty == Duty::ZERO => ValveOpenings::SHUT,
+                _ => allocate(duty, gains.pwm_period),
             },
+            direct: None,
             error,
             velocity,
             limits,
@@ -163,6 +219,16 @@ impl JointController {
     ) -> i64 {
         let config = &self.config;
         let gains = config.gains();
+        if gains.law != Law::Fuzzy {
+            return modes::law(
+                gains,
+                error,
+                error_rate,
+                reference_velocity,
+                self.integral,
+                config.tick(),
+            );
+        }
         let (rate, rate_limited) = to_input(
             error_rate.raw(),
             gains.velocity_scale.raw(),

@@ -1,5 +1,6 @@
 //! What goes into and comes out of a joint controller each tick.
 
+use crate::pwm::OnTimes;
 use crate::valve::ValveOpenings;
 use wheeleg_units::{Duty, PositionMm, Ticks, VelocityMmS};
 
@@ -14,6 +15,38 @@ pub enum Correction {
     Id,
 }
 
+/// Control law of a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Law {
+    /// PAPER §8: proportional, with a fuzzy correction.
+    #[default]
+    Fuzzy,
+    /// Full push or pull outside the settle band, nothing inside.
+    OnOff,
+    /// PWM of Kp e.
+    Proportional,
+    /// PWM of Kp e + Ki ∫e + Kd ė.
+    Pid,
+    /// Seven valve modes on a sliding surface e + T ė (after Hodgson, Le,
+    /// Tavakoli and Pham, Mechatronics 22, 2012).
+    Sliding,
+    /// Estimated pressures and motion ahead over the dead time: [`crate::axis`].
+    Predictive,
+}
+
+impl Law {
+    /// All laws, by the numbers of the parameter `law`.
+    pub const ALL: [Self; 6] = [
+        Self::Fuzzy,
+        Self::OnOff,
+        Self::Proportional,
+        Self::Pid,
+        Self::Sliding,
+        Self::Predictive,
+    ];
+}
+
 /// Inputs of one joint tick, latched at its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JointInput {
@@ -24,9 +57,8 @@ pub struct JointInput {
     /// Velocity of the reference; zero for a step.
     pub reference_velocity: VelocityMmS,
     /// The reference announced for later, and when it becomes the reference.
-    /// The present law does not use it: with or without it the output is the
-    /// same. It is carried to here for a law that vents the counter chamber
-    /// ahead of a known move.
+    /// The predictive law vents the counter chamber ahead of a known move; the
+    /// other laws give the same with or without it.
     pub announced: Option<Announced>,
 }
 
@@ -75,6 +107,9 @@ pub struct JointOutput {
     pub duty: Duty,
     /// The duty allocated to the valves: effective openings per PWM period.
     pub openings: ValveOpenings,
+    /// On-times of the next tick, when the law times each pulse itself; the
+    /// openings are then all zero and the PWM is left out.
+    pub direct: Option<OnTimes>,
     /// Error, reference − measured.
     pub error: PositionMm,
     /// Velocity estimate, positive extending.

@@ -39,11 +39,16 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.axis_fault(Fault::FollowingError, now);
         }
         // At rest, and in the very tick of a fault, no pulse goes on.
-        let on_times = if output.settled || !self.core.mode().may_drive() {
+        let on_times = if !self.core.mode().may_drive() {
+            self.pwm.shut()
+        } else if let Some(on) = output.direct {
+            self.pwm.direct(on)
+        } else if output.settled {
             self.pwm.shut()
         } else {
             self.pwm.tick(&output.openings)
         };
+        self.controller.sent(on_times);
         let mut limits = limit_bits(&output.limits, output.settled);
         if slew_limited {
             limits.insert(Limit::SlewLimited);
@@ -67,6 +72,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else {
             self.pwm.shut()
         };
+        self.controller.sent(on_times);
         self.record(now, velocity, Duty::ZERO, on_times);
         self.snapshot.limits = LimitBits::NONE;
         self.snapshot.settled = false;

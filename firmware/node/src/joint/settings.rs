@@ -4,7 +4,8 @@ use crate::JOINT_TICK;
 use crate::parameters::JointParameters;
 use crate::sensor::SensorConfig;
 use crate::supervisor::{SupervisionTimes, watchdog};
-use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains};
+use wheeleg_control::axis::AxisData;
+use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains, Law};
 use wheeleg_control::pwm::PwmTiming;
 use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
 use wheeleg_protocol::param::JointParam;
@@ -135,6 +136,32 @@ fn gains(parameters: &JointParameters) -> JointGains {
         stroke_min: position(P::StrokeMin),
         stroke_max: position(P::StrokeMax),
         pwm_period: micros(P::PwmPeriod),
+        law: usize::try_from(parameters.get(P::Law))
+            .ok()
+            .and_then(|number| Law::ALL.get(number).copied())
+            .unwrap_or_default(),
+        integral: gain(P::Integral),
+        derivative: gain(P::Derivative),
+        sliding_time: micros(P::SlidingTime),
+        axis: AxisData {
+            bore: position(P::Bore),
+            rod: position(P::Rod),
+            dead_a: position(P::DeadVolumeA),
+            dead_b: position(P::DeadVolumeB),
+            conductance: gain(P::Conductance),
+            critical_ratio: gain(P::CriticalRatio),
+            supply: position(P::SupplyPressure),
+            mass: position(P::MovingMass),
+            coulomb: position(P::FrictionCoulomb),
+            breakaway: position(P::FrictionBreakaway),
+            viscous: position(P::FrictionViscous),
+            valve_on: micros(P::ValveOn),
+            valve_off: micros(P::ValveOff),
+            margin: PULSE_MARGIN,
+            line_delay: micros(P::LineDelay),
+            band: position(P::RestBand),
+            stroke: position(P::StrokeMax),
+        },
     }
 }
 

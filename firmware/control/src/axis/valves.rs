@@ -1,0 +1,275 @@
+//! Following a valve from its coil to the chamber.
+//!
+//! The plant's valves open t_on after the coil rises and shut t_off after it
+//! falls; a pulse shorter than t_on never opens one, a gap shorter than t_off
+//! never shuts it. What the chamber sees comes later by the wave's way through
+//! the line. The same rules are followed here, in whole microseconds, on the
+//! on-times that were really sent.
+
+/// Time "never".
+const NEVER: i32 = i32::MAX;
+
+/// Changes that can be under way at once.
+const EDGES: usize = 4;
+
+/// Longest time that is counted since a coil changed, µs.
+const LONG: i32 = 1_000_000;
+
+/// Timing of the valves, µs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ValveTimes {
+    /// Control tick.
+    pub tick: i32,
+    /// Coil on to open, 0…50 000.
+    pub on: i32,
+    /// Coil off to shut, 0…50 000.
+    pub off: i32,
+    /// Wave's way through the line, 0…20 000.
+    pub line: i32,
+    /// Shortest pulse that is sent: t_on and a margin.
+    pub shortest_pulse: i32,
+    /// Shortest gap that is left: t_off and a margin.
+    pub shortest_gap: i32,
+}
+
+impl ValveTimes {
+    /// Opening of the shortest pulse, µs.
+    #[must_use]
+    pub const fn shortest_opening(&self) -> i32 {
+        self.shortest_pulse
+            .wrapping_sub(self.on)
+            .wrapping_add(self.off)
+    }
+}
+
+/// One valve as followed from its coil.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ValveTrack {
+    coil: bool,
+    open: bool,
+    /// Time until each change of the effect, oldest first.
+    edges: [i32; EDGES],
+    /// Time since the coil changed.
+    since: i32,
+}
+
+impl Default for ValveTrack {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ValveTrack {
+    /// Shut for a long time.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            coil: false,
+            open: false,
+            edges: [NEVER; EDGES],
+            since: LONG,
+        }
+    }
+
+    /// Whether the coil is on at the end of the ticks taken so far.
+    #[must_use]
+    pub const fn coil(&self) -> bool {
+        self.coil
+    }
+
+    /// Time since the coil changed, µs.
+    #[must_use]
+    pub const fn since(&self) -> i32 {
+        self.since
+    }
+
+    /// The coil changes `at` µs into the tick.
+    #[inline]
+    fn change(&mut self, at: i32, times: &ValveTimes) {
+        let lasted = self.since.wrapping_add(at);
+        let (took, delay) = if self.coil {
+            (times.on, times.off)
+        } else {
+            (times.off, times.on)
+        };
+        self.coil = !self.coil;
+        self.since = at.wrapping_neg();
+        // Called back before it moved: the change under way does not happen.
+        let under_way = self.edges.iter().take_while(|edge| **edge != NEVER).count();
+        if lasted < took
+            && let Some(last) = self.edges.get_mut(under_way.wrapping_sub(1))
+        {
+            *last = NEVER;
+        } else if let Some(next) = self.edges.get_mut(under_way) {
+            *next = at.wrapping_add(delay).wrapping_add(times.line);
+        } else {
+            // More changes than a line can hold: only the end is known.
+            self.edges = [NEVER; EDGES];
+            self.open = self.coil;
+        }
+    }
+
+    /// Takes the on-time of one tick, 0…tick µs from its edge; gives for how long
+    /// the chamber sees the valve open in that tick, µs.
+    #[inline]
+    pub fn advance(&mut self, on: i32, times: &ValveTimes) -> i32 {
+        if on > 0 && !self.coil {
+            self.change(0, times);
+        }
+        if on < times.tick && self.coil {
+            self.change(on, times);
+        }
+        self.since = self.since.wrapping_add(times.tick).min(LONG);
+        if !self.open && self.edges.first() == Some(&NEVER) {
+            return 0;
+        }
+        let opened = self.pass(times.tick);
+        for edge in &mut self.edges {
+            if *edge != NEVER {
+                *edge = edge.wrapping_sub(times.tick);
+            }
+        }
+        opened
+    }
+
+    /// Takes the changes within `span` µs; gives the time open.
+    #[inline]
+    fn pass(&mut self, span: i32) -> i32 {
+        let (mut opened, mut from) = (0_i32, 0_i32);
+        for _ in 0..EDGES {
+            let [first, second, third, fourth] = self.edges;
+            if first > span || first == NEVER {
+                break;
+            }
+            if self.open {
+                opened = opened.wrapping_add(first.wrapping_sub(from));
+            }
+            from = first;
+            self.open = !self.open;
+            self.edges = [second, third, fourth, NEVER];
+        }
+        if self.open {
+            opened = opened.wrapping_add(span.wrapping_sub(from));
+        }
+        opened
+    }
+
+    /// For how long the chamber will still see the valve open, if its coil falls
+    /// as soon as the shortest pulse allows, µs.
+    #[inline]
+    #[must_use]
+    pub fn committed(&self, times: &ValveTimes) -> i32 {
+        if !self.open && self.edges.first() == Some(&NEVER) {
+            return 0;
+        }
+        let mut ahead = *self;
+        if ahead.coil {
+            let left = times.shortest_pulse.wrapping_sub(self.since).max(0);
+            ahead.change(left, times);
+        }
+        ahead.pass(LONG.wrapping_sub(1))
+    }
+
+    /// On-time of the next tick for `need` µs of opening beyond what is
+    /// [`ValveTrack::committed`]; `rival` says that the chamber's other valve is on.
+    #[inline]
+    #[must_use]
+    pub fn on_time(&self, need: i32, rival: bool, times: &ValveTimes) -> i32 {
+        let shortest = times.shortest_opening();
+        let pulse = if self.coil {
+            let left = times.shortest_pulse.wrapping_sub(self.since).max(0);
+            // A few microseconds are not worth a tick.
+            if need < 20 {
+                left
+            } else {
+                left.saturating_add(need)
+            }
+        } else if !rival && self.since >= times.shortest_gap && need > shortest.wrapping_mul(5) >> 3
+        {
+            need.max(shortest)
+                .saturating_add(times.on)
+                .saturating_sub(times.off)
+                .max(times.shortest_pulse)
+        } else {
+            0
+        };
+        pulse.min(times.tick)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const TIMES: ValveTimes = ValveTimes {
+        tick: 1000,
+        on: 3500,
+        off: 2000,
+        line: 900,
+        shortest_pulse: 3850,
+        shortest_gap: 2350,
+    };
+
+    fn pulse(length: i32) -> [i32; 20] {
+        let mut track = ValveTrack::new();
+        let mut left = length;
+        core::array::from_fn(|_| {
+            let on = left.clamp(0, 1000);
+            left -= on;
+            track.advance(on, &TIMES)
+        })
+    }
+
+    #[test]
+    fn a_pulse_opens_for_its_length_less_on_plus_off_after_the_delay() {
+        let opened = pulse(5000);
+        assert_eq!(opened.iter().sum::<i32>(), 5000 - 3500 + 2000);
+        // Opens at 4.4 ms, shuts at 7.9 ms.
+        assert_eq!(opened[3], 0);
+        assert_eq!(opened[4], 600);
+        assert_eq!(opened[7], 900);
+    }
+
+    #[test]
+    fn a_pulse_below_t_on_opens_nothing_and_leaves_nothing_behind() {
+        assert_eq!(pulse(3400).iter().sum::<i32>(), 0);
+        let mut track = ValveTrack::new();
+        for on in [
+            1000, 1000, 0, 0, 0, 0, 1000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0,
+        ] {
+            track.advance(on, &TIMES);
+        }
+        assert!(!track.open && track.edges == [NEVER; EDGES]);
+    }
+
+    #[test]
+    fn a_gap_below_t_off_does_not_shut() {
+        let mut track = ValveTrack::new();
+        let mut opened = 0;
+        for on in [
+            1000, 1000, 1000, 1000, 1000, 1000, 500, 1000, 1000, 1000, 1000,
+        ] {
+            opened += track.advance(on, &TIMES);
+        }
+        assert_eq!(opened, 11_000 - 4400);
+    }
+
+    proptest! {
+        /// Whatever is sent, the end state follows the coil, and what was
+        /// committed is what the chamber then sees.
+        #[test]
+        fn commitment_is_kept(ticks in proptest::collection::vec(0_i32..=1000, 1..80)) {
+            let mut track = ValveTrack::new();
+            for on in ticks { track.advance(on, &TIMES); }
+            let committed = track.committed(&TIMES);
+            let mut seen = 0;
+            for _ in 0..40 {
+                let on = track.on_time(0, false, &TIMES);
+                seen += track.advance(on, &TIMES);
+            }
+            prop_assert_eq!(seen, committed);
+            prop_assert!(!track.coil && !track.open);
+        }
+    }
+}
