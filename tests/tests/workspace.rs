@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 16] = [
+const ARROWS: [(&str, &[&str]); 17] = [
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
     ("wheeleg-control", &["wheeleg-units"]),
@@ -53,6 +53,15 @@ const ARROWS: [(&str, &[&str]); 16] = [
             "wheeleg-node",
             "wheeleg-protocol",
             "wheeleg-sim",
+            "wheeleg-units",
+        ],
+    ),
+    (
+        "wheeleg-peers",
+        &[
+            "wheeleg-control",
+            "wheeleg-plant",
+            "wheeleg-protocol",
             "wheeleg-units",
         ],
     ),

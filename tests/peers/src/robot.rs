@@ -1,0 +1,56 @@
+//! Forward dynamics of whole robots: the reference tree of 14 coordinates, and the robot's own
+//! models.
+
+use std::hint::black_box;
+
+use wheeleg_plant::dynamics::chain::FloatingState;
+use wheeleg_plant::dynamics::chain::reference::{ROBOT14, robot_state};
+use wheeleg_plant::dynamics::{DynamicsError, RobotDynamics, RobotDynamicsParams};
+
+use crate::measure::{put_ns, repetitions, timed};
+
+#[inline(never)]
+fn robot_fd(
+    state: &FloatingState<8, 14>,
+    tau: &[f64; 14],
+    gravity: &[f64; 3],
+) -> Result<[f64; 14], DynamicsError> {
+    ROBOT14.forward(state, tau, gravity)
+}
+
+pub(crate) fn run() {
+    let (mut state, tau) = (robot_state(0.0), black_box([1.0; 14]));
+    let gravity = black_box([0.0, 0.0, -9.81]);
+    let repetitions = repetitions(60_000.0);
+    let mut sum = 0.0;
+    let took = timed(|| {
+        for r in 0..repetitions {
+            state.joints[0] = 1e-6 * r as f64;
+            let y = robot_fd(&state, &tau, &gravity);
+            sum += black_box(&y).as_ref().map_or(f64::NAN, |y| y[0]);
+        }
+    });
+    let check = format!("nv=14 sum={sum:.3}");
+    put_ns("robot_fd_14dof", "", took, repetitions, &check);
+    own_robot();
+}
+
+/// No reference: the robot on its wheel axle, eight coordinates, both legs with closed loops.
+fn own_robot() {
+    let Ok(robot) = RobotDynamics::new(&RobotDynamicsParams::wheeleg_2003()) else {
+        return;
+    };
+    let (qd, force) = ([0.1; 8], [1.0; 8]);
+    let mut q = [0.0, 0.0, 0.40, 0.10, 0.19, 0.40, 0.10, 0.19];
+    let repetitions = repetitions(60_000.0);
+    let mut sum = 0.0;
+    let took = timed(|| {
+        for r in 0..repetitions {
+            q[2] = 0.40 + 1e-7 * r as f64;
+            let y = robot.accelerations(&q, black_box(&qd), black_box(&force));
+            sum += black_box(&y).as_ref().map_or(f64::NAN, |y| y[0]);
+        }
+    });
+    let check = format!("nv=8 sum={sum:.3}");
+    put_ns("robot_fd_own_8dof", "", took, repetitions, &check);
+}
