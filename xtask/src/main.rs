@@ -5,6 +5,7 @@
 //! passed, failed, or was NOT RUN because a tool is missing; the last two both
 //! end the program with a non-zero status.
 
+mod conformance;
 mod fuzz;
 mod main_job;
 mod mcap;
@@ -47,6 +48,8 @@ enum Command {
     Vectors,
     /// Release build, then the main job twice in different folders: the hashes must be equal.
     MainJob,
+    /// The Rust and the Python implementation of the bus must agree, both ways.
+    Conformance,
     /// Fuzz the protocol, the boards, the master and the configuration files.
     Fuzz(fuzz::Options),
     /// Open the MCAP log of a run with the Python reader and check every channel.
@@ -71,6 +74,7 @@ fn main() -> ExitCode {
         Command::MainJob => {
             main_job::steps(&mut report);
         }
+        Command::Conformance => conformance::steps(&mut report),
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),
         Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
     }
@@ -91,6 +95,7 @@ fn test(report: &mut Report) {
     report.step("cargo test --workspace", rust::test);
     no_std::steps(report);
     vectors::steps(report);
+    conformance::steps(report);
     fuzz::short_steps(report);
     let run = main_job::steps(report);
     mcap::steps(report, run.as_deref());
