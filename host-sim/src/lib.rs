@@ -13,6 +13,7 @@ pub mod config;
 pub mod error;
 pub mod export;
 pub mod faults;
+pub mod hil;
 mod output;
 pub mod pil;
 pub mod report;
