@@ -5,6 +5,7 @@
 //! passed, failed, or was NOT RUN because a tool is missing; the last two both
 //! end the program with a non-zero status.
 
+mod bench;
 mod conformance;
 mod fuzz;
 mod main_job;
@@ -48,6 +49,8 @@ enum Command {
     Vectors,
     /// Release build, then the main job twice in different folders: the hashes must be equal.
     MainJob,
+    /// Our own code beside the C references: times, ratios, targets.
+    Bench(bench::Options),
     /// The Rust and the Python implementation of the bus must agree, both ways.
     Conformance,
     /// Fuzz the protocol, the boards, the master and the configuration files.
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
         Command::MainJob => {
             main_job::steps(&mut report);
         }
+        Command::Bench(options) => bench::steps(&mut report, &options),
         Command::Conformance => conformance::steps(&mut report),
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),
         Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
