@@ -1,0 +1,112 @@
+//! Times of the dynamics and of a plant step (criterion): `cargo bench -p wheeleg-plant`.
+//!
+//! For figures beside the C references in one run, and for instruction counts, see
+//! `cargo xtask bench`; for dated results `RESULTS.md`.
+
+use std::hint::black_box;
+
+use criterion::Criterion;
+use nalgebra::Vector3;
+use wheeleg_plant::dynamics::chain::ChainLeg;
+use wheeleg_plant::dynamics::chain::reference::{
+    GRAVITY_M_S2, ROBOT14, RPP, RPR, leg_states, robot_state,
+};
+use wheeleg_plant::dynamics::floating::{Contacts, FloatingParams, FloatingRobot, FloatingState};
+use wheeleg_plant::dynamics::noc::Leg;
+use wheeleg_plant::dynamics::{RobotDynamics, RobotDynamicsParams};
+use wheeleg_plant::testing::wheeleg_2003;
+use wheeleg_plant::{Inputs, Plant};
+
+const LENGTHS_M: [f64; 3] = [0.40, 0.10, 0.19];
+
+/// The reference legs, one state per call.
+fn reference_legs(c: &mut Criterion) {
+    let (rpp, rpr) = (
+        leg_states([true, false, false])[0],
+        leg_states([true, false, true])[0],
+    );
+    let g = GRAVITY_M_S2;
+    c.bench_function("leg_id_rpp", |b| {
+        b.iter(|| RPP.inverse(black_box(&rpp.q), &rpp.v, &rpp.a, &g));
+    });
+    c.bench_function("leg_id_rpr", |b| {
+        b.iter(|| RPR.inverse(black_box(&rpr.q), &rpr.v, &rpr.a, &g));
+    });
+    c.bench_function("leg_fd_rpp", |b| {
+        b.iter(|| RPP.forward(black_box(&rpp.q), &rpp.v, &rpp.a, &g));
+    });
+    c.bench_function("leg_fd_rpr", |b| {
+        b.iter(|| RPR.forward(black_box(&rpr.q), &rpr.v, &rpr.a, &g));
+    });
+}
+
+/// The robot's own leg: chain engine, and the readable reference that it is tested against.
+fn own_leg(c: &mut Criterion) {
+    let p = RobotDynamicsParams::wheeleg_2003();
+    let viscous = [20.0, 15.0, 15.0];
+    let chain = ChainLeg::new(p.leg_parameters(), &p.leg_bodies, viscous).expect("chain leg");
+    let noc = Leg::new(p.leg_parameters(), &p.leg_bodies, viscous).expect("leg");
+    let (q, v, a, f) = (
+        LENGTHS_M,
+        [0.1, -0.2, 0.3],
+        [1.0, -2.0, 3.0],
+        [1.0, 2.0, 60.0],
+    );
+    let g = GRAVITY_M_S2;
+    c.bench_function("leg_id_own", |b| {
+        b.iter(|| chain.inverse(black_box(&q), &v, &a, &g, &f));
+    });
+    c.bench_function("leg_fd_own", |b| {
+        b.iter(|| chain.forward(black_box(&q), &v, &a, &g, &f));
+    });
+    let vectors = [q, v, a, g, f].map(Vector3::from);
+    c.bench_function("leg_id_own_noc", |b| {
+        let [q, v, a, g, f] = &vectors;
+        b.iter(|| noc.at(black_box(q), v)?.inverse(a, g, f));
+    });
+    c.bench_function("leg_fd_own_noc", |b| {
+        let [q, v, a, g, f] = &vectors;
+        b.iter(|| noc.at(black_box(q), v)?.forward(a, g, f));
+    });
+}
+
+/// Whole robots: reference tree, model on its wheel axle, model with a floating chassis.
+fn robots(c: &mut Criterion) {
+    let state = robot_state(0.1);
+    c.bench_function("robot_fd_14dof", |b| {
+        b.iter(|| ROBOT14.forward(black_box(&state), &[1.0; 14], &[0.0, 0.0, -9.81]));
+    });
+    let axle = RobotDynamics::new(&RobotDynamicsParams::wheeleg_2003()).expect("robot");
+    let [b2, b5, b6] = LENGTHS_M;
+    let q = [0.0, 0.0, b2, b5, b6, b2, b5, b6];
+    c.bench_function("robot_fd_own_8dof", |b| {
+        b.iter(|| axle.accelerations(black_box(&q), &[0.1; 8], &[1.0; 8]));
+    });
+    let floating = FloatingRobot::new(&FloatingParams::wheeleg_2003()).expect("floating robot");
+    let state = FloatingState::at_rest([LENGTHS_M; 2]);
+    let force = nalgebra::SVector::<f64, 14>::repeat(1.0);
+    let (down, contacts) = (Vector3::new(0.0, 0.0, -9.81), Contacts::default());
+    c.bench_function("robot_fd_own_14dof", |b| {
+        b.iter(|| floating.forward(black_box(&state), &force, &down, &contacts));
+    });
+}
+
+/// One joint tick of the whole plant, 1 ms: six cylinders, robot, contact, motors, sensors.
+fn plant_tick(c: &mut Criterion) {
+    let plant = Plant::new(&wheeleg_2003()).expect("plant");
+    let start = plant.initial_state(1).expect("state");
+    let inputs = Inputs::default();
+    c.bench_function("plant_tick_1ms", |b| {
+        let mut state = start.clone();
+        b.iter(|| plant.tick(&mut state, black_box(&inputs)));
+    });
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    reference_legs(&mut criterion);
+    own_leg(&mut criterion);
+    robots(&mut criterion);
+    plant_tick(&mut criterion);
+    criterion.final_summary();
+}
