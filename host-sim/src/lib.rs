@@ -16,6 +16,7 @@ pub mod faults;
 pub mod hil;
 mod output;
 pub mod pil;
+pub mod figures;
 pub mod report;
 pub mod run;
 pub mod sil;

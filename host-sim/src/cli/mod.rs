@@ -2,6 +2,7 @@
 
 mod channels;
 mod check;
+mod figures;
 mod export;
 mod faults;
 mod list;
@@ -50,6 +51,8 @@ enum Command {
     Channels(channels::ChannelsArgs),
     /// Write the robot for other programs.
     Export(export::ExportArgs),
+    /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
+    Figures(figures::FiguresArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
 }
@@ -65,6 +68,7 @@ pub fn main() -> ExitCode {
         Some(Command::Params(args)) => params::command(&args),
         Some(Command::Channels(args)) => channels::command(&args),
         Some(Command::Export(args)) => export::command(&args),
+        Some(Command::Figures(args)) => figures::command(&args),
         Some(Command::Check(args)) => check::command(&args),
     };
     result.unwrap_or_else(|error| {

@@ -11,6 +11,13 @@ use crate::telemetry::{EventSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
 
+/// The style sheet of the report, for other pages of the program.
+pub(crate) fn style() -> &'static str {
+    let from = TEMPLATE.split_once("<style>");
+    let sheet = from.and_then(|(_, rest)| rest.split_once("</style>"));
+    sheet.map_or("", |(sheet, _)| sheet)
+}
+
 /// Events as lines of a table: time, kind, text. What several boards report at
 /// the same time in the same words becomes one line that names them all.
 fn grouped(events: &[Row<EventSample>]) -> Vec<(f64, &str, String)> {
@@ -163,6 +170,12 @@ pub(super) fn render(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_style_sheet_is_found() {
+        assert!(style().contains("--bg"));
+        assert!(!style().contains('<'));
+    }
 
     #[test]
     fn boards_that_say_the_same_share_a_line() {

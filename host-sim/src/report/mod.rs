@@ -2,9 +2,10 @@
 
 mod figures;
 mod html;
-mod plot;
+pub(crate) mod plot;
 mod summary;
 
+pub(crate) use html::style;
 pub use summary::{RunInfo, Summary};
 
 use std::path::{Path, PathBuf};
@@ -58,7 +59,7 @@ pub fn write(
     Ok(path)
 }
 
-fn subfolder(folder: &Path, name: &str) -> Result<PathBuf, SimError> {
+pub(crate) fn subfolder(folder: &Path, name: &str) -> Result<PathBuf, SimError> {
     let path = folder.join(name);
     std::fs::create_dir_all(&path).map_err(|e| SimError::output("create the folder", &path, e))?;
     Ok(path)

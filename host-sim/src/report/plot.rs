@@ -23,6 +23,22 @@ pub(crate) mod colour {
     pub(crate) const SECOND: RGBColor = RGBColor(0x12, 0x8A, 0x6B);
     pub(crate) const THIRD: RGBColor = RGBColor(0x8A, 0x4F, 0xBE);
     pub(crate) const LIMIT: RGBColor = RGBColor(0xC2, 0x2E, 0x3A);
+    /// From light (0) over blue to dark violet (1), for maps.
+    pub(crate) fn heat(share: f64) -> RGBColor {
+        const STOPS: [[f64; 3]; 3] = [
+            [236.0, 241.0, 247.0],
+            [31.0, 111.0, 196.0],
+            [74.0, 20.0, 92.0],
+        ];
+        let at = 2.0 * share.clamp(0.0, 1.0);
+        let (from, to, part) = if at < 1.0 {
+            (STOPS[0], STOPS[1], at)
+        } else {
+            (STOPS[1], STOPS[2], at - 1.0)
+        };
+        let mixed = |i: usize| (from[i] + (to[i] - from[i]) * part).round() as u8;
+        RGBColor(mixed(0), mixed(1), mixed(2))
+    }
     /// One colour per axis, joints 1 to 6, then wheels.
     pub(crate) const AXES: [RGBColor; 8] = [
         RGBColor(0x8A, 0x4F, 0xBE),
@@ -71,6 +87,26 @@ pub(crate) enum Content {
     Raster {
         rows: Vec<RasterRow>,
     },
+    /// Lines over anything but time.
+    Curves {
+        series: Vec<Series>,
+        limits: Vec<Limit>,
+        x_label: String,
+        y_label: String,
+        y_range: (f64, f64),
+    },
+    /// A map: one colour per cell.
+    Heat(Heat),
+}
+
+/// Cells of a map, from the lower left, row by row upwards.
+pub(crate) struct Heat {
+    pub(crate) columns: usize,
+    pub(crate) values: Vec<f64>,
+    pub(crate) y_range: (f64, f64),
+    pub(crate) x_label: String,
+    /// What the colours mean, with the unit.
+    pub(crate) legend: String,
 }
 
 /// One panel of a figure.
@@ -101,6 +137,7 @@ const FONT: &str = "sans-serif";
 const TITLE_HEIGHT: u32 = 26;
 const AXIS_HEIGHT: u32 = 40;
 const LEFT: u32 = 72;
+const TIME: &str = "time [s]";
 
 /// Makes the built-in font known to the drawing library, so that figures need
 /// no font of the machine.
@@ -194,8 +231,16 @@ impl Panel {
                 limits,
                 y_range,
                 ..
-            } => self.lines(&body, scale, axis_px, series, limits, *y_range),
+            } => self.lines(&body, scale, (axis_px, TIME), series, limits, *y_range),
             Content::Raster { rows } => self.raster(&body, scale, axis_px, rows),
+            Content::Curves {
+                series,
+                limits,
+                x_label,
+                y_range,
+                ..
+            } => self.lines(&body, scale, (axis_px, x_label), series, limits, *y_range),
+            Content::Heat(heat) => self.heat(&body, scale, axis_px, heat),
         }
     }
 
@@ -210,12 +255,15 @@ impl Panel {
         let title = style(15);
         let y = 6 * s;
         let words = match &self.content {
-            Content::Lines { y_label, .. } => format!("{} {y_label}", self.title),
+            Content::Lines { y_label, .. } | Content::Curves { y_label, .. } => {
+                format!("{} {y_label}", self.title)
+            }
             Content::Raster { .. } => self.title.clone(),
+            Content::Heat(heat) => format!("{}: {}", self.title, heat.legend),
         };
         head.draw_text(&words, &title, (LEFT as i32 * s, y))
             .map_err(text)?;
-        let Content::Lines { series, .. } = &self.content else {
+        let (Content::Lines { series, .. } | Content::Curves { series, .. }) = &self.content else {
             return Ok(());
         };
         let (width, _) = head.estimate_text_size(&words, &title).map_err(text)?;
@@ -239,7 +287,7 @@ impl Panel {
         &self,
         body: &DrawingArea<B, Shift>,
         scale: u32,
-        axis_px: u32,
+        (axis_px, x_label): (u32, &str),
         series: &[Series],
         limits: &[Limit],
         (y0, y1): (f64, f64),
@@ -265,7 +313,7 @@ impl Panel {
             .y_label_formatter(&|v| tick(*v))
             .x_label_formatter(&|v| tick(*v));
         if axis_px > 0 {
-            mesh.x_desc("time [s]");
+            mesh.x_desc(x_label);
         }
         mesh.draw().map_err(text)?;
         let clamp = |y: f64| y.clamp(y0, y1);
@@ -382,6 +430,54 @@ impl Panel {
                 .map_err(text)?;
         }
         Ok(())
+    }
+}
+
+impl Panel {
+    fn heat<B: DrawingBackend>(
+        &self,
+        body: &DrawingArea<B, Shift>,
+        scale: u32,
+        axis_px: u32,
+        heat: &Heat,
+    ) -> Result<(), String> {
+        let ((x0, x1), (y0, y1)) = (self.x_range, heat.y_range);
+        let mut chart = ChartBuilder::on(body)
+            .margin_right(14 * scale)
+            .margin_top(3 * scale)
+            .margin_bottom(5 * scale)
+            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
+            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
+            .build_cartesian_2d(x0..x1, y0..y1)
+            .map_err(text)?;
+        let columns = heat.columns.max(1);
+        let rows = heat.values.len().div_ceil(columns).max(1);
+        let largest = heat.values.iter().copied().fold(0.0, f64::max);
+        let step = ((x1 - x0) / columns as f64, (y1 - y0) / rows as f64);
+        for (i, value) in heat.values.iter().enumerate() {
+            let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+            let corner = (x0 + column * step.0, y0 + row * step.1);
+            let share = if largest > 0.0 { value / largest } else { 0.0 };
+            let cell = Rectangle::new(
+                [corner, (corner.0 + step.0, corner.1 + step.1)],
+                colour::heat(share).filled(),
+            );
+            chart.draw_series(std::iter::once(cell)).map_err(text)?;
+        }
+        let font = (FONT, 13 * scale).into_font().color(&colour::INK);
+        let mut mesh = chart.configure_mesh();
+        mesh.disable_mesh()
+            .axis_style(colour::INK.stroke_width(scale))
+            .label_style(font.clone())
+            .axis_desc_style(font)
+            .x_labels(11)
+            .y_labels((self.height / 28).clamp(3, 11) as usize)
+            .y_label_formatter(&|v| tick(*v))
+            .x_label_formatter(&|v| tick(*v));
+        if axis_px > 0 {
+            mesh.x_desc(heat.x_label.as_str());
+        }
+        mesh.draw().map_err(text)
     }
 }
 

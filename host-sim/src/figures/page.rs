@@ -1,0 +1,102 @@
+//! The page: one self-contained file in the style of a run's report.
+
+use minijinja::{Environment, Value, context};
+
+use super::Results;
+use super::audit::Status;
+use super::charts::short;
+use super::precision::LIMIT_M;
+use crate::SimError;
+use crate::report::{plot::Figure, style};
+
+const TEMPLATE: &str = include_str!("page.html");
+
+pub(super) fn render(results: &Results, figures: &[(Figure, String)]) -> Result<String, SimError> {
+    let mut env = Environment::new();
+    env.add_template("page.html", TEMPLATE)?;
+    let pictures: Vec<Value> = figures
+        .iter()
+        .map(|(figure, svg)| {
+            context! {
+                id => &*figure.id,
+                title => &*figure.title,
+                short => figure.title.split(':').next(),
+                caption => &*figure.caption,
+                svg => Value::from_safe_string(svg.clone()),
+            }
+        })
+        .collect();
+    let axes: Vec<Value> = results
+        .checks
+        .iter()
+        .map(|c| {
+            context! {
+                id => c.id,
+                figure => c.figure,
+                reading => c.reading,
+                quantity => c.quantity,
+                unit => c.unit,
+                axis => format!("{} to {}", short(c.axis_min), short(c.axis_max)),
+                computed => format!("{} to {}", short(c.min), short(c.max)),
+                fits => c.fits,
+            }
+        })
+        .collect();
+    let endless = |v: Option<f64>| v.map_or_else(|| "not finite".to_owned(), short);
+    let triple = |v: [f64; 3]| v.map(short).join(", ");
+    let misprints: Vec<Value> = results
+        .misprints
+        .iter()
+        .map(|m| {
+            context! {
+                equation => m.equation,
+                status => match m.status {
+                    Status::Wrong => "wrong",
+                    Status::Home => "right at home only",
+                    Status::Ambiguous => "ambiguous",
+                    Status::Singular => "0/0 at home",
+                },
+                class => if m.status == Status::Wrong { "fail" } else { "info" },
+                printed => m.printed,
+                corrected => m.corrected,
+                component => m.component,
+                unit => m.unit,
+                worst => endless(m.worst),
+                printed_value => endless(m.printed_value),
+                corrected_value => short(m.corrected_value),
+                lengths => triple(m.lengths_m),
+                rates => triple(m.rates_m_s),
+                accelerations => triple(m.accelerations_m_s2),
+                share => format!("{:.0} %", 1e2 * m.differing_share),
+                at_home => endless(m.at_home),
+                in_figures => endless(m.in_figures),
+            }
+        })
+        .collect();
+    let map = &results.precision;
+    Ok(env.get_template("page.html")?.render(context! {
+        style => Value::from_safe_string(style().to_owned()),
+        version => env!("CARGO_PKG_VERSION"),
+        figures => pictures,
+        axes => axes,
+        misprints => misprints,
+        equations => results
+            .misprints
+            .iter()
+            .map(|m| m.equation)
+            .collect::<std::collections::BTreeSet<_>>()
+            .len(),
+        argument_fits => fitting(results, "argument"),
+        literal_fits => fitting(results, "literal"),
+        worst_um => short(1e6 * map.worst_m()),
+        precise => map.worst_m() < LIMIT_M,
+        poses => map.poses,
+    })?)
+}
+
+/// "8 of 10" axes of a reading.
+fn fitting(results: &Results, reading: &str) -> String {
+    let rows = results.checks.iter().filter(|c| c.reading == reading);
+    let fits = rows.clone().filter(|c| c.fits).count();
+    format!("{fits} of {}", rows.count())
+}
