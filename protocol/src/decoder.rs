@@ -131,11 +131,39 @@ impl Decoder {
         bytes: &[u8],
         mut visit: impl FnMut(Result<Frame<'_>, FrameError>),
     ) {
-        for &byte in bytes {
+        let mut rest = bytes;
+        loop {
+            let run = self.take_run(rest);
+            rest = rest.get(run..).unwrap_or_default();
+            let Some((&byte, tail)) = rest.split_first() else {
+                return;
+            };
+            rest = tail;
             if let Some(result) = self.push(byte) {
                 visit(result);
             }
         }
+    }
+
+    /// Stores the data bytes of the present COBS block that come next, as far as
+    /// there is room; gives their number. What [`Self::push`] would do with
+    /// them, at once.
+    fn take_run(&mut self, bytes: &[u8]) -> usize {
+        if self.owed == 0 || self.discarding {
+            return 0;
+        }
+        let room = self.buffer.get_mut(self.len..).unwrap_or_default();
+        let mut run = 0_usize;
+        for (place, &byte) in room.iter_mut().zip(bytes).take(self.owed) {
+            if byte == DELIMITER {
+                break;
+            }
+            *place = byte;
+            run = run.saturating_add(1);
+        }
+        self.len = self.len.saturating_add(run);
+        self.owed = self.owed.saturating_sub(run);
+        run
     }
 
     /// Frames and errors seen so far.

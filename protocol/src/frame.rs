@@ -55,11 +55,18 @@ pub const fn encoded_len(payload_len: usize) -> usize {
     payload_len.saturating_add(HEADER_LEN + CRC_LEN + 3)
 }
 
-/// CRC-32C with one 256-entry table: 1 KiB of flash, one look-up per byte.
+/// Tables of the CRC-32C. One 256-entry table is 1 KiB of flash and one look-up
+/// per byte.
 ///
 /// The crate offers no table (eight steps per byte: too slow for a 1 MBd line on
-/// a small core), one, or sixteen (16 KiB: a third of a joint image).
-static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
+/// a small core), one, or sixteen (16 KiB: a third of a joint image, but sixteen
+/// bytes at a time: for a host, feature `wide-crc`).
+#[cfg(not(feature = "wide-crc"))]
+type Tables = Table<1>;
+#[cfg(feature = "wide-crc")]
+type Tables = Table<16>;
+
+static CRC: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISCSI);
 
 /// CRC-32C of a byte string.
 #[must_use]
@@ -192,43 +199,45 @@ pub fn encode<'a>(
         len_low,
         len_high,
     ];
-    let mut digest = CRC.digest();
-    digest.update(&head);
-    digest.update(payload);
-    let crc = digest.finalize().to_le_bytes();
-
     let total = encoded_len(payload.len());
     let out = out.get_mut(..total).ok_or(EncodeError::BufferTooSmall)?;
-    let bytes = head.iter().chain(payload).chain(&crc);
-    cobs_into(bytes, out);
+    // The slice has exactly this length, so the pieces below are always there.
+    seal(&head, payload, out).ok_or(EncodeError::BufferTooSmall)?;
     Ok(out)
 }
 
-/// Writes delimiter, COBS and delimiter. `out` has room for exactly that, and
-/// the input is shorter than one COBS block (const assertion above).
-fn cobs_into<'a>(bytes: impl Iterator<Item = &'a u8>, out: &mut [u8]) {
-    let mut code_at = 1_usize;
+/// Fills `out` with delimiter, COBS code, header, payload, CRC and delimiter;
+/// `None` if it is shorter than that.
+fn seal(head: &[u8; HEADER_LEN], payload: &[u8], out: &mut [u8]) -> Option<()> {
+    let (first, rest) = out.split_first_mut()?;
+    let (last, rest) = rest.split_last_mut()?;
+    (*first, *last) = (DELIMITER, DELIMITER);
+    let (code, frame) = rest.split_first_mut()?;
+    let (body, crc) = frame.split_last_chunk_mut::<CRC_LEN>()?;
+    let (head_place, payload_place) = body.split_first_chunk_mut::<HEADER_LEN>()?;
+    *head_place = *head;
+    for (place, byte) in payload_place.iter_mut().zip(payload) {
+        *place = *byte;
+    }
+    *crc = checksum(body).to_le_bytes();
+    *code = cobs_in_place(frame);
+    Some(())
+}
+
+/// COBS in place: every zero becomes the code of the block behind it; gives the
+/// code of the first block. The frame is shorter than one COBS block (const
+/// assertion above), so no code is added in between.
+fn cobs_in_place(frame: &mut [u8]) -> u8 {
     let mut code = 1_u8;
-    let mut at = 2_usize;
-    let mut put = |index: usize, value: u8| {
-        if let Some(place) = out.get_mut(index) {
-            *place = value;
-        }
-    };
-    put(0, DELIMITER);
-    for &byte in bytes {
-        if byte == 0 {
-            put(code_at, code);
-            code_at = at;
+    for byte in frame.iter_mut().rev() {
+        if *byte == 0 {
+            *byte = code;
             code = 1;
         } else {
-            put(at, byte);
             code = code.wrapping_add(1);
         }
-        at = at.saturating_add(1);
     }
-    put(code_at, code);
-    put(at, DELIMITER);
+    code
 }
 
 impl<'a> Frame<'a> {
