@@ -169,11 +169,8 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         for i in 0..C {
             let model = &self.cylinders[i];
             let cylinder = &mut state.cylinders[i];
-            cylinder.bristle_m =
-                model
-                    .params
-                    .friction
-                    .advance_bristle_m(cylinder.bristle_m, middle[i], h);
+            let friction = model.friction(model.pressures_pa(cylinder, after[i]));
+            cylinder.bristle_m = friction.advance_bristle_m(cylinder.bristle_m, middle[i], h);
             net[i] = model.forces(cylinder, after[i], predicted[i]).net_n();
         }
         mechanics.evaluate(&mut state.motion, &net, h)?;

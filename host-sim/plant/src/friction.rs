@@ -34,6 +34,10 @@ pub struct FrictionParams {
     pub bristle_damping_n_s_m: f64,
     /// Share of z_ss below which presliding is purely elastic \[-\], 0..0.95.
     pub elastic_share: f64,
+    /// Growth of Fc with the higher of the two chamber pressures above ambient
+    /// \[N/Pa = m²\], 0..1e-3; Fs grows in proportion. 0: friction does not depend on
+    /// pressure. A lip seal is pressed on by what it seals.
+    pub pressure_area_m2: f64,
 }
 
 impl FrictionParams {
@@ -58,7 +62,29 @@ impl FrictionParams {
             0.0,
             2000.0,
         )?;
-        check("friction.elastic_share", self.elastic_share, 0.0, 0.95)
+        check("friction.elastic_share", self.elastic_share, 0.0, 0.95)?;
+        check(
+            "friction.pressure_area_m2",
+            self.pressure_area_m2,
+            0.0,
+            1e-3,
+        )
+    }
+
+    /// The friction with `gauge_pa` as the higher chamber pressure above ambient.
+    /// Bristles break at the same deflection: stiffness grows with the force.
+    #[must_use]
+    pub fn under_pressure(&self, gauge_pa: f64) -> Self {
+        if self.pressure_area_m2 <= 0.0 || self.coulomb_n <= 0.0 {
+            return *self;
+        }
+        let grown = 1.0 + self.pressure_area_m2 * gauge_pa.max(0.0) / self.coulomb_n;
+        Self {
+            coulomb_n: self.coulomb_n * grown,
+            static_n: self.static_n * grown,
+            bristle_stiffness_n_m: self.bristle_stiffness_n_m * grown,
+            ..*self
+        }
     }
 
     /// Largest steady bristle deflection z_ss at speed `v` \[m\] and its inverse.
@@ -230,6 +256,21 @@ mod tests {
             force > 0.97 * f.static_n && force < 1.05 * f.static_n,
             "{force}"
         );
+    }
+
+    #[test]
+    fn pressure_raises_both_limits_alike() {
+        let f = FrictionParams {
+            pressure_area_m2: 1e-5,
+            ..seal_friction()
+        };
+        let g = f.under_pressure(5e5);
+        assert!((g.coulomb_n - 15.0).abs() < 1e-12 && (g.static_n - 22.5).abs() < 1e-12);
+        assert_eq!(f.under_pressure(-1e5), f.under_pressure(0.0));
+        // A piston held at 20 N slides without the pressure and sticks with it.
+        assert!(drag(&f, 1.5, |_| 20.0, 1.0)[0] > 0.05);
+        let held = drag(&g, 1.5, |t| 20.0 * (t / 0.2).min(1.0), 1.0);
+        assert!(held[0] < 1e-3, "{}", held[0]);
     }
 
     #[test]

@@ -50,6 +50,7 @@ pub fn seal_friction() -> FrictionParams {
         bristle_stiffness_n_m: 1e5,   // N/m ASSUMED
         bristle_damping_n_s_m: 500.0, // N s/m ASSUMED
         elastic_share: 0.7,           // - ASSUMED (Dupont et al. 2002)
+        pressure_area_m2: 0.0,        // m2 ASSUMED: not selected
     }
 }
 

@@ -68,7 +68,7 @@ fn is_path(name_or_path: &str) -> bool {
 
 /// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
 /// holds a path separator is a path.
-fn find(
+pub(super) fn find(
     kind: &str,
     name_or_path: &str,
     builtin: &[(&str, &str, &str)],

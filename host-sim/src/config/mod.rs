@@ -1,6 +1,7 @@
 //! Robots and scenarios: TOML files in which every parameter has a value, a
 //! unit and a source, checked against one table of allowed units and ranges.
 
+pub mod axis;
 pub mod builtin;
 mod error;
 mod node;
@@ -12,6 +13,7 @@ mod robot;
 mod scenario;
 mod suggest;
 
+pub use axis::AxisConfig;
 pub use error::{ConfigError, Problem};
 pub use node::NodeParams;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};

@@ -54,7 +54,7 @@ const LINKS: [&str; 6] = [
     "vertical_rod",
 ];
 
-fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {
+pub(super) fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {
     Iso6358 {
         conductance_m3_s_pa: c,
         critical_ratio: b,
@@ -142,7 +142,7 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
     })
 }
 
-fn gas_params(s: &GasSection) -> GasParams {
+pub(super) fn gas_params(s: &GasSection) -> GasParams {
     GasParams {
         gas_constant_j_kg_k: s.gas_constant,
         heat_capacity_ratio: s.heat_capacity_ratio,
@@ -154,7 +154,7 @@ fn gas_params(s: &GasSection) -> GasParams {
     }
 }
 
-fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection) -> SupplyParams {
+pub(super) fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection) -> SupplyParams {
     SupplyParams {
         source_pressure_pa: s.source_pressure,
         set_pressure_pa: s.set_pressure,
@@ -173,7 +173,7 @@ fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection
     }
 }
 
-fn cylinder_params(
+pub(super) fn cylinder_params(
     c: &CylinderSection,
     line: &LineSection,
     fill: &ValveSection,
@@ -212,6 +212,8 @@ fn cylinder_params(
             bristle_stiffness_n_m: f.bristle_stiffness,
             bristle_damping_n_s_m: f.bristle_damping,
             elastic_share: f.elastic_share,
+            // Not selected for the robot.
+            pressure_area_m2: 0.0,
         },
         end_stop: EndStopParams {
             stiffness_n_m: e.stiffness,
@@ -284,7 +286,7 @@ fn contact_params(s: &ContactSection) -> ContactParams {
     }
 }
 
-fn potentiometer_params(s: &PotentiometerSection) -> PotentiometerParams {
+pub(super) fn potentiometer_params(s: &PotentiometerSection) -> PotentiometerParams {
     PotentiometerParams {
         electrical_stroke_m: s.electrical_stroke,
         offset_m: s.offset,
@@ -293,7 +295,7 @@ fn potentiometer_params(s: &PotentiometerSection) -> PotentiometerParams {
     }
 }
 
-fn adc_params(s: &AdcSection) -> AdcParams {
+pub(super) fn adc_params(s: &AdcSection) -> AdcParams {
     AdcParams {
         bits: s.bits,
         oversampling: s.oversampling,

@@ -59,6 +59,8 @@ pub enum Dimension {
     Inductance,
     /// Torque constant of a motor.
     TorqueConstant,
+    /// Heat transfer coefficient.
+    HeatTransfer,
     /// Specific gas constant or heat capacity.
     SpecificHeat,
 }
@@ -98,6 +100,7 @@ impl Dimension {
             Self::Resistance => &[("ohm", 1.0), ("kohm", 1e3)],
             Self::Inductance => &[("H", 1.0), ("mH", 1e-3), ("uH", 1e-6)],
             Self::TorqueConstant => &[("N m/A", 1.0), ("mN m/A", 1e-3)],
+            Self::HeatTransfer => &[("W/(m2 K)", 1.0)],
             Self::SpecificHeat => &[("J/(kg K)", 1.0), ("kJ/(kg K)", 1e3)],
         }
     }

@@ -4,6 +4,7 @@ use super::{CylinderParams, CylinderState};
 use crate::chamber::{ChamberRates, ChamberState, Content, GasModel};
 use crate::error::{PlantError, check_state};
 use crate::flow::{GasParams, Restrictor, leak_kg_s};
+use crate::friction::FrictionParams;
 use crate::valve::{NEVER_NS, ValveParams, ValveState, ValveTiming};
 
 /// Net forces on one piston, all positive extending \[N\].
@@ -235,6 +236,15 @@ impl CylinderModel {
             - self.gas.ambient_pressure_pa * self.rod_area_m2
     }
 
+    /// Seal friction at the chamber pressures.
+    #[must_use]
+    #[inline]
+    pub fn friction(&self, pressures_pa: [f64; 2]) -> FrictionParams {
+        let [a, b] = pressures_pa;
+        let gauge_pa = a.max(b) - self.gas.ambient_pressure_pa;
+        self.params.friction.under_pressure(gauge_pa)
+    }
+
     /// All forces on the piston at a position and speed.
     #[must_use]
     #[inline]
@@ -242,7 +252,7 @@ impl CylinderModel {
         let [a, b] = self.pressures_pa(state, stroke_m);
         CylinderForces {
             pressure_n: self.pressure_force_n(a, b),
-            friction_n: -self.params.friction.force_n(state.bristle_m, v_m_s),
+            friction_n: -self.friction([a, b]).force_n(state.bristle_m, v_m_s),
             end_stop_n: self
                 .params
                 .end_stop

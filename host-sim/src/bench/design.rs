@@ -1,0 +1,244 @@
+//! Gains from the data of an axis.
+//!
+//! Nothing here is tuned to a plant: every gain of every law follows from bore,
+//! stroke, volumes, valve, mass and delays by the same rules. The rules for the
+//! usual laws are stated beside each; the predictive law's own are in
+//! [`wheeleg_control::axis::AxisModel::new`].
+
+use wheeleg_control::axis::AxisData;
+use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
+use wheeleg_node::sensor::SensorConfig;
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
+
+use super::firmware::Design;
+
+/// A controller of the comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Full push or pull outside a dead band.
+    OnOff,
+    /// PWM, proportional.
+    PwmP,
+    /// PWM, PID.
+    PwmPid,
+    /// The paper's P + fuzzy PD.
+    FuzzyPd,
+    /// P + fuzzy ID.
+    FuzzyId,
+    /// Sliding mode on seven valve modes.
+    Sliding,
+    /// Estimated pressures, dead time ahead; the default.
+    Predictive,
+}
+
+impl Kind {
+    /// All of them, simple to best.
+    pub const ALL: [Self; 7] = [
+        Self::OnOff,
+        Self::PwmP,
+        Self::PwmPid,
+        Self::FuzzyPd,
+        Self::FuzzyId,
+        Self::Sliding,
+        Self::Predictive,
+    ];
+
+    /// Name in reports and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OnOff => "on-off",
+            Self::PwmP => "pwm-p",
+            Self::PwmPid => "pwm-pid",
+            Self::FuzzyPd => "fuzzy-pd",
+            Self::FuzzyId => "fuzzy-id",
+            Self::Sliding => "sliding",
+            Self::Predictive => "predictive",
+        }
+    }
+
+    /// The controller of a name.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// What the designer knows of an axis: its data sheet. Load, and what differs
+/// from the data sheet, it does not know.
+#[derive(Debug, Clone, Copy)]
+struct Facts {
+    /// Stroke \[mm\].
+    stroke_mm: f64,
+    /// Speed of the piston at a choked outlet, slower side \[mm/s\].
+    speed_mm_s: f64,
+    /// Tick, t_on and line \[s\].
+    dead_time_s: f64,
+    /// Shortest opening over PWM period \[-\].
+    shortest_duty: f64,
+    /// PWM period \[s\].
+    period_s: f64,
+}
+
+/// The design of a controller for an axis.
+#[must_use]
+pub fn design(axis: &AxisParams, kind: Kind) -> Design {
+    let data = axis_data(axis);
+    let facts = facts(axis, &data);
+    Design {
+        gains: gains(&data, &facts, kind),
+        correction: if kind == Kind::FuzzyId {
+            Correction::Id
+        } else {
+            Correction::Pd
+        },
+        sensor: sensor(axis),
+    }
+}
+
+/// The axis's data sheet in the formats of the board.
+#[must_use]
+pub fn axis_data(axis: &AxisParams) -> AxisData {
+    let c = &axis.cylinder;
+    let mm = |metres: f64| PositionMm::from_f64(metres * 1e3);
+    let micros = |seconds: f64| Micros((seconds * 1e6).round() as u32);
+    let path = match &c.line_flow {
+        Some(line) => c.fill_valve.flow.in_series(line),
+        None => c.fill_valve.flow,
+    };
+    let gain = |value: f64| Gain::saturating_from_num(value);
+    let lsb_m = axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits);
+    AxisData {
+        bore: mm(c.bore_m),
+        rod: mm(c.rod_m),
+        dead_a: PositionMm::from_f64((c.dead_volume_a_m3 + c.line_volume_m3) * 1e6),
+        dead_b: PositionMm::from_f64((c.dead_volume_b_m3 + c.line_volume_m3) * 1e6),
+        conductance: gain(path.conductance_m3_s_pa * 1e8),
+        critical_ratio: gain(path.critical_ratio),
+        supply: PositionMm::from_f64(axis.supply.set_pressure_pa * 1e-3),
+        mass: PositionMm::from_f64(axis.moving_mass_kg),
+        coulomb: PositionMm::from_f64(c.friction.coulomb_n),
+        breakaway: PositionMm::from_f64(c.friction.static_n),
+        viscous: PositionMm::from_f64(c.friction.viscous_n_s_m),
+        valve_on: micros(c.fill_valve.t_on_s.max(c.vent_valve.t_on_s)),
+        valve_off: micros(c.fill_valve.t_off_s.max(c.vent_valve.t_off_s)),
+        margin: micros(0.1 * c.fill_valve.t_on_s.max(1e-3)),
+        line_delay: micros(c.line_delay_s),
+        // Two and a half steps of the converter: below it, rest is noise.
+        band: mm((2.5 * lsb_m).max(2e-5)),
+        stroke: mm(c.stroke_m),
+    }
+}
+
+fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
+    let c = &axis.cylinder;
+    let area_m2 = std::f64::consts::FRAC_PI_4 * c.bore_m * c.bore_m;
+    let flow = data.conductance.to_num::<f64>() * 1e-8;
+    let rho_r_t = axis.gas.reference_density_kg_m3
+        * axis.gas.gas_constant_j_kg_k
+        * axis.gas.ambient_temperature_k;
+    let us = |value: Micros| f64::from(value.get()) * 1e-6;
+    // 50 to 100 Hz: as fast as lets half of the period be used.
+    let delays_s = us(data.valve_on) + us(data.valve_off) + 2.0 * us(data.margin);
+    let period_s = (2.0 * delays_s * 1e3).ceil().clamp(10.0, 20.0) * 1e-3;
+    Facts {
+        stroke_mm: c.stroke_m * 1e3,
+        speed_mm_s: flow * rho_r_t / area_m2 * 1e3,
+        dead_time_s: 1e-3 + us(data.valve_on) + us(data.line_delay),
+        shortest_duty: (us(data.valve_off) + us(data.margin)) / period_s,
+        period_s,
+    }
+}
+
+fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
+    let gain = |value: f64| Gain::saturating_from_num(value);
+    let mm = |value: f64| PositionMm::from_f64(value);
+    let duty = |value: f64| Duty::from_per_mille((value * 1000.0).round() as i16);
+    // A PWM loop acts half a period and the dead time late.
+    let lag_s = facts.dead_time_s + 0.5 * facts.period_s;
+    // Full duty at the error from which full speed can just be stopped: the way
+    // of three lags.
+    let full_mm = 3.0 * lag_s * facts.speed_mm_s;
+    let proportional = 1.0 / full_mm;
+    let (settle_mm, release_mm) = (0.5, 1.5);
+    let base = JointGains {
+        proportional: gain(proportional),
+        // The rule base's gain at the origin, output 1/3 at 1/3 of full scale, is
+        // the damping: error and speed edge give the ratio of three lags.
+        correction_pd: gain(0.6),
+        correction_id: gain(0.6),
+        feed_forward: gain(1.0 / facts.speed_mm_s),
+        error_scale: mm((2.0 * full_mm).clamp(0.25, 1000.0)),
+        velocity_scale: VelocityMmS::from_f64(facts.speed_mm_s.clamp(1.0, 5000.0)),
+        integral_scale: mm((full_mm * 0.1).clamp(0.05, 1000.0)),
+        integral_zone: mm(0.3 * full_mm),
+        duty_limit: Duty::ONE,
+        dead_zone_duty: duty((facts.shortest_duty + 0.01).min(0.5)),
+        minimum_duty: duty(0.01),
+        settle_band: mm(settle_mm),
+        settle_velocity: VelocityMmS::from_f64(10.0),
+        release_band: mm(release_mm),
+        velocity_window: 16,
+        stroke_min: PositionMm::ZERO,
+        stroke_max: mm(facts.stroke_mm),
+        pwm_period: Micros((facts.period_s * 1e6).round() as u32),
+        axis: *data,
+        ..JointGains::default()
+    };
+    match kind {
+        Kind::OnOff => JointGains {
+            law: Law::OnOff,
+            // A full push cannot be shorter than the dead time: what the piston
+            // goes in it is the least useful dead band.
+            settle_band: mm(0.2 * facts.speed_mm_s * facts.dead_time_s),
+            release_band: mm(0.4 * facts.speed_mm_s * facts.dead_time_s),
+            ..base
+        },
+        Kind::PwmP => JointGains {
+            law: Law::Proportional,
+            ..base
+        },
+        Kind::PwmPid => JointGains {
+            law: Law::Pid,
+            // Ziegler's shape: Td a lag, Ti eight of them.
+            derivative: gain(proportional * lag_s * 2.0),
+            integral: gain(proportional / (8.0 * lag_s) * 0.5),
+            ..base
+        },
+        Kind::FuzzyPd => base,
+        Kind::FuzzyId => JointGains {
+            settle_band: mm(0.3),
+            release_band: mm(0.9),
+            ..base
+        },
+        Kind::Sliding => JointGains {
+            law: Law::Sliding,
+            sliding_time: Micros((3.0 * facts.dead_time_s * 1e6).round() as u32),
+            error_scale: mm((facts.speed_mm_s * facts.dead_time_s * 2.0).max(0.25)),
+            ..base
+        },
+        Kind::Predictive => JointGains {
+            law: Law::Predictive,
+            ..base
+        },
+    }
+}
+
+/// Calibration of the axis's position sensor, as commissioning would find it.
+fn sensor(axis: &AxisParams) -> SensorConfig {
+    let p = &axis.potentiometer;
+    let code = |share: f64| AdcCode::new((share * 65_536.0).round().clamp(0.0, 65_535.0) as u16);
+    let mm = |metres: f64| PositionMm::from_f64(metres * 1e3);
+    let stroke_m = axis.cylinder.stroke_m;
+    SensorConfig {
+        zero: code(p.offset_m / p.electrical_stroke_m),
+        full_scale: mm(p.electrical_stroke_m / p.gain),
+        code_min: code(0.01),
+        code_max: code(0.99),
+        travel_min: mm(-0.005 - 0.02 * stroke_m),
+        travel_max: mm(1.02 * stroke_m + 0.005),
+        step_max: PositionMm::from_int(10),
+    }
+}

@@ -1,0 +1,191 @@
+//! One axis in closed loop: controller, converter, plant, tick by tick.
+
+use wheeleg_control::pwm::OnTimes;
+use wheeleg_plant::PlantError;
+use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
+use wheeleg_units::{AdcCode, PositionMm, VelocityMmS};
+
+use super::motion::{LoadEvent, Motion};
+
+/// What a board latches at the start of a tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Reading of the position converter.
+    pub code: AdcCode,
+    /// Reference stroke.
+    pub reference: PositionMm,
+    /// Speed of the reference.
+    pub reference_velocity: VelocityMmS,
+    /// The reference to come and the ticks until then, if announced.
+    pub announced: Option<(PositionMm, u32)>,
+}
+
+/// What a board gives at the end of a tick.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Action {
+    /// On-times of the four valves in the next tick, µs.
+    pub on_us: OnTimes,
+    /// Valves held shut because the joint is at rest at its target.
+    pub settled: bool,
+    /// Position as the board understands its reading \[mm\].
+    pub measured_mm: f64,
+}
+
+/// A board on the bench.
+pub trait Board {
+    /// One control tick of 1 ms. The on-times act from the next tick edge.
+    fn tick(&mut self, sample: &Sample) -> Action;
+}
+
+/// One tick of a recording. Everything is as it stands at the tick's start, but
+/// for the on-times, which are those in force during it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Row {
+    /// Reference \[m\].
+    pub reference_m: f64,
+    /// True stroke \[m\].
+    pub stroke_m: f64,
+    /// Stroke as the board reads it \[m\].
+    pub measured_m: f64,
+    /// True speed \[m/s\].
+    pub velocity_m_s: f64,
+    /// Absolute chamber pressures A, B \[Pa\].
+    pub pressure_pa: [f64; 2],
+    /// Force on the rod from outside \[N\].
+    pub load_n: f64,
+    /// On-times of the valves in this tick \[µs\].
+    pub on_us: OnTimes,
+    /// Poppet movements since the start, all four valves.
+    pub switches: u64,
+    /// Air taken from the supply since the start \[kg\].
+    pub air_kg: f64,
+    /// The board says that it is at rest at its target.
+    pub settled: bool,
+}
+
+/// A recording, one row a millisecond.
+#[derive(Debug, Clone)]
+pub struct Trace {
+    /// Motion that was asked for.
+    pub motion: Motion,
+    /// Rows; row k is at k ms.
+    pub rows: Vec<Row>,
+}
+
+/// Plant and board, with the state that carries over from run to run: chamber
+/// pressures, what the board has learnt, noise.
+#[derive(Debug, Clone)]
+pub struct Bench<B> {
+    axis: Axis,
+    /// State of the plant; may be changed between runs.
+    pub state: AxisState,
+    /// The board.
+    pub board: B,
+    pending: OnTimes,
+    /// Notice that the board gets of a step \[s\]; none if zero.
+    pub notice_s: f64,
+}
+
+impl<B: Board> Bench<B> {
+    /// A bench at rest with its starting pressures. `seed` makes the noise of
+    /// the converter.
+    ///
+    /// # Errors
+    /// [`PlantError::Parameter`] names a parameter outside its range.
+    pub fn new(params: &AxisParams, seed: u64, board: B) -> Result<Self, PlantError> {
+        let axis = Axis::new(params)?;
+        Ok(Self {
+            state: axis.initial_state(seed),
+            axis,
+            board,
+            pending: [0; 4],
+            notice_s: 0.0,
+        })
+    }
+
+    /// The axis.
+    #[must_use]
+    pub fn axis(&self) -> &Axis {
+        &self.axis
+    }
+
+    /// Runs `motion` for `duration_s`, with the loads changed at their times.
+    ///
+    /// # Errors
+    /// Any [`PlantError`]; the bench is not usable after one.
+    pub fn run(
+        &mut self,
+        motion: &Motion,
+        loads: &[LoadEvent],
+        duration_s: f64,
+    ) -> Result<Trace, PlantError> {
+        self.watch(motion, loads, duration_s, |_, _| {})
+    }
+
+    /// As [`Bench::run`], and shows each row and the board to `watch`.
+    ///
+    /// # Errors
+    /// Any [`PlantError`]; the bench is not usable after one.
+    pub fn watch(
+        &mut self,
+        motion: &Motion,
+        loads: &[LoadEvent],
+        duration_s: f64,
+        mut watch: impl FnMut(&Row, &B),
+    ) -> Result<Trace, PlantError> {
+        let ticks = (duration_s * 1000.0).round() as usize;
+        let mut rows = Vec::with_capacity(ticks);
+        let start_air = self.state.core.cylinders[0].supply_mass_kg;
+        let start_switches = self.switches();
+        for k in 0..ticks {
+            let t = k as f64 * 1e-3;
+            for event in loads {
+                if event.at_s <= t {
+                    self.state.core.motion.load_n = event.load_n;
+                }
+            }
+            let (reference_m, rate_m_s) = motion.at(t);
+            let code = AdcCode::new(self.axis.read_position(&mut self.state));
+            let wait = motion.start_s() - t;
+            let announced = (wait > 0.0 && wait <= self.notice_s).then(|| {
+                (
+                    PositionMm::from_f64(motion.to_m() * 1e3),
+                    (wait * 1e3).round() as u32,
+                )
+            });
+            let action = self.board.tick(&Sample {
+                code,
+                reference: PositionMm::from_f64(reference_m * 1e3),
+                reference_velocity: VelocityMmS::from_f64(rate_m_s * 1e3),
+                announced,
+            });
+            let m = &self.state.core.motion;
+            let c = &self.state.core.cylinders[0];
+            let row = Row {
+                reference_m,
+                stroke_m: m.stroke_m,
+                measured_m: action.measured_mm * 1e-3,
+                velocity_m_s: m.velocity_m_s,
+                pressure_pa: self.axis.assembly.cylinders[0].pressures_pa(c, m.stroke_m),
+                load_n: m.load_n,
+                on_us: self.pending,
+                switches: self.switches() - start_switches,
+                air_kg: c.supply_mass_kg - start_air,
+                settled: action.settled,
+            };
+            watch(&row, &self.board);
+            rows.push(row);
+            self.axis.tick(&mut self.state, self.pending)?;
+            self.pending = action.on_us;
+        }
+        Ok(Trace {
+            motion: motion.clone(),
+            rows,
+        })
+    }
+
+    fn switches(&self) -> u64 {
+        let valves = &self.state.core.cylinders[0].valves;
+        valves.iter().map(|v| v.switches()).sum()
+    }
+}

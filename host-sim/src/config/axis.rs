@@ -1,0 +1,271 @@
+//! Single axes: cylinder, valves, load and sensor of a test bench.
+//!
+//! An axis file has the sections of a robot file that concern one cylinder,
+//! with the same units and ranges, and three of its own: `[moving]`, `[chamber]`
+//! and `[start]`.
+
+use std::path::Path;
+
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::chamber::GasModel;
+use wheeleg_plant::sensors::AdcNoise;
+
+use super::builtin;
+use super::error::ConfigError;
+use super::params::{ParameterInfo, params};
+use super::plant::sections::{
+    AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
+    LineSection, NumericsSection, PotentiometerSection, SupplySection, ValveSection,
+};
+use super::plant::{adc_params, cylinder_params, gas_params, potentiometer_params, supply_params};
+use super::reader::Reader;
+
+params! {
+    /// What moves with the rod.
+    MovingSection {
+        /// Mass of rod, carriage and payload.
+        mass: f64, "mass", Mass, 0.01, 1000.0;
+        /// Force on the rod, positive extends.
+        load: f64, "load", Force, -10_000.0, 10_000.0;
+    }
+
+    /// Choices of the chamber and friction model.
+    ChamberSection {
+        /// Energy balance with heat exchange instead of the polytropic law.
+        thermal: bool, "thermal", Flag, 0.0, 1.0;
+        /// Heat transfer coefficient of the energy balance.
+        heat_transfer: f64, "heat_transfer", HeatTransfer, 0.0, 1000.0;
+        /// Growth of the Coulomb force with the higher chamber pressure; 0: none.
+        friction_area: f64, "friction_area", Area, 0.0, 1e-3;
+    }
+
+    /// State at the start.
+    AxisStartSection {
+        /// Stroke.
+        stroke: f64, "stroke", Length, 0.0, 2.0;
+        /// Pressure of chamber A, absolute.
+        pressure_a: f64, "pressure_a", Pressure, 1e4, 2e6;
+        /// Pressure of chamber B, absolute.
+        pressure_b: f64, "pressure_b", Pressure, 1e4, 2e6;
+    }
+}
+
+/// Built-in axes: name, file name for messages, text.
+pub const AXES: &[(&str, &str, &str)] = &[
+    (
+        "bench-vq110u",
+        "axes/bench-vq110u.toml",
+        include_str!("../../axes/bench-vq110u.toml"),
+    ),
+    (
+        "small-12x50",
+        "axes/small-12x50.toml",
+        include_str!("../../axes/small-12x50.toml"),
+    ),
+    (
+        "long-16x400",
+        "axes/long-16x400.toml",
+        include_str!("../../axes/long-16x400.toml"),
+    ),
+    (
+        "heavy-40x250",
+        "axes/heavy-40x250.toml",
+        include_str!("../../axes/heavy-40x250.toml"),
+    ),
+];
+
+/// An axis file, checked and converted to SI.
+#[derive(Debug, Clone)]
+pub struct AxisConfig {
+    /// Name of the axis.
+    pub name: String,
+    /// One-line description.
+    pub description: String,
+    /// The plant.
+    pub axis: AxisParams,
+    /// Every parameter as written, for listings and reports.
+    pub parameters: Vec<ParameterInfo>,
+}
+
+impl AxisConfig {
+    /// An axis by built-in name, or by path to a TOML file.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if there is no such axis or file, or if it is wrong.
+    pub fn load(name_or_path: &str) -> Result<Self, ConfigError> {
+        let (file, text) = builtin::find("axis", name_or_path, AXES)?;
+        Self::parse(&file, &text)
+    }
+
+    /// An axis from a file.
+    ///
+    /// # Errors
+    /// As [`AxisConfig::load`].
+    pub fn from_path(path: &Path) -> Result<Self, ConfigError> {
+        Self::load(&path.to_string_lossy())
+    }
+
+    /// Reads an axis from TOML text; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with every problem found: file, line, field, value,
+    /// accepted units or range.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        let what = format!("the axis file {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, true)?;
+        let top = r.table("");
+        if let Some(top) = &top {
+            r.reject_unknown(top, &KNOWN);
+        }
+        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let description = top.as_ref().and_then(|t| r.text(t, "description"));
+        let axis = read(&mut r);
+        let config = (|| {
+            Some(Self {
+                name: name?,
+                description: description?,
+                axis: axis?,
+                parameters: Vec::new(),
+            })
+        })();
+        let (mut config, parameters) = r.finish(&what, config)?;
+        config.parameters = parameters;
+        Ok(config)
+    }
+}
+
+/// Names at the top of an axis file.
+const KNOWN: [&str; 17] = [
+    "name",
+    "description",
+    "gas",
+    "supply",
+    "regulator",
+    "dump_valve",
+    "fill_valve",
+    "vent_valve",
+    "line",
+    "cylinder",
+    "friction",
+    "end_stop",
+    "chamber",
+    "moving",
+    "start",
+    "sensor",
+    "numerics",
+];
+
+fn read(r: &mut Reader) -> Option<AxisParams> {
+    let gas = r.section::<GasSection>("gas");
+    let supply = r.section::<SupplySection>("supply");
+    let regulator = r.section::<FlowSection>("regulator");
+    let dump_valve = r.section::<ValveSection>("dump_valve");
+    let fill_valve = r.section::<ValveSection>("fill_valve");
+    let vent_valve = r.section::<ValveSection>("vent_valve");
+    let line = r.section::<LineSection>("line");
+    let cylinder = r.section::<CylinderSection>("cylinder");
+    let friction = r.section::<FrictionSection>("friction");
+    let end_stop = r.section::<EndStopSection>("end_stop");
+    let chamber = r.section::<ChamberSection>("chamber");
+    let moving = r.section::<MovingSection>("moving");
+    let start = r.section::<AxisStartSection>("start");
+    if let Some(sensor) = r.table("sensor") {
+        r.reject_unknown(&sensor, &["potentiometer", "adc"]);
+    }
+    let potentiometer = r.section::<PotentiometerSection>("sensor.potentiometer");
+    let adc = r.section::<AdcSection>("sensor.adc");
+    let numerics = r.section::<NumericsSection>("numerics");
+
+    let (chamber, moving, start) = (chamber?, moving?, start?);
+    let mut cylinder = cylinder_params(
+        &cylinder?,
+        &line?,
+        &fill_valve?,
+        &vent_valve?,
+        &friction?,
+        &end_stop?,
+    );
+    cylinder.initial_pressure_a_pa = start.pressure_a;
+    cylinder.initial_pressure_b_pa = start.pressure_b;
+    cylinder.friction.pressure_area_m2 = chamber.friction_area;
+    if chamber.thermal {
+        cylinder.gas_model = GasModel::Thermal {
+            heat_transfer_w_m2_k: chamber.heat_transfer,
+        };
+    }
+    let adc = adc?;
+    let mut converter = adc_params(&adc);
+    // On a bench the noise is stated as a bound: uniform within ± so many LSB.
+    converter.noise = if adc.noise > 0.0 {
+        AdcNoise::Uniform {
+            half_width_lsb: adc.noise,
+        }
+    } else {
+        AdcNoise::None
+    };
+    Some(AxisParams {
+        gas: gas_params(&gas?),
+        supply: supply_params(&supply?, &regulator?, &dump_valve?),
+        cylinder,
+        moving_mass_kg: moving.mass,
+        load_n: moving.load,
+        initial_stroke_m: start.stroke,
+        potentiometer: potentiometer_params(&potentiometer?),
+        adc: converter,
+        step_ns: (numerics?.step * 1e9).round() as u64,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_axis_is_a_plant() {
+        for (name, _, _) in AXES {
+            let config = AxisConfig::load(name).expect("built in");
+            assert_eq!(config.name, *name);
+            assert!(wheeleg_plant::axis::Axis::new(&config.axis).is_ok());
+            assert!(config.parameters.len() > 60);
+        }
+    }
+
+    /// The plant's own tests have a copy that needs no file.
+    #[test]
+    fn the_bench_file_and_the_plant_tests_use_the_same_cylinder() {
+        let file = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        let copy = wheeleg_plant::testing::vq110u_axis();
+        let mut cylinder = copy.cylinder.clone();
+        cylinder.initial_pressure_a_pa = file.cylinder.initial_pressure_a_pa;
+        cylinder.initial_pressure_b_pa = file.cylinder.initial_pressure_b_pa;
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs().max(b.abs());
+        let (a, b) = (&file.cylinder, &cylinder);
+        assert!(near(a.bore_m, b.bore_m) && near(a.rod_m, b.rod_m) && near(a.stroke_m, b.stroke_m));
+        assert!(near(
+            a.fill_valve.flow.conductance_m3_s_pa,
+            b.fill_valve.flow.conductance_m3_s_pa
+        ));
+        assert!(near(a.fill_valve.t_on_s, b.fill_valve.t_on_s));
+        assert!(near(a.vent_valve.t_off_s, b.vent_valve.t_off_s));
+        assert!(near(a.dead_volume_a_m3, b.dead_volume_a_m3));
+        assert!(near(a.line_volume_m3, b.line_volume_m3) && near(a.line_delay_s, b.line_delay_s));
+        assert!(near(a.friction.static_n, b.friction.static_n));
+        assert_eq!(file.moving_mass_kg, copy.moving_mass_kg);
+    }
+
+    #[test]
+    fn a_wrong_axis_names_field_value_and_range() {
+        let (_, file, text) = AXES[0];
+        let bad = text.replace(
+            "bore          = { value = 20.0",
+            "bore          = { value = 2000.0",
+        );
+        assert_ne!(bad, text);
+        let error = AxisConfig::parse(file, &bad).expect_err("out of range");
+        let summary = error.problems()[0].summary();
+        assert!(
+            summary.contains("cylinder.bore") && summary.contains("2000"),
+            "{summary}"
+        );
+    }
+}
