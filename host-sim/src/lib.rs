@@ -7,6 +7,7 @@
 //! [`report`] draws it. [`cli`] is the command line on top.
 
 pub mod analysis;
+pub mod bench;
 pub mod check;
 pub mod cli;
 pub mod config;
