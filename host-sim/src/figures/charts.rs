@@ -6,7 +6,7 @@ use crate::report::plot::{Content, Figure, Heat, Limit, Panel, Series, colour};
 
 type Points = Vec<(f64, f64)>;
 
-/// A panel of one curve or more, with the paper's axis as lines where the data goes beyond it.
+/// A panel (its words without dotted letters, which the pictures' font lacks) of one curve or more, with the paper's axis as lines where the data goes beyond it.
 fn curves(
     title: &str,
     (x_label, x_range): (&str, (f64, f64)),
@@ -153,7 +153,7 @@ fn reading_figures(reading: &Reading, motion: &[Instant], checks: &[AxisCheck]) 
             "velocities of the cylinders",
             two(
                 "[mm/s]",
-                ["ḃ5", "ḃ6"],
+                ["rate of b5", "rate of b6"],
                 [(-10.0, 10.0), (-40.0, 40.0)],
                 [points(|i| i.rate_m_s[0]), points(|i| i.rate_m_s[1])],
             ),
@@ -164,7 +164,7 @@ fn reading_figures(reading: &Reading, motion: &[Instant], checks: &[AxisCheck]) 
             "accelerations of the cylinders",
             two(
                 "[mm/s²]",
-                ["b̈5", "b̈6"],
+                ["acceleration of b5", "acceleration of b6"],
                 [(-1.0, 1.0), (-10.0, 10.0)],
                 [
                     points(|i| i.acceleration_m_s2[0]),
