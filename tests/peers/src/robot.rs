@@ -3,8 +3,12 @@
 
 use std::hint::black_box;
 
+use nalgebra::{SVector, Vector3};
 use wheeleg_plant::dynamics::chain::FloatingState;
 use wheeleg_plant::dynamics::chain::reference::{ROBOT14, robot_state};
+use wheeleg_plant::dynamics::floating::{
+    Contacts, FloatingParams, FloatingRobot, FloatingState as OwnState,
+};
 use wheeleg_plant::dynamics::{DynamicsError, RobotDynamics, RobotDynamicsParams};
 
 use crate::measure::{put_ns, repetitions, timed};
@@ -33,6 +37,7 @@ pub(crate) fn run() {
     let check = format!("nv=14 sum={sum:.3}");
     put_ns("robot_fd_14dof", "", took, repetitions, &check);
     own_robot();
+    own_floating_robot();
 }
 
 /// No reference: the robot on its wheel axle, eight coordinates, both legs with closed loops.
@@ -53,4 +58,26 @@ fn own_robot() {
     });
     let check = format!("nv=8 sum={sum:.3}");
     put_ns("robot_fd_own_8dof", "", took, repetitions, &check);
+}
+
+/// No reference: the robot with a floating chassis, both legs with closed loops, no contact.
+fn own_floating_robot() {
+    let Ok(robot) = FloatingRobot::new(&FloatingParams::wheeleg_2003()) else {
+        return;
+    };
+    let mut state = OwnState::at_rest([[0.40, 0.10, 0.19]; 2]);
+    state.velocity = SVector::repeat(0.1);
+    let force = SVector::<f64, 14>::repeat(1.0);
+    let (down, contacts) = (Vector3::new(0.0, 0.0, -9.81), Contacts::NONE);
+    let repetitions = repetitions(60_000.0);
+    let mut sum = 0.0;
+    let took = timed(|| {
+        for r in 0..repetitions {
+            state.lengths_m[0][0] = 0.40 + 1e-7 * r as f64;
+            let y = robot.forward(&state, black_box(&force), &down, &contacts);
+            sum += black_box(&y).as_ref().map_or(f64::NAN, |y| y[0]);
+        }
+    });
+    let check = format!("nv=14 sum={sum:.3}");
+    put_ns("robot_fd_own_14dof", "", took, repetitions, &check);
 }

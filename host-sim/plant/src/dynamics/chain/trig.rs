@@ -9,7 +9,7 @@
 //! software is freely granted, provided that this notice is preserved"). Error below 1.5 units in
 //! the last place of a result, plus 1e-17 absolute near the zeros.
 
-use std::f64::consts::FRAC_2_PI;
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
 
 /// Beyond this angle (rad) the three parts are too short and the C library is asked.
 const LIMIT_RAD: f64 = 1.0e5;
@@ -37,23 +37,30 @@ const C5: f64 = f64::from_bits(0x3E21_EE9E_BDB4_B1C4);
 const C6: f64 = f64::from_bits(0xBDA8_FAE9_BE88_38D4);
 
 /// (sin x, cos x); NaN for an x that is not finite.
+///
+/// As in fdlibm, angles up to π/4 go straight to the polynomials; joints move smoothly, so the branch
+/// is foreseen.
 #[inline(always)]
 pub(super) fn sin_cos(x: f64) -> (f64, f64) {
-    if x.abs() < LIMIT_RAD { near(x) } else { far(x) }
+    if x.abs() <= FRAC_PI_4 {
+        near(x)
+    } else {
+        turned(x)
+    }
 }
 
-#[cold]
 #[inline(never)]
-fn far(x: f64) -> (f64, f64) {
-    x.sin_cos()
+fn turned(x: f64) -> (f64, f64) {
+    if x.abs() < LIMIT_RAD {
+        reduced(x)
+    } else {
+        x.sin_cos()
+    }
 }
 
+/// Polynomials on ±π/4.
 #[inline(always)]
-fn near(x: f64) -> (f64, f64) {
-    let shifted = x * FRAC_2_PI + ROUND;
-    let turns = shifted - ROUND;
-    let quadrant = shifted.to_bits();
-    let r = x - turns * PIO2_1 - turns * PIO2_2 - turns * PIO2_3;
+fn near(r: f64) -> (f64, f64) {
     let z = r * r;
     let zz = z * z;
     let sin = r + r * z * ((S1 + z * S2) + zz * ((S3 + z * S4) + zz * (S5 + z * S6)));
@@ -62,16 +69,20 @@ fn near(x: f64) -> (f64, f64) {
     let high = 1.0 - half;
     // 1 - z/2 rounds; what it lost is put back.
     let cos = high + (((1.0 - high) - half) + tail);
-    // Odd quadrants swap; the signs follow the quadrant's bits.
-    let odd = (quadrant & 1).wrapping_neg();
-    let (s, c) = (sin.to_bits(), cos.to_bits());
-    let swap = (s ^ c) & odd;
-    let sign_of_sin = (quadrant & 2) << 62;
-    let sign_of_cos = (quadrant.wrapping_add(1) & 2) << 62;
-    (
-        f64::from_bits((s ^ swap) ^ sign_of_sin),
-        f64::from_bits((c ^ swap) ^ sign_of_cos),
-    )
+    (sin, cos)
+}
+
+/// Any angle within the limit.
+fn reduced(x: f64) -> (f64, f64) {
+    let shifted = x * FRAC_2_PI + ROUND;
+    let turns = shifted - ROUND;
+    let (sin, cos) = near(x - turns * PIO2_1 - turns * PIO2_2 - turns * PIO2_3);
+    match shifted.to_bits() & 3 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
 }
 
 #[cfg(test)]
