@@ -48,7 +48,7 @@ macro_rules! entry_points {
                         b2_m <= min_m * 1.001 || b2_m >= max_m * 0.999
                     }
                     KinematicsError::NoMomentArm { cos_theta3, minimum } => {
-                        !(cos_theta3 >= minimum)
+                        cos_theta3.is_nan() || cos_theta3 < minimum
                     }
                     KinematicsError::OutsideStroke { length_m, min_m, max_m, .. } => {
                         length_m < min_m || length_m > max_m
