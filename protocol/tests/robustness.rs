@@ -46,6 +46,58 @@ fn two_hundred() -> Vec<Vec<u8>> {
     frames
 }
 
+/// Work of a test: the default, or what `cargo xtask deep` asks for by `name`.
+fn amount(name: &str, default: usize) -> usize {
+    std::env::var(name).map_or(default, |text| text.parse().expect("a number"))
+}
+
+/// Frames of every type, `per_type` of each: the vectors, and then vectors with
+/// another sequence and other bytes in the payload, as long as they are sound.
+fn frames_of_every_type(per_type: usize, random: &mut Random) -> Vec<Vec<u8>> {
+    let vectors = vectors().accepted;
+    let mut frames = Vec::new();
+    for message_type in MessageType::ALL {
+        let code = message_type.code();
+        let seeds: Vec<_> = vectors.iter().filter(|v| v.message_type == code).collect();
+        assert!(!seeds.is_empty(), "{}", message_type.name());
+        for index in 0..per_type {
+            let seed = seeds[index % seeds.len()];
+            frames.push(if index < seeds.len() {
+                seed.bytes.clone()
+            } else {
+                variant(&seed.bytes, random)
+            });
+        }
+    }
+    frames
+}
+
+fn variant(bytes: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut made = None;
+    Decoder::new().push_slice(bytes, |result| {
+        let frame = result.expect("a vector");
+        let mut header = frame.header;
+        header.sequence = random.next() as u16;
+        let mut payload = frame.payload.to_vec();
+        for _ in 0..payload.len().min(8) {
+            let mut trial = payload.clone();
+            let at = random.below(trial.len());
+            trial[at] = random.next() as u8;
+            let frame = wheeleg_protocol::Frame {
+                header,
+                payload: &trial,
+            };
+            if Message::parse(&frame).is_ok() {
+                payload = trial;
+            }
+        }
+        let mut room = [0; MAX_ENCODED];
+        let line = wheeleg_protocol::encode(&header, &payload, &mut room).expect("it fits");
+        made = Some(line.to_vec());
+    });
+    made.expect("a vector")
+}
+
 type Decoded = (Envelope, Message);
 
 fn decode_one(bytes: &[u8]) -> Option<Decoded> {
@@ -62,7 +114,8 @@ fn decode_one(bytes: &[u8]) -> Option<Decoded> {
 fn no_one_or_two_bit_flip_makes_another_frame() {
     let mut decoder = Decoder::new();
     let (mut flips, mut same, mut wrong, mut other_type) = (0_u64, 0_u64, 0_u64, 0_u64);
-    for frame in two_hundred() {
+    let per_type = amount("WHEELEG_FLIP_FRAMES_PER_TYPE", 8);
+    for frame in frames_of_every_type(per_type, &mut Random(2003)) {
         let original = decode_one(&frame).expect("valid");
         let mut bytes = frame.clone();
         let mut offer = |bytes: &[u8]| {
@@ -112,7 +165,8 @@ fn a_million_random_streams_give_no_wrong_frame() {
     let (mut delivered, mut errors, mut planted) = (0_u64, 0_u64, 0_u64);
     let mut stream = Vec::with_capacity(512);
     let mut allowed = Vec::with_capacity(2);
-    for _ in 0..1_000_000 {
+    let streams = amount("WHEELEG_RANDOM_STREAMS", 1_000_000);
+    for _ in 0..streams {
         stream.clear();
         allowed.clear();
         let mut must_arrive = false;
@@ -196,8 +250,11 @@ fn a_million_random_streams_give_no_wrong_frame() {
             });
         }
     }
-    println!("{delivered} frames delivered ({planted} planted whole), {errors} errors");
-    assert!(delivered >= planted && planted > 150_000 && errors > 500_000);
+    println!(
+        "{streams} streams: {delivered} frames, {planted} planted, {errors} errors, 0 phantoms"
+    );
+    let (planted_min, errors_min) = (streams as u64 * 15 / 100, streams as u64 / 2);
+    assert!(delivered >= planted && planted > planted_min && errors > errors_min);
 }
 
 #[test]

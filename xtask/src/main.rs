@@ -7,9 +7,11 @@
 
 mod bench;
 mod conformance;
+mod deep;
 mod fuzz;
 mod main_job;
 mod mcap;
+mod mutants;
 mod no_std;
 mod process;
 mod report;
@@ -55,6 +57,10 @@ enum Command {
     Conformance,
     /// Fuzz the protocol, the boards, the master and the configuration files.
     Fuzz(fuzz::Options),
+    /// Mutate the code that decides safe states: tests must notice every mutant.
+    Mutants(mutants::Options),
+    /// The long checks; results are appended to DEEP.md.
+    Deep(deep::Options),
     /// Open the MCAP log of a run with the Python reader and check every channel.
     McapCheck {
         /// The run's output folder.
@@ -80,6 +86,8 @@ fn main() -> ExitCode {
         Command::Bench(options) => bench::steps(&mut report, &options),
         Command::Conformance => conformance::steps(&mut report),
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),
+        Command::Mutants(options) => mutants::steps(&mut report, &options),
+        Command::Deep(options) => deep::steps(&mut report, &options),
         Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
     }
     print!("{report}");

@@ -15,8 +15,8 @@ pub(crate) const CYCLE_US: u32 = 10_000;
 /// A frame that concerns the board under test.
 #[derive(Clone, Debug)]
 pub(crate) enum Heard {
-    /// SYNC, and whether its counter advanced.
-    Sync(Sync, bool),
+    /// SYNC, whether its counter advanced or not.
+    Sync(Sync),
     /// A frame of the master to this board; the message if it is one.
     Request(Sound, Option<Message>),
     /// A frame that claims to come from this board.
@@ -89,13 +89,16 @@ impl Observer {
         }
         let message = parse(&sound);
         match (sound.destination, message) {
-            (255, Some(Message::Sync(sync))) => Some(Heard::Sync(sync, self.sync(&sync, at))),
+            (255, Some(Message::Sync(sync))) => {
+                self.sync(&sync, at);
+                Some(Heard::Sync(sync))
+            }
             (to, message) if to == self.address.raw() => Some(Heard::Request(sound, message)),
             _ => None,
         }
     }
 
-    fn sync(&mut self, sync: &Sync, at: u32) -> bool {
+    fn sync(&mut self, sync: &Sync, at: u32) {
         let step = self.counter.map(|last| sync.cycle.wrapping_sub(last));
         let advanced = step.is_some_and(|step| (1..=0x7FFF).contains(&step));
         // A living link keeps to its counter; otherwise any stream is followed.
@@ -111,7 +114,6 @@ impl Observer {
             self.exhaust_allowed =
                 slot.is_some_and(|slot| slot.on_link_loss == LinkLossAction::HoldThenExhaust);
         }
-        advanced
     }
 
     fn is_fresh(&self, now: u32) -> bool {

@@ -1,14 +1,20 @@
 //! The second engine: bolero draws the inputs, under plain `cargo test`. The
 //! number of inputs is small here; `BOLERO_RANDOM_ITERATIONS` and
-//! `BOLERO_RANDOM_TEST_TIME_MS` make it larger, and `cargo xtask deep` does.
-//! No assertion stands here: the targets assert.
+//! `BOLERO_RANDOM_TEST_TIME_MS` change it, as `cargo xtask deep engine` does.
+//! What it finds it shrinks, and names the `BOLERO_RANDOM_SEED` that repeats it.
+//! The targets assert; nothing is left to assert here.
+
+fn iterations(default: usize) -> usize {
+    let wanted = std::env::var("BOLERO_RANDOM_ITERATIONS").ok();
+    wanted.map_or(default, |text| text.parse().expect("a number"))
+}
 
 macro_rules! engine {
     ($($name:ident: $iterations:literal, $length:literal;)*) => { $(
         #[test]
         fn $name() {
             bolero::check!()
-                .with_iterations($iterations)
+                .with_iterations(iterations($iterations))
                 .with_max_len($length)
                 .for_each(|data: &[u8]| wheeleg_fuzz_targets::$name::run(data));
         }
@@ -21,7 +27,7 @@ engine! {
     parse: 20_000, 200;
     joint: 1_500, 2_000;
     wheel: 700, 2_000;
-    master: 400, 1_000;
+    master: 200, 1_000;
 }
 
 #[cfg(feature = "sim")]

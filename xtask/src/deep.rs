@@ -1,0 +1,159 @@
+//! Long checks that do not fit the test suite. Each run appends a dated line
+//! per check to `DEEP.md`, so that what was last looked at, and when, is in the
+//! repository.
+
+use std::fs::OpenOptions;
+use std::io::Write;
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::process::{ask, cargo, command, output, root};
+use crate::report::{Report, StepResult};
+use crate::{fuzz, mutants};
+
+/// Seconds per target when fuzzing.
+const FUZZ_SECONDS: u64 = 600;
+
+/// A long check: name, what it does, about how many minutes on two cores, how.
+struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
+
+const CHECKS: [Check; 5] = [
+    Check(
+        "flips",
+        "all 1- and 2-bit flips of 1 000 frames of every message type",
+        10,
+        flips,
+    ),
+    Check(
+        "streams",
+        "10 000 000 random streams with split reads",
+        3,
+        streams,
+    ),
+    Check("fuzz", "libFuzzer, 10 minutes per target", 75, fuzzing),
+    Check(
+        "engine",
+        "the second engine (bolero), 2 minutes per target",
+        15,
+        engine,
+    ),
+    Check(
+        "mutants",
+        "mutations of the code that decides safe states",
+        120,
+        mutations,
+    ),
+];
+
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Checks to run; without one, all of them.
+    checks: Vec<String>,
+    /// Lists the checks.
+    #[arg(long)]
+    list: bool,
+}
+
+/// `cargo xtask deep`.
+pub(crate) fn steps(report: &mut Report, options: &Options) {
+    if options.list {
+        report.step("checks", || {
+            for Check(name, what, minutes, _) in &CHECKS {
+                println!("    {name:<10} {what} (about {minutes} min)");
+            }
+            Ok(())
+        });
+        return;
+    }
+    let unknown = options
+        .checks
+        .iter()
+        .find(|name| CHECKS.iter().all(|check| check.0 != name.as_str()));
+    if let Some(name) = unknown {
+        report.step("choose", || -> StepResult {
+            Err(anyhow::anyhow!("no check `{name}`; see --list").into())
+        });
+        return;
+    }
+    let wanted = |name: &str| options.checks.is_empty() || options.checks.iter().any(|c| c == name);
+    for Check(name, what, _, run) in CHECKS.iter().filter(|check| wanted(check.0)) {
+        report.step(format!("deep: {what}"), || {
+            let result = run();
+            let text = match &result {
+                Ok(text) => text.clone(),
+                Err(error) => format!("FAILED: {error:?}"),
+            };
+            println!("    {text}");
+            note(name, &text)?;
+            result.map(drop)
+        });
+    }
+}
+
+/// Appends a line to `DEEP.md`: date, commit, check, result.
+fn note(name: &str, text: &str) -> Result<()> {
+    let date = ask(command("date").args(["-u", "+%F"])).unwrap_or_else(|| "undated".to_owned());
+    let commit = ask(command("git").args(["rev-parse", "--short", "HEAD"]));
+    let commit = commit.unwrap_or_else(|| "-".to_owned());
+    let first = text.lines().next().unwrap_or_default().replace('|', "/");
+    let path = root().join("DEEP.md");
+    let mut file = OpenOptions::new()
+        .append(true)
+        .open(&path)
+        .context("DEEP.md")?;
+    writeln!(file, "| {date} | {commit} | {name} | {first} |")?;
+    Ok(())
+}
+
+/// The line of a test program's output that starts with `marker`'s number, with
+/// the tests run by name in an optimised build.
+fn robustness(test: &str, variable: &str, amount: u32, marker: &str) -> StepResult<String> {
+    let text = output(
+        cargo()
+            .args(["test", "--release", "--package", "wheeleg-protocol"])
+            .args(["--test", "robustness", "--", "--exact", "--nocapture", test])
+            .env(variable, amount.to_string()),
+    )?;
+    let line = text.lines().find(|line| line.contains(marker));
+    Ok(line
+        .with_context(|| format!("no line with `{marker}`"))?
+        .to_owned())
+}
+
+fn flips() -> StepResult<String> {
+    robustness(
+        "no_one_or_two_bit_flip_makes_another_frame",
+        "WHEELEG_FLIP_FRAMES_PER_TYPE",
+        1_000,
+        " flips: ",
+    )
+}
+
+fn streams() -> StepResult<String> {
+    robustness(
+        "a_million_random_streams_give_no_wrong_frame",
+        "WHEELEG_RANDOM_STREAMS",
+        10_000_000,
+        " streams: ",
+    )
+}
+
+fn fuzzing() -> StepResult<String> {
+    fuzz::all_targets(FUZZ_SECONDS)
+}
+
+fn engine() -> StepResult<String> {
+    output(
+        cargo()
+            .args(["test", "--release", "--package", "wheeleg-fuzz-targets"])
+            .args(["--test", "engine", "--", "--test-threads=2"])
+            .env("BOLERO_RANDOM_TEST_TIME_MS", "120000")
+            .env("BOLERO_RANDOM_ITERATIONS", "1000000000"),
+    )?;
+    Ok("120 s per target, no finding".to_owned())
+}
+
+fn mutations() -> StepResult<String> {
+    mutants::run_all()
+}
