@@ -8,6 +8,7 @@
 mod bench;
 mod conformance;
 mod deep;
+mod firmware;
 mod fuzz;
 mod main_job;
 mod mcap;
@@ -15,7 +16,9 @@ mod mutants;
 mod no_std;
 mod process;
 mod report;
+mod rigid_body;
 mod rust;
+mod sizes;
 mod tools;
 mod vectors;
 
@@ -45,6 +48,10 @@ enum Command {
     Ci,
     /// Format, lints and bare-metal checks; no tests.
     Check,
+    /// Build all board images into `target/firmware`, and check that none can panic.
+    Firmware,
+    /// Flash, static RAM and worst stack of the board images, against `tests/budgets`.
+    Sizes(sizes::Options),
     /// Check every `no_std` crate for a bare-metal target.
     NoStd,
     /// Rerun the reference generators; their output must equal the checked-in vectors.
@@ -57,6 +64,8 @@ enum Command {
     Conformance,
     /// Fuzz the protocol, the boards, the master and the configuration files.
     Fuzz(fuzz::Options),
+    /// Compare the robot's dynamics with Pinocchio on the same states.
+    RigidBody,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
     /// The long checks; results are appended to DEEP.md.
@@ -78,6 +87,8 @@ fn main() -> ExitCode {
             lints(&mut report);
             no_std::steps(&mut report);
         }
+        Command::Firmware => firmware::steps(&mut report),
+        Command::Sizes(options) => sizes::steps(&mut report, &options),
         Command::NoStd => no_std::steps(&mut report),
         Command::Vectors => vectors::steps(&mut report),
         Command::MainJob => {
@@ -86,6 +97,7 @@ fn main() -> ExitCode {
         Command::Bench(options) => bench::steps(&mut report, &options),
         Command::Conformance => conformance::steps(&mut report),
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),
+        Command::RigidBody => rigid_body::steps(&mut report),
         Command::Mutants(options) => mutants::steps(&mut report, &options),
         Command::Deep(options) => deep::steps(&mut report, &options),
         Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
@@ -106,11 +118,14 @@ fn test(report: &mut Report) {
     lints(report);
     report.step("cargo test --workspace", rust::test);
     no_std::steps(report);
+    firmware::steps(report);
+    sizes::steps(report, &sizes::Options::default());
     vectors::steps(report);
     conformance::steps(report);
     fuzz::short_steps(report);
     let run = main_job::steps(report);
     mcap::steps(report, run.as_deref());
+    rigid_body::steps(report);
 }
 
 fn tools_for_lints(report: &mut Report) {

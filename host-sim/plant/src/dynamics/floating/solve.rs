@@ -20,6 +20,9 @@ pub(super) const fn at(row: usize, column: usize) -> usize {
 /// Sign of a chassis entry under the mirror: \[moment, force\].
 pub(super) const MIRROR: [f64; 6] = [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
 
+/// Chassis directions in which b6 has momentum: roll, pitch, up.
+const LIFTED: [usize; 3] = [0, 1, 5];
+
 /// A leg taken out of the equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Eliminated {
@@ -55,11 +58,18 @@ pub(super) fn eliminate(
     }
     let free2 = (right[0] - ratio * right[1]) * inv2;
     let (part5, free6) = (right[1] * inv5, right[2] * inv6);
-    for i in 0..6 {
+    // b2 and b5 push nothing upwards; b6 only upwards, and turns nothing about the vertical.
+    for i in 0..5 {
         for j in 0..=i {
-            block[at(i, j)] -= gain[0][i] * rest[j] + gain[1][i] * c5[j] + gain[2][i] * c6[j];
+            block[at(i, j)] -= gain[0][i] * rest[j] + gain[1][i] * c5[j];
         }
-        side[i] -= rest[i] * free2 + c5[i] * part5 + c6[i] * free6;
+        side[i] -= rest[i] * free2 + c5[i] * part5;
+    }
+    for (n, &i) in LIFTED.iter().enumerate() {
+        for &j in &LIFTED[..=n] {
+            block[at(i, j)] -= gain[2][i] * c6[j];
+        }
+        side[i] -= c6[i] * free6;
     }
     // b5 follows b2.
     for i in 0..6 {

@@ -1,0 +1,57 @@
+//! The robot's dynamics against a rigid-body library that is not ours.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::process::{cargo, command, output, run, target_dir};
+use crate::report::Report;
+use crate::tools;
+
+const ROBOT: &str = "wheeleg-2003";
+const SEED: &str = "1";
+const STATES: &str = "200";
+
+/// Exports the robot, lets our dynamics and Pinocchio compute the same states, compares; then
+/// falsifies the export in many places, each of which must be noticed.
+pub(crate) fn steps(report: &mut Report) {
+    let folder = target_dir().join("xtask").join("rigid-body");
+    let (urdf, states) = (folder.join("robot.urdf"), folder.join("states.json"));
+    let made = report.step("rigid body: export of robot and states", || {
+        Ok(export(&folder, &urdf, &states)?)
+    });
+    let compare = |options: &[&str]| {
+        let python = tools::python()?;
+        run(command(python)
+            .arg("tests/python/check_rigid_body.py")
+            .args([&urdf, &states])
+            .args(options))?;
+        Ok(())
+    };
+    if made.is_some() {
+        report.step("rigid body: Pinocchio on the same states", || compare(&[]));
+        report.step("rigid body: a falsified robot is noticed", || {
+            compare(&["--seeded-errors"])
+        });
+    }
+}
+
+fn export(folder: &Path, urdf: &Path, states: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    fs::create_dir_all(folder)?;
+    let built = ["build", "--locked", "--release", "--package", "wheeleg-sim"];
+    run(cargo().args(built).args(["--bin", "wheeleg"]))?;
+    run(cargo().args(built).args(["--example", "floating_states"]))?;
+    let release = target_dir().join("release");
+    run(command(release.join("wheeleg"))
+        .args(["export", "urdf", ROBOT, "--out"])
+        .arg(urdf))?;
+    let text = output(
+        command(release.join("examples").join("floating_states")).args([ROBOT, SEED, STATES]),
+    )?;
+    fs::write(states, text)?;
+    Ok(())
+}
