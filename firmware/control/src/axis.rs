@@ -24,6 +24,7 @@ pub mod learn;
 mod model;
 pub mod motion;
 pub mod predictive;
+pub mod probe;
 pub mod valves;
 
 pub use model::{AxisData, AxisField, AxisModel};

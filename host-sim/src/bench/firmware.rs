@@ -5,7 +5,7 @@ use wheeleg_control::joint::{Announced, ConfigError, JointConfig, JointControlle
 use wheeleg_control::joint::{Correction, JointInput};
 use wheeleg_control::pwm::{PwmTiming, ValvePwm};
 use wheeleg_node::sensor::SensorConfig;
-use wheeleg_units::{Micros, Ticks};
+use wheeleg_units::{Micros, PositionMm, Ticks};
 
 use super::run::{Action, Board, Sample};
 
@@ -60,9 +60,17 @@ impl Firmware {
     }
 }
 
+impl Firmware {
+    /// The stroke that a sample's reading stands for.
+    #[must_use]
+    pub fn position(&self, sample: &Sample) -> PositionMm {
+        self.sensor.position(sample.code)
+    }
+}
+
 impl Board for Firmware {
     fn tick(&mut self, sample: &Sample) -> Action {
-        let measured = self.sensor.position(sample.code);
+        let measured = self.position(sample);
         let output = self.controller.step(&JointInput {
             measured,
             reference: sample.reference,

@@ -26,12 +26,14 @@
 
 mod design;
 mod firmware;
+mod identify;
 mod metrics;
 mod motion;
 mod run;
 
 pub use design::{Kind, axis_data, design};
 pub use firmware::{Design, Firmware, TICK};
+pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};
 pub use run::{Action, Bench, Board, Row, Sample, Trace};

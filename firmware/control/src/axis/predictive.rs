@@ -17,7 +17,9 @@
 //! * **Friction** is fed forward in the direction of v*; a piston that stands
 //!   outside the band is pushed with a growing force until it slips.
 //! * **Rest.** Inside the band and slow, all valves shut, and stay shut until the
-//!   error has left three bands.
+//!   error has left three bands. A piston is also let to rest when friction alone
+//!   will stop it in the band. What does not come to rest near its target for
+//!   long may do so in a wider band, up to three times: no limit cycle lasts.
 //! * **Announced moves.** With a move announced, the force is brought to the edge
 //!   of slipping in its direction: the counter chamber vents and the drive
 //!   chamber fills ahead of time, and the piston stands.
@@ -42,6 +44,11 @@ const CATCH: i32 = 6 << 16;
 const REFERENCE_RESTS: i32 = 1 << 16;
 /// Ticks in the band before rest.
 const REST_TICKS: u16 = 30;
+/// Ticks near the target without coming to rest after which the band widens …
+const PATIENCE: u16 = 700;
+/// … by one band in so many ticks, up to three bands in all.
+const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
+const PATIENCE_SHIFT: u32 = 9;
 /// Ticks outside three bands before the end of rest.
 const RELEASE_TICKS: u16 = 4;
 
@@ -74,6 +81,7 @@ pub struct Predictive {
     target: i32,
     held: u16,
     released: u16,
+    near: u16,
     settled: bool,
     primed: bool,
 }
@@ -96,6 +104,7 @@ impl Predictive {
             target: 0,
             held: 0,
             released: 0,
+            near: 0,
             settled: false,
             primed: false,
             model,
@@ -225,16 +234,31 @@ impl Predictive {
 
     /// Rest detection; whether the valves are to stay shut.
     fn rest(&mut self, reference: i32, reference_speed: i32, measured: i32) -> bool {
-        let band = self.model.band;
+        let narrow = self.model.band;
         let error = reference
             .saturating_sub(self.motion.stroke)
             .saturating_abs();
         let steps = reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        if reference.saturating_sub(self.target).saturating_abs() > band {
+        if reference.saturating_sub(self.target).saturating_abs() > narrow {
             self.target = reference;
             self.push = 0;
+            self.near = 0;
         }
-        let quiet = steps && error < band && self.motion.speed.wrapping_abs() < CATCH;
+        let near = steps && !self.settled && error < narrow.saturating_mul(24);
+        if near {
+            self.near = self.near.saturating_add(1).min(PATIENCE.saturating_mul(4));
+        } else if !self.settled {
+            self.near = self.near.saturating_sub(1);
+        }
+        // Patience: what has not come to rest for long may do so in a wider band.
+        let beyond = i32::from(self.near.saturating_sub(PATIENCE));
+        let wider = scaled(narrow, beyond.min(2 * PATIENCE_STEP), PATIENCE_SHIFT);
+        let band = narrow.saturating_add(wider);
+        let catch =
+            CATCH.saturating_add(scaled(CATCH, beyond.min(2 * PATIENCE_STEP), PATIENCE_SHIFT));
+
+        let slow = error < band && self.motion.speed.wrapping_abs() < catch;
+        let quiet = steps && (slow || self.stops_within(reference, band));
         self.held = if quiet {
             self.held.saturating_add(1)
         } else {
@@ -243,7 +267,8 @@ impl Predictive {
         if self.held > REST_TICKS {
             self.settled = true;
         }
-        let outside = reference.saturating_sub(measured).saturating_abs() > band.saturating_mul(3);
+        let release = narrow.saturating_mul(2).saturating_add(band);
+        let outside = reference.saturating_sub(measured).saturating_abs() > release;
         if self.settled && (outside || !steps) {
             self.released = self.released.saturating_add(1);
             if self.released >= RELEASE_TICKS || !steps {
@@ -255,6 +280,38 @@ impl Predictive {
             self.released = 0;
         }
         self.settled || quiet
+    }
+
+    /// Whether friction alone stops the piston within the band, if the valves shut:
+    /// the way is the kinetic energy over what friction has left beside the
+    /// forces that act.
+    fn stops_within(&self, reference: i32, band: i32) -> bool {
+        let m = &self.motion;
+        let speed = m.speed.wrapping_shr(8);
+        let error = reference.saturating_sub(m.stroke);
+        if error.saturating_abs() > band.saturating_mul(12) {
+            return false;
+        }
+        let net = self
+            .model
+            .pressure_force(self.pressures)
+            .saturating_add(m.load);
+        let along = if speed < 0 { net.saturating_neg() } else { net };
+        let stopping = self.model.coulomb.saturating_sub(along);
+        if stopping < self.model.coulomb >> 2 {
+            return false;
+        }
+        // kg × mm²/s² = µJ = mN × mm, all × 2^16.
+        let energy = i64::from(self.inertia.mass)
+            .wrapping_mul(i64::from(speed).wrapping_mul(i64::from(speed)))
+            .wrapping_shr(17);
+        let ahead = if speed < 0 {
+            error.saturating_neg()
+        } else {
+            error
+        };
+        let work = |way: i32| i64::from(stopping).wrapping_mul(i64::from(way));
+        energy > work(ahead.saturating_sub(band)) && energy < work(ahead.saturating_add(band))
     }
 
     /// Everything shut as soon as the pulses under way allow.

@@ -1,0 +1,167 @@
+//! Finding the valves' opening delay at start-up, with the potentiometer alone.
+//!
+//! A pulse shorter than t_on lets nothing through, however often it is sent; one
+//! that is longer lets through t_off's worth at least, and a few of those move
+//! the piston. So pulses of growing length are sent to one fill valve until
+//! the piston moves: first in coarse steps, which brings the chamber to the edge of
+//! slipping, then in fine ones from a little below. The pulse that moves it then
+//! exceeds t_on by a step or two. If neither chamber moves the piston, there is
+//! no result.
+//!
+//! t_off does not show this way. Both delays of a valve come from one coil and
+//! one spring: it is taken to differ from its data sheet by the same factor.
+
+use crate::pwm::OnTimes;
+use wheeleg_units::{Micros, PositionMm};
+
+/// Time between the starts of two pulses, ticks.
+const PERIOD: u16 = 30;
+/// Standing still before pulses begin, ticks: a loaded, vented piston first runs
+/// to its end stop.
+const PAUSE: u16 = 200;
+/// Coarse and fine steps, µs.
+const COARSE: u16 = 200;
+const FINE: u16 = 50;
+/// Fine steps begin this far below the coarse result, µs.
+const BACK: u16 = 3000;
+/// Longest pulse, µs: slower valves than 20 ms are not for this use.
+const LONGEST: u16 = 20_000;
+/// Shortest pulse, µs.
+const SHORTEST: u16 = 200;
+/// Motion that counts, raw mm (0.2 mm: four steps of a 12-bit converter).
+const MOVED: i32 = 13_107;
+/// Fine results that are taken; the smallest counts.
+const ROUNDS: u8 = 3;
+
+/// Where the search stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Phase {
+    Pause,
+    Pulses,
+    Done,
+}
+
+/// The search; feed it one position per tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct DelayProbe {
+    phase: Phase,
+    /// Fine steps: the chamber is at the edge of slipping.
+    fine: bool,
+    /// Chamber B instead of A.
+    rod_side: bool,
+    pulse: u16,
+    /// Ticks since the pulse began, or of the pause.
+    at: u16,
+    base: Option<i32>,
+    rounds: u8,
+    found: Option<u16>,
+}
+
+impl Default for DelayProbe {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl DelayProbe {
+    /// At the beginning. The joint is at rest; its other chamber should be vented.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            phase: Phase::Pause,
+            fine: false,
+            rod_side: false,
+            pulse: SHORTEST,
+            at: 0,
+            base: None,
+            rounds: 0,
+            found: None,
+        }
+    }
+
+    /// Whether the search has ended.
+    #[must_use]
+    pub const fn is_done(&self) -> bool {
+        matches!(self.phase, Phase::Done)
+    }
+
+    /// The opening delay, once the search has ended with one.
+    #[must_use]
+    pub fn t_on(&self) -> Option<Micros> {
+        let found = if self.is_done() { self.found } else { None };
+        // The piston moves with the second pulse that opens, on the average.
+        found.map(|pulse| Micros(u32::from(pulse.saturating_sub(FINE))))
+    }
+
+    /// One tick: on-times of the next, µs. A tick is 1 ms.
+    pub fn tick(&mut self, measured: PositionMm) -> OnTimes {
+        let position = measured.raw();
+        let base = *self.base.get_or_insert(position);
+        let travel = position.saturating_sub(base).saturating_abs();
+        match self.phase {
+            Phase::Done => [0; 4],
+            Phase::Pause => {
+                self.at = self.at.saturating_add(1);
+                if travel > MOVED >> 2 {
+                    self.base = None;
+                    self.at = 0;
+                } else if self.at >= PAUSE {
+                    self.at = 0;
+                    self.phase = Phase::Pulses;
+                }
+                [0; 4]
+            }
+            Phase::Pulses if travel > MOVED => self.seen(),
+            Phase::Pulses => {
+                let on = self
+                    .pulse
+                    .saturating_sub(self.at.saturating_mul(1000))
+                    .min(1000);
+                self.at = self.at.saturating_add(1);
+                if self.at >= PERIOD {
+                    self.next_pulse();
+                }
+                if self.rod_side {
+                    [0, 0, on, 0]
+                } else {
+                    [on, 0, 0, 0]
+                }
+            }
+        }
+    }
+
+    /// The piston has moved.
+    fn seen(&mut self) -> OnTimes {
+        if self.fine {
+            let best = self.found.map_or(self.pulse, |found| found.min(self.pulse));
+            self.found = Some(best);
+            self.rounds = self.rounds.saturating_add(1);
+        }
+        self.fine = true;
+        self.base = None;
+        self.pulse = self.pulse.saturating_sub(BACK).max(SHORTEST);
+        self.at = 0;
+        self.phase = if self.rounds >= ROUNDS {
+            Phase::Done
+        } else {
+            Phase::Pause
+        };
+        [0; 4]
+    }
+
+    fn next_pulse(&mut self) {
+        self.at = 0;
+        let step = if self.fine { FINE } else { COARSE };
+        self.pulse = self.pulse.saturating_add(step);
+        if self.pulse <= LONGEST {
+            return;
+        }
+        if !self.fine && !self.rod_side {
+            // Against an end stop, or the load: the other way.
+            self.rod_side = true;
+            self.pulse = SHORTEST;
+        } else {
+            self.phase = Phase::Done;
+        }
+    }
+}
