@@ -37,7 +37,7 @@ pub(crate) struct Options {
     /// A folder of further programs that print RESULT lines; each executable in it runs once a round.
     #[arg(long)]
     peers: Option<PathBuf>,
-    /// Print the table as JSON too, as the last line of standard output.
+    /// Print the table as JSON too, as one line of standard output (it begins with a brace).
     #[arg(long)]
     json: bool,
 }
