@@ -15,6 +15,7 @@ mod mcap;
 mod mutants;
 mod no_std;
 mod process;
+mod qemu;
 mod report;
 mod rigid_body;
 mod rust;
@@ -52,6 +53,8 @@ enum Command {
     Firmware,
     /// Flash, static RAM and worst stack of the board images, against `tests/budgets`.
     Sizes(sizes::Options),
+    /// Boards on QEMU: images, comparison with the host, instructions per tick.
+    Qemu(qemu::Options),
     /// Check every `no_std` crate for a bare-metal target.
     NoStd,
     /// Rerun the reference generators; their output must equal the checked-in vectors.
@@ -89,6 +92,7 @@ fn main() -> ExitCode {
         }
         Command::Firmware => firmware::steps(&mut report),
         Command::Sizes(options) => sizes::steps(&mut report, &options),
+        Command::Qemu(options) => qemu::steps(&mut report, &options),
         Command::NoStd => no_std::steps(&mut report),
         Command::Vectors => vectors::steps(&mut report),
         Command::MainJob => {

@@ -42,9 +42,19 @@ const FORCE_BUILD_STD: &str = "WHEELEG_BUILD_STD";
 
 /// How a target is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+pub(crate) enum Way {
     Rustup,
     DebianBuildStd,
+}
+
+impl Way {
+    /// The way, for people.
+    pub(crate) const fn describe(self) -> &'static str {
+        match self {
+            Self::Rustup => "rustup's target",
+            Self::DebianBuildStd => "Debian's rustc, core built from source",
+        }
+    }
 }
 
 /// One step: every crate, every target. A target that fails does not hide the next.
@@ -57,13 +67,10 @@ pub(crate) fn steps(report: &mut Report) {
 
 fn check(target: &str) -> StepResult {
     let way = set_up(target)?;
-    match way {
-        Way::Rustup => println!("    way: rustup's {target}"),
-        Way::DebianBuildStd => println!("    way: Debian's rustc, core built from source"),
-    }
+    println!("    way: {} for {target}", way.describe());
     let mut wrong = Vec::new();
     for package in CRATES {
-        let mut command = cargo_for(way);
+        let mut command = cargo_for(way, "check");
         command.args([
             "--locked",
             "--lib",
@@ -84,7 +91,7 @@ fn check(target: &str) -> StepResult {
 }
 
 /// Finds a way to compile for the target, installing what may be installed.
-fn set_up(target: &str) -> StepResult<Way> {
+pub(crate) fn set_up(target: &str) -> StepResult<Way> {
     if env::var_os(FORCE_BUILD_STD).is_none() {
         if has_core(target) {
             return Ok(Way::Rustup);
@@ -137,18 +144,18 @@ fn has_debian() -> bool {
         })
 }
 
-/// `cargo check`, as the way wants it.
-fn cargo_for(way: Way) -> Command {
+/// `cargo <sub>`, as the way wants it.
+pub(crate) fn cargo_for(way: Way, sub: &str) -> Command {
     match way {
         Way::Rustup => {
             let mut command = cargo();
-            command.arg("check");
+            command.arg(sub);
             command
         }
         Way::DebianBuildStd => {
             let mut command = command(DEBIAN_CARGO);
             command
-                .args(["check", "-Zbuild-std=core"])
+                .args([sub, "-Zbuild-std=core"])
                 .env("RUSTC", DEBIAN_RUSTC)
                 .env("RUSTC_BOOTSTRAP", "1")
                 .env_remove("RUSTUP_TOOLCHAIN")
@@ -201,7 +208,7 @@ mod tests {
 
     #[test]
     fn the_second_way_does_not_share_products_with_the_first() {
-        let command = cargo_for(Way::DebianBuildStd);
+        let command = cargo_for(Way::DebianBuildStd, "check");
         let folder = command
             .get_envs()
             .find(|(name, _)| *name == "CARGO_TARGET_DIR")

@@ -27,6 +27,8 @@ pub mod parameters;
 pub mod pins;
 pub mod power;
 #[cfg(feature = "outputs")]
+pub mod slot;
+#[cfg(feature = "outputs")]
 pub mod start;
 #[cfg(feature = "outputs")]
 pub mod tick;

@@ -2,12 +2,20 @@
 
 use cortex_m_rt::{entry, exception};
 use wheeleg_board::executive;
+use wheeleg_board::g431::latch::{Feet, Potentiometer};
+use wheeleg_board::g431::slot::Slot;
+use wheeleg_board::g431::valves::Valves;
 use wheeleg_board::g431::{self, adc, board, bus, fatal, pac, power, start};
 use wheeleg_board::reset::Note;
+use wheeleg_node::ConfigError;
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::JointParameters;
 
 use pac::interrupt;
+
+type Node = JointNode<Valves, Potentiometer, Feet>;
+
+static NODE: Slot<Result<Node, ConfigError>> = Slot::new();
 
 #[entry]
 fn main() -> ! {
@@ -16,14 +24,17 @@ fn main() -> ! {
         start.halt();
     };
     let (valves, potentiometer, feet) = start.joint_hardware();
-    let parameters = g431::parameters::load(JointParameters::default(), |held, id, raw| {
-        held.with(id, raw, true)
+    let node = NODE.fill(|| {
+        let parameters = g431::parameters::load(JointParameters::default(), |held, id, raw| {
+            held.with(id, raw, true)
+        });
+        JointNode::new(identity, parameters, valves, potentiometer, feet)
     });
-    let Ok(mut node) = JointNode::new(identity, parameters, valves, potentiometer, feet) else {
+    let Some(Ok(node)) = node else {
         start.halt();
     };
     let mut board = start.joint_board();
-    executive::run(&mut node, &mut board)
+    executive::run(node, &mut board)
 }
 
 #[interrupt]

@@ -2,14 +2,23 @@
 
 use cortex_m_rt::{entry, exception};
 use wheeleg_board::executive;
+use wheeleg_board::g431::bridge::{Dump, Pulse, Sign};
+use wheeleg_board::g431::encoder::WheelEncoder;
+use wheeleg_board::g431::latch::Supply;
+use wheeleg_board::g431::slot::Slot;
 use wheeleg_board::g431::{self, board, bus, fatal, pac, power, start};
 use wheeleg_board::reset::Note;
-use wheeleg_node::hardware::DumpPin;
+use wheeleg_node::ConfigError;
+use wheeleg_node::hardware::{DumpPin, HBridge};
 use wheeleg_node::parameters::WheelParameters;
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_units::Micros;
 
 use pac::interrupt;
+
+type Node = WheelNode<HBridge<Pulse, Sign>, WheelEncoder, Supply, DumpPin<Dump>>;
+
+static NODE: Slot<Result<Node, ConfigError>> = Slot::new();
 
 #[entry]
 fn main() -> ! {
@@ -18,15 +27,17 @@ fn main() -> ! {
         start.halt();
     };
     let (motor, encoder, supply, dump) = start.wheel_hardware();
-    let parameters = g431::parameters::load(WheelParameters::default(), |held, id, raw| {
-        held.with(id, raw, true)
+    let node = NODE.fill(|| {
+        let parameters = g431::parameters::load(WheelParameters::default(), |held, id, raw| {
+            held.with(id, raw, true)
+        });
+        WheelNode::new(identity, parameters, motor, encoder, supply, DumpPin(dump))
     });
-    let Ok(mut node) = WheelNode::new(identity, parameters, motor, encoder, supply, DumpPin(dump))
-    else {
+    let Some(Ok(node)) = node else {
         start.halt();
     };
     let mut board = start.wheel_board(Micros(node.tick_period_us()));
-    executive::run(&mut node, &mut board)
+    executive::run(node, &mut board)
 }
 
 #[interrupt]

@@ -1,0 +1,24 @@
+//! An image that parses a fixed-point literal at run time. It shows that the
+//! search for the parser in the other images can find it.
+#![no_std]
+#![no_main]
+#![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicI32, Ordering};
+use fixed::types::I16F16;
+use wheeleg_board as _;
+
+static GAIN: AtomicI32 = AtomicI32::new(0);
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {}
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    loop {
+        // As it is written by mistake: without `const { … }`.
+        GAIN.store(I16F16::lit("12.5").to_bits(), Ordering::Relaxed);
+    }
+}

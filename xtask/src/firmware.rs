@@ -1,0 +1,264 @@
+//! The images of the boards: built by the rustup target, or by Debian's compiler
+//! with `core` from source, and laid down in `target/firmware`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, ensure};
+
+use crate::no_std::{Way, cargo_for, set_up};
+use crate::process::{command, run, target_dir};
+use crate::report::{Report, StepError, StepResult};
+use crate::sizes::elf::Elf;
+
+/// The part on the boards.
+pub(crate) const TARGET: &str = "thumbv7em-none-eabi";
+const PROFILE: &str = "firmware";
+const PACKAGE: &str = "wheeleg-board";
+
+/// Images by the feature that they are built with.
+const IMAGES: [(&str, &[&str]); 2] = [
+    ("outputs", &["joint", "wheel"]),
+    ("hil", &["joint-hil", "wheel-hil"]),
+];
+
+/// Images that drive outputs: the ones with budgets.
+pub(crate) const SHIPPED: [&str; 2] = ["joint", "wheel"];
+
+/// What a reachable panic leaves for the linker to complain about.
+const PANIC_SYMBOL: &str = "this_image_can_panic";
+
+/// One image.
+pub(crate) struct Image {
+    pub(crate) name: &'static str,
+    pub(crate) elf: PathBuf,
+    /// BLAKE3 of what goes into flash.
+    pub(crate) hash: String,
+}
+
+/// `cargo xtask firmware`.
+pub(crate) fn steps(report: &mut Report) {
+    report.step("firmware images", || build().map(drop));
+    report.step("no panic is reachable in an image", link_check);
+    report.step(
+        "no fixed-point literal is parsed in an image",
+        literal_check,
+    );
+    report.step("lints of the board support", lint);
+}
+
+/// Builds all images and says how.
+pub(crate) fn build() -> StepResult<Vec<Image>> {
+    let way = set_up(TARGET)?;
+    println!("    way: {}", way.describe());
+    let folder = target_dir().join("firmware");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut images = Vec::new();
+    for (feature, names) in IMAGES {
+        let mut command = cargo(way, "build", feature)?;
+        for name in names {
+            command.args(["--bin", name]);
+        }
+        run(&mut command)?;
+        for name in names {
+            let elf = folder.join(format!("{name}.elf"));
+            fs::copy(products(way).join(name), &elf)
+                .with_context(|| format!("cannot copy the image {name}"))?;
+            let contents = Elf::read(&elf)?;
+            let hash = contents.flash_hash();
+            println!(
+                "    {:<10} {:>6} bytes in flash  blake3 {}  {}",
+                name,
+                contents.flash_bytes(),
+                hash.get(..16).unwrap_or(&hash),
+                elf.display()
+            );
+            images.push(Image { name, elf, hash });
+        }
+    }
+    Ok(images)
+}
+
+/// Links each image with a panic handler that does not exist. A third program,
+/// with a panic planted in it, must *not* link: else the check shows nothing.
+pub(crate) fn link_check() -> StepResult {
+    let way = set_up(TARGET)?;
+    let mut command = cargo(way, "build", "outputs")?;
+    command.args(["--bin", "link_check_joint", "--bin", "link_check_wheel"]);
+    run(&mut command)?;
+    let mut command = cargo(way, "build", "planted")?;
+    command.args(["--bin", "planted_panic"]);
+    Ok(must_not_link(&mut command)?)
+}
+
+fn must_not_link(command: &mut Command) -> anyhow::Result<()> {
+    println!("    the planted panic must be found");
+    let output = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .output()
+        .context("cannot start cargo")?;
+    let text = String::from_utf8_lossy(&output.stderr);
+    ensure!(
+        !output.status.success() && text.contains(&format!("undefined symbol: {PANIC_SYMBOL}")),
+        "the link check does not find a planted panic:\n{text}"
+    );
+    Ok(())
+}
+
+/// No image contains the parser of fixed-point literals; a program that does is
+/// recognised.
+pub(crate) fn literal_check() -> StepResult {
+    for image in build()? {
+        Elf::read(&image.elf)?
+            .no_literal_parsing()
+            .context(image.name)?;
+    }
+    let way = set_up(TARGET)?;
+    let mut command = cargo(way, "build", "planted")?;
+    run(command.args(["--bin", "planted_literal"]))?;
+    let planted = Elf::read(&products(way).join("planted_literal"))?;
+    match planted.no_literal_parsing() {
+        Err(_) => Ok(()),
+        Ok(()) => Err(anyhow::anyhow!("a planted run-time literal is not found").into()),
+    }
+}
+
+/// The board support is not built on the host, so its lints are checked here.
+fn lint() -> StepResult {
+    let way = set_up(TARGET)?;
+    if way == Way::DebianBuildStd {
+        return Err(StepError::missing(
+            format!("the Rust target {TARGET} for clippy"),
+            format!("rustup target add {TARGET}"),
+        ));
+    }
+    for (feature, names) in IMAGES {
+        let mut command = cargo(way, "clippy", feature)?;
+        // The crates below are linted on the host.
+        command.args(["--no-deps", "--lib"]);
+        for name in names {
+            command.args(["--bin", name]);
+        }
+        run(command.args(["--", "-D", "warnings"]))?;
+    }
+    Ok(())
+}
+
+/// Where the compiled images lie.
+fn products(way: Way) -> PathBuf {
+    folder(way).join(TARGET).join(PROFILE)
+}
+
+/// Own target folders: the flags differ from every other build's, and each
+/// change of flags would rebuild everything in a shared folder.
+fn folder(way: Way) -> PathBuf {
+    target_dir().join(match way {
+        Way::Rustup => "firmware-build",
+        Way::DebianBuildStd => "firmware-build-debian",
+    })
+}
+
+/// `cargo <sub>` for the board crate alone, so that no other crate's features
+/// reach into an image.
+fn cargo(way: Way, sub: &str, features: &str) -> StepResult<Command> {
+    let mut command = cargo_for(way, sub);
+    command
+        .args(["--locked", "--package", PACKAGE, "--features", features])
+        .args(["--profile", PROFILE, "--target", TARGET])
+        .env("CARGO_TARGET_DIR", folder(way))
+        // Stack sizes go into a section that is not loaded; the flag is unstable,
+        // what it does to the code is nothing.
+        .env("RUSTC_BOOTSTRAP", "1")
+        .env("RUSTFLAGS", "-Zemit-stack-sizes");
+    if way == Way::DebianBuildStd {
+        let linker = linker_folder()?;
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let all = std::iter::once(linker).chain(std::env::split_paths(&path));
+        let joined = std::env::join_paths(all).context("PATH with the linker's folder")?;
+        command.env("PATH", joined);
+    }
+    Ok(command)
+}
+
+/// A folder with the linker under the name by which Debian's compiler calls it.
+fn linker_folder() -> StepResult<PathBuf> {
+    let found = rustup_linker().or_else(|| {
+        [
+            "/usr/bin/ld.lld",
+            "/usr/bin/ld.lld-19",
+            "/usr/bin/ld.lld-14",
+        ]
+        .into_iter()
+        .map(PathBuf::from)
+        .find(|path| path.exists())
+    });
+    let Some(linker) = found else {
+        return Err(StepError::missing("ld.lld", "apt-get install -y lld"));
+    };
+    let folder = target_dir().join("firmware-build-debian").join("linker");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let link = folder.join("rust-lld");
+    let _ = fs::remove_file(&link);
+    symlink(&linker, &link).with_context(|| format!("cannot link {}", link.display()))?;
+    Ok(folder)
+}
+
+#[cfg(unix)]
+fn symlink(original: &Path, link: &Path) -> std::io::Result<()> {
+    std::os::unix::fs::symlink(original, link)
+}
+
+#[cfg(not(unix))]
+fn symlink(original: &Path, link: &Path) -> std::io::Result<()> {
+    fs::copy(original, link).map(drop)
+}
+
+/// rustup's own linker, if there is a rustup.
+fn rustup_linker() -> Option<PathBuf> {
+    let sysroot = crate::process::ask(command("rustc").args(["--print", "sysroot"]))?;
+    let libraries = Path::new(&sysroot).join("lib/rustlib");
+    let hosts = fs::read_dir(libraries).ok()?;
+    hosts
+        .flatten()
+        .map(|host| host.path().join("bin/rust-lld"))
+        .find(|path| path.exists())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process::root;
+
+    /// Crates whose code runs in a tick: bare operators, which wrap silently on
+    /// fixed-point numbers, are lint errors in each of them.
+    const TICK_CRATES: [&str; 5] = [
+        "firmware/units",
+        "firmware/control",
+        "firmware/node",
+        "firmware/board",
+        "protocol",
+    ];
+
+    #[test]
+    fn bare_operators_are_errors_in_every_crate_of_the_tick() {
+        for folder in TICK_CRATES {
+            let source = fs::read_to_string(root().join(folder).join("src/lib.rs")).expect(folder);
+            let from = source.find("deny(").expect(folder);
+            let list = source[from..].split(")]").next().expect(folder);
+            assert!(
+                list.contains("clippy::arithmetic_side_effects"),
+                "{folder}: {list}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_shipped_image_is_built_and_has_a_budget() {
+        for name in SHIPPED {
+            assert!(IMAGES.iter().any(|(_, names)| names.contains(&name)));
+            assert!(root().join(format!("tests/budgets/{name}.toml")).exists());
+        }
+    }
+}

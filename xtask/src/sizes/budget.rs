@@ -1,0 +1,113 @@
+//! The budgets in `tests/budgets`.
+
+use std::fs;
+
+use anyhow::{Context, Result};
+use serde::Deserialize;
+
+use crate::process::root;
+
+/// Limits of one image.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Budget {
+    pub(super) flash_bytes_max: u64,
+    pub(super) static_ram_bytes_max: u64,
+    pub(super) stack_margin_min: f64,
+    /// Used by the runs on emulated boards.
+    pub(super) tick_instructions_max: u64,
+}
+
+/// Figures of one image.
+#[derive(Debug)]
+pub(super) struct Figures {
+    pub(super) flash_bytes: u64,
+    pub(super) static_ram_bytes: u64,
+    pub(super) stack_bound_bytes: u64,
+    pub(super) stack_room_bytes: u64,
+}
+
+impl Figures {
+    /// Share of the stack's room that is never used; negative if it overflows.
+    pub(super) fn stack_margin(&self) -> f64 {
+        1.0 - self.stack_bound_bytes as f64 / self.stack_room_bytes as f64
+    }
+}
+
+impl Budget {
+    /// The budget of an image.
+    pub(super) fn read(image: &str) -> Result<Self> {
+        let path = root().join(format!("tests/budgets/{image}.toml"));
+        let text =
+            fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        toml::from_str(&text).with_context(|| path.display().to_string())
+    }
+
+    /// What is beyond the limits.
+    pub(super) fn breaches(&self, figures: &Figures) -> Vec<String> {
+        let mut breaches = Vec::new();
+        let mut limit = |what: &str, value: u64, max: u64| {
+            if value > max {
+                breaches.push(format!("{what} {value} bytes, allowed are {max}"));
+            }
+        };
+        limit("flash", figures.flash_bytes, self.flash_bytes_max);
+        limit(
+            "static RAM",
+            figures.static_ram_bytes,
+            self.static_ram_bytes_max,
+        );
+        let margin = figures.stack_margin();
+        // Written so that a margin that is no number is a breach.
+        if !(margin >= self.stack_margin_min) {
+            breaches.push(format!(
+                "stack margin {:.1} %, at least {:.1} % is asked",
+                margin * 100.0,
+                self.stack_margin_min * 100.0
+            ));
+        }
+        breaches
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(flash: u64, ram: u64, stack: u64) -> Figures {
+        Figures {
+            flash_bytes: flash,
+            static_ram_bytes: ram,
+            stack_bound_bytes: stack,
+            stack_room_bytes: 8192,
+        }
+    }
+
+    #[test]
+    fn a_byte_beyond_any_limit_is_a_breach() {
+        let budget = Budget::read("joint").expect("budget");
+        let (flash, ram) = (budget.flash_bytes_max, budget.static_ram_bytes_max);
+        assert!(budget.breaches(&figures(flash, ram, 6144)).is_empty());
+        for (breach, word) in [
+            (figures(flash + 1, ram, 6144), "flash"),
+            (figures(flash, ram + 1, 6144), "static RAM"),
+            (figures(flash, ram, 6145), "stack"),
+            (figures(flash, ram, 9000), "stack"),
+        ] {
+            let found = budget.breaches(&breach);
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert!(found[0].starts_with(word), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn the_issue_s_limits_stand_in_the_files() {
+        for (image, instructions) in [("joint", 1500), ("wheel", 800)] {
+            let budget = Budget::read(image).expect(image);
+            assert_eq!(budget.flash_bytes_max, 48 * 1024);
+            assert_eq!(budget.static_ram_bytes_max, 8 * 1024);
+            assert!((budget.stack_margin_min - 0.25).abs() < 1e-12);
+            assert_eq!(budget.tick_instructions_max, instructions);
+        }
+    }
+}
