@@ -80,13 +80,15 @@ const LIBRARIES: [&str; 8] = [
     "wheeleg-units",
 ];
 
-const TESTED: [&str; 8] = [
+const TESTED: [&str; 10] = [
     "wheeleg-control",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
+    "wheeleg-pil-link",
     "wheeleg-plant",
     "wheeleg-protocol",
+    "wheeleg-remote",
     "wheeleg-sim",
     "wheeleg-units",
 ];

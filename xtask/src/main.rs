@@ -124,6 +124,7 @@ fn test(report: &mut Report) {
     no_std::steps(report);
     firmware::steps(report);
     sizes::steps(report, &sizes::Options::default());
+    qemu::steps(report, &qemu::Options::default());
     vectors::steps(report);
     conformance::steps(report);
     fuzz::short_steps(report);

@@ -115,9 +115,12 @@ impl<'p> Board<'p> for RemoteJoint<'p> {
             fill_b: Channel::new(fill_b, VALVE_COUNTS),
             vent_b: Channel::new(vent_b, VALVE_COUNTS),
         };
+        // Nothing is left of a life before this reset.
         for duty in &pins.duty {
             duty.set(0);
         }
+        pins.code.set(0);
+        pins.switches.set(0);
         let mask = if has_foot(identity.address.raw()) {
             WireSwitches::FOOT
         } else {
@@ -206,8 +209,12 @@ impl<'p> Board<'p> for RemoteWheel<'p> {
         pins: &'p WheelPins,
     ) -> Result<Self, ConfigError> {
         let has_supply = has_supply(identity.address.raw());
+        // Nothing is left of a life before this reset.
         pins.pulse.set(0);
+        pins.backward.set(false);
         pins.dump.set(false);
+        pins.count.set(0);
+        pins.supply.set(0);
         let bridge = HBridge {
             pulse: Channel::new(&pins.pulse, BRIDGE_COUNTS),
             sign: Output(&pins.backward),

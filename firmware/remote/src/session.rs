@@ -107,6 +107,8 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         self.parameters = B::Parameters::default();
         self.identity = None;
         self.board = None;
+        self.active = Outputs::default();
+        self.edge_ns = 0;
         self.resets = 0;
     }
 

@@ -69,6 +69,11 @@ impl<S: Stream> Partner<S> {
         self.stream.name()
     }
 
+    /// The stream.
+    pub fn stream(&self) -> &S {
+        &self.stream
+    }
+
     /// The stream, at the end of the session.
     pub fn into_stream(self) -> S {
         self.stream

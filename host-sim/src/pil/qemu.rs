@@ -22,6 +22,12 @@ const PROGRAM: &str = "qemu-system-arm";
 /// Environment variable with the emulator's path.
 pub const PROGRAM_VARIABLE: &str = "WHEELEG_QEMU";
 
+/// Environment variable with a TCG plugin, see [`QemuOptions::plugin`].
+pub const PLUGIN_VARIABLE: &str = "WHEELEG_QEMU_PLUGIN";
+
+/// Number of the next emulator.
+static NUMBER: AtomicU64 = AtomicU64::new(0);
+
 /// Version that the project is tested with is 7.2; machine and options are the
 /// command of record of ARCHITECTURE.md.
 const ARGUMENTS: [&str; 16] = [
@@ -48,6 +54,9 @@ const ARGUMENTS: [&str; 16] = [
 const PATIENCE: Duration = Duration::from_secs(20);
 /// How often the watch looks.
 const WATCH_PERIOD: Duration = Duration::from_millis(250);
+/// How long an emulator may take to end by itself.
+const GRACE_STEPS: u32 = 200;
+const GRACE_STEP: Duration = Duration::from_millis(5);
 /// Last lines of the emulator's complaints that are kept.
 const KEPT_LINES: usize = 8;
 
@@ -58,20 +67,22 @@ pub struct QemuOptions {
     pub program: PathBuf,
     /// The image.
     pub image: PathBuf,
-    /// TCG plugin with its arguments, as after `-plugin`.
+    /// TCG plugin with its arguments, as after `-plugin`. `{n}` in it stands for
+    /// the image's name and a number of its own for every emulator of this program.
     pub plugin: Option<String>,
     /// How long an answer may take.
     pub patience: Duration,
 }
 
 impl QemuOptions {
-    /// The emulator of the environment, or the one on the path, with `image`.
+    /// The emulator and the plugin of the environment, or the one on the path
+    /// and none, with `image`.
     pub fn new(image: impl Into<PathBuf>) -> Self {
         let program = std::env::var_os(PROGRAM_VARIABLE);
         Self {
             program: program.map_or_else(|| PROGRAM.into(), PathBuf::from),
             image: image.into(),
-            plugin: None,
+            plugin: std::env::var(PLUGIN_VARIABLE).ok(),
             patience: PATIENCE,
         }
     }
@@ -146,7 +157,11 @@ impl Qemu {
         let mut command = Command::new(&options.program);
         command.args(ARGUMENTS);
         if let Some(plugin) = &options.plugin {
-            command.arg("-plugin").arg(plugin);
+            let stem = image.file_stem().unwrap_or_default().to_string_lossy();
+            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+            command
+                .arg("-plugin")
+                .arg(plugin.replace("{n}", &format!("{stem}-{number}")));
         }
         let mut child = command
             .arg("-kernel")
@@ -323,7 +338,18 @@ impl Stream for Qemu {
 impl Drop for Qemu {
     fn drop(&mut self) {
         self.watch.state.store(OVER, Ordering::Relaxed);
-        {
+        // The image ends with its input, and the emulator with the image; so a
+        // plugin gets to write its result.
+        self.stdin = None;
+        let mut ended = false;
+        for _ in 0..GRACE_STEPS {
+            ended = !matches!(lock(&self.child).try_wait(), Ok(None));
+            if ended {
+                break;
+            }
+            thread::sleep(GRACE_STEP);
+        }
+        if !ended {
             let mut child = lock(&self.child);
             let _ = child.kill();
             let _ = child.wait();

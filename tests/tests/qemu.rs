@@ -1,0 +1,429 @@
+//! The images on QEMU against the application in this process: `cargo xtask qemu`
+//! builds the images and runs these tests.
+
+mod bench;
+
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use heapless::Vec as Short;
+use wheeleg_pil_link::{Figures, Inputs, Nonvolatile, Power, Ran, Reply, Request, Run, Switches};
+use wheeleg_protocol::{
+    Address, Arm, ClearFault, Envelope, JointSetpoint, LinkLossAction, MAX_ENCODED, Message,
+    SCHEMA_HASH, Sync, SyncFlags, SyncSlots, WheelSetpoint,
+};
+use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, WheelPins};
+use wheeleg_sim::SimError;
+use wheeleg_sim::hil::{HilOptions, connect};
+use wheeleg_sim::pil::Partner;
+use wheeleg_sim::pil::qemu::{Qemu, QemuOptions};
+use wheeleg_units::{PositionMm, WheelCount, WireVelocity};
+
+use bench::{NoTime, assert_follows, assert_same, closed_loop, closed_loop_natively, power_up};
+
+/// Environment variable with the folder of the images.
+const IMAGES: &str = "WHEELEG_IMAGES";
+
+fn image(name: &str) -> PathBuf {
+    let folder = std::env::var_os(IMAGES).expect("`cargo xtask qemu` names the folder of images");
+    Path::new(&folder).join(name)
+}
+
+fn board(name: &str) -> Partner<Qemu> {
+    let mut partner = Qemu::partner(&QemuOptions::new(image(name))).expect("QEMU starts");
+    let hello = partner.hello().expect("the image answers");
+    assert_eq!(format!("qemu-{}", hello.image.name), name);
+    partner
+}
+
+fn said(error: &SimError) -> String {
+    let SimError::Simulation { what, help } = error else {
+        panic!("{error:?}");
+    };
+    format!("{what} | {help}")
+}
+
+#[test]
+fn the_loop_closed_by_the_emulated_board_is_that_of_the_host_bit_for_bit() {
+    let mut partner = board("qemu-joint");
+    let trace = closed_loop(bench::SCRIPT_MS, |request| {
+        partner.ask(request).expect("the image answers")
+    });
+    assert_follows(&trace);
+    assert_same(&trace, &closed_loop_natively());
+}
+
+#[test]
+fn two_runs_are_equal_down_to_the_stack() {
+    let run = || {
+        let mut partner = board("qemu-joint");
+        let mut replies = Vec::new();
+        let _ = closed_loop(1_100, |request| {
+            let reply = partner.ask(request).expect("the image answers");
+            replies.push(reply.clone());
+            reply
+        });
+        replies
+    };
+    let (first, second) = (run(), run());
+    assert!(first == second);
+    let deepest = first.iter().filter_map(|reply| match reply {
+        Reply::Ran(ran) => Some(ran.figures),
+        _ => None,
+    });
+    let figures = deepest.max_by_key(|f| f.stack_used).expect("replies");
+    println!(
+        "stack: {} of {} bytes",
+        figures.stack_used, figures.stack_size
+    );
+    assert!(figures.stack_used > 0, "the watermark was taken");
+    // A quarter of the room stays free.
+    assert!(
+        figures.stack_used * 4 <= figures.stack_size * 3,
+        "{figures:?}"
+    );
+}
+
+/// Numbers that follow from a seed (SplitMix64, public domain).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, limit: u64) -> u64 {
+        self.next() % limit
+    }
+}
+
+fn frame(destination: Address, sequence: u16, message: &Message) -> Vec<u8> {
+    let envelope = Envelope {
+        source: Address::MASTER,
+        destination,
+        sequence,
+    };
+    let mut buffer = [0; MAX_ENCODED];
+    message.emit(envelope, &mut buffer).expect("fits").to_vec()
+}
+
+/// A life of `ticks` ticks full of incidents, for the board at `address`:
+/// wandering sensors, jumps, wild set-points, E-stops, silence of the master,
+/// rubbish on the line, a brown-out.
+fn eventful_life(address: u8, ticks: u64, seed: u64) -> Vec<Request> {
+    let mut numbers = Numbers(seed);
+    let own = Address::new(address).expect("an address");
+    let period_ns = if address <= 6 { 1_000_000 } else { 520_000 };
+    let mut requests = vec![power_up(address)];
+    let (mut adc, mut encoder, mut sequence) = (30_000_i64, 0_i32, 0_u16);
+    for tick in 0..ticks {
+        let now_ns = tick * period_ns;
+        adc = (adc + numbers.below(41) as i64 - 20).clamp(3_300, 62_000);
+        encoder = encoder.wrapping_add(numbers.below(7) as i32 - 3);
+        let jump = numbers.below(700) == 0;
+        let inputs = Inputs {
+            adc: if jump {
+                numbers.next() as u16
+            } else {
+                adc as u16
+            },
+            switches: Switches(numbers.below(32) as u8),
+            encoder,
+        };
+        let power = if (1_500..1_504).contains(&tick) {
+            Power::BrownOut
+        } else {
+            Power::Good
+        };
+        requests.push(Request::Run(Run {
+            until_ns: now_ns,
+            edge: Some(inputs),
+            power,
+            ..Run::default()
+        }));
+        let silent = (1_000..1_100).contains(&tick);
+        let bytes = match tick % 10 {
+            0 if !silent => {
+                let mut slots = SyncSlots::NONE;
+                let reference = PositionMm::from_f64(numbers.below(180_000) as f64 * 1e-3);
+                if address <= 6 {
+                    slots.set_joint(
+                        own,
+                        JointSetpoint {
+                            reference,
+                            velocity: WireVelocity::ZERO,
+                            next: None,
+                            on_link_loss: LinkLossAction::Hold,
+                            track: true,
+                        },
+                    );
+                } else {
+                    slots.set_wheel(
+                        own,
+                        WheelSetpoint {
+                            reference: WheelCount::wrapping_new(numbers.next() as i32 >> 16),
+                            velocity_raw: numbers.next() as i16,
+                            track: true,
+                        },
+                    );
+                }
+                let flags = if numbers.below(60) == 0 {
+                    SyncFlags::ESTOP
+                } else {
+                    SyncFlags::NONE
+                };
+                frame(
+                    Address::BROADCAST,
+                    0,
+                    &Message::Sync(Sync {
+                        cycle: (tick / 10) as u16,
+                        master_time_us: (now_ns / 1_000) as u32,
+                        flags,
+                        slots,
+                    }),
+                )
+            }
+            3 if numbers.below(4) == 0 => {
+                sequence = sequence.wrapping_add(1);
+                frame(own, sequence, &Message::ClearFault(ClearFault {}))
+            }
+            5 if numbers.below(3) == 0 => {
+                sequence = sequence.wrapping_add(1);
+                let schema_hash = SCHEMA_HASH;
+                frame(own, sequence, &Message::Arm(Arm { schema_hash }))
+            }
+            7 if numbers.below(5) == 0 => {
+                let length = 1 + numbers.below(40);
+                (0..length).map(|_| numbers.next() as u8).collect()
+            }
+            _ => continue,
+        };
+        let until_ns = now_ns + 300_000;
+        requests.push(Request::Run(Run {
+            until_ns,
+            received: Short::from_slice(&bytes).expect("fits"),
+            received_end_ns: until_ns,
+            byte_ns: 10_000,
+            power,
+            ..Run::default()
+        }));
+    }
+    requests
+}
+
+fn without_figures(reply: Reply) -> Reply {
+    match reply {
+        Reply::Ran(ran) => Reply::Ran(Ran {
+            figures: Figures {
+                resets: ran.figures.resets,
+                ..Figures::default()
+            },
+            ..ran
+        }),
+        other => other,
+    }
+}
+
+fn answers_here(address: u8, requests: &[Request]) -> Vec<Reply> {
+    let (joint, wheel) = (JointPins::default(), WheelPins::default());
+    let mut joint = Session::<RemoteJoint<'_>>::new(&joint, "", 0);
+    let mut wheel = Session::<RemoteWheel<'_>>::new(&wheel, "", 0);
+    requests
+        .iter()
+        .map(|request| {
+            without_figures(if address <= 6 {
+                joint.answer(request, &mut NoTime)
+            } else {
+                wheel.answer(request, &mut NoTime)
+            })
+        })
+        .collect()
+}
+
+#[test]
+fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
+    let lives: Vec<Vec<Request>> = (1..=8)
+        .map(|address| eventful_life(address, 2_500, u64::from(address)))
+        .collect();
+    let expected: Vec<Vec<Reply>> = (1..=8)
+        .zip(&lives)
+        .map(|(address, life)| answers_here(address, life))
+        .collect();
+    let mut boards: Vec<Partner<Qemu>> = (1..=8)
+        .map(|address| {
+            board(if address <= 6 {
+                "qemu-joint"
+            } else {
+                "qemu-wheel"
+            })
+        })
+        .collect();
+    let longest = lives.iter().map(Vec::len).max().expect("eight");
+    for i in 0..longest {
+        for (board, life) in boards.iter_mut().zip(&lives) {
+            if let Some(request) = life.get(i) {
+                board.send(request).expect("QEMU lives");
+            }
+        }
+        for (n, board) in boards.iter_mut().enumerate() {
+            if let Some(request) = lives[n].get(i) {
+                let reply = without_figures(board.receive().expect("QEMU answers"));
+                let here = &expected[n][i];
+                assert!(
+                    reply == *here,
+                    "board {}, request {i}, {request:?}\nhere  {here:?}\nthere {reply:?}",
+                    n + 1
+                );
+            }
+        }
+    }
+    // The lives were worth comparing: outputs moved, frames were sent, a reset seen.
+    for (n, replies) in expected.iter().enumerate() {
+        let ran = || {
+            replies.iter().filter_map(|reply| match reply {
+                Reply::Ran(ran) => Some(ran),
+                _ => None,
+            })
+        };
+        let driven =
+            ran().filter(|r| r.outputs.valve_on_us != [0; 4] || r.outputs.bridge_percent != 0);
+        assert!(driven.count() > 50, "board {}", n + 1);
+        assert!(
+            ran().map(|r| r.sent.len()).sum::<usize>() > 200,
+            "board {}",
+            n + 1
+        );
+        assert_eq!(
+            ran().filter(|r| r.trip.is_some()).count(),
+            1,
+            "board {}",
+            n + 1
+        );
+    }
+}
+
+#[test]
+fn parameters_reach_the_image_and_impossible_ones_are_refused() {
+    let mut partner = board("qemu-joint");
+    let store = |bytes: &[u8]| {
+        Request::Store(Nonvolatile {
+            offset: 0,
+            bytes: Short::from_slice(bytes).expect("fits"),
+        })
+    };
+    let head = [0x57, 0x57, 1, 0, 0, 0, 0, 0];
+    let record = |id: u16, raw: i32| {
+        let mut bytes = head.to_vec();
+        bytes.extend_from_slice(&id.to_le_bytes());
+        bytes.extend_from_slice(&[0, 0]);
+        bytes.extend_from_slice(&raw.to_le_bytes());
+        bytes
+    };
+    let row = &wheeleg_protocol::param::JOINT_PARAMS[0];
+    let reply = partner
+        .ask(&store(&record(row.id, row.max)))
+        .expect("answer");
+    assert_eq!(reply, Reply::Done);
+    for wrong in [record(row.id, row.max + 1), record(0xEEEE, 0), vec![1; 16]] {
+        let reply = partner.ask(&store(&wrong)).expect("answer");
+        assert!(matches!(reply, Reply::Refused(_)), "{reply:?}");
+    }
+    let wheel = partner.ask(&power_up(7)).expect("answer");
+    assert!(matches!(wheel, Reply::Refused(_)), "{wheel:?}");
+}
+
+#[test]
+fn a_missing_emulator_or_image_is_named_with_the_command_that_brings_it() {
+    let mut options = QemuOptions::new(image("qemu-joint"));
+    options.program = "no-such-emulator".into();
+    let error = said(&Qemu::start(&options).expect_err("missing"));
+    assert!(error.contains("no-such-emulator"), "{error}");
+    assert!(error.contains("apt-get install qemu-system-arm"), "{error}");
+    let error = said(&Qemu::start(&QemuOptions::new("no/image")).expect_err("missing"));
+    assert!(error.contains("no/image"), "{error}");
+    assert!(error.contains("cargo xtask qemu"), "{error}");
+}
+
+#[test]
+fn an_emulator_that_dies_or_hangs_is_an_error_and_none_is_left_behind() {
+    // Killed from outside.
+    let mut partner = board("qemu-joint");
+    partner.ask(&power_up(1)).expect("answer");
+    let id = partner.stream().id();
+    let killed = Command::new("kill").args(["-9", &id.to_string()]).status();
+    assert!(killed.expect("kill").success());
+    let error = loop {
+        if let Err(error) = partner.ask(&power_up(1)) {
+            break said(&error);
+        }
+    };
+    assert!(
+        error.contains("QEMU (qemu-joint) has ended in mid-session"),
+        "{error}"
+    );
+    assert!(error.contains("signal: 9"), "{error}");
+
+    // An image that never answers here: it listens to its UART.
+    let mut options = QemuOptions::new(image("qemu-hil-joint"));
+    options.patience = Duration::from_millis(600);
+    let mut partner = Qemu::partner(&options).expect("starts");
+    let id = partner.stream().id();
+    let error = said(&partner.hello().expect_err("silence"));
+    assert!(error.contains("did not answer"), "{error}");
+    drop(partner);
+    assert!(!Path::new(&format!("/proc/{id}")).exists(), "still there");
+
+    // Dropped in mid-session.
+    let partner = board("qemu-wheel");
+    let id = partner.stream().id();
+    assert!(Path::new(&format!("/proc/{id}")).exists());
+    drop(partner);
+    assert!(!Path::new(&format!("/proc/{id}")).exists(), "still there");
+}
+
+#[test]
+fn a_bench_board_on_the_emulated_uart_closes_the_loop_over_its_port() {
+    let mut emulator = Command::new("qemu-system-arm")
+        .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
+        .args(["-display", "none", "-monitor", "none", "-serial", "pty"])
+        .arg("-kernel")
+        .arg(image("qemu-hil-joint"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("QEMU starts");
+    let output = emulator.stdout.take().expect("piped");
+    let line = BufReader::new(output).lines().next().expect("a line");
+    let line = line.expect("text");
+    let port = line
+        .split_whitespace()
+        .find(|word| word.starts_with("/dev/"))
+        .unwrap_or_else(|| panic!("no port in `{line}`"));
+    let options = HilOptions::parse(port).expect("a port");
+    let (mut partner, hello) = connect(&options, "joint").expect("a joint board");
+    assert!(hello.host.contains("HIL"), "{hello:?}");
+    let trace = closed_loop(300, |request| partner.ask(request).expect("an answer"));
+    let pins = JointPins::default();
+    let mut here = Session::<RemoteJoint<'_>>::new(&pins, "", 0);
+    let expected = closed_loop(300, |request| here.answer(request, &mut NoTime));
+    assert_same(&trace, &expected);
+    // The cylinder moves towards its second set-point by then.
+    assert!(trace.stroke_mm[299] > 95.0, "{}", trace.stroke_mm[299]);
+
+    // The emulator dies in mid-run.
+    emulator.kill().expect("killed");
+    emulator.wait().expect("ended");
+    let error = loop {
+        if let Err(error) = partner.ask(&power_up(1)) {
+            break said(&error);
+        }
+    };
+    assert!(error.contains(port), "{error}");
+}

@@ -1,0 +1,252 @@
+//! The boards on QEMU: emulator, images, the tests that compare them with the
+//! host, and instructions per tick.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::no_std::{Way, cargo_for, set_up};
+use crate::process::{ask, cargo, command, run, target_dir};
+use crate::report::{Report, StepError, StepResult};
+use crate::tools::{apt_install, have, may_apt};
+
+const EMULATOR: &str = "qemu-system-arm";
+const TARGET: &str = "thumbv7em-none-eabi";
+const PROFILE: &str = "firmware";
+const PACKAGE: &str = "wheeleg-board-qemu";
+const IMAGES: [&str; 3] = ["qemu-joint", "qemu-wheel", "qemu-hil-joint"];
+
+/// What is counted in the images that have a tick: name of the region, and the
+/// functions that mark its begin and end.
+const REGIONS: [(&str, &str, &str); 2] = [
+    ("tick", "mark_tick_begins", "mark_tick_ended"),
+    ("bytes", "mark_bytes_begin", "mark_bytes_ended"),
+];
+
+/// Arguments of `cargo xtask qemu`.
+#[derive(Args, Debug, Default)]
+pub(crate) struct Options {
+    /// Print the figures as one line of JSON at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+/// `cargo xtask qemu`.
+pub(crate) fn steps(report: &mut Report, options: &Options) {
+    if report.step("set-up: QEMU", emulator).is_none() {
+        return;
+    }
+    let Some(images) = report.step("QEMU images", images) else {
+        return;
+    };
+    report.step("lints of the QEMU board support", lint);
+    report.step("QEMU boards against the host, bit for bit", || {
+        compare(&images)
+    });
+    let counts = report.step("instructions per tick on QEMU", || count(&images));
+    if options.json
+        && let Some(counts) = counts
+    {
+        println!("{counts}");
+    }
+}
+
+/// Finds the emulator or installs it.
+fn emulator() -> StepResult {
+    if have(EMULATOR) || (may_apt() && apt_install(&[EMULATOR]) && have(EMULATOR)) {
+        let version = ask(command(EMULATOR).arg("--version")).unwrap_or_default();
+        println!("    {}", version.lines().next().unwrap_or_default());
+        return Ok(());
+    }
+    Err(StepError::missing(
+        EMULATOR,
+        format!("apt-get install -y {EMULATOR}"),
+    ))
+}
+
+/// Builds the images; gives the folder in which they lie. They link only if no
+/// panic can be reached.
+fn images() -> StepResult<PathBuf> {
+    let way = set_up(TARGET)?;
+    println!("    way: {}", way.describe());
+    let mut build = cargo_for(way, "build");
+    build
+        .args(["--locked", "--package", PACKAGE, "--features", "image"])
+        .args(["--profile", PROFILE, "--target", TARGET]);
+    run(&mut build)?;
+    let products = match way {
+        Way::Rustup => target_dir(),
+        Way::DebianBuildStd => target_dir().join("debian"),
+    };
+    let folder = products.join(TARGET).join(PROFILE);
+    for image in IMAGES {
+        let path = folder.join(image);
+        present(&path)?;
+    }
+    Ok(folder)
+}
+
+/// Images and tests that need them are not among the host's targets, so their
+/// lints are checked here.
+fn lint() -> StepResult {
+    if set_up(TARGET)? == Way::DebianBuildStd {
+        return Err(StepError::missing(
+            format!("the Rust target {TARGET} for clippy"),
+            format!("rustup target add {TARGET}"),
+        ));
+    }
+    run(cargo()
+        .args(["clippy", "--locked", "--no-deps", "--package", PACKAGE])
+        .args(["--features", "image", "--target", TARGET])
+        .args(["--", "-D", "warnings"]))?;
+    run(cargo()
+        .args([
+            "clippy",
+            "--locked",
+            "--no-deps",
+            "--package",
+            "wheeleg-tests",
+        ])
+        .args([
+            "--features",
+            "qemu",
+            "--test",
+            "qemu",
+            "--",
+            "-D",
+            "warnings",
+        ]))?;
+    Ok(())
+}
+
+fn present(path: &Path) -> anyhow::Result<()> {
+    ensure!(path.is_file(), "no image {}", path.display());
+    Ok(())
+}
+
+/// `cargo test` of the tests that need the images.
+fn tests(images: &Path) -> std::process::Command {
+    let mut test = cargo();
+    test.args(["test", "--locked", "--package", "wheeleg-tests"])
+        .args(["--features", "qemu", "--test", "qemu"])
+        .env("WHEELEG_IMAGES", images);
+    test
+}
+
+fn compare(images: &Path) -> StepResult {
+    run(&mut tests(images))?;
+    Ok(())
+}
+
+/// Runs the loops of the tests with the counting plugin. Gives, for each
+/// application and region, passes and the smallest, median and largest count.
+fn count(images: &Path) -> StepResult<Value> {
+    run(cargo().args(["build", "--locked", "--release", "--package", "insn-plugin"]))?;
+    let plugin = target_dir().join("release").join(format!(
+        "{}insn_plugin{}",
+        std::env::consts::DLL_PREFIX,
+        std::env::consts::DLL_SUFFIX
+    ));
+    let folder = target_dir().join("qemu-counts");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut argument = format!("{},out={}/{{n}}.txt", plugin.display(), folder.display());
+    for (name, begin, end) in REGIONS {
+        argument.push_str(&format!(",region={name}:{begin}:{end}"));
+    }
+    run(tests(images)
+        .args(["--", "closed", "eventful"])
+        .env("WHEELEG_QEMU_PLUGIN", argument))?;
+    let mut figures = json!({});
+    for application in ["joint", "wheel"] {
+        for (region, ..) in REGIONS {
+            let lines = results(&folder, application, region)?;
+            let line = merge(&lines)
+                .with_context(|| format!("nothing counted: {application}, {region}"))?;
+            println!(
+                "    {application} {region:<5} {:>6} passes, instructions: least {}, median {}, most {}",
+                line.passes, line.least, line.median, line.most
+            );
+            figures[application][region] = json!({
+                "passes": line.passes, "min": line.least, "median": line.median, "max": line.most,
+            });
+        }
+    }
+    Ok(json!({ "qemu": { "machine": "mps2-an386", "instructions": figures } }))
+}
+
+/// Counts of one emulator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Line {
+    passes: u64,
+    least: u64,
+    median: u64,
+    most: u64,
+}
+
+/// The lines `region` of all emulators that ran this application.
+fn results(folder: &Path, application: &str, region: &str) -> anyhow::Result<Vec<Line>> {
+    let mut lines = Vec::new();
+    for entry in fs::read_dir(folder).context("the folder of counts")? {
+        let path = entry?.path();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        if name.starts_with(&format!("qemu-{application}-")) {
+            let text = fs::read_to_string(&path).context("a file of counts")?;
+            lines.extend(text.lines().filter_map(|line| parse(line, region)));
+        }
+    }
+    Ok(lines)
+}
+
+/// `name passes least median most pass-of-the-most`; `None` for another region
+/// or one that was never passed.
+fn parse(line: &str, region: &str) -> Option<Line> {
+    let rest = line.strip_prefix(region)?.strip_prefix(' ')?;
+    let numbers: Vec<u64> = rest.split(' ').map_while(|n| n.parse().ok()).collect();
+    let [passes, least, median, most, _] = numbers[..] else {
+        return None;
+    };
+    Some(Line {
+        passes,
+        least,
+        median,
+        most,
+    })
+}
+
+/// All emulators together; the median is that of the emulator that passed most
+/// often.
+fn merge(lines: &[Line]) -> Option<Line> {
+    let longest = lines.iter().max_by_key(|line| line.passes)?;
+    Some(Line {
+        passes: lines.iter().map(|line| line.passes).sum(),
+        least: lines.iter().map(|line| line.least).min()?,
+        median: longest.median,
+        most: lines.iter().map(|line| line.most).max()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Line, merge, parse};
+
+    #[test]
+    fn results_of_several_emulators_become_one() {
+        let a = parse("tick 100 10 20 90 4", "tick").expect("a line");
+        let b = parse("tick 300 12 25 60 9", "tick").expect("a line");
+        assert_eq!(parse("bytes 7 1 2 3 0", "tick"), None);
+        assert_eq!(parse("tick 0", "tick"), None, "never passed");
+        let merged = merge(&[a, b]).expect("lines");
+        let expected = Line {
+            passes: 400,
+            least: 10,
+            median: 25,
+            most: 90,
+        };
+        assert_eq!(merged, expected);
+        assert_eq!(merge(&[]), None);
+    }
+}
