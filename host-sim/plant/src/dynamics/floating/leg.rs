@@ -109,7 +109,6 @@ impl LegModel {
         let prime = leg.theta1_prime;
         let (h2, j2) = self.rod.at(&Vector3::new(leg.lengths.b2_m, 0.0, 0.0));
         let (h, j) = (self.barrel.0 + h2, self.barrel.1.plus(&j2));
-        let mass = self.barrel_mass + self.rod.m;
         let motion = Motion::new(
             yaw.to_group(omega),
             yaw.to_group(&carried(&self.o1)),
@@ -135,7 +134,6 @@ impl LegModel {
         let mut first = h;
         let mut inertia = yaw.tensor_to_chassis(&j).shifted(&self.o1, &h);
         let (force_a, moment_a) = (force, moment);
-        debug_assert!(mass > 0.0);
 
         // Bodies 3 to 6 about O4.
         let yaw = Yaw {

@@ -1,7 +1,7 @@
 //! The floating robot by the natural orthogonal complement, as the paper does the leg.
 //!
-//! Twists, inertias and wrenches in world axes, which are inertial, so that M_i ṫ_i = −W_i M_i t_i
-//! + w_i holds as it stands. With R the chassis's rotation, e_j = R ê_j, and ρ from the origin of B
+//! Twists, inertias and wrenches in world axes, which are inertial, so that
+//! M_i ṫ_i = −W_i M_i t_i + w_i holds as it stands. With R the chassis's rotation, e_j = R ê_j, and ρ from the origin of B
 //! to the mass centre, the columns of a body and their derivatives are
 //!
 //! | velocity | T_i | Ṫ_i |
@@ -194,8 +194,8 @@ impl FloatingReference {
                 let (angular, linear) = halves(&t);
                 twist(mirror::axial(s, &angular), mirror::vector(s, &linear))
             };
-            for i in 0..6 {
-                let (at, block) = (1 + 6 * leg + i, &own.bodies[i]);
+            for (i, block) in own.bodies.iter().enumerate() {
+                let at = 1 + 6 * leg + i;
                 local[at] = Placement {
                     rotation: mirror::matrix(s) * placements[i].rotation,
                     com_m: mirror::vector(s, &(o4 + placements[i].com_m)),

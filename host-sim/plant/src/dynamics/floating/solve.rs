@@ -72,8 +72,9 @@ pub(super) fn eliminate(
         side[i] -= c6[i] * free6;
     }
     // b5 follows b2.
-    for i in 0..6 {
-        gain[1][i] -= ratio * gain[0][i];
+    let [yaw, horizontal, _] = &mut gain;
+    for (own, by_yaw) in horizontal.iter_mut().zip(yaw) {
+        *own -= ratio * *by_yaw;
     }
     Ok(Eliminated {
         gain,
