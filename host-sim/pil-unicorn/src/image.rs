@@ -112,6 +112,19 @@ impl Image {
         })
     }
 
+    /// An image of these bytes alone.
+    #[cfg(test)]
+    pub(crate) fn bare(flash: Vec<u8>) -> Self {
+        Self {
+            name: "bare".to_owned(),
+            flash,
+            digest: [0; 16],
+            stack_bottom: RAM_BASE,
+            symbols: BTreeMap::new(),
+            by_address: BTreeMap::new(),
+        }
+    }
+
     /// Word at an offset of the flash memory.
     pub(crate) fn word(&self, offset: usize) -> u32 {
         self.flash

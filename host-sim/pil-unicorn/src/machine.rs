@@ -5,7 +5,9 @@
 //! peripherals and interrupts are taken between basic blocks: an interrupt
 //! comes some tens of cycles late at most, and every run is the same to the bit.
 
-use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM as R, Unicorn, uc_error};
+use unicorn_engine::{
+    Arch, ArmCpuModel, HookType, Mode, Prot, RegisterARM as R, Unicorn, uc_error,
+};
 
 use crate::image::{FLASH_BASE, FLASH_SIZE, Image, RAM_BASE, RAM_SIZE};
 use crate::nvic::{HARD_FAULT, Nvic, SV_CALL};
@@ -82,6 +84,8 @@ pub(crate) struct State {
     service_call: bool,
     /// An exception of the engine that no handler here knows.
     fault: Option<u32>,
+    /// The last access that nothing answered.
+    unanswered: String,
     /// Faults have been injected: a hard fault is the program's to handle.
     pub(crate) tolerant: bool,
     /// What the program read in the last tick that was worked off.
@@ -181,8 +185,9 @@ pub(crate) struct Machine {
     asleep: bool,
 }
 
-/// Pattern that RAM holds at power-up; also what the stack's watermark looks for.
-const PAINT: u8 = 0xA5;
+/// Pattern that RAM holds at power-up, and that the start-up code of the images
+/// paints their stack with; the watermark looks for it.
+const PAINT: u8 = 0xCC;
 
 fn engine(error: uc_error) -> String {
     format!("the engine refuses: {error:?}")
@@ -204,6 +209,7 @@ impl Machine {
             returns: false,
             service_call: false,
             fault: None,
+            unanswered: String::new(),
             tolerant: false,
             seen: Seen::default(),
             await_tick: false,
@@ -335,6 +341,16 @@ impl Machine {
             state.trace[state.trace_at % TRACE] = address as u32;
             state.trace_at += 1;
         })?;
+        uc.add_mem_hook(
+            HookType::MEM_INVALID,
+            1,
+            0,
+            |uc, kind, address, size, value| {
+                uc.get_data_mut().unanswered =
+                    format!("{kind:?} of {size} bytes at {address:#010x} (value {value:#x})");
+                false
+            },
+        )?;
         uc.add_intr_hook(|uc, number| {
             let state = uc.get_data_mut();
             match number {
@@ -665,7 +681,10 @@ impl Machine {
                 }
                 Ok(())
             }
-            Err(error) => self.hard_fault(&format!("{error:?}"), pc),
+            Err(error) => {
+                let what = format!("{error:?}, {}", std::mem::take(&mut state.unanswered));
+                self.hard_fault(&what, pc)
+            }
         }
     }
 
@@ -697,5 +716,121 @@ impl Machine {
             pc,
             format!("in {}, after {}", image.function(pc), blocks.join(" < ")),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::soc::flash::STORE_SIZE;
+
+    const CODE: usize = 0x200;
+
+    /// A machine whose reset handler is `code` (Thumb half-words at 0x200);
+    /// exception `n` goes to `handlers[n]`.
+    fn machine(code: &[u16], handlers: &[(usize, u32)]) -> Machine {
+        let mut flash = vec![0xFF; FLASH_SIZE as usize];
+        let mut put = |at: usize, word: u32| flash[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        put(0, RAM_BASE + RAM_SIZE);
+        put(4, FLASH_BASE + CODE as u32 + 1);
+        for (n, offset) in handlers {
+            put(4 * n, FLASH_BASE + offset + 1);
+        }
+        for (i, half) in code.iter().enumerate() {
+            flash[CODE + 2 * i..][..2].copy_from_slice(&half.to_le_bytes());
+        }
+        let soc = Soc::new(vec![0xFF; STORE_SIZE], [0; 12], true, 0);
+        Machine::new(&Image::bare(flash), soc).expect("a machine")
+    }
+
+    /// Runs to `cycle` in stretches of `stretch` cycles.
+    fn run(machine: &mut Machine, cycle: u64, stretch: u64) {
+        while machine.state().cycle < cycle {
+            let ns = (machine.state().cycle + stretch) * 125 / 2;
+            let stop = machine.run(ns, Until::Cycle, true).expect("runs");
+            assert_eq!(stop, Stop::Time);
+        }
+    }
+
+    #[test]
+    fn every_instruction_is_counted_once_however_often_the_machine_stops() {
+        // adds r0, #1; b .-2
+        for stretch in [1, 7, 100, 10_000] {
+            let mut machine = machine(&[0x3001, 0xE7FD], &[]);
+            run(&mut machine, 20_000, stretch);
+            let loops = machine.get(R::R0).expect("r0");
+            assert_eq!(
+                u64::from(loops),
+                machine.state().retired / 2,
+                "stretch {stretch}"
+            );
+            assert!((10_000..10_100).contains(&loops), "{loops}");
+        }
+    }
+
+    #[test]
+    fn a_sleeping_processor_passes_time_without_instructions() {
+        // adds r0, #1; wfi; b .-4
+        let mut machine = machine(&[0x3001, 0xBF30, 0xE7FC], &[]);
+        run(&mut machine, 1_000_000, 1_000_000);
+        assert_eq!(machine.get(R::R0), Ok(1));
+        assert_eq!(machine.state().retired, 2);
+    }
+
+    #[test]
+    fn an_exception_stacks_runs_and_returns_and_waits_for_primask() {
+        // r1 = ICSR; r2 = PENDSVSET; cpsid i; str r2, [r1]; r0 = 5;
+        // cpsie i; adds r0, #1; b .
+        let code = [
+            0x4904, // ldr r1, [pc, #16]
+            0x4A05, // ldr r2, [pc, #20]
+            0xB672, // cpsid i
+            0x600A, // str r2, [r1]
+            0x2005, // movs r0, #5
+            0x4603, // mov r3, r0
+            0xB662, // cpsie i
+            0x3001, // adds r0, #1
+            0xE7FE, // b .
+            0xBF00, // nop
+            0xED04, 0xE000, // ICSR
+            0x0000, 0x1000, // PENDSVSET
+            // handler at 0x21C: adds r0, #100 (lost with the frame); ldr r4 = r0
+            0x3064, // adds r0, #100
+            0x4604, // mov r4, r0
+            0x4770, // bx lr
+        ];
+        let mut machine = machine(&code, &[(14, 0x21C)]);
+        run(&mut machine, 200, 200);
+        assert_eq!(machine.get(R::R3), Ok(5), "masked until here");
+        let r4 = machine.get(R::R4).expect("r4");
+        assert!(
+            r4 == 105 || r4 == 106,
+            "{r4}: the handler saw the interrupted value"
+        );
+        assert_eq!(machine.get(R::R0), Ok(6), "and its own change is gone");
+        assert_eq!(machine.get(R::SP), Ok(RAM_BASE + RAM_SIZE));
+        assert!(!machine.state().nvic.in_handler());
+    }
+
+    #[test]
+    fn an_unmodelled_register_ends_the_run_by_its_name() {
+        // r1 = 0x4000_0800 (TIM4); ldr r0, [r1]; b .
+        let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x0800, 0x4000];
+        let mut machine = machine(&code, &[]);
+        let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
+        assert!(error.contains("0x40000800"), "{error}");
+        // RCC_AHB1RSTR exists on the part and is not modelled.
+        let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x1028, 0x4002];
+        let mut machine = super::tests::machine(&code, &[]);
+        let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
+        assert!(error.contains("RCC+0x028"), "{error}");
+        // A port whose clock is off.
+        let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x0000, 0x4800];
+        let mut machine = super::tests::machine(&code, &[]);
+        let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
+        assert!(
+            error.contains("GPIOA") && error.contains("clock off"),
+            "{error}"
+        );
     }
 }
