@@ -70,6 +70,10 @@ fn node(elf: &Elf, function: &Function) -> Result<(Node, bool)> {
             Effect::Push(bytes) => pushed += bytes,
             Effect::DynamicPush => dynamic = true,
             Effect::Indirect => indirect = true,
+            Effect::Table => ensure!(
+                begins_a_table(elf, function, at + 2),
+                "{name}: at {at:#x} a computed jump that is no jump table"
+            ),
             Effect::Branch { target, links } => {
                 let inside = (function.address..end).contains(&target);
                 if links || !inside {
@@ -98,6 +102,21 @@ fn node(elf: &Elf, function: &Function) -> Result<(Node, bool)> {
         },
         indirect,
     ))
+}
+
+/// Whether a list of branches begins here, at most two bytes of padding away. Its
+/// branches are decoded like any other.
+fn begins_a_table(elf: &Elf, function: &Function, at: u32) -> bool {
+    let at = at.next_multiple_of(4);
+    let code = elf.halfword(at).zip(elf.halfword(at + 2));
+    let inside = function.address..function.address + function.size;
+    inside.contains(&at)
+        && code.is_some_and(|(first, second)| {
+            matches!(
+                decode(at, first, second),
+                Effect::Branch { links: false, .. }
+            )
+        })
 }
 
 /// Functions whose address (with the Thumb bit) is a word in flash. The vector

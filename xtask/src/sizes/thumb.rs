@@ -19,6 +19,8 @@ pub(super) enum Effect {
     },
     /// Calls or branches to what a register or a word in memory holds.
     Indirect,
+    /// Jumps into the list of branches that follows it (a `match`).
+    Table,
     /// Takes so many bytes of stack.
     Push(u32),
     /// Takes an amount of stack that is not in the instruction.
@@ -61,8 +63,10 @@ fn narrow(address: u32, h: u16) -> Effect {
         // BX LR is a return; BX and BLX of other registers are not.
         0x4770 => Effect::None,
         0x4700..=0x47FF => Effect::Indirect,
-        // MOV PC, Rm and ADD PC, Rm
-        _ if h & 0xFF87 == 0x4687 || h & 0xFF87 == 0x4487 => Effect::Indirect,
+        // MOV PC, Rm: the compiler's jump into a list of branches
+        _ if h & 0xFF87 == 0x4687 => Effect::Table,
+        // ADD PC, Rm
+        _ if h & 0xFF87 == 0x4487 => Effect::Indirect,
         // PUSH
         0xB400..=0xB5FF => Effect::Push((word & 0x1FF).count_ones() * 4),
         // SUB SP, #imm
@@ -153,7 +157,8 @@ mod tests {
         assert_eq!(at(0x4770, 0), Effect::None, "bx lr");
         assert_eq!(at(0x4798, 0), Effect::Indirect, "blx r3");
         assert_eq!(at(0x4718, 0), Effect::Indirect, "bx r3");
-        assert_eq!(at(0x469F, 0), Effect::Indirect, "mov pc, r3");
+        assert_eq!(at(0x469F, 0), Effect::Table, "mov pc, r3");
+        assert_eq!(at(0x449F, 0), Effect::Indirect, "add pc, r3");
         assert_eq!(at(0xF8D3, 0xF000), Effect::Indirect, "ldr.w pc, [r3]");
         assert_eq!(at(0xF85D, 0xFB04), Effect::None, "ldr pc, [sp], #4");
         assert_eq!(at(0xB5F0, 0), Effect::Push(20), "push {r4-r7, lr}");

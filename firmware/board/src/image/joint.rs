@@ -7,9 +7,9 @@ use wheeleg_board::g431::slot::Slot;
 use wheeleg_board::g431::valves::Valves;
 use wheeleg_board::g431::{self, adc, board, bus, fatal, pac, power, start};
 use wheeleg_board::reset::Note;
-use wheeleg_node::ConfigError;
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::JointParameters;
+use wheeleg_node::{ConfigError, NodeIdentity};
 
 use pac::interrupt;
 
@@ -24,17 +24,29 @@ fn main() -> ! {
         start.halt();
     };
     let (valves, potentiometer, feet) = start.joint_hardware();
+    let Some(node) = make(identity, valves, potentiometer, feet) else {
+        start.halt();
+    };
+    let mut board = start.joint_board();
+    executive::run(node, &mut board)
+}
+
+/// Makes the application in its place. Not inlined, so that what its making takes
+/// is off the stack when it runs.
+#[inline(never)]
+fn make(
+    identity: NodeIdentity,
+    valves: Valves,
+    potentiometer: Potentiometer,
+    feet: Feet,
+) -> Option<&'static mut Node> {
     let node = NODE.fill(|| {
         let parameters = g431::parameters::load(JointParameters::default(), |held, id, raw| {
             held.with(id, raw, true)
         });
         JointNode::new(identity, parameters, valves, potentiometer, feet)
     });
-    let Some(Ok(node)) = node else {
-        start.halt();
-    };
-    let mut board = start.joint_board();
-    executive::run(node, &mut board)
+    node?.as_mut().ok()
 }
 
 #[interrupt]

@@ -8,10 +8,10 @@ use wheeleg_board::g431::latch::Supply;
 use wheeleg_board::g431::slot::Slot;
 use wheeleg_board::g431::{self, board, bus, fatal, pac, power, start};
 use wheeleg_board::reset::Note;
-use wheeleg_node::ConfigError;
 use wheeleg_node::hardware::{DumpPin, HBridge};
 use wheeleg_node::parameters::WheelParameters;
 use wheeleg_node::wheel::WheelNode;
+use wheeleg_node::{ConfigError, NodeIdentity};
 use wheeleg_units::Micros;
 
 use pac::interrupt;
@@ -27,17 +27,30 @@ fn main() -> ! {
         start.halt();
     };
     let (motor, encoder, supply, dump) = start.wheel_hardware();
+    let Some(node) = make(identity, motor, encoder, supply, dump) else {
+        start.halt();
+    };
+    let mut board = start.wheel_board(Micros(node.tick_period_us()));
+    executive::run(node, &mut board)
+}
+
+/// Makes the application in its place. Not inlined, so that what its making takes
+/// is off the stack when it runs.
+#[inline(never)]
+fn make(
+    identity: NodeIdentity,
+    motor: HBridge<Pulse, Sign>,
+    encoder: WheelEncoder,
+    supply: Supply,
+    dump: Dump,
+) -> Option<&'static mut Node> {
     let node = NODE.fill(|| {
         let parameters = g431::parameters::load(WheelParameters::default(), |held, id, raw| {
             held.with(id, raw, true)
         });
         WheelNode::new(identity, parameters, motor, encoder, supply, DumpPin(dump))
     });
-    let Some(Ok(node)) = node else {
-        start.halt();
-    };
-    let mut board = start.wheel_board(Micros(node.tick_period_us()));
-    executive::run(node, &mut board)
+    node?.as_mut().ok()
 }
 
 #[interrupt]
