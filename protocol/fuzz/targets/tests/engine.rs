@@ -2,11 +2,13 @@
 //! number of inputs is small here; `BOLERO_RANDOM_ITERATIONS` and
 //! `BOLERO_RANDOM_TEST_TIME_MS` change it, as `cargo xtask deep engine` does.
 //! What it finds it shrinks, and names the `BOLERO_RANDOM_SEED` that repeats it.
-//! The targets assert; nothing is left to assert here.
+//! What must hold is asserted by the targets.
 
 fn iterations(default: usize) -> usize {
     let wanted = std::env::var("BOLERO_RANDOM_ITERATIONS").ok();
-    wanted.map_or(default, |text| text.parse().expect("a number"))
+    let iterations = wanted.map_or(default, |text| text.parse().expect("a number"));
+    assert!(iterations > 0, "no input would be no test");
+    iterations
 }
 
 macro_rules! engine {
