@@ -197,6 +197,7 @@ fn arm(length: u16, start_at: u32) {
         r.set_msize(Size::BITS32);
         r.set_en(true);
     });
+    // In this order: the flag may stand from the transmitter's first idle frame.
     pac::USART1.icr().write(|r| r.set_tc(true));
     pac::USART1.cr1().modify(|r| r.set_tcie(true));
     let end = length.saturating_mul(BYTE_US).saturating_add(MARGIN_US);
@@ -244,7 +245,8 @@ pub fn on_usart() {
         usart.icr().write(|r| r.set_cmf(true));
         mark(time);
     }
-    if status.tc() && SENDING.load(Ordering::Relaxed) {
+    // The flag also stands after the line was idle; the enable says that it is ours.
+    if status.tc() && usart.cr1().read().tcie() {
         // The compare values match again in 71 minutes: nothing may be armed then.
         pac::TIM2.dier().modify(|r| r.set_ccde(BEGIN, false));
         pac::TIM15
