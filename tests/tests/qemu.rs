@@ -271,14 +271,12 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
                 board.send(request).expect("QEMU lives");
             }
         }
-        for (n, board) in boards.iter_mut().enumerate() {
-            if let Some(request) = lives[n].get(i) {
+        for ((board, answers), address) in boards.iter_mut().zip(&expected).zip(1..) {
+            if let Some(here) = answers.get(i) {
                 let reply = without_figures(board.receive().expect("QEMU answers"));
-                let here = &expected[n][i];
                 assert!(
                     reply == *here,
-                    "board {}, request {i}, {request:?}\nhere  {here:?}\nthere {reply:?}",
-                    n + 1
+                    "board {address}, request {i}: here  {here:?}\nthere {reply:?}"
                 );
             }
         }
