@@ -11,10 +11,13 @@ pub(crate) mod elf;
 mod stack;
 mod thumb;
 
+use std::fs;
+
 use anyhow::Context;
 use serde_json::{Value, json};
 
 use crate::firmware::{self, Image, SHIPPED};
+use crate::process::target_dir;
 use crate::report::{Report, StepResult};
 use budget::{Budget, Figures};
 use elf::Elf;
@@ -22,7 +25,8 @@ use elf::Elf;
 /// `cargo xtask sizes`.
 #[derive(clap::Args, Default)]
 pub(crate) struct Options {
-    /// Print the figures as JSON, for machines to read.
+    /// Print the figures as one line of JSON. They are in `target/firmware/sizes.json`
+    /// in any case.
     #[arg(long)]
     json: bool,
 }
@@ -36,8 +40,12 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
             .filter(|image| SHIPPED.contains(&image.name))
             .map(measure)
             .collect::<anyhow::Result<Vec<_>>>()?;
+        let figures: Value = rows.iter().map(Row::json).collect();
+        let file = target_dir().join("firmware/sizes.json");
+        fs::write(&file, format!("{figures:#}\n"))
+            .with_context(|| format!("cannot write {}", file.display()))?;
         if options.json {
-            println!("{:#}", rows.iter().map(Row::json).collect::<Value>());
+            println!("{figures}");
         } else {
             rows.iter().for_each(Row::print);
         }

@@ -161,8 +161,8 @@ mod tests {
         assert_eq!(at(0x449F, 0), Effect::Indirect, "add pc, r3");
         assert_eq!(at(0xF8D3, 0xF000), Effect::Indirect, "ldr.w pc, [r3]");
         assert_eq!(at(0xF85D, 0xFB04), Effect::None, "ldr pc, [sp], #4");
-        assert_eq!(at(0xB5F0, 0), Effect::Push(20), "push {r4-r7, lr}");
-        assert_eq!(at(0xE92D, 0x4FF0), Effect::Push(36), "push.w {r4-r11, lr}");
+        assert_eq!(at(0xB5F0, 0), Effect::Push(20), "push r4-r7, lr");
+        assert_eq!(at(0xE92D, 0x4FF0), Effect::Push(36), "push.w r4-r11, lr");
         assert_eq!(at(0xF84D, 0x8D04), Effect::Push(4), "str r8, [sp, #-4]!");
         assert_eq!(at(0xB084, 0), Effect::Push(16), "sub sp, #16");
         assert_eq!(at(0xF5AD, 0x7D00), Effect::Push(512), "sub.w sp, sp, #512");
