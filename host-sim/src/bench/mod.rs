@@ -22,14 +22,20 @@
 //!
 //! * [`Bench::run`] keeps chamber pressures, noise and what the board has learnt
 //!   from one motion to the next; so a learning move is simply a motion before.
-//! * [`Metrics::of`] works out the figures.
+//! * [`Metrics::of`] works out the figures; [`suite`] has the experiments of the
+//!   comparison; [`optimal`] the bound that perfect knowledge gives; [`identify`]
+//!   finds the valves' delays at start-up, as a board would.
 
 mod design;
+pub mod export;
 mod firmware;
 mod identify;
 mod metrics;
 mod motion;
+pub mod optimal;
+pub mod plant_check;
 mod run;
+pub mod suite;
 
 pub use design::{Kind, axis_data, design};
 pub use firmware::{Design, Firmware, TICK};

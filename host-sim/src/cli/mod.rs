@@ -7,6 +7,7 @@ mod export;
 mod faults;
 mod list;
 mod params;
+mod plant;
 mod run;
 
 use std::io::Write as _;
@@ -53,6 +54,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
+    /// Check the pneumatic plant of an axis, or export it for another integrator.
+    Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
 }
@@ -69,6 +72,7 @@ pub fn main() -> ExitCode {
         Some(Command::Channels(args)) => channels::command(&args),
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
+        Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
     };
     result.unwrap_or_else(|error| {

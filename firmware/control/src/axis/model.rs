@@ -191,6 +191,14 @@ const RHO_R_T: f32 = 1.185 * 287.05 * 293.15;
 const AMBIENT_PA: f32 = 101_325.0;
 /// Polytropic exponent (ASSUMED: usual for small cylinders).
 const EXPONENT: f32 = 1.2;
+/// Slope of the speed law times the dead time.
+const SLOPE: f32 = 0.19;
+/// Gain of the speed error times the dead time.
+const DAMPING: f32 = 0.43;
+/// Deceleration over slope times top speed.
+const BRAKE: f32 = 0.7;
+/// Top speed as a share of that of a choked outlet.
+const TOP: f32 = 0.92;
 /// Bandwidth of the observer, rad/s: noise of a 12-bit converter with 16-fold
 /// oversampling gives 1 mm/s of speed.
 const OBSERVER: f32 = 150.0;
@@ -199,7 +207,7 @@ impl AxisModel {
     /// Checks the data and works out the coefficients for a tick of `tick`.
     ///
     /// The speed law is scaled by two facts of the axis: the dead time
-    /// T = tick + t_on + line, which bounds its slope (0.19/T) and damping (0.43/T),
+    /// T = tick + t_on + line, which bounds its slope and damping,
     /// and the speed at which a choked outlet lets the piston go, which bounds
     /// its top. The three factors were found on one axis (bore 20 × 180 mm,
     /// VQ110U-class valves) and hold for others because they have no unit.
@@ -251,10 +259,10 @@ impl AxisModel {
 
         // Speed law. The larger piston side is the slower outlet, of choked speed
         // C ρ0 R T / area.
-        let top = 0.92 * flow_b.min(flow_a * 1.5);
-        let slope = 0.19 / horizon_s;
-        let damping = 0.43 / horizon_s;
-        let brake = 0.7 * slope * top;
+        let top = TOP * flow_b.min(flow_a * 1.5);
+        let slope = SLOPE / horizon_s;
+        let damping = DAMPING / horizon_s;
+        let brake = BRAKE * slope * top;
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
         // how fast the force can change, mN/s.
         let volume_a = d.dead_a_mm3 + 0.5 * area_a * d.stroke_mm;

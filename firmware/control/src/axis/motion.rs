@@ -7,6 +7,12 @@ use wheeleg_units::saturate_i32;
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
 const STICK: i32 = 4 << 16;
 
+/// A piston that stands so near to an end stop leans on it, raw mm (1 mm).
+const STOP_ZONE: i32 = 1 << 16;
+
+/// Length before an end stop in which a cushion may act, raw mm (6 mm).
+const CUSHION: i32 = 6 << 16;
+
 /// What follows from the moving mass; worked out when that changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Inertia {
@@ -106,7 +112,14 @@ impl Motion {
     #[inline]
     pub fn update(&mut self, model: &AxisModel, inertia: &Inertia, force: i32, measured: i32) {
         let drive = force.saturating_add(self.load);
-        self.stuck = self.speed.wrapping_abs() < STICK && drive.saturating_abs() < model.breakaway;
+        // Pressed against an end stop, the stop takes what is left of the force.
+        let against_stop = if drive > 0 {
+            self.stroke > model.stroke.saturating_sub(STOP_ZONE)
+        } else {
+            self.stroke < STOP_ZONE
+        };
+        self.stuck = self.speed.wrapping_abs() < STICK
+            && (against_stop || drive.saturating_abs() < model.breakaway);
         self.friction = if self.stuck {
             drive
         } else {
@@ -133,7 +146,13 @@ impl Motion {
         self.speed = self
             .speed
             .saturating_add(scaled(innovation, model.observe_speed, 16));
-        if !self.stuck {
+        // Near an end the cushion brakes: that is no load.
+        let cushioned = if self.speed > 0 {
+            self.stroke > model.stroke.saturating_sub(CUSHION)
+        } else {
+            self.stroke < CUSHION
+        };
+        if !self.stuck && !cushioned {
             let load = self
                 .load
                 .saturating_add(scaled(innovation, inertia.load_gain, 16));

@@ -82,6 +82,8 @@ pub struct Predictive {
     held: u16,
     released: u16,
     near: u16,
+    /// Where the piston stood when the next move was announced.
+    awaits: Option<i32>,
     settled: bool,
     primed: bool,
 }
@@ -105,6 +107,7 @@ impl Predictive {
             held: 0,
             released: 0,
             near: 0,
+            awaits: None,
             settled: false,
             primed: false,
             model,
@@ -210,15 +213,18 @@ impl Predictive {
         self.learn();
         let quiet = self.rest(reference, reference_speed, input.measured.raw());
         let ahead = self.ahead();
-        let force = match input.announced {
-            Some(announced) if quiet => {
-                match self.preload(announced.reference.raw().saturating_sub(self.motion.stroke)) {
-                    Some(force) => force,
-                    None => return self.shut(),
-                }
-            }
-            _ if quiet => return self.shut(),
-            _ => self.wanted_force(reference, reference_speed, &ahead),
+        let stands = quiet || self.motion.speed.wrapping_abs() < STILL;
+        let awaited = match input.announced {
+            Some(announced) if stands => self.preload(announced.reference.raw()),
+            _ => None,
+        };
+        if input.announced.is_none() {
+            self.awaits = None;
+        }
+        let force = match awaited {
+            Some(force) => force,
+            None if quiet => return self.shut(),
+            None => self.wanted_force(reference, reference_speed, &ahead),
         };
         self.pulses(force, &ahead)
     }
@@ -435,15 +441,15 @@ impl Predictive {
             .saturating_sub(load)
     }
 
-    /// The force that an announced move by `distance` is awaited with; `None` if
+    /// The force with which an announced move to `next` is awaited; `None` if
     /// the piston has begun to move, or the move is none.
-    fn preload(&self, distance: i32) -> Option<i32> {
+    fn preload(&mut self, next: i32) -> Option<i32> {
+        let stroke = self.motion.stroke;
+        let place = *self.awaits.get_or_insert(stroke);
+        let distance = next.saturating_sub(place);
+        let gone = stroke.saturating_sub(place).saturating_abs();
         let band = self.model.band;
-        let off = self
-            .target
-            .saturating_sub(self.motion.stroke)
-            .saturating_abs();
-        if distance.saturating_abs() <= band || off > band.saturating_mul(2) {
+        if distance.saturating_abs() <= band || gone > band.saturating_mul(2) {
             return None;
         }
         let edge = self.model.coulomb.wrapping_shr(1);
