@@ -8,10 +8,11 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{RobotConfig, Scenario, builtin};
+use crate::faults::{self, FaultSpec};
+use crate::pil::Nodes;
 use crate::report::{self, RunInfo, Summary};
 use crate::sil;
 use crate::telemetry::Recorder;
-use crate::faults::{self, FaultSpec};
 use crate::{SimError, analysis, output};
 
 /// Scenario of a bare `wheeleg`.
@@ -28,6 +29,8 @@ pub struct Options {
     pub robot: Option<String>,
     /// Seed instead of the scenario's.
     pub seed: Option<u64>,
+    /// Where each node runs.
+    pub nodes: Nodes,
     /// Faults beside the scenario's own.
     pub faults: Vec<FaultSpec>,
     /// Folder for the results instead of `runs/<scenario>-seed<N>`.
@@ -74,14 +77,21 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
     let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst));
     let bar = progress_bar(&scenario);
     let begun = Instant::now();
-    let outcome = sil::run(&scenario, &robot, seed, &mut recorder, &mut |t_s| {
-        bar.set_position((t_s * 1e3) as u64);
-        if INTERRUPTED.load(Ordering::SeqCst) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    });
+    let outcome = sil::run_with(
+        &scenario,
+        &robot,
+        seed,
+        &options.nodes,
+        &mut recorder,
+        &mut |t_s| {
+            bar.set_position((t_s * 1e3) as u64);
+            if INTERRUPTED.load(Ordering::SeqCst) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        },
+    );
     let closed = recorder.finish();
     let wall_s = begun.elapsed().as_secs_f64();
     bar.finish_and_clear();
@@ -94,6 +104,7 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
         recorded_s: outcome.recorded_s,
         wall_s,
         complete: !outcome.stopped,
+        pil: outcome.pil,
     };
     let analysis = analysis::analyse(&scenario, &robot, &recording);
     let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);

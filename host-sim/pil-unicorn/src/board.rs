@@ -20,6 +20,9 @@ const WORK_NS: u64 = 500_000;
 /// Time for the start-up code before a board is taken for one that does not
 /// run its tick [ns].
 const START_UP_NS: u64 = 100_000_000;
+/// From the voltage detector's threshold to the brown-out reset (ASSUMED: a
+/// capacitor that lasts so long) [ns].
+const FALL_NS: u64 = 20_000;
 /// Edges between two looks at the stack.
 const STACK_EVERY: u32 = 64;
 
@@ -31,6 +34,7 @@ pub(crate) struct Board {
     halted: Option<Halt>,
     running: bool,
     edge_ns: u64,
+    first_edge_ns: u64,
     grid_ns: u64,
     power: Power,
     announced: Option<(u64, Vec<u8>)>,
@@ -51,6 +55,7 @@ impl Board {
             halted: None,
             running: false,
             edge_ns: 0,
+            first_edge_ns: 0,
             grid_ns: 1_000_000,
             power: Power::Good,
             announced: None,
@@ -243,6 +248,7 @@ impl Board {
     /// oscillators' start-up takes as long as it must for that.)
     fn align(&mut self, edge_ns: u64) {
         self.running = true;
+        self.first_edge_ns = edge_ns;
         if let Some(machine) = &mut self.machine {
             let state = machine.state_mut();
             if let Some(edge) = state.soc.tick_timer().overflow_at() {
@@ -277,11 +283,26 @@ impl Board {
             self.latch(&inputs)?;
             self.advance(run.until_ns + BEYOND_EDGE_NS, Until::Cycle)?;
             self.edges = self.edges.wrapping_add(1);
+            self.check_edge(run.until_ns)?;
         } else {
             let until = Until::Asleep(run.until_ns + WORK_NS);
             self.advance(run.until_ns, until)?;
         }
         self.reply()
+    }
+
+    /// The board's tick timer keeps the simulator's time.
+    fn check_edge(&mut self, edge_ns: u64) -> Result<(), String> {
+        let runs = self.running && self.first_edge_ns <= edge_ns;
+        let state = self.machine()?.state();
+        let edge = state.soc.edge;
+        if !runs || edge == Some(state.soc.time.cycle_of(edge_ns)) {
+            return Ok(());
+        }
+        Err(format!(
+            "the tick timer's newest edge is at {:?} ns, expected at {edge_ns} ns",
+            edge.map(|cycle| state.soc.time.ns_of(cycle))
+        ))
     }
 
     /// Puts the received bytes on the line at their times.
@@ -319,13 +340,22 @@ impl Board {
         }
     }
 
-    /// The processor is held in reset until the supply is back.
+    /// The supply falls: first through the threshold of the voltage detector,
+    /// [`FALL_NS`] later through that of the brown-out reset, which holds the
+    /// processor until the supply is back.
     fn power_fails(&mut self) -> Result<(), String> {
+        let soc = &mut self.machine()?.state_mut().soc;
+        soc.ports[0].outside &= !(1 << wiring::POWER_OK);
+        soc.break_inputs(false);
+        soc.pwr.supply(true);
+        soc.flash.power_failed = false;
+        let time = soc.time;
+        let fallen = time.ns_of(self.machine()?.state().cycle) + FALL_NS;
+        self.machine()?.run(fallen, Until::Cycle, true)?;
         let machine = self.machine()?;
         machine.reset(BROWN_OUT_RESET | PIN_RESET, true)?;
         let state = machine.state_mut();
         state.stop_processor = true;
-        state.soc.ports[0].outside &= !(1 << wiring::POWER_OK);
         let at_ns = state.soc.time.ns_of(state.cycle);
         self.tripped(at_ns, BROWN_OUT_RESET | PIN_RESET);
         Ok(())
@@ -467,21 +497,14 @@ impl Board {
             return Ok(sent);
         };
         let time = machine.state().soc.time;
-        for (start, bytes) in std::mem::take(&mut machine.state_mut().soc.gone) {
-            if self.announced.as_ref() != Some(&(start, bytes)) {
-                return Err(format!(
-                    "a frame left at {} ns that did not stand ready in hardware like that",
-                    time.ns_of(start)
-                ));
-            }
-        }
+        // Started since the last reply, or standing ready.
         let cycle = machine.state().cycle;
-        if let Some((start, address, length)) = machine.state().soc.armed(cycle)
-            && self
-                .announced
-                .as_ref()
-                .is_none_or(|(known, _)| *known != start)
-        {
+        let started = machine.state_mut().soc.started.take();
+        let armed = machine.state().soc.armed(cycle);
+        for (start, address, length) in started.into_iter().chain(armed) {
+            if self.announced.as_ref().is_some_and(|(told, _)| *told == start) {
+                continue;
+            }
             let mut bytes = vec![0; length as usize];
             machine.memory(address, &mut bytes)?;
             let copy = heapless::Vec::from_slice(&bytes)
@@ -492,6 +515,19 @@ impl Board {
             };
             let _ = sent.push(frame);
             self.announced = Some((start, bytes));
+        }
+        for frame in std::mem::take(&mut machine.state_mut().soc.gone) {
+            let told = self.announced.as_ref();
+            if told != Some(&frame) {
+                let text = |(start, bytes): &(u64, Vec<u8>)| {
+                    format!("{} bytes at {} ns", bytes.len(), time.ns_of(*start))
+                };
+                return Err(format!(
+                    "a frame left ({}) that did not stand ready in hardware like that ({})",
+                    text(&frame),
+                    told.map_or_else(|| "nothing".to_owned(), text)
+                ));
+            }
         }
         Ok(sent)
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -11,6 +11,7 @@ use super::{INTERRUPTED, TARGETS_MISSED, print};
 use crate::SimError;
 use crate::analysis::Target;
 use crate::faults::FaultSpec;
+use crate::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
 use crate::run::{self, Finished, Options};
 
 /// Arguments of `wheeleg run`.
@@ -33,6 +34,18 @@ pub(super) struct RunArgs {
     /// times. `wheeleg faults list` prints them all.
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<FaultSpec>,
+    /// Where the nodes run: `sil` in this program, `pil` as the firmware images on
+    /// emulated boards, `qemu` as the same applications on QEMU.
+    #[arg(long, value_name = "KIND", default_value = "sil")]
+    nodes: NodeKind,
+    /// Where one node runs, instead: `joint3=pil`, `wheel7=qemu`,
+    /// `joint1=hil:/dev/ttyACM0`; may be given several times.
+    #[arg(long = "node", value_name = "NODE=KIND")]
+    node: Vec<NodeChoice>,
+    /// Run the scenario once more with all nodes in this program; exit with code
+    /// 2 unless both logs are the same to the bit.
+    #[arg(long)]
+    compare_sil: bool,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -49,6 +62,9 @@ impl Default for RunArgs {
             seed: None,
             robot: None,
             faults: Vec::new(),
+            nodes: NodeKind::Sil,
+            node: Vec::new(),
+            compare_sil: false,
             json: false,
             strict: false,
         }
@@ -68,8 +84,12 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
         seed: args.seed,
         out: args.out.clone(),
         faults: args.faults.clone(),
+        nodes: Nodes::new(&args.nodes, &args.node),
     };
     let finished = run::run(&options)?;
+    if args.compare_sil {
+        compare_sil(&options, &finished)?;
+    }
     if args.json {
         print(&finished.summary.to_json())?;
     } else {
@@ -83,6 +103,56 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// Repeats a run with all nodes here. The logs hold every input, output,
+/// frame and internal at its time, so equal hashes mean equal runs.
+fn compare_sil(options: &Options, finished: &Finished) -> Result<(), SimError> {
+    let folder = finished.report.parent().unwrap_or(Path::new("."));
+    let native = run::run(&Options {
+        nodes: Nodes::default(),
+        out: Some(folder.join("sil")),
+        ..options.clone()
+    })?;
+    if native.summary.hash == finished.summary.hash {
+        return Ok(());
+    }
+    let pil = finished.summary.pil.as_ref();
+    let first = pil.and_then(|p| p.first_difference.clone());
+    Err(SimError::simulation(
+        format!(
+            "the logs differ: {} here, {} on the boards; first difference: {}",
+            native.summary.hash,
+            finished.summary.hash,
+            first.as_deref().unwrap_or("none at the boards' pins")
+        ),
+        format!("both logs are below {}", folder.display()),
+    ))
+}
+
+/// Comparison and figures of boards outside of this program.
+fn pil_text(pil: &PilSummary) -> String {
+    let mut out = format!(
+        "boards  {} bits of {} ticks and {} frames compared with the native application, {} differ\n",
+        pil.compared_bits, pil.compared_ticks, pil.compared_frames, pil.differing_bits
+    );
+    if let Some(first) = &pil.first_difference {
+        let _ = writeln!(out, "        first difference: {first}");
+    }
+    for board in &pil.boards {
+        let _ = writeln!(
+            out,
+            "        {} on {}: tick {} instructions (median {}), stack {} of {} B, {} resets",
+            board.node,
+            board.host,
+            board.tick_instructions_worst,
+            board.tick_instructions_median,
+            board.stack_used_bytes,
+            board.stack_size_bytes,
+            board.resets
+        );
+    }
+    out
 }
 
 fn run_text(finished: &Finished) -> String {
@@ -108,6 +178,10 @@ fn run_text(finished: &Finished) -> String {
             "\n{} messages could not be written to the log",
             s.dropped_messages
         );
+    }
+    if let Some(pil) = &s.pil {
+        out.push('\n');
+        out.push_str(&pil_text(pil));
     }
     let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);
     let _ = writeln!(out, "hash    {}", s.hash);

@@ -1,6 +1,19 @@
 //! Processor in the loop: boards that run outside of this process.
 
+pub mod choice;
+mod compare;
+mod figures;
+mod line;
+mod outside;
 mod partner;
 pub mod qemu;
+mod serial;
+mod store;
+pub mod unicorn;
 
+pub use choice::{NodeChoice, NodeKind, Nodes};
+pub use compare::{Comparison, Difference};
+pub use figures::{BoardFigures, PilSummary};
+pub use line::Line;
+pub(crate) use outside::Outside;
 pub use partner::{Partner, Stream};

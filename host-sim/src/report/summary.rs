@@ -4,10 +4,11 @@ use serde::Serialize;
 
 use crate::analysis::{Analysis, Target};
 use crate::config::{RobotConfig, Scenario};
+use crate::pil::PilSummary;
 use crate::telemetry::Recording;
 
 /// Facts about a run that are not in its recording.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RunInfo {
     /// Seed used.
     pub seed: u64,
@@ -19,6 +20,8 @@ pub struct RunInfo {
     pub wall_s: f64,
     /// False when the run was stopped before its end.
     pub complete: bool,
+    /// What boards outside of this process did, if there were any.
+    pub pil: Option<PilSummary>,
 }
 
 /// Contents of `summary.json`.
@@ -53,6 +56,9 @@ pub struct Summary {
     pub passed: bool,
     /// Targets with values and verdicts.
     pub targets: Vec<Target>,
+    /// Boards outside of this process and their comparison, if there were any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pil: Option<PilSummary>,
 }
 
 impl Summary {
@@ -79,6 +85,7 @@ impl Summary {
             realtime_factor: info.simulated_s / info.wall_s.max(1e-9),
             complete: info.complete,
             passed: info.complete && analysis.passed(),
+            pil: info.pil,
             targets: analysis.targets.clone(),
         }
     }

@@ -129,6 +129,15 @@ impl JointBoard {
         std::array::from_fn(|i| self.valves[i].preloaded())
     }
 
+    /// The outputs that become active at this tick edge, as boards outside of
+    /// this process report them.
+    pub(super) fn active_outputs(&self) -> wheeleg_pil_link::Outputs {
+        wheeleg_pil_link::Outputs {
+            valve_on_us: self.active_on_us(),
+            ..Default::default()
+        }
+    }
+
     /// Latches the inputs and runs the tick that starts now.
     pub(super) fn tick(&mut self, now: Micros, code: u16, foot: [bool; 4]) -> TickReport {
         self.sensor.latch(code);
@@ -238,6 +247,17 @@ impl WheelBoard {
             -magnitude
         } else {
             magnitude
+        }
+    }
+
+    /// The outputs that become active at this sample edge, as boards outside
+    /// of this process report them.
+    pub(super) fn active_outputs(&self) -> wheeleg_pil_link::Outputs {
+        wheeleg_pil_link::Outputs {
+            bridge_percent: self.pulse.preloaded() as u8,
+            bridge_backward: self.sign.level(),
+            dump: self.dump.level(),
+            ..Default::default()
         }
     }
 

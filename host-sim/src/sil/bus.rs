@@ -49,6 +49,9 @@ pub(super) struct Bus {
     byte_ns: u64,
     under_way: VecDeque<Delivery>,
     counters: BusCounters,
+    /// What was delivered at the present instant, if boards outside of this
+    /// process still have to hear its last bytes.
+    delivered: Option<Vec<Delivery>>,
 }
 
 impl Bus {
@@ -60,6 +63,7 @@ impl Bus {
             byte_ns: BITS_PER_BYTE * 1_000_000_000 / u64::from(baud.max(1)),
             under_way: VecDeque::new(),
             counters: BusCounters::default(),
+            delivered: None,
         }
     }
 
@@ -106,11 +110,50 @@ impl Bus {
 
     /// Takes the delivery due at or before `now_ns`, earliest first.
     pub(super) fn take_due(&mut self, now_ns: u64) -> Option<Delivery> {
-        if self.next_delivery_ns()? <= now_ns {
-            self.under_way.pop_front()
-        } else {
-            None
+        if self.next_delivery_ns()? > now_ns {
+            return None;
         }
+        let delivery = self.under_way.pop_front();
+        if let (Some(kept), Some(delivery)) = (&mut self.delivered, &delivery) {
+            kept.push(delivery.clone());
+        }
+        delivery
+    }
+
+    /// Keeps what is delivered until [`Self::forget_delivered`], for [`Self::heard`].
+    pub(super) fn keep_delivered(&mut self) {
+        self.delivered.get_or_insert_default();
+    }
+
+    /// All boards have heard what was delivered.
+    pub(super) fn forget_delivered(&mut self) {
+        if let Some(kept) = &mut self.delivered {
+            kept.clear();
+        }
+    }
+
+    /// Duration of a byte \[ns\].
+    #[must_use]
+    pub(super) fn byte_ns(&self) -> u64 {
+        self.byte_ns
+    }
+
+    /// Bytes that a receiver other than `listener`'s own driver has heard since
+    /// `after_ns`, up to `until_ns`: end of each, and the byte.
+    #[must_use]
+    pub(super) fn heard(&self, listener: Driver, after_ns: u64, until_ns: u64) -> Vec<(u64, u8)> {
+        let mut heard = Vec::new();
+        let kept = self.delivered.iter().flatten();
+        for delivery in kept.chain(&self.under_way).filter(|d| d.from != listener) {
+            for (i, byte) in (1..).zip(&delivery.bytes) {
+                let end_ns = delivery.start_ns + i * self.byte_ns;
+                if (after_ns + 1..=until_ns).contains(&end_ns) {
+                    heard.push((end_ns, *byte));
+                }
+            }
+        }
+        heard.sort_by_key(|(end_ns, _)| *end_ns);
+        heard
     }
 
     /// Counters since the start.
@@ -169,6 +212,19 @@ mod tests {
         let b = bus.take_due(u64::MAX).expect("second");
         assert_eq!(a.bytes, vec![0xF0, 0xF0, 0x00]);
         assert_eq!(b.bytes, vec![0x00, 0x0F, 0x0F]);
+    }
+
+    #[test]
+    fn a_byte_is_heard_once_by_all_but_its_sender() {
+        let mut bus = Bus::new(1_000_000);
+        bus.keep_delivered();
+        bus.transmit(1, 0, vec![7, 8, 9]);
+        assert_eq!(bus.heard(2, 0, 20_000), vec![(10_000, 7), (20_000, 8)]);
+        assert_eq!(bus.heard(1, 0, 20_000), Vec::new());
+        assert!(bus.take_due(30_000).is_some());
+        assert_eq!(bus.heard(2, 20_000, 30_000), vec![(30_000, 9)]);
+        bus.forget_delivered();
+        assert_eq!(bus.heard(2, 20_000, 30_000), Vec::new());
     }
 
     #[test]

@@ -22,6 +22,7 @@ use self::world::{Happened, World};
 use crate::SimError;
 use crate::config::{EventAction, RobotConfig, Scenario};
 use crate::faults::Schedule;
+use crate::pil::{Nodes, Outside, PilSummary};
 use crate::telemetry::{EventKind, Recorder};
 
 /// Beginning of every event in the record that tells of the time before it.
@@ -31,7 +32,7 @@ pub(crate) const START_UP: &str = "start-up, ";
 pub type Control = ControlFlow<()>;
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RunOutcome {
     /// Scenario time simulated and recorded, s.
     pub recorded_s: f64,
@@ -39,6 +40,8 @@ pub struct RunOutcome {
     pub simulated_s: f64,
     /// The caller stopped the run before its end.
     pub stopped: bool,
+    /// What boards outside of this process did, if there were any.
+    pub pil: Option<PilSummary>,
 }
 
 /// Runs a scenario and records it.
@@ -57,9 +60,25 @@ pub fn run(
     recorder: &mut Recorder,
     progress: &mut dyn FnMut(f64) -> Control,
 ) -> Result<RunOutcome, SimError> {
+    let native = Nodes::default();
+    run_with(scenario, robot, seed, &native, recorder, progress)
+}
+
+/// As [`run`], with some or all nodes outside of this process.
+///
+/// # Errors
+/// As [`run`]; also when a board outside does not come up or stops.
+pub fn run_with(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    nodes: &Nodes,
+    recorder: &mut Recorder,
+    progress: &mut dyn FnMut(f64) -> Control,
+) -> Result<RunOutcome, SimError> {
     let plant = setup::plant(scenario, robot);
     let master = setup::master(scenario, robot);
-    let mut world = World::new(robot, &plant, master, seed)?;
+    let mut world = World::new(robot, &plant, master, seed, Outside::connect(nodes, robot)?)?;
     let mut operator = Operator::new(scenario, &robot.start_up);
     let mut observer = Observer::default();
     let mut schedule = Schedule::new(&scenario.faults);
@@ -119,6 +138,9 @@ pub fn run(
         recorded_s: start_ns.map_or(0.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9),
         simulated_s: now_ns as f64 * 1e-9,
         stopped,
+        pil: world
+            .outside()
+            .map(|outside| outside.summary(nodes, now_ns)),
     })
 }
 

@@ -7,6 +7,7 @@
 //! not touch it.
 
 use wheeleg_master::{Master, MasterConfig};
+use wheeleg_pil_link as link;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::Address;
 use wheeleg_units::Micros;
@@ -14,8 +15,9 @@ use wheeleg_units::Micros;
 use super::boards::{JointBoard, WheelBoard};
 use super::bus::Bus;
 use crate::SimError;
-use crate::config::RobotConfig;
+use crate::config::{NodeParams, RobotConfig};
 use crate::faults::{FaultSpec, Injector};
+use crate::pil::Outside;
 
 /// Joint tick, ns.
 pub(super) const JOINT_TICK_NS: u64 = 1_000_000;
@@ -53,6 +55,8 @@ pub(super) struct World {
     next_cycle_ns: u64,
     tick_inputs: TickInputs,
     faults: Injector,
+    outside: Option<Outside>,
+    stored: NodeParams,
 }
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
@@ -80,6 +84,31 @@ impl TickInputs {
 
 const VALVE_TICK_US: u16 = 1000;
 
+/// What the joint boards read at a tick edge.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sensed {
+    codes: [u16; 6],
+    feet: [[bool; 4]; 6],
+}
+
+/// Whether the board at `address` works at `now_ns`: always here, outside
+/// unless it is in reset.
+fn runs(outside: Option<&Outside>, address: u8, now_ns: u64) -> bool {
+    outside
+        .and_then(|o| o.ticks(address, now_ns))
+        .unwrap_or(true)
+}
+
+/// Duty of a bridge, −1..=1.
+fn duty(outputs: &link::Outputs) -> f64 {
+    let magnitude = f64::from(outputs.bridge_percent) / 100.0;
+    if outputs.bridge_backward {
+        -magnitude
+    } else {
+        magnitude
+    }
+}
+
 fn micros(ns: u64) -> Micros {
     // The boards' clocks are 32-bit microsecond counters and wrap.
     Micros((ns / NS_PER_US) as u32)
@@ -95,6 +124,7 @@ impl World {
         plant: &PlantParams,
         master: MasterConfig,
         seed: u64,
+        outside: Option<Outside>,
     ) -> Result<Self, SimError> {
         let refused = |part: &str, e: &dyn std::fmt::Display| {
             SimError::simulation(
@@ -116,6 +146,10 @@ impl World {
         let joint = |n: u8| JointBoard::new(address(n)?, &stored.joints[usize::from(n) - 1]);
         let wheel = |n: u8| WheelBoard::new(address(n)?, &stored.wheels[usize::from(n) - 7]);
         let outputs = plant.outputs(&state);
+        let mut bus = Bus::new(robot.bus.baud_bit_s as u32);
+        if outside.is_some() {
+            bus.keep_delivered();
+        }
         let wheels = [wheel(7)?, wheel(8)?];
         // Both ends count speeds per sample, so the master must know the board's.
         let master = MasterConfig {
@@ -136,7 +170,7 @@ impl World {
                 joint(6)?,
             ],
             wheels,
-            bus: Bus::new(robot.bus.baud_bit_s as u32),
+            bus,
             master: Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?,
             master_alive: true,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
@@ -147,6 +181,8 @@ impl World {
             next_cycle_ns: 0,
             tick_inputs: TickInputs::default(),
             faults: Injector::new(seed),
+            outside,
+            stored: stored.clone(),
         })
     }
 
@@ -161,7 +197,7 @@ impl World {
             && due <= tick_ns
         {
             self.now_ns = due;
-            self.deliver();
+            self.deliver()?;
             return Ok(Happened::Delivery);
         }
         self.now_ns = tick_ns;
@@ -183,28 +219,58 @@ impl World {
             .map_err(|e| unphysical(self.now_ns, &e))
     }
 
+    /// Positions and foot contacts as the boards read them now.
+    fn sense(&mut self) -> Sensed {
+        let feet = self.outputs.foot_switches;
+        let mut sensed = Sensed::default();
+        for i in 0..6 {
+            let code = self.plant.read_position(&mut self.state, i);
+            let stroke_m = self.plant.params().potentiometers[i].electrical_stroke_m;
+            sensed.codes[i] = self.faults.position_code(i, code, stroke_m);
+            sensed.feet[i] = self.faults.switches(i / 3, feet[i / 3]);
+        }
+        sensed
+    }
+
     fn joint_tick(&mut self) -> Result<(), SimError> {
         self.advance_plant()?;
-        for (i, board) in self.joints.iter().enumerate() {
-            let on_us = board.active_on_us();
+        // A board outside answers with the outputs that act from this edge on
+        // when it is told the inputs of the edge. Neither depends on the other.
+        let sensed = if self.outside.is_some() {
+            self.outputs = self.plant.outputs(&self.state);
+            let sensed = self.sense();
+            self.joint_edge_outside(&sensed)?;
+            Some(sensed)
+        } else {
+            None
+        };
+        for (i, address) in (0..6).zip(1..) {
+            let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
+            let on_us = match outside {
+                Some(outputs) => outputs.valve_on_us,
+                None => self.joints[i].active_on_us(),
+            };
             self.tick_inputs.take(i, on_us);
             self.inputs.valve_on_us[i] = on_us;
         }
-        self.inputs.dump = self.wheels[0].dumps();
+        let outside = self.outside.as_ref().and_then(|o| o.outputs(7));
+        self.inputs.dump = match outside {
+            Some(outputs) => outputs.dump,
+            None => self.wheels[0].dumps(),
+        };
         self.plant
             .apply(&mut self.state, &self.inputs)
             .map_err(|e| unphysical(self.now_ns, &e))?;
         self.outputs = self.plant.outputs(&self.state);
-        let feet = self.outputs.foot_switches;
-        for (i, board) in self.joints.iter_mut().enumerate() {
-            let code = self.plant.read_position(&mut self.state, i);
-            let potentiometer = &self.plant.params().potentiometers[i];
-            let code = self
-                .faults
-                .position_code(i, code, potentiometer.electrical_stroke_m);
-            let feet = self.faults.switches(i / 3, feet[i / 3]);
-            let now = micros(self.faults.clock_ns(i as u8 + 1, self.now_ns));
-            board.tick(now, code, feet);
+        let sensed = match sensed {
+            Some(sensed) => sensed,
+            None => self.sense(),
+        };
+        for (i, address) in (0..6).zip(1..) {
+            let now = micros(self.faults.clock_ns(address, self.now_ns));
+            if runs(self.outside.as_ref(), address, self.now_ns) {
+                self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
+            }
         }
         self.next_joint_ns += JOINT_TICK_NS;
         self.collect_transmissions();
@@ -212,24 +278,118 @@ impl World {
         Ok(())
     }
 
+    /// The edge of all joint boards outside, and the comparison of the outputs
+    /// that act from it on.
+    fn joint_edge_outside(&mut self, sensed: &Sensed) -> Result<(), SimError> {
+        let (now_ns, bus) = (self.now_ns, &self.bus);
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        let mut edges: Vec<(u8, Option<link::Inputs>)> = (1..)
+            .zip(sensed.codes.iter().zip(sensed.feet))
+            .map(|(address, (code, feet))| {
+                let inputs = link::Inputs {
+                    adc: *code,
+                    switches: link::Switches::from_foot(feet),
+                    encoder: 0,
+                };
+                (address, Some(inputs))
+            })
+            .collect();
+        // The dump valve acts at once: its board is brought to this instant.
+        edges.push((7, None));
+        outside.run(now_ns, &edges, bus.byte_ns(), |address, after_ns| {
+            bus.heard(address, after_ns, now_ns)
+        })?;
+        self.restart_tripped()?;
+        for (board, address) in self.joints.iter().zip(1..) {
+            if runs(self.outside.as_ref(), address, now_ns)
+                && let Some(outside) = &mut self.outside
+            {
+                outside.compare_outputs(now_ns, address, &board.active_outputs());
+            }
+        }
+        Ok(())
+    }
+
+    /// A board outside that was reset: the application beside it starts anew.
+    fn restart_tripped(&mut self) -> Result<(), SimError> {
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        for raw in 1..=8_u8 {
+            let Some(address) = outside.take_trip(raw).and_then(|_| Address::new(raw)) else {
+                continue;
+            };
+            let i = usize::from(raw) - 1;
+            if i < 6 {
+                self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
+            } else {
+                self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6])?;
+            }
+        }
+        Ok(())
+    }
+
     fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
         self.advance_plant()?;
-        let board = &mut self.wheels[wheel];
-        // Only the bridge takes new inputs here: the valves keep their tick.
-        self.inputs.bridge_duty[wheel] = board.active_duty();
-        self.inputs.bridge_enabled[wheel] = true;
-        let core = &mut self.state.core;
-        core.motion.motors[wheel].duty = self.inputs.bridge_duty[wheel];
-        core.motion.motors[wheel].enabled = self.inputs.bridge_enabled[wheel];
+        let core = &self.state.core;
         let mechanics = &self.plant.assembly.mechanics;
         let angle_rad = mechanics.wheel_angle_rad(&core.motion);
         let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
         let edges = self.faults.edges(wheel, edges);
         let switch = core.supply.pressure_switch;
-        let now_ns = self.faults.clock_ns(wheel as u8 + 7, self.now_ns);
-        board.tick(micros(now_ns), edges, switch);
+        self.wheel_edge_outside(wheel, edges, switch)?;
+        let address = wheel as u8 + 7;
+        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
+        // Only the bridge takes new inputs here: the valves keep their tick.
+        self.inputs.bridge_duty[wheel] = match outside {
+            Some(outputs) => duty(&outputs),
+            None => self.wheels[wheel].active_duty(),
+        };
+        self.inputs.bridge_enabled[wheel] = true;
+        let motor = &mut self.state.core.motion.motors[wheel];
+        motor.duty = self.inputs.bridge_duty[wheel];
+        motor.enabled = self.inputs.bridge_enabled[wheel];
+        let now_ns = self.faults.clock_ns(address, self.now_ns);
+        let board = &mut self.wheels[wheel];
+        if runs(self.outside.as_ref(), address, self.now_ns) {
+            board.tick(micros(now_ns), edges, switch);
+        }
         self.next_wheel_ns[wheel] += u64::from(board.period_us()) * NS_PER_US;
         self.collect_transmissions();
+        Ok(())
+    }
+
+    /// The edge of a wheel board outside, and the comparison of its outputs.
+    fn wheel_edge_outside(
+        &mut self,
+        wheel: usize,
+        edges: i64,
+        switch: bool,
+    ) -> Result<(), SimError> {
+        let (now_ns, bus) = (self.now_ns, &self.bus);
+        let address = wheel as u8 + 7;
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        let inputs = link::Inputs {
+            adc: 0,
+            switches: link::Switches::from_supply(switch),
+            // The counter wraps, as the board's does.
+            encoder: edges as i32,
+        };
+        let edge = [(address, Some(inputs))];
+        outside.run(now_ns, &edge, bus.byte_ns(), |address, after_ns| {
+            bus.heard(address, after_ns, now_ns)
+        })?;
+        self.restart_tripped()?;
+        if runs(self.outside.as_ref(), address, now_ns)
+            && let Some(outside) = &mut self.outside
+        {
+            let here = self.wheels[wheel].active_outputs();
+            outside.compare_outputs(now_ns, address, &here);
+        }
         Ok(())
     }
 
@@ -248,16 +408,17 @@ impl World {
         self.next_cycle_ns = due_ns.saturating_add_signed(self.faults.cycle_jitter_ns());
     }
 
-    fn deliver(&mut self) {
+    fn deliver(&mut self) -> Result<(), SimError> {
         while let Some(delivery) = self.bus.take_due(self.now_ns) {
+            let outside = self.outside.as_ref();
             let t_end = |address| micros(self.faults.clock_ns(address, delivery.end_ns));
             for (board, address) in self.joints.iter_mut().zip(1..) {
-                if delivery.from != address {
+                if delivery.from != address && runs(outside, address, self.now_ns) {
                     board.on_bus_bytes(&delivery.bytes, t_end(address));
                 }
             }
             for (board, address) in self.wheels.iter_mut().zip(7..) {
-                if delivery.from != address {
+                if delivery.from != address && runs(outside, address, self.now_ns) {
                     board.on_bus_bytes(&delivery.bytes, t_end(address));
                 }
             }
@@ -266,8 +427,18 @@ impl World {
                     .on_bus_bytes(&delivery.bytes, delivery.end_ns / NS_PER_US);
             }
         }
+        if let Some(outside) = &mut self.outside {
+            let (now_ns, bus) = (self.now_ns, &self.bus);
+            let all: [(u8, Option<link::Inputs>); 8] = std::array::from_fn(|i| (i as u8 + 1, None));
+            outside.run(now_ns, &all, bus.byte_ns(), |address, after_ns| {
+                bus.heard(address, after_ns, now_ns)
+            })?;
+            self.bus.forget_delivered();
+            self.restart_tripped()?;
+        }
         self.collect_transmissions();
         self.offer_acyclic();
+        Ok(())
     }
 
     /// Puts on the line what the boards want to send, at the times they chose.
@@ -275,6 +446,7 @@ impl World {
         let now_ns = self.now_ns;
         let bus = &mut self.bus;
         let faults = &mut self.faults;
+        let outside = &mut self.outside;
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
             if !faults.can_send(from) {
                 return;
@@ -288,7 +460,12 @@ impl World {
             } else {
                 0
             };
-            transmit(bus, faults, from, now_ns + ahead_ns, t.bytes.to_vec());
+            let (start_ns, bytes) = (now_ns + ahead_ns, t.bytes.to_vec());
+            match outside {
+                // What goes on the line is what the board outside sends.
+                Some(outside) if outside.has(from) => outside.expect_frame(from, start_ns, bytes),
+                _ => transmit(bus, faults, from, start_ns, bytes),
+            }
         };
         for (board, address) in self.joints.iter_mut().zip(1..) {
             while let Some(t) = board.take_transmission() {
@@ -300,6 +477,20 @@ impl World {
                 send(address, t);
             }
         }
+        if let Some(outside) = &mut self.outside {
+            for address in 1..=8 {
+                for (start_ns, bytes) in outside.take_frames(address) {
+                    if self.faults.can_send(address) {
+                        transmit(&mut self.bus, &mut self.faults, address, start_ns, bytes);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The boards outside of this process.
+    pub(super) fn outside(&mut self) -> Option<&mut Outside> {
+        self.outside.as_mut()
     }
 
     /// Lets the master use the line for a request while nothing is on it or scheduled.

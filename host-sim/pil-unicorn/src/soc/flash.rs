@@ -189,12 +189,6 @@ impl Flash {
         }
         Ok(())
     }
-
-    /// A reset: the operation under way is lost, the contents stay.
-    pub(crate) fn reset(&mut self) {
-        let store = std::mem::take(&mut self.store);
-        *self = Self::new(store);
-    }
 }
 
 #[cfg(test)]

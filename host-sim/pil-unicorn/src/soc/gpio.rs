@@ -43,11 +43,6 @@ impl Port {
         self.mode(pin) == 1 && self.odr >> pin & 1 != 0
     }
 
-    /// Whether a pin is a plain output.
-    pub(crate) fn is_output(&self, pin: u32) -> bool {
-        self.mode(pin) == 1
-    }
-
     /// Whether a pin is analogue.
     pub(crate) fn is_analogue(&self, pin: u32) -> bool {
         self.mode(pin) == 3

@@ -101,6 +101,8 @@ pub(crate) struct Soc {
     pub(crate) edge: Option<u64>,
     /// Frames that went out whole: start cycle and bytes.
     pub(crate) gone: Vec<(u64, Vec<u8>)>,
+    /// The frame that has been started last: start cycle, address, length.
+    pub(crate) started: Option<(u64, u32, u32)>,
     burst_high: Option<(u64, u64)>,
     syscfg: [u32; 3],
 }
@@ -134,6 +136,7 @@ impl Soc {
             driver_timeouts: 0,
             edge: None,
             gone: Vec::new(),
+            started: None,
             burst_high: None,
             syscfg: [0; 3],
         }
@@ -187,11 +190,6 @@ impl Soc {
         self.next().map_or(u64::MAX, |(at, _)| at)
     }
 
-    /// Whether the conversion of a tick is under way.
-    pub(crate) fn converting(&self) -> bool {
-        self.adc.next().is_some()
-    }
-
     /// Carries out the next event if it is due; gives its cycle.
     pub(crate) fn step(&mut self, cycle: u64) -> Option<u64> {
         let (at, source) = self.next().filter(|(at, _)| *at <= cycle)?;
@@ -205,6 +203,7 @@ impl Soc {
                     (TIM2, Event::Match(0)) if self.tim[TIM2].triggers_on_match() => {
                         self.tim[TIM15].trigger(1, at);
                     }
+                    (TIM2, Event::Match(3)) => self.started = self.frame().map(|f| (at, f.0, f.1)),
                     (TIM15, Event::Update) => self.driver_off(at),
                     _ => {}
                 }
@@ -320,10 +319,16 @@ impl Soc {
             return None;
         }
         let start = clock.cycle_of(clock.ccr[3]);
+        let (address, length) = self.frame()?;
+        let waits = clock.triggers_on_match() && driver.waits_for(1);
+        (start > cycle && (waits || driver.runs())).then_some((start, address, length))
+    }
+
+    /// Address and length of the frame that DMA would send, once started.
+    fn frame(&self) -> Option<(u32, u32)> {
         self.dma.serving(REQUEST_TIM2_CH4)?;
         let frame = &self.dma.channels[self.dma.serving(REQUEST_USART1_TX)?];
-        let waits = clock.triggers_on_match() && driver.waits_for(1);
-        (start > cycle && (waits || driver.runs())).then(|| (start, frame.address(), frame.left()))
+        Some((frame.address(), frame.left()))
     }
 
     /// All interrupt lines.

@@ -1,0 +1,80 @@
+//! Figures of the boards outside, for summary and report.
+
+use serde::Serialize;
+use wheeleg_pil_link::{Figures, Hello};
+
+use super::choice::NODE_NAMES;
+
+/// Figures of one board.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct BoardFigures {
+    /// `joint1` … `wheel8`.
+    pub node: String,
+    /// Name of its image.
+    pub image: String,
+    /// Digest of the image, hexadecimal.
+    pub digest: String,
+    /// What it runs on.
+    pub host: String,
+    /// Ticks worked off.
+    pub ticks: u64,
+    /// Instructions of a tick, interrupt entry and main loop included, median.
+    pub tick_instructions_median: u32,
+    /// The same, worst.
+    pub tick_instructions_worst: u32,
+    /// Most instructions between two sleeps, whatever caused them.
+    pub longest_awake_instructions: u32,
+    /// Deepest stack, bytes.
+    pub stack_used_bytes: u32,
+    /// Room for the stack, bytes.
+    pub stack_size_bytes: u32,
+    /// Resets.
+    pub resets: u16,
+    /// Bytes that came late to the emulator.
+    pub late_bytes: u32,
+}
+
+impl BoardFigures {
+    pub(crate) fn new(address: u8, hello: &Hello, figures: &Figures, ticks: &[u32]) -> Self {
+        let mut sorted = ticks.to_vec();
+        sorted.sort_unstable();
+        Self {
+            node: NODE_NAMES[usize::from(address) - 1].to_owned(),
+            image: hello.image.name.to_string(),
+            digest: hello
+                .image
+                .digest
+                .iter()
+                .map(|b| format!("{b:02x}"))
+                .collect(),
+            host: hello.host.to_string(),
+            ticks: ticks.len() as u64,
+            tick_instructions_median: sorted.get(sorted.len() / 2).copied().unwrap_or(0),
+            tick_instructions_worst: sorted.last().copied().unwrap_or(0),
+            longest_awake_instructions: figures.longest_awake,
+            stack_used_bytes: figures.stack_used,
+            stack_size_bytes: figures.stack_size,
+            resets: figures.resets,
+            late_bytes: figures.late_bytes,
+        }
+    }
+}
+
+/// What a run with boards outside adds to the summary.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PilSummary {
+    /// Where each node ran, addresses 1 to 8.
+    pub nodes: Vec<String>,
+    /// Bits compared with the application in this process.
+    pub compared_bits: u64,
+    /// Bits that differed.
+    pub differing_bits: u64,
+    /// Ticks compared.
+    pub compared_ticks: u64,
+    /// Transmissions compared.
+    pub compared_frames: u64,
+    /// The first difference, in words.
+    pub first_difference: Option<String>,
+    /// The boards outside.
+    pub boards: Vec<BoardFigures>,
+}

@@ -1,0 +1,472 @@
+//! Boards outside of this process, in the place of native ones.
+//!
+//! Beside each of them the same application runs here, on the same inputs. It
+//! gives the internals that an image does not show, and it is what the board is
+//! compared with at every tick and for every frame. What moves the plant and
+//! what goes on the line comes from the board outside.
+
+use std::collections::VecDeque;
+
+use wheeleg_pil_link::{
+    Hello, Hook, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run,
+    Straps, Trip,
+};
+
+use super::choice::{NODE_NAMES, NodeKind, Nodes};
+use super::compare::Comparison;
+use super::figures::{BoardFigures, PilSummary};
+use super::line::Line;
+use super::qemu::{Qemu, QemuOptions};
+use super::{store, unicorn};
+use crate::SimError;
+use crate::config::RobotConfig;
+
+/// A byte on the line: end of its last bit in ns, and its value.
+pub(crate) type Heard = (u64, u8);
+
+/// One board outside.
+struct Board {
+    address: u8,
+    line: usize,
+    index: u8,
+    name: String,
+    hello: Hello,
+    ran: Ran,
+    /// Bytes that ended up to here have been handed over, ns.
+    heard_ns: u64,
+    /// Inputs of the newest edges that have not been compared.
+    latched: VecDeque<(u64, Inputs)>,
+    /// Sent here by the native application, there by the board.
+    here: VecDeque<(u64, Vec<u8>)>,
+    there: VecDeque<(u64, Vec<u8>)>,
+    /// Time of the first tick after the newest start, ns; `None` while down.
+    running_from_ns: Option<u64>,
+    tripped: Option<Trip>,
+    power: Power,
+    tick_instructions: Vec<u32>,
+}
+
+/// All boards outside.
+pub(crate) struct Outside {
+    lines: Vec<Box<dyn Line>>,
+    boards: Vec<Board>,
+    /// Board of each address from 1, as an index.
+    by_address: [Option<usize>; 8],
+    comparison: Comparison,
+    requests: Vec<usize>,
+    /// The first difference has been told.
+    told: bool,
+}
+
+/// Processes over which the emulated boards are spread. The result does not
+/// depend on it.
+fn processes() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get().min(2))
+}
+
+impl Outside {
+    /// Starts the boards that do not run here, and powers them up. `None` when
+    /// all do.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] when a program or image is missing or does not
+    /// come up.
+    pub(crate) fn connect(nodes: &Nodes, robot: &RobotConfig) -> Result<Option<Self>, SimError> {
+        if nodes.all_native() {
+            return Ok(None);
+        }
+        let mut outside = Self {
+            lines: Vec::new(),
+            boards: Vec::new(),
+            by_address: [None; 8],
+            comparison: Comparison::default(),
+            requests: Vec::new(),
+            told: false,
+        };
+        outside.start_pil(nodes)?;
+        for (address, kind) in (1..).zip(&nodes.0) {
+            match kind {
+                NodeKind::Sil | NodeKind::Pil => {}
+                NodeKind::Qemu => {
+                    let image = if address <= 6 {
+                        "qemu-joint"
+                    } else {
+                        "qemu-wheel"
+                    };
+                    let options = QemuOptions::new(unicorn::image(image)?);
+                    let line = outside.lines.len();
+                    outside.lines.push(Box::new(Qemu::partner(&options)?));
+                    outside.adopt(address, line, 0)?;
+                }
+                NodeKind::Hil(port) => {
+                    let line = outside.lines.len();
+                    outside.lines.push(super::serial::open(port)?);
+                    outside.adopt(address, line, 0)?;
+                }
+            }
+        }
+        for number in 0..outside.boards.len() {
+            outside.power_up(number, robot)?;
+        }
+        Ok(Some(outside))
+    }
+
+    /// Spreads the byte-identical images over a few processes.
+    fn start_pil(&mut self, nodes: &Nodes) -> Result<(), SimError> {
+        let pil = (1..).zip(&nodes.0).filter(|(_, k)| **k == NodeKind::Pil);
+        let addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
+        for part in 0..processes() {
+            // Every second one, so that joints and wheels are spread evenly.
+            let mine: Vec<u8> = addresses
+                .iter()
+                .skip(part)
+                .step_by(processes())
+                .copied()
+                .collect();
+            if mine.is_empty() {
+                continue;
+            }
+            let images = mine
+                .iter()
+                .map(|a| unicorn::image(if *a <= 6 { "joint" } else { "wheel" }))
+                .collect::<Result<Vec<_>, _>>()?;
+            let line = self.lines.len();
+            self.lines.push(Box::new(unicorn::Unicorn::start(&images)?));
+            for (index, address) in (0..).zip(mine) {
+                self.adopt(address, line, index)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn ask(&mut self, line: usize, index: u8, request: &Request) -> Result<Reply, SimError> {
+        let line = &mut self.lines[line];
+        line.queue(index, request)?;
+        line.flush()?;
+        line.receive().map(|(_, reply)| reply)
+    }
+
+    fn adopt(&mut self, address: u8, line: usize, index: u8) -> Result<(), SimError> {
+        let name = NODE_NAMES[usize::from(address) - 1].to_owned();
+        let version = LINK_VERSION;
+        let hello = match self.ask(line, index, &Request::Hello { version })? {
+            Reply::Hello(hello) if hello.version == version => hello,
+            Reply::Hello(hello) => {
+                return Err(SimError::simulation(
+                    format!(
+                        "{name} speaks version {} of the board link, this program {version}",
+                        hello.version
+                    ),
+                    "build image and program from the same sources: cargo xtask pil --build",
+                ));
+            }
+            other => return Err(unexpected(&name, &other)),
+        };
+        self.by_address[usize::from(address) - 1] = Some(self.boards.len());
+        self.boards.push(Board {
+            address,
+            line,
+            index,
+            name,
+            hello,
+            ran: Ran::default(),
+            heard_ns: 0,
+            latched: VecDeque::new(),
+            here: VecDeque::new(),
+            there: VecDeque::new(),
+            running_from_ns: Some(0),
+            tripped: None,
+            power: Power::Good,
+            tick_instructions: Vec::new(),
+        });
+        Ok(())
+    }
+
+    fn power_up(&mut self, number: usize, robot: &RobotConfig) -> Result<(), SimError> {
+        let (address, line, index) = {
+            let board = &self.boards[number];
+            (board.address, board.line, board.index)
+        };
+        let stored = match address {
+            1..=6 => &robot.node.joints[usize::from(address) - 1],
+            _ => &robot.node.wheels[usize::from(address) - 7],
+        };
+        for stretch in store::stretches(stored) {
+            match self.ask(line, index, &Request::Store(stretch))? {
+                Reply::Done => {}
+                other => return Err(unexpected(&self.boards[number].name, &other)),
+            }
+        }
+        let straps = Straps {
+            address,
+            unique_id: [address; 12],
+            crystal: true,
+        };
+        match self.ask(line, index, &Request::PowerUp(straps))? {
+            Reply::Ran(ran) => {
+                self.boards[number].ran = ran;
+                Ok(())
+            }
+            other => Err(unexpected(&self.boards[number].name, &other)),
+        }
+    }
+
+    fn number(&self, address: u8) -> Option<usize> {
+        self.by_address
+            .get(usize::from(address).wrapping_sub(1))
+            .copied()
+            .flatten()
+    }
+
+    /// Whether the board at `address` is outside.
+    pub(crate) fn has(&self, address: u8) -> bool {
+        self.number(address).is_some()
+    }
+
+    /// Outputs of the board at `address`, if it is outside.
+    pub(crate) fn outputs(&self, address: u8) -> Option<Outputs> {
+        self.number(address).map(|n| self.boards[n].ran.outputs)
+    }
+
+    /// Whether the board at `address` runs a tick at `now_ns`, if it is outside.
+    pub(crate) fn ticks(&self, address: u8, now_ns: u64) -> Option<bool> {
+        let from = self.boards[self.number(address)?].running_from_ns;
+        Some(from.is_some_and(|from| from <= now_ns))
+    }
+
+    /// The reset of the board at `address` since the last call.
+    pub(crate) fn take_trip(&mut self, address: u8) -> Option<Trip> {
+        let n = self.number(address)?;
+        self.boards[n].tripped.take()
+    }
+
+    /// Supply of the board at `address` from its next run on.
+    pub(crate) fn set_power(&mut self, address: u8, power: Power) {
+        if let Some(n) = self.number(address) {
+            self.boards[n].power = power;
+        }
+    }
+
+    /// Provokes a fault in the board at `address`.
+    ///
+    /// # Errors
+    /// [`SimError`] if the board is not outside or refuses.
+    pub(crate) fn hook(&mut self, address: u8, hook: Hook) -> Result<(), SimError> {
+        let Some(n) = self.number(address) else {
+            return Err(SimError::simulation(
+                format!("board {address} runs in this process: it has no processor to disturb"),
+                "run it with --nodes pil",
+            ));
+        };
+        let (line, index) = (self.boards[n].line, self.boards[n].index);
+        match self.ask(line, index, &Request::Hook(hook))? {
+            Reply::Done => Ok(()),
+            other => Err(unexpected(&self.boards[n].name, &other)),
+        }
+    }
+
+    /// Queues a run of one board to `now_ns`, with what it has heard.
+    fn queue(
+        &mut self,
+        number: usize,
+        now_ns: u64,
+        edge: Option<Inputs>,
+        heard: &[Heard],
+        byte_ns: u64,
+    ) -> Result<(), SimError> {
+        let board = &mut self.boards[number];
+        let line = &mut self.lines[board.line];
+        let mut run = Run {
+            until_ns: now_ns,
+            power: board.power,
+            byte_ns: byte_ns as u32,
+            ..Run::default()
+        };
+        for (end_ns, byte) in heard {
+            let gap = !run.received.is_empty() && run.received_end_ns + byte_ns != *end_ns;
+            if gap || run.received.len() == MAX_RECEIVED {
+                // What follows does not join on: an own run up to here.
+                let part = Run {
+                    until_ns: run.received_end_ns,
+                    ..run.clone()
+                };
+                line.queue(board.index, &Request::Run(part))?;
+                self.requests.push(number);
+                run.received.clear();
+            }
+            let _ = run.received.push(*byte);
+            run.received_end_ns = *end_ns;
+        }
+        run.edge = edge;
+        if let Some(inputs) = edge {
+            board.latched.push_back((now_ns, inputs));
+            if board.latched.len() > 4 {
+                board.latched.pop_front();
+            }
+        }
+        board.heard_ns = now_ns;
+        line.queue(board.index, &Request::Run(run))?;
+        self.requests.push(number);
+        Ok(())
+    }
+
+    /// Runs boards to `now_ns`: with an edge those that have inputs, to
+    /// the bare instant the others. `heard` gives what the board at an address has
+    /// heard after the instant named.
+    ///
+    /// # Errors
+    /// [`SimError`] when a board stops.
+    pub(crate) fn run(
+        &mut self,
+        now_ns: u64,
+        boards: &[(u8, Option<Inputs>)],
+        byte_ns: u64,
+        heard: impl Fn(u8, u64) -> Vec<Heard>,
+    ) -> Result<(), SimError> {
+        for (address, edge) in boards {
+            if let Some(number) = self.number(*address) {
+                let bytes = heard(*address, self.boards[number].heard_ns);
+                self.queue(number, now_ns, *edge, &bytes, byte_ns)?;
+            }
+        }
+        for line in &mut self.lines {
+            line.flush()?;
+        }
+        for number in std::mem::take(&mut self.requests) {
+            let line = self.boards[number].line;
+            let (_, reply) = self.lines[line].receive()?;
+            self.take(number, reply)?;
+        }
+        if let (Some(first), false) = (&self.comparison.first, self.told) {
+            self.told = true;
+            // Told at once: the run may end before its summary.
+            eprintln!("a board differs from the host: {first}");
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, number: usize, reply: Reply) -> Result<(), SimError> {
+        let board = &mut self.boards[number];
+        let Reply::Ran(ran) = reply else {
+            return Err(unexpected(&board.name, &reply));
+        };
+        for sent in &ran.sent {
+            board.there.push_back((sent.start_ns, sent.bytes.to_vec()));
+        }
+        if let Some(trip) = ran.trip {
+            let down = board
+                .running_from_ns
+                .take()
+                .is_some_and(|from| from <= trip.at_ns);
+            if down {
+                board.tripped = Some(trip);
+                board.latched.clear();
+            }
+            board.running_from_ns = (trip.running_ns > 0).then_some(trip.running_ns);
+        }
+        // The tick that was worked off last, once.
+        while let Some((edge_ns, inputs)) = board.latched.front() {
+            if *edge_ns > ran.seen_at_ns || ran.figures.resets != board.ran.figures.resets {
+                break;
+            }
+            // Before its first tick a board names time zero, too.
+            if *edge_ns == ran.seen_at_ns && *edge_ns > 0 {
+                self.comparison
+                    .inputs(*edge_ns, board.address, inputs, &ran.seen);
+                board.tick_instructions.push(ran.figures.tick_instructions);
+            }
+            board.latched.pop_front();
+        }
+        board.ran = ran;
+        Ok(())
+    }
+
+    /// Compares the outputs that act from `now_ns` on with those of the native
+    /// application.
+    pub(crate) fn compare_outputs(&mut self, now_ns: u64, address: u8, here: &Outputs) {
+        if let Some(n) = self.number(address) {
+            let there = &self.boards[n].ran.outputs;
+            self.comparison.outputs(now_ns, address, here, there);
+        }
+    }
+
+    /// A transmission of the native application beside the board at `address`.
+    pub(crate) fn expect_frame(&mut self, address: u8, start_ns: u64, bytes: Vec<u8>) {
+        if let Some(n) = self.number(address) {
+            self.boards[n].here.push_back((start_ns, bytes));
+        }
+    }
+
+    /// What the board at `address` has scheduled to send since the last call.
+    pub(crate) fn take_frames(&mut self, address: u8) -> Vec<(u64, Vec<u8>)> {
+        let Some(n) = self.number(address) else {
+            return Vec::new();
+        };
+        let board = &mut self.boards[n];
+        let mut frames = Vec::new();
+        while let Some(there) = board.there.pop_front() {
+            let here = board.here.pop_front();
+            let side = |f: &(u64, Vec<u8>)| (f.0, f.1.clone());
+            let pair = (here.as_ref().map(side), side(&there));
+            let here = pair
+                .0
+                .as_ref()
+                .map(|(start, bytes)| (*start, bytes.as_slice()));
+            let out = Some((pair.1.0, pair.1.1.as_slice()));
+            self.comparison.frame(there.0, address, here, out);
+            frames.push(there);
+        }
+        frames
+    }
+
+    /// Frames that only the native application has sent are differences.
+    fn finish(&mut self, now_ns: u64) {
+        for board in &mut self.boards {
+            while let Some((start, bytes)) = board.here.pop_front() {
+                // One that is due later need not stand ready yet.
+                if start + 1_000_000 < now_ns {
+                    let here = Some((start, bytes.as_slice()));
+                    self.comparison.frame(start, board.address, here, None);
+                }
+            }
+        }
+    }
+
+    /// Comparison and figures, at the end of a run.
+    pub(crate) fn summary(&mut self, nodes: &Nodes, now_ns: u64) -> PilSummary {
+        self.finish(now_ns);
+        let figures = |b: &Board| {
+            BoardFigures::new(b.address, &b.hello, &b.ran.figures, &b.tick_instructions)
+        };
+        PilSummary {
+            nodes: nodes.0.iter().map(ToString::to_string).collect(),
+            compared_bits: self.comparison.bits,
+            differing_bits: self.comparison.differing,
+            compared_ticks: self.comparison.ticks,
+            compared_frames: self.comparison.frames,
+            first_difference: self.comparison.first.as_ref().map(ToString::to_string),
+            boards: self.boards.iter().map(figures).collect(),
+        }
+    }
+}
+
+/// An answer that does not belong to the request.
+fn unexpected(name: &str, reply: &Reply) -> SimError {
+    let (what, help) = match reply {
+        Reply::Refused(why) => (format!("refuses: {why}"), "what was logged is complete"),
+        Reply::Halted(halt) => (
+            format!(
+                "has stopped at {:.6} s, program counter 0x{:08X}: {}",
+                halt.at_ns as f64 * 1e-9,
+                halt.pc,
+                halt.reason
+            ),
+            "what was logged up to here is complete",
+        ),
+        other => (
+            format!("answers out of turn: {other:?}"),
+            "build image and program from the same sources: cargo xtask pil --build",
+        ),
+    };
+    SimError::simulation(format!("{name} {what}"), help)
+}
