@@ -216,7 +216,6 @@ pub fn connect(
 
 /// One call: a port that cannot be opened is the outer error, a board that does
 /// not answer well the inner one.
-#[expect(clippy::type_complexity, reason = "said in words above")]
 fn call(options: &HilOptions) -> Result<Result<(Partner<SerialLine>, Hello), SimError>, SimError> {
     let mut partner = Partner::new(SerialLine::open(options)?);
     Ok(partner.hello().map(|hello| (partner, hello)))
