@@ -58,8 +58,7 @@ impl Budget {
             self.static_ram_bytes_max,
         );
         let margin = figures.stack_margin();
-        // Written so that a margin that is no number is a breach.
-        if !(margin >= self.stack_margin_min) {
+        if margin.is_nan() || margin < self.stack_margin_min {
             breaches.push(format!(
                 "stack margin {:.1} %, at least {:.1} % is asked",
                 margin * 100.0,

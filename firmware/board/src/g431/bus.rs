@@ -28,6 +28,9 @@ const LEAD_US: u32 = 2;
 const SOONEST_US: u32 = 4;
 /// Lead of 1 µs and tail of 2 µs around the frame, as TIM15 counts them.
 const MARGIN_US: u16 = 3;
+/// Positions in the ring are counted modulo its size, a power of two.
+const POSITION_MASK: u16 = (RING - 1) as u16;
+const _: () = assert!(RING.is_power_of_two());
 /// Time of a byte, µs.
 const BYTE_US: u16 = 10;
 
@@ -229,7 +232,7 @@ fn arm(length: u16, start_at: u32) {
 fn mark(time: u32) {
     let left = pac::DMA1.ch(RX.0).ndtr().read().ndt();
     MARKS.push(Mark {
-        position: (RING as u16).wrapping_sub(left) % RING as u16,
+        position: (RING as u16).wrapping_sub(left) & POSITION_MASK,
         time: Micros(time),
     });
     latch::wake();

@@ -32,6 +32,7 @@ pub mod slot;
 pub mod start;
 #[cfg(feature = "outputs")]
 pub mod tick;
+#[cfg(any(feature = "outputs", feature = "hil"))]
 pub mod timebase;
 #[cfg(feature = "outputs")]
 pub mod valves;
