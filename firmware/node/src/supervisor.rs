@@ -57,6 +57,8 @@ pub struct Supervisor {
     mode_check: u8,
     entered_at: Micros,
     staged: bool,
+    /// Whether the present Hold began while the outputs were driven.
+    from_drive: bool,
     exhaust: ExhaustKind,
     exhaust_allowed: bool,
     emergency: bool,
@@ -106,6 +108,7 @@ impl Supervisor {
             mode_check: !(Mode::Boot as u8),
             entered_at: Micros::ZERO,
             staged: false,
+            from_drive: false,
             exhaust: ExhaustKind::Staged,
             exhaust_allowed: false,
             emergency: false,
@@ -130,6 +133,12 @@ impl Supervisor {
     /// Why the board is, or was last, not driving.
     pub const fn disarm_reason(&self) -> DisarmReason {
         self.disarm_reason
+    }
+
+    /// Whether the present Hold began while the outputs were driven; otherwise
+    /// there is nothing to ramp down.
+    pub const fn held_from_drive(&self) -> bool {
+        self.from_drive
     }
 
     /// Time since the present mode was entered (modulo 2^32 µs).
@@ -173,8 +182,9 @@ impl Supervisor {
                 self.disarm_reason = disarm_reason(event);
             }
             if next == Mode::Hold {
+                self.from_drive = before.may_drive();
                 self.staged =
-                    before.may_drive() && matches!(event, Event::LinkLost | Event::EmergencyStop);
+                    self.from_drive && matches!(event, Event::LinkLost | Event::EmergencyStop);
             }
             self.mode = next;
             self.mode_check = !(next as u8);
@@ -231,6 +241,7 @@ impl Supervisor {
             self.mode = Mode::Hold;
             self.mode_check = !(Mode::Hold as u8);
             self.staged = false;
+            self.from_drive = false;
             self.faults.latch(Fault::StateCorrupt, now);
         }
         self.link.set_watchdog(times.watchdog);

@@ -111,6 +111,23 @@ fn emergency_stop_ramps_at_once_and_dumps_the_supply() {
     assert!(!rig.dump.high.get());
 }
 
+/// Found by the fuzzer: the ramp of a stop began again, at the drive of its start.
+#[test]
+fn a_stop_that_is_cleared_and_braked_anew_does_not_begin_its_ramp_again() {
+    let mut rig = WheelRig::turning();
+    let brake = Message::EmergencyBrake(EmergencyBrake {});
+    rig.request(&brake);
+    rig.run_ms(100, None);
+    assert_eq!(rig.node.mode(), Mode::Hold);
+    assert!(rig.drive() > 0, "half way down the ramp");
+    assert!(matches!(clear(&mut rig), Message::Ack(_)));
+    assert_eq!(rig.node.mode(), Mode::Idle);
+    rig.request(&brake);
+    assert_eq!(rig.node.mode(), Mode::Hold);
+    rig.tick();
+    assert_eq!(rig.drive(), 0, "a disarmed wheel has nothing to ramp down");
+}
+
 #[test]
 fn emergency_brake_ramps_only_this_wheel_and_keeps_the_supply() {
     let mut rig = WheelRig::turning();

@@ -81,7 +81,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             stop: false,
         });
         // After a fault of the axis its drive may be what runs away: no ramp.
+        // None either for a stop of what was stopped: a ramp cleared and braked
+        // anew between two ticks would begin again.
         let ramps = self.core.mode() == Mode::Hold
+            && self.core.supervisor.held_from_drive()
             && self.core.supervisor.disarm_reason() != DisarmReason::Fault;
         let ramp = i64::from(self.settings.stop_ramp.get());
         let left = ramp.saturating_sub(i64::from(self.core.supervisor.time_in_mode(now).get()));

@@ -52,8 +52,15 @@ impl Board for Wheel {
                 assert!(self.rig.node.faults().is_empty(), "drives with a fault");
             }
             Mode::Hold => {
-                assert!(drive.abs() <= before.abs(), "a stop that speeds up");
-                assert!(drive == 0 || (drive < 0) == (before < 0), "a reversal");
+                let stopping = self.stopping_us;
+                assert!(
+                    drive.abs() <= before.abs(),
+                    "a stop that speeds up: {before} to {drive} % after {stopping} us"
+                );
+                assert!(
+                    drive == 0 || (drive < 0) == (before < 0),
+                    "a stop that reverses: {before} to {drive} % after {stopping} us"
+                );
                 let ramp = self.rig.node.parameters().get(WheelParam::StopRamp);
                 let ramp_us = u32::try_from(ramp).expect("a positive time") * 1000;
                 assert!(self.stopping_us <= ramp_us || drive == 0, "no standstill");
