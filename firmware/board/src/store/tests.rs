@@ -153,7 +153,7 @@ fn a_power_cut_at_any_word_leaves_the_old_set_or_the_new_one() {
     let operations = 33;
     for saves in [0, 1, 2, 3] {
         let (before, old) = after(saves);
-        let old = (saves > 0).then_some(old).unwrap_or_default();
+        let old = if saves > 0 { old } else { Default::default() };
         let (mut kept, mut replaced) = (0, 0);
         for at in 0..operations {
             for torn in TORN {
