@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn the_issue_s_limits_stand_in_the_files() {
+    fn the_limits_of_the_design_stand_in_the_files() {
         for (image, instructions) in [("joint", 1500), ("wheel", 800)] {
             let budget = Budget::read(image).expect(image);
             assert_eq!(budget.flash_bytes_max, 48 * 1024);
