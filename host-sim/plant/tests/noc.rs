@@ -365,7 +365,7 @@ fn leg_potential_j(q: &Vector3<f64>, gravity: &Vector3<f64>) -> f64 {
     -gravity.dot(&moment)
 }
 
-/// Energy lost (J) by an undriven, frictionless leg on a slope of 20° in 0.2 s of RK4 steps.
+/// Change of energy (J) of an undriven, frictionless leg under tilted gravity, by steps of RK4.
 fn energy_drift_j(step_s: f64, steps: usize) -> f64 {
     let mut p = params();
     p.viscous_n_s_m = [0.0; 4];
@@ -444,10 +444,7 @@ fn impossible_states_are_named() {
     p.leg_bodies[5].mass_kg = 0.0;
     let system = leg_of(&p).at(&Vector3::new(0.4, 0.1, 0.1), &still).unwrap();
     let massless = system.forward(&still, &still, &still);
-    assert!(
-        matches!(massless, Err(DynamicsError::Singular { .. })),
-        "{massless:?}"
-    );
+    assert_eq!(massless, Err(DynamicsError::Singular { pivot: 0.0 }));
     let system = half()
         .at(&Vector4::new(0.0, 0.4, 0.1, 0.1), &Vector4::zeros())
         .unwrap();

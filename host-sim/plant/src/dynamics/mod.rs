@@ -4,8 +4,8 @@
 //!   48 × 4), with the corrected equations. [`printed`] holds the paper's printed variants.
 //! * [`robot`]: the engine the simulator steps: the whole robot in eight coordinates, floating in
 //!   pitch on its wheel axle. Same principle, with the zeros left out.
-//!
 //! * [`floating`]: the whole robot with a floating chassis, fourteen velocities, both ways.
+//! * [`chain`]: a recursive engine for any tree of revolute and prismatic joints, and the leg on it.
 //!
 //! Positive cylinder forces extend their cylinder. Gravity is a vector, so a slope is a tilted
 //! gravity.

@@ -126,9 +126,13 @@ impl ChainLeg {
     /// Generalised inertia NᵀHN (kg).
     ///
     /// # Errors
-    /// [`DynamicsError::Leg`].
+    /// [`DynamicsError::Leg`]; [`DynamicsError::NonFinite`] if an entry overflows (with its column).
     pub fn inertia(&self, q_m: &[f64; 3]) -> Result<[[f64; 3]; 3], DynamicsError> {
-        Ok(self.inertia_at(&self.posture(q_m)?))
+        let rows = self.inertia_at(&self.posture(q_m)?);
+        for row in &rows {
+            finite("mass matrix", row)?;
+        }
+        Ok(rows)
     }
 
     fn posture(&self, q: &[f64; 3]) -> Result<LegPosture<f64>, DynamicsError> {

@@ -49,9 +49,13 @@ fn look<const J: usize, const N: usize>(
     finite("gravity", gravity)
 }
 
-/// Both triangles of a mass matrix.
-fn mirrored<const N: usize>(h: &[[Num; N]; N]) -> [[f64; N]; N] {
-    std::array::from_fn(|i| std::array::from_fn(|j| h[i.max(j)][i.min(j)].get()))
+/// Both triangles of a mass matrix; refuses one that overflowed.
+fn mirrored<const N: usize>(h: &[[Num; N]; N]) -> Result<[[f64; N]; N], DynamicsError> {
+    let rows = std::array::from_fn(|i| std::array::from_fn(|j| h[i.max(j)][i.min(j)].get()));
+    for row in &rows {
+        finite("mass matrix", row)?;
+    }
+    Ok(rows)
 }
 
 /// A tree of N joints on an unmoved base.
@@ -122,11 +126,11 @@ impl<T: Tree, const N: usize> Fixed<T, N> {
     /// Mass matrix: composite rigid bodies.
     ///
     /// # Errors
-    /// [`DynamicsError::NonFinite`] for a position.
+    /// [`DynamicsError::NonFinite`] for a position or, after overflow, an entry (with its column).
     #[inline(always)]
     pub fn mass_matrix(&self, q: &[f64; N]) -> Result<[[f64; N]; N], DynamicsError> {
         finite("position", q)?;
-        Ok(mirrored(&self.matrix(&self.poses(q))))
+        mirrored(&self.matrix(&self.poses(q)))
     }
 
     /// Accelerations for positions, rates, joint forces and gravity.
@@ -307,13 +311,14 @@ impl<const P: u16, T: Tree, const J: usize, const N: usize> Floating<P, T, J, N>
     /// Mass matrix of the quasi-velocities.
     ///
     /// # Errors
-    /// [`DynamicsError::NonFinite`] for a joint position.
+    /// [`DynamicsError::NonFinite`] for a joint position or, after overflow, an entry (with its
+    /// column).
     #[inline(always)]
     pub fn mass_matrix(&self, joints: &[f64; J]) -> Result<[[f64; N]; N], DynamicsError> {
         finite("position", joints)?;
         let mut poses = [Pose::HOME; J];
         self.tree.place(0, joints, &mut poses);
-        Ok(mirrored(&self.matrix(&poses)))
+        mirrored(&self.matrix(&poses))
     }
 
     /// Accelerations for a state, forces and gravity.

@@ -48,6 +48,7 @@
 
 mod contact;
 mod group;
+mod kin;
 mod leg;
 mod mirror;
 mod params;
@@ -57,7 +58,8 @@ mod solve;
 pub mod state;
 
 pub use contact::{Contacts, Wrench};
+pub use kin::{FloatingKin, Momentum};
 pub use params::FloatingParams;
 pub use reference::{FloatingReference, FloatingSystem};
-pub use robot::{FloatingKin, FloatingRobot, Momentum};
+pub use robot::FloatingRobot;
 pub use state::{DOF, FloatingState, Velocity};

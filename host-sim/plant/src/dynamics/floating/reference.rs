@@ -16,12 +16,14 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
 use super::contact::Contacts;
+use super::kin::Momentum;
 use super::mirror;
 use super::params::FloatingParams;
-use super::robot::Momentum;
 use super::state::{DOF, FloatingState, LEG, Velocity, WHEEL};
 use crate::dynamics::error::{DynamicsError, finite};
-use crate::dynamics::noc::{BodyBlock, J, Leg, O, Placement, System, body_mass, spin, twist};
+use crate::dynamics::noc::{
+    BodyBlock, J, Leg, O, Placement, System, body_mass, checked, spin, twist,
+};
 
 /// Chassis, two legs of six, two wheels, two rotors.
 pub const BODIES: usize = 17;
@@ -154,7 +156,8 @@ impl FloatingReference {
     /// The blocks at a state.
     ///
     /// # Errors
-    /// [`DynamicsError::NonFinite`], [`DynamicsError::NotUnit`], [`DynamicsError::Leg`].
+    /// [`DynamicsError::NonFinite`] (also for blocks that overflow), [`DynamicsError::NotUnit`],
+    /// [`DynamicsError::Leg`].
     pub fn at(&self, state: &FloatingState) -> Result<FloatingSystem, DynamicsError> {
         state.check()?;
         let p = &self.params.robot;
@@ -272,7 +275,8 @@ impl FloatingReference {
                 rates: *nu,
                 viscous: SVector::from(self.params.viscous()),
                 foot_jacobian: SMatrix::zeros(),
-            },
+            }
+            .finite()?,
             placements: local.map(|l| Placement {
                 rotation: rotation * l.rotation,
                 com_m: state.position_m + rotation * l.com_m,
@@ -320,7 +324,7 @@ impl FloatingSystem {
     ) -> Result<Velocity, DynamicsError> {
         check_inputs(acceleration, "acceleration", gravity_m_s2, contacts)?;
         let force = self.blocks.inverse(acceleration, gravity_m_s2, &O)?;
-        Ok(force - self.contact_force(contacts))
+        checked("force", force - self.contact_force(contacts))
     }
 
     /// Acceleration for a generalised force.

@@ -171,7 +171,7 @@ impl<const B: usize, const N: usize> System<B, N> {
         let inertia = self.inertia();
         let Some(factor) = inertia.cholesky() else {
             return Err(DynamicsError::Singular {
-                pivot: inertia.diagonal().min(),
+                pivot: bad_pivot(inertia),
             });
         };
         checked("acceleration", factor.solve(&force))
@@ -182,6 +182,25 @@ impl<const B: usize, const N: usize> System<B, N> {
     pub fn kinetic_energy_j(&self) -> f64 {
         0.5 * self.rates.dot(&(self.inertia() * self.rates))
     }
+}
+
+/// The first pivot of an elimination that is not positive, NaN included; the last one if rounding
+/// alone made the difference.
+fn bad_pivot<const N: usize>(mut m: SMatrix<f64, N, N>) -> f64 {
+    let mut pivot = 0.0;
+    for k in 0..N {
+        pivot = m[(k, k)];
+        if pivot.is_nan() || pivot <= 0.0 {
+            break;
+        }
+        for i in k + 1..N {
+            let factor = m[(i, k)] / pivot;
+            for j in k + 1..N {
+                m[(i, j)] -= factor * m[(k, j)];
+            }
+        }
+    }
+    pivot
 }
 
 /// Where a body is.

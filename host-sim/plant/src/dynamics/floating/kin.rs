@@ -1,0 +1,266 @@
+//! The floating robot at one state: its mass matrix, bias and contacts, and the accelerations that
+//! follow. Conventions: [`super`].
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use wheeleg_kinematics::LegPosture;
+
+use super::contact::Contacts;
+use super::group::Sym3;
+use super::leg::{LegTerms, joined};
+use super::mirror;
+use super::solve::{MIRROR, Packed, add_mirrored, assemble, at, eliminate, solve_block};
+use super::state::{DOF, LEG, Velocity, WHEEL};
+use crate::dynamics::error::{DynamicsError, finite};
+
+/// Linear momentum, and angular momentum about the mass centre, in world axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Momentum {
+    /// kg m/s.
+    pub linear_kg_m_s: Vector3<f64>,
+    /// kg m²/s.
+    pub angular_kg_m2_s: Vector3<f64>,
+}
+
+/// Everything that depends on position and velocity alone.
+#[derive(Debug, Clone, Copy)]
+pub struct FloatingKin {
+    pub(super) rotation: Matrix3<f64>,
+    pub(super) position: Vector3<f64>,
+    pub(super) postures: [LegPosture<f64>; 2],
+    pub(super) soles: [Vector3<f64>; 2],
+    pub(super) half_track: f64,
+    pub(super) legs: [LegTerms; 2],
+    pub(super) leg_masses: [f64; 2],
+    pub(super) mass: f64,
+    pub(super) first: Vector3<f64>,
+    pub(super) inertia: Sym3,
+    pub(super) spin: f64,
+    pub(super) axle: f64,
+    pub(super) base: [f64; 6],
+    pub(super) velocity: Velocity,
+    pub(super) viscous: Velocity,
+}
+
+impl FloatingKin {
+    /// ν̇ for a generalised force that holds contacts already; viscous friction is added here.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NonFinite`], [`DynamicsError::Singular`].
+    pub fn solve(&self, force: &Velocity) -> Result<Velocity, DynamicsError> {
+        let f = force + self.dissipation();
+        let mut block = [0.0; 21];
+        let mut side = [0.0; 6];
+        let net =
+            |leg: usize| std::array::from_fn(|k| f[LEG + 3 * leg + k] - self.legs[leg].bias[k]);
+        let [l, r] = &self.legs;
+        let left = eliminate(l, self.leg_masses, net(0), &mut block, &mut side)?;
+        let mut block_r = [0.0; 21];
+        let mut side_r = [0.0; 6];
+        let right = eliminate(r, self.leg_masses, net(1), &mut block_r, &mut side_r)?;
+        add_mirrored(&mut block, &block_r);
+        self.add_base(&mut block);
+        // Wheels: both couple with the pitch rate alone.
+        if self.axle <= 0.0 {
+            return Err(DynamicsError::Singular { pivot: self.axle });
+        }
+        let share = self.spin / self.axle;
+        let wheels = [f[WHEEL], f[WHEEL + 1]];
+        block[at(1, 1)] -= 2.0 * share * self.spin;
+        let mut x: [f64; 6] =
+            std::array::from_fn(|i| f[i] - self.base[i] + side[i] + MIRROR[i] * side_r[i]);
+        x[1] -= share * (wheels[0] + wheels[1]);
+        solve_block(&mut block, &mut x)?;
+        let mirrored: [f64; 6] = std::array::from_fn(|i| MIRROR[i] * x[i]);
+        let acceleration = assemble(
+            &x,
+            &[left.follow(&x), right.follow(&mirrored)],
+            wheels.map(|w| w / self.axle - share * x[1]),
+        );
+        let values: [f64; DOF] = acceleration.into();
+        finite("acceleration", &values)?;
+        Ok(acceleration)
+    }
+
+    /// Adds the 6 × 6 composite inertia \[J, h×; −h×, m\].
+    #[inline]
+    fn add_base(&self, block: &mut Packed) {
+        let (j, h, m) = (&self.inertia, &self.first, self.mass);
+        block[at(0, 0)] += j.xx;
+        block[at(1, 0)] += j.xy;
+        block[at(1, 1)] += j.yy;
+        block[at(2, 0)] += j.xz;
+        block[at(2, 1)] += j.yz;
+        block[at(2, 2)] += j.zz;
+        // Linear rows: p = m v + ω × h.
+        block[at(3, 1)] += h.z;
+        block[at(3, 2)] -= h.y;
+        block[at(4, 0)] -= h.z;
+        block[at(4, 2)] += h.x;
+        block[at(5, 0)] += h.y;
+        block[at(5, 1)] -= h.x;
+        block[at(3, 3)] += m;
+        block[at(4, 4)] += m;
+        block[at(5, 5)] += m;
+    }
+
+    /// Mass matrix (kg, kg m, kg m²), symmetric.
+    #[must_use]
+    pub fn mass_matrix(&self) -> SMatrix<f64, DOF, DOF> {
+        let mut m = SMatrix::zeros();
+        let mut block = [0.0; 21];
+        self.add_base(&mut block);
+        let mut put = |i: usize, j: usize, value: f64| {
+            m[(i, j)] = value;
+            m[(j, i)] = value;
+        };
+        for i in 0..6 {
+            for j in 0..=i {
+                put(i, j, block[at(i, j)]);
+            }
+        }
+        for (leg, t) in self.legs.iter().enumerate() {
+            let s = LEG + 3 * leg;
+            for (k, column) in t.columns.iter().enumerate() {
+                for (i, value) in column.iter().enumerate() {
+                    let sign = if leg == 0 { 1.0 } else { MIRROR[i] };
+                    put(i, s + k, sign * value);
+                }
+            }
+            put(s, s, t.d22);
+            put(s + 1, s, t.d25);
+            put(s + 1, s + 1, self.leg_masses[0]);
+            put(s + 2, s + 2, self.leg_masses[1]);
+        }
+        for wheel in WHEEL..DOF {
+            put(wheel, 1, self.spin);
+            put(wheel, wheel, self.axle);
+        }
+        m
+    }
+
+    /// I a.
+    #[must_use]
+    pub fn times_mass(&self, a: &Velocity) -> Velocity {
+        let (omega, v) = (
+            a.fixed_rows::<3>(0).into_owned(),
+            a.fixed_rows::<3>(3).into_owned(),
+        );
+        let mut angular = self.inertia.times(&omega) + self.first.cross(&v);
+        angular.y += self.spin * (a[WHEEL] + a[WHEEL + 1]);
+        let mut base = joined(&angular, &(self.mass * v + omega.cross(&self.first)));
+        let mut legs = [[0.0; 3]; 2];
+        for (leg, t) in self.legs.iter().enumerate() {
+            let s = LEG + 3 * leg;
+            let [m56, m6] = self.leg_masses;
+            let own = [a[s], a[s + 1], a[s + 2]];
+            legs[leg] = [
+                t.d22 * own[0] + t.d25 * own[1],
+                t.d25 * own[0] + m56 * own[1],
+                m6 * own[2],
+            ];
+            for (k, column) in t.columns.iter().enumerate() {
+                for i in 0..6 {
+                    let entry = if leg == 0 { 1.0 } else { MIRROR[i] } * column[i];
+                    base[i] += entry * own[k];
+                    legs[leg][k] += entry * a[i];
+                }
+            }
+        }
+        let wheels = [a[WHEEL], a[WHEEL + 1]].map(|w| self.axle * w + self.spin * omega.y);
+        assemble(&base, &legs, wheels)
+    }
+
+    /// C ν − τ_g: the force that holds ν̇ at zero, friction and contact apart.
+    #[must_use]
+    pub fn bias(&self) -> Velocity {
+        assemble(
+            &self.base,
+            &[self.legs[0].bias, self.legs[1].bias],
+            [0.0; 2],
+        )
+    }
+
+    /// τ_d, viscous.
+    #[must_use]
+    pub fn dissipation(&self) -> Velocity {
+        -self.viscous.component_mul(&self.velocity)
+    }
+
+    /// Contact reference points in the world (m): left and right sole, left and right wheel centre.
+    #[must_use]
+    pub fn points_m(&self) -> [Vector3<f64>; 4] {
+        self.local_points()
+            .map(|r| self.position + self.rotation * r)
+    }
+
+    fn local_points(&self) -> [Vector3<f64>; 4] {
+        let wheel = Vector3::new(0.0, self.half_track, 0.0);
+        [self.soles[0], self.soles[1], wheel, -wheel]
+    }
+
+    /// Generalised force of the contacts.
+    #[must_use]
+    pub fn contact_force(&self, contacts: &Contacts) -> Velocity {
+        if *contacts == Contacts::NONE {
+            return Velocity::zeros();
+        }
+        let (mut angular, mut linear) = (Vector3::zeros(), Vector3::zeros());
+        let mut local = [(Vector3::zeros(), Vector3::zeros()); 4];
+        for ((wrench, point), own) in contacts
+            .all()
+            .iter()
+            .zip(self.local_points())
+            .zip(&mut local)
+        {
+            let n = self.rotation.tr_mul(&wrench.moment_n_m);
+            let f = self.rotation.tr_mul(&wrench.force_n);
+            angular += n + point.cross(&f);
+            linear += f;
+            *own = (n, f);
+        }
+        let legs = [0, 1].map(|leg| {
+            let (s, posture) = (mirror::sign(leg), &self.postures[leg]);
+            let n = mirror::axial(s, &local[leg].0);
+            let f = mirror::vector(s, &local[leg].1);
+            let (s4, c4) = (posture.sin4, posture.cos4);
+            let arm = posture.lengths.b5_m * (c4 * f.x + s4 * f.y);
+            [posture.phi_prime * (arm + n.z), s4 * f.x - c4 * f.y, -f.z]
+        });
+        assemble(
+            &joined(&angular, &linear),
+            &legs,
+            [local[2].0.y, local[3].0.y],
+        )
+    }
+
+    /// Kinetic energy ½ νᵀ I ν (J).
+    #[must_use]
+    pub fn kinetic_energy_j(&self) -> f64 {
+        0.5 * self.velocity.dot(&self.times_mass(&self.velocity))
+    }
+
+    /// Mass centre of the robot in the world (m).
+    #[must_use]
+    pub fn com_m(&self) -> Vector3<f64> {
+        self.position + self.rotation * (self.first / self.mass)
+    }
+
+    /// Potential energy (J), zero with the mass centre at the origin of the world.
+    #[must_use]
+    pub fn potential_energy_j(&self, gravity_m_s2: &Vector3<f64>) -> f64 {
+        -self.mass * gravity_m_s2.dot(&self.com_m())
+    }
+
+    /// Momentum: the chassis rows of I ν, moved to the mass centre.
+    #[must_use]
+    pub fn momentum(&self) -> Momentum {
+        let p = self.times_mass(&self.velocity);
+        let linear = p.fixed_rows::<3>(3).into_owned();
+        let about_origin: Vector3<f64> = p.fixed_rows::<3>(0).into_owned();
+        let about_com = about_origin - (self.first / self.mass).cross(&linear);
+        Momentum {
+            linear_kg_m_s: self.rotation * linear,
+            angular_kg_m2_s: self.rotation * about_com,
+        }
+    }
+}
