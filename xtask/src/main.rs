@@ -14,6 +14,8 @@ mod main_job;
 mod mcap;
 mod mutants;
 mod no_std;
+mod pil;
+mod plant;
 mod process;
 mod qemu;
 mod report;
@@ -55,6 +57,8 @@ enum Command {
     Sizes(sizes::Options),
     /// Boards on QEMU: images, comparison with the host, instructions per tick.
     Qemu(qemu::Options),
+    /// The firmware images on emulated boards: comparison with the host, faults, figures.
+    Pil(pil::Options),
     /// Check every `no_std` crate for a bare-metal target.
     NoStd,
     /// Rerun the reference generators; their output must equal the checked-in vectors.
@@ -69,6 +73,8 @@ enum Command {
     Fuzz(fuzz::Options),
     /// Compare the robot's dynamics with Pinocchio on the same states.
     RigidBody,
+    /// Compare the pneumatic plant with an integration by scipy.
+    Plant,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
     /// The long checks; results are appended to DEEP.md.
@@ -93,6 +99,7 @@ fn main() -> ExitCode {
         Command::Firmware => firmware::steps(&mut report),
         Command::Sizes(options) => sizes::steps(&mut report, &options),
         Command::Qemu(options) => qemu::steps(&mut report, &options),
+        Command::Pil(options) => pil::steps(&mut report, &options),
         Command::NoStd => no_std::steps(&mut report),
         Command::Vectors => vectors::steps(&mut report),
         Command::MainJob => {
@@ -102,6 +109,7 @@ fn main() -> ExitCode {
         Command::Conformance => conformance::steps(&mut report),
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),
         Command::RigidBody => rigid_body::steps(&mut report),
+        Command::Plant => plant::steps(&mut report),
         Command::Mutants(options) => mutants::steps(&mut report, &options),
         Command::Deep(options) => deep::steps(&mut report, &options),
         Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
@@ -125,12 +133,14 @@ fn test(report: &mut Report) {
     firmware::steps(report);
     sizes::steps(report, &sizes::Options::default());
     qemu::steps(report, &qemu::Options::default());
+    pil::steps(report, &pil::Options::default());
     vectors::steps(report);
     conformance::steps(report);
     fuzz::short_steps(report);
     let run = main_job::steps(report);
     mcap::steps(report, run.as_deref());
     rigid_body::steps(report);
+    plant::steps(report);
 }
 
 fn tools_for_lints(report: &mut Report) {

@@ -1,0 +1,183 @@
+//! Firmware images on emulated boards: start-up, faults of the processor and of
+//! its supply, determinism. `cargo xtask pil` builds what they need and runs
+//! them; the bit-for-bit comparison of a whole run is a step of its own there.
+
+use wheeleg_pil_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, Straps};
+use wheeleg_sim::pil::Line as _;
+use wheeleg_sim::pil::unicorn::{Unicorn, image};
+
+/// RCC_CSR: the independent watchdog has bitten.
+const WATCHDOG: u32 = 1 << 29;
+/// RCC_CSR: brown-out or power-on.
+const BROWN_OUT: u32 = 1 << 27;
+const TICK_NS: u64 = 1_000_000;
+
+/// One emulated joint board, alone on its bus.
+struct Bench {
+    line: Unicorn,
+    now_ns: u64,
+    /// Every reply so far, to compare sessions.
+    replies: Vec<Reply>,
+}
+
+impl Bench {
+    fn new(address: u8) -> Self {
+        let image = image(if address <= 6 { "joint" } else { "wheel" }).expect("an image");
+        let line = Unicorn::start(&[image]).expect("the emulator");
+        let mut bench = Self {
+            line,
+            now_ns: 0,
+            replies: Vec::new(),
+        };
+        let straps = Straps {
+            address,
+            unique_id: [address; 12],
+            crystal: true,
+        };
+        let up = bench.ran(&Request::PowerUp(straps));
+        assert_eq!(up.outputs, Outputs::default(), "off at power-up");
+        bench
+    }
+
+    fn ask(&mut self, request: &Request) -> Reply {
+        self.line.queue(0, request).expect("queued");
+        self.line.flush().expect("sent");
+        let (_, reply) = self.line.receive().expect("a reply");
+        self.replies.push(reply.clone());
+        reply
+    }
+
+    fn ran(&mut self, request: &Request) -> Ran {
+        match self.ask(request) {
+            Reply::Ran(ran) => ran,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn tick(&mut self, power: Power) -> Ran {
+        let inputs = Inputs {
+            adc: 30_000,
+            ..Inputs::default()
+        };
+        let run = Run {
+            until_ns: self.now_ns,
+            edge: Some(inputs),
+            power,
+            byte_ns: 10_000,
+            ..Run::default()
+        };
+        self.now_ns += TICK_NS;
+        self.ran(&Request::Run(run))
+    }
+
+    /// Ticks until the board tells of a reset; gives it with the time of the
+    /// provocation taken off.
+    fn until_reset(&mut self, ticks: u32) -> Option<(u64, u32)> {
+        let since_ns = self.now_ns;
+        (0..ticks).find_map(|_| {
+            let ran = self.tick(Power::Good);
+            assert_eq!(ran.outputs, Outputs::default());
+            ran.trip.map(|trip| (trip.at_ns - since_ns, trip.cause))
+        })
+    }
+}
+
+#[test]
+fn a_board_comes_up_ticks_and_sees_what_is_latched() {
+    let mut bench = Bench::new(2);
+    let mut last = Ran::default();
+    for _ in 0..100 {
+        last = bench.tick(Power::Good);
+    }
+    assert_eq!(last.period_us, 1000);
+    assert_eq!(last.seen.adc, 30_000);
+    assert_eq!(
+        last.seen_at_ns,
+        98 * TICK_NS,
+        "the tick before the newest edge"
+    );
+    assert_eq!(last.figures.resets, 0);
+    assert!(last.figures.tick_instructions > 100);
+    let figures = last.figures;
+    assert!(
+        (1..figures.stack_size).contains(&figures.stack_used),
+        "{figures:?}"
+    );
+}
+
+#[test]
+fn the_watchdog_bites_when_the_main_loop_or_the_processor_stops_and_only_then() {
+    let mut bench = Bench::new(1);
+    assert_eq!(bench.until_reset(200), None, "a sound board");
+    for hook in [Hook::StopMainLoop, Hook::StopProcessor] {
+        assert_eq!(bench.ask(&Request::Hook(hook)), Reply::Done);
+        let (after_ns, cause) = bench.until_reset(80).expect("a reset");
+        assert!(cause & WATCHDOG != 0, "{cause:#x}");
+        // Fed at the end of the last tick, within the millisecond before.
+        assert!(
+            (48_000_000..=50_100_000).contains(&after_ns),
+            "{after_ns} ns"
+        );
+        // It comes up again and stays up.
+        for _ in 0..20 {
+            bench.tick(Power::Good);
+        }
+        assert_eq!(bench.until_reset(200), None, "after the reset");
+    }
+}
+
+#[test]
+fn a_brown_out_resets_with_outputs_off_and_the_board_returns_with_the_supply() {
+    let mut bench = Bench::new(3);
+    for _ in 0..50 {
+        bench.tick(Power::Good);
+    }
+    let down = bench.tick(Power::BrownOut);
+    let trip = down.trip.expect("a reset");
+    assert!(trip.cause & BROWN_OUT != 0 && trip.cause & WATCHDOG == 0);
+    for _ in 0..100 {
+        let ran = bench.tick(Power::BrownOut);
+        assert_eq!((ran.outputs, ran.period_us), (Outputs::default(), 0));
+    }
+    for _ in 0..100 {
+        bench.tick(Power::Good);
+    }
+    let up = bench.tick(Power::Good);
+    assert_eq!(up.period_us, 1000);
+    assert_eq!(up.seen.adc, 30_000);
+}
+
+#[test]
+fn straps_of_another_kind_of_board_leave_it_silent() {
+    let image = image("joint").expect("an image");
+    let mut line = Unicorn::start(&[image]).expect("the emulator");
+    let straps = Straps {
+        address: 7,
+        unique_id: [7; 12],
+        crystal: true,
+    };
+    line.queue(0, &Request::PowerUp(straps)).expect("queued");
+    line.flush().expect("sent");
+    let (_, reply) = line.receive().expect("a reply");
+    let Reply::Ran(ran) = reply else {
+        panic!("{reply:?}");
+    };
+    assert_eq!((ran.period_us, ran.outputs), (0, Outputs::default()));
+    assert!(ran.sent.is_empty());
+}
+
+#[test]
+fn equal_sessions_give_equal_replies_to_the_bit() {
+    let session = || {
+        let mut bench = Bench::new(5);
+        for _ in 0..150 {
+            bench.tick(Power::Good);
+        }
+        bench.ask(&Request::Hook(Hook::StopMainLoop));
+        bench.until_reset(80).expect("a reset");
+        bench.replies
+    };
+    let first = session();
+    assert_eq!(first.len(), session().len());
+    assert_eq!(first, session());
+}
