@@ -18,7 +18,7 @@ pub enum DynamicsError {
     NonFinite {
         /// `position`, `velocity`, `force`, `acceleration`, or what overflowed.
         name: &'static str,
-        /// Coordinate number; body or leg number for what overflowed there.
+        /// Coordinate number; body or leg number for what overflowed there, column of a mass matrix.
         index: usize,
         /// The value.
         value: f64,
@@ -38,7 +38,7 @@ pub enum DynamicsError {
     /// A parameter outside its range.
     #[error("parameter {name} = {value} is outside its range")]
     Parameter {
-        /// Field of [`super::RobotDynamicsParams`].
+        /// Field of the parameters: of a robot, a half robot, a floating robot or a link.
         name: &'static str,
         /// The value.
         value: f64,
