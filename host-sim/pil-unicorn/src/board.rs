@@ -216,16 +216,11 @@ impl Board {
         soc.ports[0].outside = 1 << wiring::POWER_OK;
         self.machine = Some(Machine::new(&self.image, soc)?);
         self.running = false;
-        let mut stop = self.start_up(START_UP_NS)?;
+        let stop = self.start_up(START_UP_NS)?;
         if stop == Stop::TickStarted {
-            // Almost to the first edge.
+            // The rest of the start-up code runs on the way to the first edge,
+            // whose inputs come with it.
             self.align(0);
-            let machine = self.machine()?;
-            let cycle = machine.state().cycle;
-            let edge = machine.state().soc.time.cycle_of(0);
-            if cycle < edge {
-                stop = machine.run(0, Until::Cycle, true)?;
-            }
         }
         if let Stop::Reset(cause) = stop {
             return Err(format!("reset {cause:#x} in the start-up code"));
