@@ -158,20 +158,19 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     let duty = |value: f64| Duty::from_per_mille((value * 1000.0).round() as i16);
     // A PWM loop acts half a period and the dead time late.
     let lag_s = facts.dead_time_s + 0.5 * facts.period_s;
-    // Full duty at the error from which full speed can just be stopped: the way
-    // of three lags.
-    let full_mm = 3.0 * lag_s * facts.speed_mm_s;
+    // Full duty at an error of six lags at full speed: the factors here and below
+    // were searched once, on the bench axis, for no limit cycle, then error and
+    // settling time; they have no unit.
+    let full_mm = 6.0 * lag_s * facts.speed_mm_s;
     let proportional = 1.0 / full_mm;
     let (settle_mm, release_mm) = (0.5, 1.5);
     let base = JointGains {
         proportional: gain(proportional),
-        // The rule base's gain at the origin, output 1/3 at 1/3 of full scale, is
-        // the damping: error and speed edge give the ratio of three lags.
         correction_pd: gain(0.6),
         correction_id: gain(0.6),
         feed_forward: gain(1.0 / facts.speed_mm_s),
-        error_scale: mm((2.0 * full_mm).clamp(0.25, 1000.0)),
-        velocity_scale: VelocityMmS::from_f64(facts.speed_mm_s.clamp(1.0, 5000.0)),
+        error_scale: mm(full_mm.clamp(0.25, 1000.0)),
+        velocity_scale: VelocityMmS::from_f64((0.5 * facts.speed_mm_s).clamp(1.0, 5000.0)),
         integral_scale: mm((full_mm * 0.1).clamp(0.05, 1000.0)),
         integral_zone: mm(0.3 * full_mm),
         duty_limit: Duty::ONE,
@@ -190,33 +189,37 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     match kind {
         Kind::OnOff => JointGains {
             law: Law::OnOff,
-            // A full push cannot be shorter than the dead time: what the piston
-            // goes in it is the least useful dead band.
-            settle_band: mm(0.2 * facts.speed_mm_s * facts.dead_time_s),
-            release_band: mm(0.4 * facts.speed_mm_s * facts.dead_time_s),
+            // A full push cannot be shorter than the dead time: a dead band of four
+            // dead times at full speed, or it chatters all the more.
+            settle_band: mm(4.0 * facts.speed_mm_s * facts.dead_time_s),
+            release_band: mm(6.0 * facts.speed_mm_s * facts.dead_time_s),
             ..base
         },
         Kind::PwmP => JointGains {
             law: Law::Proportional,
+            // Without damping, a quarter of the gain.
+            proportional: gain(proportional * 6.0 / 25.0),
             ..base
         },
         Kind::PwmPid => JointGains {
             law: Law::Pid,
-            // Ziegler's shape: Td a lag, Ti eight of them.
-            derivative: gain(proportional * lag_s * 2.0),
-            integral: gain(proportional / (8.0 * lag_s) * 0.5),
+            derivative: gain(proportional * 4.0 * lag_s),
+            integral: gain(proportional / (20.0 * lag_s)),
             ..base
         },
         Kind::FuzzyPd => base,
         Kind::FuzzyId => JointGains {
-            settle_band: mm(0.3),
-            release_band: mm(0.9),
+            correction_id: gain(1.0),
+            settle_band: mm(0.4),
+            release_band: mm(1.2),
             ..base
         },
         Kind::Sliding => JointGains {
             law: Law::Sliding,
-            sliding_time: Micros((3.0 * facts.dead_time_s * 1e6).round() as u32),
-            error_scale: mm((facts.speed_mm_s * facts.dead_time_s * 2.0).max(0.25)),
+            sliding_time: Micros((6.0 * facts.dead_time_s * 1e6).round() as u32),
+            settle_band: mm(facts.speed_mm_s * facts.dead_time_s),
+            release_band: mm(3.0 * facts.speed_mm_s * facts.dead_time_s),
+            error_scale: mm((10.0 * facts.speed_mm_s * facts.dead_time_s).max(0.25)),
             ..base
         },
         Kind::Predictive => JointGains {

@@ -1,0 +1,46 @@
+//! The pneumatic plant against an independent integration.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::process::{cargo, command, run, target_dir};
+use crate::report::Report;
+use crate::tools;
+
+/// One axis with the polytropic law is enough for a commit; the script takes any.
+const AXES: [&str; 2] = ["bench-vq110u", "heavy-40x250"];
+
+/// Exports valve sequences with the plant's trajectories, and lets scipy
+/// integrate the same equations with tight tolerances.
+pub(crate) fn steps(report: &mut Report) {
+    let folder = target_dir().join("xtask").join("plant");
+    let made = report.step("plant: export of valve sequences", || Ok(export(&folder)?));
+    if made.is_none() {
+        return;
+    }
+    for axis in AXES {
+        report.step(&format!("plant: scipy on the sequences of {axis}"), || {
+            let python = tools::python()?;
+            run(command(python)
+                .arg("tests/python/check_plant.py")
+                .arg(folder.join(axis).with_extension("json")))?;
+            Ok(())
+        });
+    }
+}
+
+fn export(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)?;
+    let built = ["build", "--locked", "--release", "--package", "wheeleg-sim"];
+    run(cargo().args(built).args(["--bin", "wheeleg"]))?;
+    let wheeleg = target_dir().join("release").join("wheeleg");
+    for axis in AXES {
+        run(command(&wheeleg).args(["plant", "check", axis]))?;
+        run(command(&wheeleg)
+            .args(["plant", "export", axis, "--out"])
+            .arg(folder.join(axis).with_extension("json")))?;
+    }
+    Ok(())
+}
