@@ -280,8 +280,16 @@ impl Board {
             self.edges = self.edges.wrapping_add(1);
             self.check_edge(run.until_ns)?;
         } else {
-            let until = Until::Asleep(run.until_ns + WORK_NS);
-            self.advance(run.until_ns, until)?;
+            // Never through a tick edge: its inputs come with a run of its own.
+            let state = self.machine()?.state();
+            let edge = state.soc.tick_timer().overflow_at();
+            let running = self.running;
+            let cap = self.machine()?.state().soc.time;
+            let cap = edge
+                .filter(|_| running)
+                .map_or(u64::MAX, |cycle| cap.ns_of(cycle).saturating_sub(6));
+            let until = Until::Asleep(cap.min(run.until_ns + WORK_NS));
+            self.advance(cap.min(run.until_ns), until)?;
         }
         self.reply()
     }
@@ -497,7 +505,11 @@ impl Board {
         let started = machine.state_mut().soc.started.take();
         let armed = machine.state().soc.armed(cycle);
         for (start, address, length) in started.into_iter().chain(armed) {
-            if self.announced.as_ref().is_some_and(|(told, _)| *told == start) {
+            if self
+                .announced
+                .as_ref()
+                .is_some_and(|(told, _)| *told == start)
+            {
                 continue;
             }
             let mut bytes = vec![0; length as usize];
