@@ -84,6 +84,7 @@ mod tests {
             recorded_s: 10.0,
             wall_s: 0.25,
             complete: true,
+            pil: None,
         };
         let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
         write(
