@@ -21,7 +21,7 @@ pub(crate) fn steps(report: &mut Report) {
         return;
     }
     for axis in AXES {
-        report.step(&format!("plant: scipy on the sequences of {axis}"), || {
+        report.step(format!("plant: scipy on the sequences of {axis}"), || {
             let python = tools::python()?;
             run(command(python)
                 .arg("tests/python/check_plant.py")

@@ -4,7 +4,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use wheeleg_plant::PlantError;
-use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
+use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_plant::flow::Restrictor;
 
 /// Result of the checks of one axis.
@@ -42,7 +42,7 @@ pub fn check(params: &AxisParams) -> Result<PlantCheck, PlantError> {
     let (mass_residual, energy_residual) = balances(params)?;
     let (order, step_error_m) = convergence(params)?;
     let flow_jump = jump(params);
-    let between = |x: f64| x >= ORDER_RANGE[0] && x <= ORDER_RANGE[1];
+    let between = |x: f64| (ORDER_RANGE[0]..=ORDER_RANGE[1]).contains(&x);
     Ok(PlantCheck {
         mass_residual,
         energy_residual,
