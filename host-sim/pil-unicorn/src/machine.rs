@@ -460,7 +460,7 @@ impl Machine {
         let mut stack = vec![0; (top - bottom) as usize];
         self.memory(bottom, &mut stack)?;
         let free = stack.iter().take_while(|b| **b == PAINT).count();
-        Ok(bottom + free as u32 & !3)
+        Ok((bottom + free as u32) & !3)
     }
 
     /// Runs to `ns`. Unless `started`, stops as soon as the tick timer runs.

@@ -8,8 +8,8 @@
 use std::collections::VecDeque;
 
 use wheeleg_pil_link::{
-    Hello, Hook, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run,
-    Straps, Trip,
+    Hello, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run, Straps,
+    Trip,
 };
 
 use super::choice::{NODE_NAMES, NodeKind, Nodes};
@@ -238,31 +238,6 @@ impl Outside {
     pub(crate) fn take_trip(&mut self, address: u8) -> Option<Trip> {
         let n = self.number(address)?;
         self.boards[n].tripped.take()
-    }
-
-    /// Supply of the board at `address` from its next run on.
-    pub(crate) fn set_power(&mut self, address: u8, power: Power) {
-        if let Some(n) = self.number(address) {
-            self.boards[n].power = power;
-        }
-    }
-
-    /// Provokes a fault in the board at `address`.
-    ///
-    /// # Errors
-    /// [`SimError`] if the board is not outside or refuses.
-    pub(crate) fn hook(&mut self, address: u8, hook: Hook) -> Result<(), SimError> {
-        let Some(n) = self.number(address) else {
-            return Err(SimError::simulation(
-                format!("board {address} runs in this process: it has no processor to disturb"),
-                "run it with --nodes pil",
-            ));
-        };
-        let (line, index) = (self.boards[n].line, self.boards[n].index);
-        match self.ask(line, index, &Request::Hook(hook))? {
-            Reply::Done => Ok(()),
-            other => Err(unexpected(&self.boards[n].name, &other)),
-        }
     }
 
     /// Queues a run of one board to `now_ns`, with what it has heard.

@@ -32,7 +32,7 @@ impl Channel {
     }
 
     /// From memory to a peripheral.
-    pub(crate) fn to_peripheral(&self) -> bool {
+    pub(crate) fn sends(&self) -> bool {
         self.ccr & DIR != 0
     }
 

@@ -276,7 +276,7 @@ impl Soc {
     /// The next transfer that DMA owes, and its bookkeeping.
     pub(crate) fn transfer(&mut self) -> Option<Transfer> {
         if let Some(channel) = self.dma.serving(REQUEST_USART1_RX)
-            && !self.dma.channels[channel].to_peripheral()
+            && !self.dma.channels[channel].sends()
             && let Some(byte) = self.usart.dma_receive()
         {
             let address = self.dma.channels[channel].address();
@@ -407,7 +407,7 @@ impl Soc {
         }
         // Narrow reads see their part of the word.
         let part = (address & 3) * 8;
-        let offset = (address - base & !3) as usize;
+        let offset = ((address - base) & !3) as usize;
         let value = match name {
             "IWDG" => self.watchdog.read(offset),
             "PWR" => self.pwr.read(offset),
