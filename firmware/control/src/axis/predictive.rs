@@ -45,7 +45,7 @@ const REFERENCE_RESTS: i32 = 1 << 16;
 /// Ticks in the band before rest.
 const REST_TICKS: u16 = 30;
 /// Ticks near the target without coming to rest after which the band widens …
-const PATIENCE: u16 = 700;
+const PATIENCE: u16 = 500;
 /// … by one band in so many ticks, up to three bands in all.
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 9;
@@ -257,7 +257,7 @@ impl Predictive {
             self.near = self.near.saturating_sub(1);
         }
         // Patience: what has not come to rest for long may do so in a wider band.
-        let beyond = i32::from(self.near.saturating_sub(PATIENCE));
+        let beyond = self.beyond();
         let wider = scaled(narrow, beyond.min(2 * PATIENCE_STEP), PATIENCE_SHIFT);
         let band = narrow.saturating_add(wider);
         let catch =
@@ -286,6 +286,11 @@ impl Predictive {
             self.released = 0;
         }
         self.settled || quiet
+    }
+
+    /// Ticks near the target beyond what patience allows.
+    fn beyond(&self) -> i32 {
+        i32::from(self.near.saturating_sub(PATIENCE))
     }
 
     /// Whether friction alone stops the piston within the band, if the valves shut:
@@ -427,6 +432,10 @@ impl Predictive {
         } else {
             model.coulomb
         };
+        // What is fed forward for friction that is less than told makes a relay:
+        // where the piston does not come to rest, it fades.
+        let left = (2 * PATIENCE_STEP).saturating_sub(self.beyond()).max(0);
+        let grip = scaled(grip, left, PATIENCE_SHIFT.wrapping_add(1));
         let along = if ahead.speed.wrapping_abs() > SLIDES {
             ahead.speed
         } else {
