@@ -353,13 +353,11 @@ impl Predictive {
         let gained = scaled(m.acceleration, model.horizon, 16);
         let mean = m.speed.saturating_add(gained.wrapping_shr(1));
         let stroke = m.stroke.saturating_add(scaled(mean, model.horizon, 32));
-        let both = Wanted {
-            fill: true,
-            vent: true,
-        };
-        let a = model.rates_a(self.pressures.a, stroke, mean, both);
-        let b = model.rates_b(self.pressures.b, stroke, mean, both);
+        // A flow that nothing has been committed to waits until it is known to be
+        // wanted.
         let [fill_a, vent_a, fill_b, vent_b] = open;
+        let a = model.rates_a(self.pressures.a, stroke, mean, wanted(fill_a, vent_a));
+        let b = model.rates_b(self.pressures.b, stroke, mean, wanted(fill_b, vent_b));
         let span = model.horizon_us;
         let pressures = Pressures {
             a: self
@@ -475,9 +473,30 @@ impl Predictive {
         let model = &self.model;
         let (target, limited) = targets(model, force);
         let mut on = [0; 4];
+        let (mut a, mut b) = (ahead.a, ahead.b);
+        let missing = |change: i32, rates: &ChamberRates| Wanted {
+            fill: change > 0 && rates.fill == 0,
+            vent: change < 0 && rates.vent == 0,
+        };
+        let lacks = missing(target.a.saturating_sub(ahead.pressures.a), &a);
+        if lacks.fill || lacks.vent {
+            let more = model.rates_a(self.pressures.a, ahead.stroke, 0, lacks);
+            (a.fill, a.vent) = (
+                a.fill.wrapping_add(more.fill),
+                a.vent.wrapping_add(more.vent),
+            );
+        }
+        let lacks = missing(target.b.saturating_sub(ahead.pressures.b), &b);
+        if lacks.fill || lacks.vent {
+            let more = model.rates_b(self.pressures.b, ahead.stroke, 0, lacks);
+            (b.fill, b.vent) = (
+                b.fill.wrapping_add(more.fill),
+                b.vent.wrapping_add(more.vent),
+            );
+        }
         let chambers = [
-            (target.a.saturating_sub(ahead.pressures.a), &ahead.a),
-            (target.b.saturating_sub(ahead.pressures.b), &ahead.b),
+            (target.a.saturating_sub(ahead.pressures.a), &a),
+            (target.b.saturating_sub(ahead.pressures.b), &b),
         ];
         for ((change, rates), (pair, valves)) in chambers
             .into_iter()
