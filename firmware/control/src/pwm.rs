@@ -156,6 +156,10 @@ impl Channel {
 
     #[inline]
     fn tick(&mut self, timing: &PwmTiming, opening: Micros) -> u16 {
+        if !self.running && opening == Micros::ZERO {
+            // A valve with nothing to do: what follows would give the same.
+            return 0;
+        }
         let target = timing.pulse(opening).get();
         if self.running && self.elapsed >= timing.period {
             if self.energised && target > 0 {
@@ -218,6 +222,13 @@ impl ValvePwm {
     #[must_use]
     pub const fn timing(&self) -> &PwmTiming {
         &self.timing
+    }
+
+    /// What a tick changes: all but the timing, to be sealed apart from it.
+    #[inline]
+    #[must_use]
+    pub fn state(&self) -> impl core::hash::Hash + '_ {
+        &self.channels
     }
 
     /// Changes the timing; running periods end by the new one.

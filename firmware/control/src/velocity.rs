@@ -105,11 +105,17 @@ const fn quotient(dividend: u64, divisor: u64) -> u64 {
 }
 
 /// The last positions and their sums.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+///
+/// Its `Hash` is for sealing memory: of the samples, those of the window count,
+/// up to the next multiple of four; the rest are never read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VelocityEstimator {
+    /// A ring in the first `length` places.
     samples: [i32; CAPACITY],
-    newest: u8,
-    primed: bool,
+    /// Samples of the window; 0 before the first sample.
+    length: u8,
+    /// Place of the oldest sample, which the next one takes.
+    oldest: u8,
     /// Σ y.
     total: i64,
     /// Σ k y, k = 0 for the oldest.
@@ -128,8 +134,8 @@ impl VelocityEstimator {
     pub const fn new() -> Self {
         Self {
             samples: [0; CAPACITY],
-            newest: 0,
-            primed: false,
+            length: 0,
+            oldest: 0,
             total: 0,
             moment: 0,
         }
@@ -150,25 +156,17 @@ impl VelocityEstimator {
         let newest = i64::from(sample);
         let length = i64::from(window.length);
         let last = length.wrapping_sub(1);
-        if !self.primed {
-            self.primed = true;
+        if self.length == 0 {
+            self.length = window.length;
             self.samples = [sample; CAPACITY];
             self.total = newest.wrapping_mul(length);
             self.moment = newest.wrapping_mul(length.wrapping_mul(last).wrapping_shr(1));
             return VelocityMmS::ZERO;
         }
-        // The ring has 64 places, a power of two; the oldest sample of the
-        // window is `length` places behind the one about to be written.
-        let place = self.newest.wrapping_add(1) & (MAX_WINDOW - 1);
-        let oldest_place = place.wrapping_sub(window.length) & (MAX_WINDOW - 1);
-        let oldest = self
-            .samples
-            .get(usize::from(oldest_place))
-            .map_or(0, |&sample| i64::from(sample));
-        if let Some(slot) = self.samples.get_mut(usize::from(place)) {
-            *slot = sample;
-        }
-        self.newest = place;
+        let place = self.samples.get_mut(usize::from(self.oldest));
+        let oldest = place.map_or(0, |place| i64::from(core::mem::replace(place, sample)));
+        let next = self.oldest.wrapping_add(1);
+        self.oldest = if next < self.length { next } else { 0 };
         // Every k falls by one, the oldest leaves with k = 0, the newest comes
         // with k = N − 1. |total| < 2^37, |moment| < 2^43.
         self.moment = self
@@ -181,5 +179,30 @@ impl VelocityEstimator {
             .wrapping_mul(2)
             .wrapping_sub(self.total.wrapping_mul(last));
         window.velocity(sum)
+    }
+}
+
+impl core::hash::Hash for VelocityEstimator {
+    #[inline]
+    fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            samples,
+            length,
+            oldest,
+            total,
+            moment,
+        } = self;
+        let (fours, _) = samples.as_chunks::<4>();
+        let used = usize::from(length.wrapping_add(3).wrapping_shr(2));
+        for [a, b, c, d] in fours.iter().take(used) {
+            state.write_i32(*a);
+            state.write_i32(*b);
+            state.write_i32(*c);
+            state.write_i32(*d);
+        }
+        state.write_u32(u32::from(*length) | u32::from(*oldest).wrapping_shl(8));
+        state.write_i64(*total);
+        state.write_i64(*moment);
     }
 }

@@ -10,4 +10,4 @@ mod settings;
 mod integrity_tests;
 
 pub use node::JointNode;
-pub use settings::JointSettings;
+pub use settings::{JointSettings, TickSettings};

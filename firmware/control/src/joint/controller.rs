@@ -68,6 +68,30 @@ impl JointController {
         &self.config
     }
 
+    /// What a tick changes: all but the configuration, to be sealed apart from it.
+    #[inline]
+    #[must_use]
+    pub fn state(&self) -> impl core::hash::Hash + '_ {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            config: _,
+            correction,
+            velocity,
+            settle,
+            integral,
+            last_law,
+            changed,
+            fade,
+            fade_step,
+            sent,
+            predictive,
+        } = self;
+        (
+            (correction, velocity, settle, integral, last_law),
+            (changed, fade, fade_step, sent, predictive),
+        )
+    }
+
     /// The correction in use.
     #[must_use]
     pub const fn correction(&self) -> Correction {

@@ -14,7 +14,7 @@ const ACCELERATION_MAX: u16 = 0x7FFF;
 const PWM_MAX: i8 = 100;
 
 /// What runs in each mode.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 enum Run {
     #[default]
     Idle,
@@ -43,7 +43,7 @@ enum Run {
 /// entered while LIMIT is latched; a sample timer below the minimum of the mode
 /// is refused. As on the chip, the position command is a register of its own: set
 /// it to the actual position before entering position control, or the wheel moves.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct WheelController {
     run: Run,
     memory: FilterMemory,

@@ -20,7 +20,7 @@ const PORT_MIN: i64 = -(128 << FRACTION);
 /// does not say; with the unlimited one, a large step (K/4 = 16 on 1000 counts)
 /// would come back a quarter as large with the opposite sign, and throw the
 /// motor into full reverse in the sample after.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct FilterMemory {
     error: i32,
     command: i32,

@@ -19,7 +19,7 @@ const FRACTION: u32 = 8;
 /// end agree with it.
 ///
 /// The way is the shorter one around the 24-bit circle, at most 7FFFFFH counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Profile {
     /// Where the next point is measured from.
     target: WheelCount,
@@ -133,7 +133,7 @@ impl Profile {
 
 /// A velocity that follows its command at a bounded acceleration, and the
 /// position that it generates (integral velocity mode).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Ramp {
     position: WheelCount,
     /// 0…255: 1/256 count.

@@ -90,7 +90,7 @@ impl SampleTimer {
 }
 
 /// Inputs of one sample, latched at its start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct WheelInput {
     /// Encoder position.
     pub actual: WheelCount,

@@ -126,7 +126,7 @@ fn damaged_parameters_settings_and_gains_are_seen() {
     assert!(holds_after(|node| {
         let gains = JointGains {
             feed_forward: fixed::FixedI32::from_bits(1),
-            ..*node.settings.control.gains()
+            ..*node.controller.config().gains()
         };
         let config = JointConfig::new(&gains, Micros(1000)).unwrap();
         node.controller.retune(config);

@@ -1,23 +1,23 @@
 //! The joint board application.
 
+use core::hash::Hash;
+
 use super::reference::Target;
-use super::settings::JointSettings;
+use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
 use crate::debounce::Debounce;
 use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::JointParameters;
 use crate::seal::Seal;
-use crate::sensor::{Reading, Rejection, SensorConfig, SensorMonitor};
+use crate::sensor::{Reading, Rejection, SensorMonitor};
 use crate::snapshot::{JointSnapshot, TickReport};
-use crate::supervisor::SupervisionTimes;
 use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
 use wheeleg_control::joint::JointController;
 use wheeleg_control::pwm::ValvePwm;
-use wheeleg_control::valve::ValveOpenings;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits};
-use wheeleg_units::{Micros, PositionMm, Ticks, VelocityMmS};
+use wheeleg_units::{Micros, PositionMm, Ticks};
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,16 +28,6 @@ pub(super) struct TickState {
     boot_ticks: Ticks,
 }
 
-type Sealed<'a> = (
-    &'a JointParameters,
-    &'a TickState,
-    &'a SensorMonitor,
-    &'a SensorConfig,
-    &'a SupervisionTimes,
-    ([PositionMm; 2], VelocityMmS, Ticks, ValveOpenings, Micros),
-    (&'a JointController, &'a ValvePwm, &'a Target),
-);
-
 /// Application of one joint board: sense, control, valves.
 ///
 /// `V` are the four valve outputs, `S` the position sensor, `W` the switches
@@ -47,13 +37,16 @@ type Sealed<'a> = (
 pub struct JointNode<V, S, W> {
     pub(super) core: BoardCore,
     pub(super) parameters: JointParameters,
-    pub(super) settings: JointSettings,
+    pub(super) settings: TickSettings,
     pub(super) controller: JointController,
     pub(super) pwm: ValvePwm,
     pub(super) monitor: SensorMonitor,
     pub(super) target: Target,
     pub(super) state: TickState,
-    pub(super) seal: Seal,
+    /// Seal of what only a request changes.
+    fixed_seal: Seal,
+    /// Seal of what a tick changes.
+    seal: Seal,
     pub(super) snapshot: JointSnapshot,
     pub(super) switches: Debounce,
     pub(super) valves: V,
@@ -82,7 +75,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
         let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
         let mut controller = JointController::new(settings.control);
-        controller.set_correction(settings.correction);
+        controller.set_correction(settings.tick.correction);
         let mut node = Self {
             core: BoardCore::new(BoardKind::Joint, identity, settings.times),
             controller,
@@ -95,16 +88,17 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 following: Ticks::ZERO,
                 boot_ticks: Ticks::ZERO,
             },
+            fixed_seal: Seal::default(),
             seal: Seal::default(),
             snapshot: JointSnapshot::at_boot(),
             switches: Debounce::new(SWITCH_TICKS),
             parameters,
-            settings,
+            settings: settings.tick,
             valves,
             sensor,
             switch_pins: switches,
         };
-        node.reseal();
+        node.reseal_all();
         Ok(node)
     }
 
@@ -192,37 +186,46 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    /// What the checksum covers: everything that shapes the outputs of the next
-    /// tick. The gains and the valve timing of the settings are not in it: the
-    /// controller and the PWM hold the same, and are compared.
-    fn sealed(&self) -> Sealed<'_> {
-        let settings = &self.settings;
+    /// What shapes the outputs of the next tick and is changed by requests alone.
+    #[inline(always)]
+    fn fixed(&self) -> impl Hash + '_ {
         (
             &self.parameters,
+            &self.settings,
+            &self.core.times,
+            self.controller.config(),
+            self.pwm.timing(),
+        )
+    }
+
+    /// What shapes the outputs of the next tick and is changed by every tick.
+    #[inline(always)]
+    fn moving(&self) -> impl Hash + '_ {
+        (
             &self.state,
             &self.monitor,
-            &settings.sensor,
-            &self.core.times,
-            (
-                [settings.slew_step, settings.following_error],
-                settings.slew_rate,
-                settings.following_ticks,
-                settings.staged_exhaust,
-                settings.full_period,
-            ),
-            (&self.controller, &self.pwm, &self.target),
+            &self.target,
+            self.controller.state(),
+            self.pwm.state(),
         )
     }
 
     /// Whether the state is as the last tick or request left it.
+    #[inline]
     fn is_intact(&self) -> bool {
-        self.seal.holds(&self.sealed())
-            && self.controller.config().gains() == self.settings.control.gains()
-            && *self.pwm.timing() == self.settings.timing
+        self.fixed_seal.holds(&self.fixed()) && self.seal.holds(&self.moving())
     }
 
+    #[inline]
     fn reseal(&mut self) {
-        self.seal = Seal::of(&self.sealed());
+        let seal = Seal::of(&self.moving());
+        self.seal = seal;
+    }
+
+    fn reseal_all(&mut self) {
+        let seal = Seal::of(&self.fixed());
+        self.fixed_seal = seal;
+        self.reseal();
     }
 
     /// A change of sealed state between two ticks. State that was damaged before
@@ -231,7 +234,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let intact = self.is_intact();
         let result = change(self);
         if intact {
-            self.reseal();
+            self.reseal_all();
         }
         result
     }

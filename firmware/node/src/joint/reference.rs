@@ -14,7 +14,7 @@
 //! The next reference of a slot is counted down to the tick and handed to the
 //! control law, which does not use it yet.
 
-use super::settings::JointSettings;
+use super::settings::TickSettings;
 use crate::JOINT_TICK;
 use wheeleg_control::joint::Announced;
 use wheeleg_protocol::JointSetpoint;
@@ -23,6 +23,10 @@ use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
 
 /// Ticks of one bus cycle.
 const CYCLE_TICKS: u32 = CYCLE_US / JOINT_TICK.get();
+
+/// Ticks in a second.
+const TICKS_PER_SECOND: i32 = 1_000_000 / JOINT_TICK.get() as i32;
+const _: () = assert!(1_000_000 % JOINT_TICK.get() == 0);
 
 /// What the bus wants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -64,12 +68,7 @@ impl Target {
     fn advance(&mut self) -> (PositionMm, VelocityMmS) {
         let moving = self.age < CYCLE_TICKS;
         let ticks = self.age.min(CYCLE_TICKS);
-        let micros = i64::from(ticks).saturating_mul(i64::from(JOINT_TICK.get()));
-        let travel = i64::from(self.velocity.raw())
-            .saturating_mul(micros)
-            .checked_div(1_000_000)
-            .unwrap_or(0);
-        let travel = PositionMm::from_raw(i32::try_from(travel).unwrap_or(0));
+        let travel = PositionMm::from_raw(travel(self.velocity.raw(), ticks));
         self.age = self.age.saturating_add(1);
         let velocity = if moving {
             self.velocity
@@ -88,6 +87,21 @@ impl Target {
     }
 }
 
+/// Way at `velocity`, raw mm/s, over `ticks`, at most one bus cycle; rounded
+/// toward zero.
+fn travel(velocity: i32, ticks: u32) -> i32 {
+    // Up to the velocities of the wire, and beyond, the product fits 32 bits, and
+    // the division is a multiplication.
+    if let Ok(ticks) = i32::try_from(ticks)
+        && let Some(product) = velocity.checked_mul(ticks)
+    {
+        return product / TICKS_PER_SECOND;
+    }
+    let product = i64::from(velocity).saturating_mul(i64::from(ticks));
+    let travel = product.checked_div(i64::from(TICKS_PER_SECOND));
+    i32::try_from(travel.unwrap_or(0)).unwrap_or(0)
+}
+
 /// Reference of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TickReference {
@@ -101,7 +115,7 @@ pub(super) struct TickReference {
 pub(super) fn advance(
     last: PositionMm,
     target: &mut Target,
-    settings: &JointSettings,
+    settings: &TickSettings,
 ) -> TickReference {
     let announced = target.announced();
     let (wanted, velocity) = target.advance();
@@ -120,5 +134,36 @@ pub(super) fn advance(
         velocity,
         announced,
         slew_limited,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CYCLE_TICKS, travel};
+
+    #[test]
+    fn the_way_of_a_cycle_is_exact_for_every_velocity() {
+        let edges = [
+            i32::MAX,
+            i32::MAX / 10,
+            i32::MAX / 10 + 1,
+            65_536,
+            999,
+            1,
+            0,
+        ];
+        for velocity in edges
+            .into_iter()
+            .flat_map(|v| [v, -v, v.wrapping_neg() - 1])
+        {
+            for ticks in 0..=CYCLE_TICKS {
+                let exact = i64::from(velocity) * i64::from(ticks) * 1000 / 1_000_000;
+                assert_eq!(
+                    i64::from(travel(velocity, ticks)),
+                    exact,
+                    "{velocity} {ticks}"
+                );
+            }
+        }
     }
 }

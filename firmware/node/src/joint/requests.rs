@@ -134,7 +134,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !self.core.in_time(command.deadline_cycle) {
             return Err(NackReason::Expired);
         }
-        let gains = self.settings.control.gains();
+        let gains = self.controller.config().gains();
         let reference = command.reference();
         if reference < gains.stroke_min || reference > gains.stroke_max {
             return Err(NackReason::OutOfRange);
@@ -149,20 +149,20 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let trial = self.parameters.with(id, raw, disarmed)?;
         let settings = JointSettings::new(&trial).ok_or(NackReason::OutOfRange)?;
         self.change(|node| {
-            if settings.sensor != node.settings.sensor {
+            if settings.tick.sensor != node.settings.sensor {
                 // Another calibration moves the stroke without a motion: neither
                 // a rate fault nor a velocity. The new one has to prove itself
                 // before the board may arm.
                 node.monitor = SensorMonitor::new();
                 node.controller.reset();
             }
-            if settings.correction != node.settings.correction {
-                node.controller.set_correction(settings.correction);
+            if settings.tick.correction != node.settings.correction {
+                node.controller.set_correction(settings.tick.correction);
             }
             node.controller.retune(settings.control);
             node.pwm.set_timing(settings.timing);
             node.core.times = settings.times;
-            node.settings = settings;
+            node.settings = settings.tick;
             node.parameters = trial;
         });
         Ok(())

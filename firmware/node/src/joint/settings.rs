@@ -19,16 +19,24 @@ const PULSE_MARGIN: Micros = Micros(350);
 const BLOW_THROUGH_TIME: Micros = Micros::from_millis(5000);
 
 /// Everything that follows from the parameters, worked out when they change.
+/// The controller, the PWM and the supervision keep theirs; the board keeps `tick`.
 #[derive(Clone, Debug)]
 pub struct JointSettings {
     /// Control law.
     pub control: JointConfig,
     /// Valve timing.
     pub timing: PwmTiming,
-    /// Position sensor.
-    pub sensor: SensorConfig,
     /// Watchdog and staging.
     pub times: SupervisionTimes,
+    /// The rest.
+    pub tick: TickSettings,
+}
+
+/// The settings that the board application itself uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TickSettings {
+    /// Position sensor.
+    pub sensor: SensorConfig,
     /// Correction after start-up.
     pub correction: Correction,
     /// Largest change of the reference per tick.
@@ -84,24 +92,26 @@ impl JointSettings {
         Some(Self {
             control,
             timing,
-            sensor,
             times: SupervisionTimes {
                 tick: JOINT_TICK,
                 watchdog: watchdog(raw(P::WatchdogCycles)),
                 hold: millis(P::HoldTime),
                 blow_through: BLOW_THROUGH_TIME,
             },
-            correction: if raw(P::Correction) == 0 {
-                Correction::Pd
-            } else {
-                Correction::Id
+            tick: TickSettings {
+                sensor,
+                correction: if raw(P::Correction) == 0 {
+                    Correction::Pd
+                } else {
+                    Correction::Id
+                },
+                slew_step: per_tick(raw(P::SlewRate)),
+                slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
+                following_error: position(P::FollowingError),
+                following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
+                staged_exhaust: ValveMode::Exhaust.openings(opening),
+                full_period: gains.pwm_period,
             },
-            slew_step: per_tick(raw(P::SlewRate)),
-            slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
-            following_error: position(P::FollowingError),
-            following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
-            staged_exhaust: ValveMode::Exhaust.openings(opening),
-            full_period: gains.pwm_period,
         })
     }
 }

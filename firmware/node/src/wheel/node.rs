@@ -1,5 +1,7 @@
 //! The wheel board application.
 
+use core::hash::Hash;
+
 use super::encoder::EncoderWatch;
 use super::motion::Target;
 use super::settings::WheelSettings;
@@ -10,7 +12,6 @@ use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::WheelParameters;
 use crate::seal::Seal;
 use crate::snapshot::{TickReport, WheelSnapshot};
-use crate::supervisor::SupervisionTimes;
 use crate::transmission::Transmission;
 use crate::{ConfigError, SWITCH_TICKS};
 use wheeleg_control::wheel::{WheelCommand, WheelController};
@@ -48,10 +49,11 @@ pub struct WheelNode<M, E, P, D> {
     pub(super) settings: WheelSettings,
     pub(super) control_mode: WheelControlMode,
     pub(super) controller: WheelController,
-    /// The controller as the last tick or request left it.
-    shadow: WheelController,
     pub(super) target: Target,
     pub(super) state: TickState,
+    /// Seal of what only a request changes.
+    fixed_seal: Seal,
+    /// Seal of what a sample changes.
     seal: Seal,
     pub(super) snapshot: WheelSnapshot,
     switches: Debounce,
@@ -87,9 +89,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             settings,
             control_mode,
             controller: WheelController::new(),
-            shadow: WheelController::new(),
             target: Target::default(),
             state: TickState::default(),
+            fixed_seal: Seal::default(),
             seal: Seal::default(),
             snapshot: WheelSnapshot::at_boot(),
             switches: Debounce::new(SWITCH_TICKS),
@@ -99,7 +101,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             dump_valve,
         };
         node.tune();
-        node.reseal();
+        node.reseal_all();
         Ok(node)
     }
 
@@ -237,33 +239,39 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         let _ = self.controller.apply(acceleration);
     }
 
-    fn sealed(
-        &self,
-    ) -> (
-        &WheelParameters,
-        &TickState,
-        &WheelSettings,
-        &SupervisionTimes,
-        &Target,
-        WheelControlMode,
-    ) {
+    /// What shapes the outputs of the next sample and is changed by requests alone.
+    #[inline(always)]
+    fn fixed(&self) -> impl Hash + '_ {
         (
             &self.parameters,
-            &self.state,
             &self.settings,
             &self.core.times,
-            &self.target,
             self.control_mode,
         )
     }
 
-    fn is_intact(&self) -> bool {
-        self.seal.holds(&self.sealed()) && self.shadow == self.controller
+    /// What shapes the outputs of the next sample and is changed by every sample.
+    #[inline(always)]
+    fn moving(&self) -> impl Hash + '_ {
+        (&self.state, &self.target, &self.controller)
     }
 
+    /// Whether the state is as the last sample or request left it.
+    #[inline]
+    fn is_intact(&self) -> bool {
+        self.fixed_seal.holds(&self.fixed()) && self.seal.holds(&self.moving())
+    }
+
+    #[inline]
     fn reseal(&mut self) {
-        self.shadow = self.controller.clone();
-        self.seal = Seal::of(&self.sealed());
+        let seal = Seal::of(&self.moving());
+        self.seal = seal;
+    }
+
+    fn reseal_all(&mut self) {
+        let seal = Seal::of(&self.fixed());
+        self.fixed_seal = seal;
+        self.reseal();
     }
 
     /// A change of sealed state between two samples. State that was damaged
@@ -272,7 +280,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         let intact = self.is_intact();
         let result = change(self);
         if intact {
-            self.reseal();
+            self.reseal_all();
         }
         result
     }
