@@ -1,6 +1,6 @@
 //! One axis on the bench: any joint law against the single-cylinder plant.
 //!
-//! The controller is the firmware's own code ([`firmware::Firmware`]: converter
+//! The controller is the firmware's own code ([`Firmware`]: converter
 //! code → stroke → [`wheeleg_control::joint::JointController`] → valve PWM →
 //! on-times of a tick); its gains follow from the axis's data ([`design`]). The
 //! plant is [`wheeleg_plant::axis::Axis`]. Outputs act one tick after the inputs
