@@ -25,6 +25,10 @@ impl Debounce {
     /// Takes one sample of the raw levels and returns the debounced ones.
     pub fn sample(&mut self, raw: u8) -> u8 {
         let changed = raw ^ self.state;
+        if changed == 0 {
+            self.counts = [0; 8];
+            return self.state;
+        }
         for (bit, count) in self.counts.iter_mut().enumerate() {
             let mask = 1_u8.wrapping_shl(u32::try_from(bit).unwrap_or(0));
             if changed & mask == 0 {

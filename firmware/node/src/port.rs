@@ -79,17 +79,18 @@ impl BusPort {
             destination: Address::MASTER,
             sequence: 0,
         };
-        let replaced = self.slot_reply.take().is_some();
+        let replaced = self.slot_reply.is_some();
         self.unsent = self.unsent.saturating_add(u32::from(replaced));
-        self.slot_reply = encode(message, envelope, start_at);
+        encode(&mut self.slot_reply, message, envelope, start_at);
     }
 
     /// Queues the answer to a request; the bus has one requester, so an unsent
     /// older one is dropped and counted.
     pub fn queue_answer(&mut self, message: &Message, request: Envelope, start_at: Micros) {
-        let replaced = self.answer.take().is_some();
+        let replaced = self.answer.is_some();
         self.unsent = self.unsent.saturating_add(u32::from(replaced));
-        self.answer = encode(message, request.reply(self.address), start_at);
+        let envelope = request.reply(self.address);
+        encode(&mut self.answer, message, envelope, start_at);
     }
 
     /// The next frame to send: an answer before a slot reply, because it is due
@@ -114,11 +115,19 @@ impl BusPort {
     }
 }
 
-fn encode(message: &Message, envelope: Envelope, start_at: Micros) -> Option<Transmission> {
-    let mut buffer = [0; MAX_ENCODED];
-    let encoded = message.emit(envelope, &mut buffer).ok()?;
-    Some(Transmission {
-        start_at,
-        bytes: Vec::from_slice(encoded).ok()?,
-    })
+/// Writes the frame where it waits, without a copy of the buffer.
+fn encode(
+    place: &mut Option<Transmission>,
+    message: &Message,
+    envelope: Envelope,
+    start_at: Micros,
+) {
+    let bytes = Vec::new();
+    let transmission = place.insert(Transmission { start_at, bytes });
+    let bytes = &mut transmission.bytes;
+    let room = bytes.resize_default(MAX_ENCODED);
+    match (room, message.emit(envelope, bytes).map(<[u8]>::len)) {
+        (Ok(()), Ok(length)) => bytes.truncate(length),
+        _ => *place = None,
+    }
 }

@@ -5,7 +5,7 @@ use super::node::WheelNode;
 use crate::hardware::{DumpValve, Encoder, MotorDrive, PinError, SwitchBank};
 use crate::mode::Mode;
 use wheeleg_control::wheel::{WheelCommand, WheelInput, WheelMode, WheelOutput, WheelStatus};
-use wheeleg_protocol::{DisarmReason, Fault, Limit, LimitBits};
+use wheeleg_protocol::{DisarmReason, Fault, Limit, LimitBits, WheelControlMode};
 use wheeleg_units::{Micros, Ticks};
 
 /// Fractional bits of the mean drive.
@@ -38,7 +38,12 @@ fn ramp_from(mean: i32, newest: i8) -> i8 {
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, D> {
     /// Closed loop.
     pub(super) fn drive(&mut self, limits: &mut LimitBits, now: Micros) -> WheelOutput {
-        if self.controller.mode() != WheelMode::Trapezoidal {
+        // The other modes read neither speed nor acceleration of the controller.
+        let ramps = matches!(
+            self.control_mode,
+            WheelControlMode::Trapezoidal | WheelControlMode::IntegralVelocity
+        );
+        if ramps && self.controller.mode() != WheelMode::Trapezoidal {
             self.tune_profile();
         }
         let motion = command(
