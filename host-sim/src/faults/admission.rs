@@ -52,11 +52,7 @@ fn no_twins(faults: &[FaultSpec]) -> Result<(), SimError> {
 #[must_use]
 pub fn not_implemented(kind: FaultKind) -> Option<&'static str> {
     match kind {
-        FaultKind::NodeOff
-        | FaultKind::NodeReset
-        | FaultKind::BrownOut
-        | FaultKind::NodeHang
-        | FaultKind::DuplicateAddress
+        FaultKind::DuplicateAddress
         | FaultKind::Babble
         | FaultKind::BabbleUnguarded
         | FaultKind::OtherInterface

@@ -36,12 +36,14 @@ impl Schedule {
         Self { changes, next: 0 }
     }
 
-    /// Hands over every change that is due at `t_ns`, each once; true means begin.
-    pub(crate) fn due(&mut self, t_ns: u64, mut change: impl FnMut(&FaultSpec, bool)) {
+    /// Every change that is due at `t_ns`, each once; true means begin.
+    pub(crate) fn due(&mut self, t_ns: u64) -> Vec<(FaultSpec, bool)> {
+        let mut due = Vec::new();
         while let Some(c) = self.changes.get(self.next).filter(|c| c.at_ns <= t_ns) {
-            change(&c.fault, c.begin);
+            due.push((c.fault, c.begin));
             self.next += 1;
         }
+        due
     }
 }
 
@@ -62,9 +64,8 @@ mod tests {
         let mut schedule = Schedule::new(&faults);
         let mut seen = Vec::new();
         for ms in 0..5000_u64 {
-            schedule.due(ms * 1_000_000, |f, begin| {
-                seen.push((ms, f.kind.name(), begin));
-            });
+            let due = schedule.due(ms * 1_000_000);
+            seen.extend(due.iter().map(|(f, begin)| (ms, f.kind.name(), *begin)));
         }
         let expected = [
             (1000, "pot-open", true),

@@ -7,7 +7,6 @@ mod line;
 mod outside;
 mod partner;
 pub mod qemu;
-mod serial;
 mod store;
 pub mod unicorn;
 

@@ -8,8 +8,8 @@
 use std::collections::VecDeque;
 
 use wheeleg_pil_link::{
-    Hello, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run, Straps,
-    Trip,
+    Hello, Hook, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run,
+    Straps, Trip,
 };
 
 use super::choice::{NODE_NAMES, NodeKind, Nodes};
@@ -20,6 +20,7 @@ use super::qemu::{Qemu, QemuOptions};
 use super::{store, unicorn};
 use crate::SimError;
 use crate::config::RobotConfig;
+use crate::hil::{self, HilOptions};
 
 /// A byte on the line: end of its last bit in ns, and its value.
 pub(crate) type Heard = (u64, u8);
@@ -100,7 +101,10 @@ impl Outside {
                 }
                 NodeKind::Hil(port) => {
                     let line = outside.lines.len();
-                    outside.lines.push(super::serial::open(port)?);
+                    let options = HilOptions::parse(&port.display().to_string())?;
+                    let application = if address <= 6 { "joint" } else { "wheel" };
+                    let (partner, _) = hil::connect(&options, application)?;
+                    outside.lines.push(Box::new(partner));
                     outside.adopt(address, line, 0)?;
                 }
             }
@@ -238,6 +242,28 @@ impl Outside {
     pub(crate) fn take_trip(&mut self, address: u8) -> Option<Trip> {
         let n = self.number(address)?;
         self.boards[n].tripped.take()
+    }
+
+    /// Supply of the board at `address` from its next run on.
+    pub(crate) fn set_power(&mut self, address: u8, power: Power) {
+        if let Some(n) = self.number(address) {
+            self.boards[n].power = power;
+        }
+    }
+
+    /// Provokes a fault in the board at `address`; does nothing to one that runs here.
+    ///
+    /// # Errors
+    /// [`SimError`] if the board refuses.
+    pub(crate) fn hook(&mut self, address: u8, hook: Hook) -> Result<(), SimError> {
+        let Some(n) = self.number(address) else {
+            return Ok(());
+        };
+        let (line, index) = (self.boards[n].line, self.boards[n].index);
+        match self.ask(line, index, &Request::Hook(hook))? {
+            Reply::Done => Ok(()),
+            other => Err(unexpected(&self.boards[n].name, &other)),
+        }
     }
 
     /// Queues a run of one board to `now_ns`, with what it has heard.

@@ -103,13 +103,13 @@ pub fn run_with(
                 if t_ns >= duration_ns {
                     break;
                 }
-                schedule.due(t_ns, |fault, begin| {
-                    world.strike(fault, begin);
+                for (fault, begin) in schedule.due(t_ns) {
+                    world.strike(&fault, begin)?;
                     recorder.set_disk_full(!world.faults().can_record());
                     let what = if begin { "begins" } else { "ends" };
                     let text = format!("fault {fault} {what}");
                     recorder.event(t_ns, EventKind::Scenario, text);
-                });
+                }
                 for event in operator.due(t_ns) {
                     act(&event.action, &mut world, &operator, t_ns, recorder)?;
                 }

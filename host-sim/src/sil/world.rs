@@ -16,12 +16,32 @@ use super::boards::{JointBoard, WheelBoard};
 use super::bus::Bus;
 use crate::SimError;
 use crate::config::{NodeParams, RobotConfig};
-use crate::faults::{FaultSpec, Injector};
+use crate::faults::{FaultKind, FaultSpec, Injector, Victim};
 use crate::pil::Outside;
 
 /// Joint tick, ns.
 pub(super) const JOINT_TICK_NS: u64 = 1_000_000;
 const NS_PER_US: u64 = 1_000;
+/// A stopped program is reset after this, ns: the independent watchdog of the
+/// boards (firmware/board/BOARD.md).
+const WATCHDOG_NS: u64 = 50_000_000;
+
+/// Why a board does not run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Down {
+    /// It runs.
+    No,
+    /// It has no power: all its outputs are off.
+    Off {
+        /// When power comes back, ns.
+        until_ns: u64,
+    },
+    /// Its program has stopped: its outputs stay as they are.
+    Hung {
+        /// When the watchdog bites, ns.
+        until_ns: u64,
+    },
+}
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +75,7 @@ pub(super) struct World {
     next_cycle_ns: u64,
     tick_inputs: TickInputs,
     faults: Injector,
+    down: [Down; 8],
     outside: Option<Outside>,
     stored: NodeParams,
 }
@@ -91,12 +112,13 @@ struct Sensed {
     feet: [[bool; 4]; 6],
 }
 
-/// Whether the board at `address` works at `now_ns`: always here, outside
-/// unless it is in reset.
-fn runs(outside: Option<&Outside>, address: u8, now_ns: u64) -> bool {
-    outside
-        .and_then(|o| o.ticks(address, now_ns))
-        .unwrap_or(true)
+/// Whether the board at `address` works at `now_ns`: here unless it is down,
+/// outside unless it is in reset.
+fn runs(outside: Option<&Outside>, down: &[Down; 8], address: u8, now_ns: u64) -> bool {
+    down[usize::from(address) - 1] == Down::No
+        && outside
+            .and_then(|o| o.ticks(address, now_ns))
+            .unwrap_or(true)
 }
 
 /// Duty of a bridge, −1..=1.
@@ -181,6 +203,7 @@ impl World {
             next_cycle_ns: 0,
             tick_inputs: TickInputs::default(),
             faults: Injector::new(seed),
+            down: [Down::No; 8],
             outside,
             stored: stored.clone(),
         })
@@ -234,6 +257,7 @@ impl World {
 
     fn joint_tick(&mut self) -> Result<(), SimError> {
         self.advance_plant()?;
+        self.bring_up()?;
         // A board outside answers with the outputs that act from this edge on
         // when it is told the inputs of the edge. Neither depends on the other.
         let sensed = if self.outside.is_some() {
@@ -246,17 +270,20 @@ impl World {
         };
         for (i, address) in (0..6).zip(1..) {
             let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
-            let on_us = match outside {
-                Some(outputs) => outputs.valve_on_us,
-                None => self.joints[i].active_on_us(),
+            let on_us = match (outside, self.down[i]) {
+                (Some(outputs), _) => outputs.valve_on_us,
+                (None, Down::Off { .. }) => [0; 4],
+                (None, _) => self.joints[i].active_on_us(),
             };
             self.tick_inputs.take(i, on_us);
             self.inputs.valve_on_us[i] = on_us;
         }
         let outside = self.outside.as_ref().and_then(|o| o.outputs(7));
-        self.inputs.dump = match outside {
-            Some(outputs) => outputs.dump,
-            None => self.wheels[0].dumps(),
+        self.inputs.dump = match (outside, self.down[6]) {
+            (Some(outputs), _) => outputs.dump,
+            // The dump valve shuts without current: air stays on.
+            (None, Down::Off { .. }) => false,
+            (None, _) => self.wheels[0].dumps(),
         };
         self.plant
             .apply(&mut self.state, &self.inputs)
@@ -268,7 +295,7 @@ impl World {
         };
         for (i, address) in (0..6).zip(1..) {
             let now = micros(self.faults.clock_ns(address, self.now_ns));
-            if runs(self.outside.as_ref(), address, self.now_ns) {
+            if runs(self.outside.as_ref(), &self.down, address, self.now_ns) {
                 self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
             }
         }
@@ -303,7 +330,7 @@ impl World {
         })?;
         self.restart_tripped()?;
         for (board, address) in self.joints.iter().zip(1..) {
-            if runs(self.outside.as_ref(), address, now_ns)
+            if runs(self.outside.as_ref(), &self.down, address, now_ns)
                 && let Some(outside) = &mut self.outside
             {
                 outside.compare_outputs(now_ns, address, &board.active_outputs());
@@ -314,18 +341,42 @@ impl World {
 
     /// A board outside that was reset: the application beside it starts anew.
     fn restart_tripped(&mut self) -> Result<(), SimError> {
-        let Some(outside) = &mut self.outside else {
-            return Ok(());
-        };
         for raw in 1..=8_u8 {
-            let Some(address) = outside.take_trip(raw).and_then(|_| Address::new(raw)) else {
+            let trip = self.outside.as_mut().and_then(|o| o.take_trip(raw));
+            let Some(address) = trip.and_then(|_| Address::new(raw)) else {
                 continue;
             };
-            let i = usize::from(raw) - 1;
-            if i < 6 {
-                self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
-            } else {
-                self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6])?;
+            self.start_anew(address)?;
+        }
+        Ok(())
+    }
+
+    /// The application of a board from its reset on.
+    fn start_anew(&mut self, address: Address) -> Result<(), SimError> {
+        let i = usize::from(address.raw()) - 1;
+        self.down[i] = Down::No;
+        if i < 6 {
+            self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
+        } else {
+            self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6])?;
+        }
+        Ok(())
+    }
+
+    /// Boards whose time without power, or in a stopped program, is over.
+    fn bring_up(&mut self) -> Result<(), SimError> {
+        for raw in 1..=8_u8 {
+            let until_ns = match self.down[usize::from(raw) - 1] {
+                Down::No => continue,
+                Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
+            };
+            let Some(address) = Address::new(raw).filter(|_| until_ns <= self.now_ns) else {
+                continue;
+            };
+            match &mut self.outside {
+                // Its own watchdog and its own start-up end the fault.
+                Some(outside) if outside.has(raw) => outside.set_power(raw, link::Power::Good),
+                _ => self.start_anew(address)?,
             }
         }
         Ok(())
@@ -343,17 +394,19 @@ impl World {
         let address = wheel as u8 + 7;
         let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         // Only the bridge takes new inputs here: the valves keep their tick.
+        let off = matches!(self.down[wheel + 6], Down::Off { .. });
         self.inputs.bridge_duty[wheel] = match outside {
             Some(outputs) => duty(&outputs),
+            None if off => 0.0,
             None => self.wheels[wheel].active_duty(),
         };
-        self.inputs.bridge_enabled[wheel] = true;
+        self.inputs.bridge_enabled[wheel] = outside.is_some() || !off;
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];
         let now_ns = self.faults.clock_ns(address, self.now_ns);
         let board = &mut self.wheels[wheel];
-        if runs(self.outside.as_ref(), address, self.now_ns) {
+        if runs(self.outside.as_ref(), &self.down, address, self.now_ns) {
             board.tick(micros(now_ns), edges, switch);
         }
         self.next_wheel_ns[wheel] += u64::from(board.period_us()) * NS_PER_US;
@@ -384,7 +437,7 @@ impl World {
             bus.heard(address, after_ns, now_ns)
         })?;
         self.restart_tripped()?;
-        if runs(self.outside.as_ref(), address, now_ns)
+        if runs(self.outside.as_ref(), &self.down, address, now_ns)
             && let Some(outside) = &mut self.outside
         {
             let here = self.wheels[wheel].active_outputs();
@@ -413,12 +466,12 @@ impl World {
             let outside = self.outside.as_ref();
             let t_end = |address| micros(self.faults.clock_ns(address, delivery.end_ns));
             for (board, address) in self.joints.iter_mut().zip(1..) {
-                if delivery.from != address && runs(outside, address, self.now_ns) {
+                if delivery.from != address && runs(outside, &self.down, address, self.now_ns) {
                     board.on_bus_bytes(&delivery.bytes, t_end(address));
                 }
             }
             for (board, address) in self.wheels.iter_mut().zip(7..) {
-                if delivery.from != address && runs(outside, address, self.now_ns) {
+                if delivery.from != address && runs(outside, &self.down, address, self.now_ns) {
                     board.on_bus_bytes(&delivery.bytes, t_end(address));
                 }
             }
@@ -507,9 +560,41 @@ impl World {
     }
 
     /// A fault begins, or ends.
-    pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) {
+    ///
+    /// # Errors
+    /// [`SimError`] if a board outside refuses it.
+    pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
         self.faults
             .strike(fault, begin, &mut self.plant, &mut self.state);
+        let Victim::Board(address) = fault.victim else {
+            return Ok(());
+        };
+        let after_ns = |ns: u64| self.now_ns.saturating_add(ns);
+        let down = match fault.kind {
+            FaultKind::NodeOff if begin => Down::Off { until_ns: u64::MAX },
+            FaultKind::NodeOff => Down::Off { until_ns: 0 },
+            FaultKind::NodeReset if begin => Down::Off {
+                until_ns: after_ns(JOINT_TICK_NS),
+            },
+            FaultKind::BrownOut if begin => Down::Off {
+                until_ns: after_ns((fault.value * 1e6) as u64),
+            },
+            FaultKind::NodeHang if begin => Down::Hung {
+                until_ns: after_ns(WATCHDOG_NS),
+            },
+            _ => return Ok(()),
+        };
+        self.down[usize::from(address) - 1] = down;
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        match down {
+            Down::Hung { .. } => outside.hook(address, link::Hook::StopProcessor),
+            _ => {
+                outside.set_power(address, link::Power::BrownOut);
+                Ok(())
+            }
+        }
     }
 
     /// The faults under way.
