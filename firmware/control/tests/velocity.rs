@@ -181,3 +181,19 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_hash_tells_histories_of_equal_sums_apart() {
+    use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
+    let window = window(4);
+    let hash_of = |samples: [i32; 5]| {
+        let mut estimator = VelocityEstimator::new();
+        for sample in samples {
+            estimator.update(&window, PositionMm::from_raw(sample));
+        }
+        BuildHasherDefault::<DefaultHasher>::default().hash_one(estimator)
+    };
+    // Both have a sum of 2 and a moment of 3.
+    assert_ne!(hash_of([0, 1, 0, 0, 1]), hash_of([0, 0, 1, 1, 0]));
+    assert_eq!(hash_of([0, 1, 0, 0, 1]), hash_of([0, 1, 0, 0, 1]));
+}

@@ -43,7 +43,9 @@ enum Run {
 /// entered while LIMIT is latched; a sample timer below the minimum of the mode
 /// is refused. As on the chip, the position command is a register of its own: set
 /// it to the actual position before entering position control, or the wheel moves.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+///
+/// Its `Hash` covers every field, so that a board can seal it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WheelController {
     run: Run,
     memory: FilterMemory,
@@ -62,6 +64,60 @@ pub struct WheelController {
     input: WheelInput,
     previous: Option<WheelCount>,
     negative: bool,
+}
+
+impl core::hash::Hash for WheelController {
+    #[inline]
+    fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            run,
+            memory,
+            filter,
+            timer,
+            next_timer,
+            command,
+            final_position,
+            velocity,
+            integral_velocity,
+            acceleration,
+            maximum_velocity,
+            inhibit,
+            limit,
+            stop,
+            input,
+            previous,
+            negative,
+        } = self;
+        (run, memory, command, final_position, input.actual, previous).hash(state);
+        // Each in a byte of its own, four to a word.
+        let [velocity_low, velocity_high] = velocity.to_bits().to_le_bytes();
+        let [acceleration_low, acceleration_high] = acceleration.to_bits().to_le_bytes();
+        for bytes in [
+            [filter.zero, filter.pole, filter.gain, timer.0],
+            [
+                velocity_low,
+                velocity_high,
+                acceleration_low,
+                acceleration_high,
+            ],
+            [
+                next_timer.0,
+                integral_velocity.cast_unsigned(),
+                *maximum_velocity,
+                u8::from(*negative),
+            ],
+            [
+                u8::from(*inhibit),
+                u8::from(*limit),
+                u8::from(*stop),
+                u8::from(input.limit),
+            ],
+            [u8::from(input.stop), 0, 0, 0],
+        ] {
+            state.write_u32(u32::from_le_bytes(bytes));
+        }
+    }
 }
 
 impl WheelController {

@@ -6,7 +6,9 @@ use crate::NodeIdentity;
 use crate::hardware::{Encoder, MotorDrive, NoDumpValve, NoSwitches, PinError};
 use crate::mode::{Event, Mode};
 use crate::parameters::WheelParameters;
-use wheeleg_control::wheel::WheelCommand;
+use wheeleg_control::wheel::{
+    LeadFilter, SampleTimer, WheelAcceleration, WheelCommand, WheelVelocity,
+};
 use wheeleg_protocol::{Address, Fault};
 use wheeleg_units::{Micros, WheelCount};
 
@@ -85,4 +87,32 @@ fn damaged_controller_settings_and_state_are_seen() {
     assert!(holds_after(|node| {
         node.core.times.tick = Micros(node.core.times.tick.get() ^ 1);
     }));
+}
+
+#[test]
+fn every_damaged_register_of_the_controller_is_seen() {
+    let filter = |change: fn(&mut LeadFilter)| {
+        let mut filter = armed().settings.filter;
+        change(&mut filter);
+        WheelCommand::Filter(filter)
+    };
+    for damage in [
+        filter(|filter| filter.zero ^= 1),
+        filter(|filter| filter.pole ^= 0x80),
+        filter(|filter| filter.gain ^= 1),
+        WheelCommand::SampleTimer(SampleTimer(0x41)),
+        WheelCommand::Velocity(WheelVelocity::from_bits(1)),
+        WheelCommand::Velocity(WheelVelocity::from_bits(i16::MIN)),
+        WheelCommand::IntegralVelocity(1),
+        WheelCommand::Acceleration(WheelAcceleration::from_bits(0x7FFF)),
+        WheelCommand::MaximumVelocity(126),
+        WheelCommand::FinalPosition(WheelCount::MIN),
+        WheelCommand::SignReversalInhibit(true),
+        WheelCommand::Enter(wheeleg_control::wheel::WheelMode::Idle),
+    ] {
+        assert!(
+            holds_after(|node| node.controller.apply(damage).unwrap()),
+            "{damage:?}"
+        );
+    }
 }
