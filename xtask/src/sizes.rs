@@ -108,6 +108,9 @@ impl Row {
             "      flash      {:>6} of {:>6} bytes",
             f.flash_bytes, b.flash_bytes_max
         );
+        if let Some(known) = &b.flash_shortfall {
+            println!("      KNOWN SHORTFALL of flash: {}", known.reason);
+        }
         println!(
             "      static RAM {:>6} of {:>6} bytes",
             f.static_ram_bytes, b.static_ram_bytes_max

@@ -5,6 +5,8 @@
 //! peripherals and interrupts are taken between basic blocks: an interrupt
 //! comes some tens of cycles late at most, and every run is the same to the bit.
 
+mod exceptions;
+
 use unicorn_engine::{
     Arch, ArmCpuModel, HookType, Mode, Prot, RegisterARM as R, Unicorn, uc_error,
 };
@@ -576,80 +578,6 @@ impl Machine {
         }
     }
 
-    /// Takes the most urgent exception that nothing holds back.
-    fn take_exception(&mut self) -> Result<bool, String> {
-        let state = self.uc.get_data_mut();
-        if state.stop_processor {
-            return Ok(false);
-        }
-        state.nvic.lines = state.soc.lines();
-        if !state.nvic.wakes() {
-            return Ok(false);
-        }
-        let primask = self.get(R::PRIMASK)? & 1 != 0;
-        let basepri = self.get(R::BASEPRI)? as u8;
-        // A processor that sleeps wakes even if the exception is masked.
-        if self.uc.get_data().nvic.next(false, 0).is_some() {
-            self.asleep = false;
-        }
-        let Some(n) = self.uc.get_data().nvic.next(primask, basepri) else {
-            return Ok(false);
-        };
-        self.enter(n)?;
-        Ok(true)
-    }
-
-    /// Stacks the basic frame and goes to the handler (ARMv7-M B1.5.6).
-    fn enter(&mut self, n: usize) -> Result<(), String> {
-        let sp = self.get(R::SP)?;
-        let xpsr = self.get(R::XPSR)?;
-        let frame = (sp - 0x20) & !7;
-        let aligned = (sp & 4) << 7;
-        let mut words = [0; 8];
-        let saved = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR];
-        for (word, register) in words.iter_mut().zip(saved) {
-            *word = self.get(register)?;
-        }
-        words[6] = self.get(R::PC)? & !1;
-        words[7] = xpsr & !(1 << 9) | aligned;
-        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-        self.set_memory(frame, &bytes)
-            .map_err(|_| format!("the stack has left RAM: {frame:#010x}"))?;
-        self.set(R::SP, frame)?;
-        let nested = self.uc.get_data().nvic.in_handler();
-        self.set(R::LR, if nested { 0xFFFF_FFF1 } else { 0xFFFF_FFF9 })?;
-        let vector = self.uc.get_data().nvic.vector_base() + 4 * n as u32;
-        let mut handler = [0; 4];
-        self.memory(vector, &mut handler)?;
-        self.set(R::IPSR, n as u32)?;
-        self.set(R::PC, u32::from_le_bytes(handler) | 1)?;
-        let state = self.uc.get_data_mut();
-        state.nvic.enter(n);
-        state.woken_by(n);
-        Ok(())
-    }
-
-    /// Unstacks the frame (ARMv7-M B1.5.8).
-    fn leave(&mut self) -> Result<(), String> {
-        let sp = self.get(R::SP)?;
-        let mut bytes = [0; 32];
-        self.memory(sp, &mut bytes)?;
-        let word = |i: usize| {
-            let b = &bytes[4 * i..4 * i + 4];
-            u32::from_le_bytes([b[0], b[1], b[2], b[3]])
-        };
-        let saved = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR];
-        for (i, register) in saved.into_iter().enumerate() {
-            self.set(register, word(i))?;
-        }
-        self.set(R::SP, sp + 0x20 + (word(7) >> 9 & 1) * 4)?;
-        self.set(R::XPSR, word(7) & !(1 << 9))?;
-        self.set(R::PC, word(6) | 1)?;
-        let left = self.uc.get_data_mut().nvic.leave();
-        left.map(drop)
-            .ok_or_else(|| "exception return outside of a handler".to_owned())
-    }
-
     /// Executes instructions until cycle `due` or something happens.
     fn execute(&mut self, due: u64) -> Result<(), String> {
         let state = self.uc.get_data_mut();
@@ -720,117 +648,4 @@ impl Machine {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::soc::flash::STORE_SIZE;
-
-    const CODE: usize = 0x200;
-
-    /// A machine whose reset handler is `code` (Thumb half-words at 0x200);
-    /// exception `n` goes to `handlers[n]`.
-    fn machine(code: &[u16], handlers: &[(usize, u32)]) -> Machine {
-        let mut flash = vec![0xFF; FLASH_SIZE as usize];
-        let mut put = |at: usize, word: u32| flash[at..at + 4].copy_from_slice(&word.to_le_bytes());
-        put(0, RAM_BASE + RAM_SIZE);
-        put(4, FLASH_BASE + CODE as u32 + 1);
-        for (n, offset) in handlers {
-            put(4 * n, FLASH_BASE + offset + 1);
-        }
-        for (i, half) in code.iter().enumerate() {
-            flash[CODE + 2 * i..][..2].copy_from_slice(&half.to_le_bytes());
-        }
-        let soc = Soc::new(vec![0xFF; STORE_SIZE], [0; 12], true, 0);
-        Machine::new(&Image::bare(flash), soc).expect("a machine")
-    }
-
-    /// Runs to `cycle` in stretches of `stretch` cycles.
-    fn run(machine: &mut Machine, cycle: u64, stretch: u64) {
-        while machine.state().cycle < cycle {
-            let ns = (machine.state().cycle + stretch) * 125 / 2;
-            let stop = machine.run(ns, Until::Cycle, true).expect("runs");
-            assert_eq!(stop, Stop::Time);
-        }
-    }
-
-    #[test]
-    fn every_instruction_is_counted_once_however_often_the_machine_stops() {
-        // adds r0, #1; b .-2
-        for stretch in [1, 7, 100, 10_000] {
-            let mut machine = machine(&[0x3001, 0xE7FD], &[]);
-            run(&mut machine, 20_000, stretch);
-            let loops = machine.get(R::R0).expect("r0");
-            assert_eq!(
-                u64::from(loops),
-                machine.state().retired / 2,
-                "stretch {stretch}"
-            );
-            assert!((10_000..10_100).contains(&loops), "{loops}");
-        }
-    }
-
-    #[test]
-    fn a_sleeping_processor_passes_time_without_instructions() {
-        // adds r0, #1; wfi; b .-4
-        let mut machine = machine(&[0x3001, 0xBF30, 0xE7FC], &[]);
-        run(&mut machine, 1_000_000, 1_000_000);
-        assert_eq!(machine.get(R::R0), Ok(1));
-        assert_eq!(machine.state().retired, 2);
-    }
-
-    #[test]
-    fn an_exception_stacks_runs_and_returns_and_waits_for_primask() {
-        // r1 = ICSR; r2 = PENDSVSET; cpsid i; str r2, [r1]; r0 = 5;
-        // cpsie i; adds r0, #1; b .
-        let code = [
-            0x4904, // ldr r1, [pc, #16]
-            0x4A05, // ldr r2, [pc, #20]
-            0xB672, // cpsid i
-            0x600A, // str r2, [r1]
-            0x2005, // movs r0, #5
-            0x4603, // mov r3, r0
-            0xB662, // cpsie i
-            0x3001, // adds r0, #1
-            0xE7FE, // b .
-            0xBF00, // nop
-            0xED04, 0xE000, // ICSR
-            0x0000, 0x1000, // PENDSVSET
-            // handler at 0x21C: adds r0, #100 (lost with the frame); ldr r4 = r0
-            0x3064, // adds r0, #100
-            0x4604, // mov r4, r0
-            0x4770, // bx lr
-        ];
-        let mut machine = machine(&code, &[(14, 0x21C)]);
-        run(&mut machine, 200, 200);
-        assert_eq!(machine.get(R::R3), Ok(5), "masked until here");
-        let r4 = machine.get(R::R4).expect("r4");
-        assert!(
-            r4 == 105 || r4 == 106,
-            "{r4}: the handler saw the interrupted value"
-        );
-        assert_eq!(machine.get(R::R0), Ok(6), "and its own change is gone");
-        assert_eq!(machine.get(R::SP), Ok(RAM_BASE + RAM_SIZE));
-        assert!(!machine.state().nvic.in_handler());
-    }
-
-    #[test]
-    fn an_unmodelled_register_ends_the_run_by_its_name() {
-        // r1 = 0x4000_0800 (TIM4); ldr r0, [r1]; b .
-        let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x0800, 0x4000];
-        let mut machine = machine(&code, &[]);
-        let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
-        assert!(error.contains("0x40000800"), "{error}");
-        // RCC_AHB1RSTR exists on the part and is not modelled.
-        let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x1028, 0x4002];
-        let mut machine = super::tests::machine(&code, &[]);
-        let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
-        assert!(error.contains("RCC+0x028"), "{error}");
-        // A port whose clock is off.
-        let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x0000, 0x4800];
-        let mut machine = super::tests::machine(&code, &[]);
-        let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
-        assert!(
-            error.contains("GPIOA") && error.contains("clock off"),
-            "{error}"
-        );
-    }
-}
+mod tests;

@@ -38,9 +38,8 @@ fn listing(json: bool) -> String {
         let list: Vec<serde_json::Value> = KINDS.iter().map(row_json).collect();
         return format!("{:#}\n", serde_json::json!({ "faults": list }));
     }
-    let mut out = String::from(
-        "Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]):\n",
-    );
+    let mut out =
+        String::from("Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]):\n");
     for row in KINDS {
         let _ = writeln!(out, "\n  {}", row.name);
         let _ = writeln!(out, "      {}", row.doc);
@@ -80,7 +79,11 @@ mod tests {
     fn every_fault_is_listed_with_its_state() {
         let text = listing(false);
         for row in KINDS {
-            assert!(text.contains(&format!("\n  {}\n", row.name)), "{}", row.name);
+            assert!(
+                text.contains(&format!("\n  {}\n", row.name)),
+                "{}",
+                row.name
+            );
         }
         let json: serde_json::Value = serde_json::from_str(&listing(true)).expect("JSON");
         assert_eq!(json["faults"].as_array().map(Vec::len), Some(KINDS.len()));

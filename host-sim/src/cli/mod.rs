@@ -2,9 +2,9 @@
 
 mod channels;
 mod check;
-mod figures;
 mod export;
 mod faults;
+mod figures;
 mod list;
 mod params;
 mod plant;

@@ -154,7 +154,11 @@ pub(super) fn gas_params(s: &GasSection) -> GasParams {
     }
 }
 
-pub(super) fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection) -> SupplyParams {
+pub(super) fn supply_params(
+    s: &SupplySection,
+    regulator: &FlowSection,
+    dump: &ValveSection,
+) -> SupplyParams {
     SupplyParams {
         source_pressure_pa: s.source_pressure,
         set_pressure_pa: s.set_pressure,
