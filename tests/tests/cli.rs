@@ -86,6 +86,7 @@ fn json_is_one_object_with_every_key() {
     for key in [
         "scenario",
         "seed",
+        "faults",
         "hash",
         "simulated_s",
         "wall_s",

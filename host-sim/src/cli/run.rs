@@ -184,6 +184,9 @@ fn run_text(finished: &Finished) -> String {
         out.push_str(&pil_text(pil));
     }
     let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);
+    for fault in &s.faults {
+        let _ = writeln!(out, "fault   {fault}");
+    }
     let _ = writeln!(out, "hash    {}", s.hash);
     let _ = writeln!(
         out,

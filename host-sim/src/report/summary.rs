@@ -38,6 +38,8 @@ pub struct Summary {
     pub version: &'static str,
     /// Seed used.
     pub seed: u64,
+    /// Faults injected, of the scenario and of the command line.
+    pub faults: Vec<String>,
     /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
     pub hash: String,
     /// Messages that could not be written to the log file.
@@ -77,6 +79,7 @@ impl Summary {
             robot_hash: robot.fingerprint(),
             version: env!("CARGO_PKG_VERSION"),
             seed: info.seed,
+            faults: scenario.faults.iter().map(ToString::to_string).collect(),
             hash: recording.hash.clone(),
             dropped_messages: recording.dropped,
             simulated_s: info.simulated_s,
