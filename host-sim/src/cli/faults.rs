@@ -47,8 +47,10 @@ fn listing(json: bool) -> String {
         if let Some(v) = row.value {
             let _ = writeln!(
                 out,
-                "      value {} to {} {}, default {}: {}",
-                v.min, v.max, v.unit, v.default, v.doc
+                "      value {}, default {}: {}",
+                v.range(),
+                v.default,
+                v.doc
             );
         }
         if let Some(reason) = not_implemented(row.kind) {

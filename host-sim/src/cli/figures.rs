@@ -30,12 +30,21 @@ pub(super) fn command(args: &FiguresArgs) -> Result<ExitCode, SimError> {
     }
     let results = &finished.results;
     let mut out = String::from("axes of the paper\n");
+    // Three decimals, without the sign of a zero.
+    let shown = |v: f64| if v.abs() < 5e-4 { 0.0 } else { v };
     for c in &results.checks {
         let verdict = if c.fits { "fits" } else { "does not fit" };
         let _ = writeln!(
             out,
             "  Fig. {} {:8} {:8} {:>10.3} to {:>8.3} {:5} on {:>6} to {:>4}  {verdict}",
-            c.figure, c.reading, c.quantity, c.min, c.max, c.unit, c.axis_min, c.axis_max
+            c.figure,
+            c.reading,
+            c.quantity,
+            shown(c.min),
+            shown(c.max),
+            c.unit,
+            c.axis_min,
+            c.axis_max
         );
     }
     let _ = writeln!(

@@ -56,7 +56,8 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, SimError> {
         What::Check(args) => check(args),
         What::Export(args) => {
             let config = AxisConfig::load(&args.axis)?;
-            let value = export::sequences(&config.name, &config.axis).map_err(plant_error)?;
+            let value = export::sequences(&config.name, &config.axis)
+                .map_err(|e| plant_error(&args.axis, e))?;
             std::fs::write(&args.out, format!("{value}\n")).map_err(|reason| SimError::Output {
                 action: "write",
                 path: args.out.clone(),
@@ -67,16 +68,16 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, SimError> {
     }
 }
 
-fn plant_error(e: impl std::fmt::Display) -> SimError {
+fn plant_error(axis: &str, e: impl std::fmt::Display) -> SimError {
     SimError::simulation(
-        format!("the axis cannot be simulated: {e}"),
-        "check the axis file against the ranges in the message",
+        format!("the axis `{axis}` cannot be simulated: {e}"),
+        "check the axis file against the range in the message, which is in SI units",
     )
 }
 
 fn check(args: &CheckArgs) -> Result<ExitCode, SimError> {
     let config = AxisConfig::load(&args.axis)?;
-    let c = plant_check::check(&config.axis).map_err(plant_error)?;
+    let c = plant_check::check(&config.axis).map_err(|e| plant_error(&args.axis, e))?;
     if args.json {
         let value = serde_json::json!({ "axis": config.name, "check": c });
         print(&format!("{value:#}\n"))?;

@@ -32,6 +32,17 @@ pub struct ValueSpec {
     pub doc: &'static str,
 }
 
+impl ValueSpec {
+    /// Allowed range with its unit.
+    #[must_use]
+    pub fn range(&self) -> String {
+        match self.unit {
+            "1" => format!("{} to {}", self.min, self.max),
+            unit => format!("{} to {} {unit}", self.min, self.max),
+        }
+    }
+}
+
 /// One row of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KindInfo {
@@ -88,7 +99,7 @@ kinds! {
     NodeSilent = "node-silent", Board, None,
         "A board hears and works, but its transmitter is dead.";
     NodeOff = "node-off", Board, None,
-        "A board loses its power for good: its outputs drop, it hears and says nothing.";
+        "A board loses its power, for good unless an end is given: its outputs drop, it hears and says nothing.";
     NodeReset = "node-reset", Board, None,
         "A board is reset by its watchdog and starts anew.";
     BrownOut = "brown-out", Board, value("ms", 1.0, 1000.0, 30.0, "time without power"),

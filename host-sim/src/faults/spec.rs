@@ -81,7 +81,7 @@ pub enum SpecError {
 }
 
 fn suggestion(nearest: &Option<&'static str>) -> String {
-    nearest.map_or_else(String::new, |n| format!(", did you mean `{n}`?"))
+    nearest.map_or_else(String::new, |n| format!(" (did you mean `{n}`?)"))
 }
 
 fn got(found: &Option<String>) -> String {
@@ -191,8 +191,9 @@ impl FromStr for FaultSpec {
                 .filter(|x| (v.min..=v.max).contains(x))
                 .ok_or_else(|| {
                     wrong(format!(
-                        "the value `{n}` is not a number from {} to {} {} ({})",
-                        v.min, v.max, v.unit, v.doc
+                        "the value `{n}` is not a number from {} ({})",
+                        v.range(),
+                        v.doc
                     ))
                 })?,
         };

@@ -46,10 +46,7 @@ pub enum VectorsError {
     },
     /// The file is not JSON.
     #[error("`{file}` is not JSON: {reason}")]
-    #[diagnostic(
-        code(wheeleg::vectors::json),
-        help("numbers must be finite: JSON has no NaN and no infinity")
-    )]
+    #[diagnostic(code(wheeleg::vectors::json), help("{}", json_help(reason)))]
     Json {
         /// The file.
         file: String,
@@ -78,6 +75,14 @@ impl VectorsError {
             file: file.to_owned(),
             problems,
         }
+    }
+}
+
+fn json_help(reason: &serde_json::Error) -> &'static str {
+    if reason.is_eof() {
+        "the file ends too early: it is empty or was cut off"
+    } else {
+        "numbers must be finite: JSON has no NaN and no infinity"
     }
 }
 
