@@ -46,7 +46,7 @@ enum Command {
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
     Params(params::ParamsArgs),
-    /// Faults that can be injected, and what the robot does about them.
+    /// Faults that can be injected, what they strike and which are not implemented yet.
     Faults(faults::FaultsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
