@@ -92,7 +92,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
 }
 
 /// Appends a line to `DEEP.md`: date, commit, check, result.
-fn note(name: &str, text: &str) -> Result<()> {
+pub(crate) fn note(name: &str, text: &str) -> Result<()> {
     let date = ask(command("date").args(["-u", "+%F"])).unwrap_or_else(|| "undated".to_owned());
     let commit = ask(command("git").args(["rev-parse", "--short", "HEAD"]));
     let commit = commit.unwrap_or_else(|| "-".to_owned());

@@ -12,7 +12,7 @@ use clap::Args;
 
 use crate::process::{ask, cargo, command, output, root, run, succeeds, target_dir};
 use crate::report::{Report, StepError, StepResult};
-use crate::tools;
+use crate::{deep, tools};
 
 /// The fuzzers' folder, from the root.
 const FOLDER: &str = "protocol/fuzz";
@@ -92,6 +92,9 @@ pub(crate) struct Options {
     /// Afterwards, reduces the corpus to the fewest inputs with the same coverage and stores it.
     #[arg(long)]
     store: bool,
+    /// Afterwards, appends a dated line per target to `DEEP.md`.
+    #[arg(long)]
+    note: bool,
 }
 
 /// `cargo xtask fuzz`.
@@ -135,7 +138,15 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     for target in chosen {
         let limit = Duration::from_secs(options.seconds);
         report.step(format!("fuzz: {}", target.0), || {
-            explore(&bins, target, limit)?;
+            let result = explore(&bins, target, limit);
+            if options.note {
+                let text = match &result {
+                    Ok(text) => text.clone(),
+                    Err(error) => format!("FAILED: {error}"),
+                };
+                deep::note(&format!("fuzz {}", target.0), &text)?;
+            }
+            result?;
             if options.store {
                 store(&bins, target)?;
             }
@@ -163,13 +174,12 @@ pub(crate) fn short_steps(report: &mut Report) {
 /// Every target for `seconds`; a sentence about the result.
 pub(crate) fn all_targets(seconds: u64) -> StepResult<String> {
     let bins = build(&root(), true)?;
+    let mut texts = Vec::new();
     for target in &TARGETS {
-        explore(&bins, target, Duration::from_secs(seconds))?;
+        let text = explore(&bins, target, Duration::from_secs(seconds))?;
+        texts.push(format!("{}: {text}", target.0));
     }
-    Ok(format!(
-        "{seconds} s for each of {} targets, no finding",
-        TARGETS.len()
-    ))
+    Ok(texts.join("; "))
 }
 
 fn patches_apply() -> Result<()> {
@@ -232,9 +242,10 @@ fn stored(kind: &str, target: &Target) -> PathBuf {
     root().join(FOLDER).join(kind).join(target.0)
 }
 
-/// Runs a target from the stored corpus for a time. New inputs go to the target
-/// folder; an input that breaks a property ends the run and is named.
-fn explore(bins: &Path, target: &Target, limit: Duration) -> Result<()> {
+/// Runs a target from the stored corpus for a time; a sentence about the result.
+/// New inputs go to the target folder; an input that breaks a property ends the
+/// run and is named.
+fn explore(bins: &Path, target: &Target, limit: Duration) -> Result<String> {
     let found = work_folder().join("corpus").join(target.0);
     let artifacts = work_folder().join("artifacts").join(target.0);
     fs::create_dir_all(&found)?;
@@ -262,17 +273,30 @@ fn explore(bins: &Path, target: &Target, limit: Duration) -> Result<()> {
             target.0
         );
     }
+    let text = summary(&log, limit.as_secs());
+    println!("    {:<10} {text}", target.0);
+    Ok(text)
+}
+
+/// Seconds, inputs and coverage from a fuzzer's log. Edges are those of all code
+/// linked in, the standard library's among them.
+fn summary(log: &str, seconds: u64) -> String {
     let stat = |name: &str| {
         let line = log.lines().find_map(|line| line.strip_prefix(name));
-        line.map_or("?", str::trim).to_owned()
+        line.map_or("?", str::trim)
     };
-    println!(
-        "    {:<10} {:>9} runs, {:>7}/s, no finding",
-        target.0,
+    let done = log.lines().rfind(|line| line.contains(" cov: "));
+    let after = |name: &str| {
+        let rest = done.and_then(|line| line.split_once(name));
+        rest.and_then(|(_, rest)| rest.split_whitespace().next())
+            .unwrap_or("?")
+    };
+    format!(
+        "{seconds} s, {} inputs, {} edges, {} features, no finding",
         stat("stat::number_of_executed_units:"),
-        stat("stat::average_exec_per_sec:"),
-    );
-    Ok(())
+        after(" cov: "),
+        after(" ft: "),
+    )
 }
 
 fn last_lines(text: &str, count: usize) -> String {
@@ -491,6 +515,13 @@ mod tests {
                 assert!(TARGETS.iter().any(|t| t.0 == name), "{}", patch.name);
             }
         }
+    }
+
+    #[test]
+    fn the_figures_of_a_run_come_from_the_end_of_its_log() {
+        let log = "#2\tINITED cov: 9 ft: 10 corp: 1/1b\n#77\tDONE   cov: 1234 ft: 5678 corp: 4/9b\nDone 77 runs\nstat::number_of_executed_units: 77\n";
+        let expected = "60 s, 77 inputs, 1234 edges, 5678 features, no finding";
+        assert_eq!(summary(log, 60), expected);
     }
 
     #[test]
