@@ -4,10 +4,8 @@
 #![no_main]
 #![allow(unsafe_code)]
 
-use cortex_m_rt::{entry, exception};
-use wheeleg_board::g431::pac::interrupt;
-use wheeleg_board::g431::{fatal, hil, power};
-use wheeleg_board::reset::Note;
+use cortex_m_rt::entry;
+use wheeleg_board::g431::hil;
 use wheeleg_remote::{RemoteWheel, WheelPins};
 
 unsafe extern "C" {
@@ -26,22 +24,4 @@ fn main() -> ! {
     hil::run::<RemoteWheel<'_>>(&pins)
 }
 
-#[interrupt]
-fn PVD_PVM() {
-    power::on_sag();
-}
-
-#[exception]
-unsafe fn NonMaskableInt() {
-    fatal::on_nmi();
-}
-
-#[exception(trampoline = false)]
-unsafe fn HardFault() -> ! {
-    fatal::reset(Note::ProcessorFault)
-}
-
-#[exception]
-unsafe fn DefaultHandler(_number: i16) {
-    fatal::reset(Note::ProcessorFault)
-}
+wheeleg_board::ways_down!();

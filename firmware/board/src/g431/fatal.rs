@@ -32,3 +32,37 @@ pub fn on_nmi() {
         reset(Note::ClockLoss);
     }
 }
+
+/// The handlers of all that ends in a reset, once in every image: the supply
+/// sags, the clock stops, the processor faults, an interrupt has no handler.
+#[macro_export]
+macro_rules! ways_down {
+    () => {
+        mod ways_down {
+            use cortex_m_rt::exception;
+            use $crate::g431::pac::interrupt;
+            use $crate::g431::{fatal, power};
+            use $crate::reset::Note;
+
+            #[interrupt]
+            fn PVD_PVM() {
+                power::on_sag();
+            }
+
+            #[exception]
+            unsafe fn NonMaskableInt() {
+                fatal::on_nmi();
+            }
+
+            #[exception(trampoline = false)]
+            unsafe fn HardFault() -> ! {
+                fatal::reset(Note::ProcessorFault)
+            }
+
+            #[exception]
+            unsafe fn DefaultHandler(_number: i16) {
+                fatal::reset(Note::ProcessorFault)
+            }
+        }
+    };
+}

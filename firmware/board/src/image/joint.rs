@@ -1,12 +1,11 @@
 //! The joint image: everything but its panic handler.
 
-use cortex_m_rt::{entry, exception};
+use cortex_m_rt::entry;
 use wheeleg_board::executive;
 use wheeleg_board::g431::latch::{Feet, Potentiometer};
 use wheeleg_board::g431::slot::Slot;
 use wheeleg_board::g431::valves::Valves;
-use wheeleg_board::g431::{self, adc, board, bus, fatal, pac, power, start};
-use wheeleg_board::reset::Note;
+use wheeleg_board::g431::{self, adc, board, bus, pac, start};
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_node::{ConfigError, NodeIdentity};
@@ -69,22 +68,4 @@ fn DMA1_CHANNEL1() {
     bus::on_ring();
 }
 
-#[interrupt]
-fn PVD_PVM() {
-    power::on_sag();
-}
-
-#[exception]
-unsafe fn NonMaskableInt() {
-    fatal::on_nmi();
-}
-
-#[exception(trampoline = false)]
-unsafe fn HardFault() -> ! {
-    fatal::reset(Note::ProcessorFault)
-}
-
-#[exception]
-unsafe fn DefaultHandler(_number: i16) {
-    fatal::reset(Note::ProcessorFault)
-}
+wheeleg_board::ways_down!();

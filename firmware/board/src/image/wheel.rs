@@ -1,13 +1,12 @@
 //! The wheel image: everything but its panic handler.
 
-use cortex_m_rt::{entry, exception};
+use cortex_m_rt::entry;
 use wheeleg_board::executive;
 use wheeleg_board::g431::bridge::{Dump, Pulse, Sign};
 use wheeleg_board::g431::encoder::WheelEncoder;
 use wheeleg_board::g431::latch::Supply;
 use wheeleg_board::g431::slot::Slot;
-use wheeleg_board::g431::{self, board, bus, fatal, pac, power, start};
-use wheeleg_board::reset::Note;
+use wheeleg_board::g431::{self, board, bus, pac, start};
 use wheeleg_node::hardware::{DumpPin, HBridge};
 use wheeleg_node::parameters::WheelParameters;
 use wheeleg_node::wheel::WheelNode;
@@ -68,22 +67,4 @@ fn DMA1_CHANNEL1() {
     bus::on_ring();
 }
 
-#[interrupt]
-fn PVD_PVM() {
-    power::on_sag();
-}
-
-#[exception]
-unsafe fn NonMaskableInt() {
-    fatal::on_nmi();
-}
-
-#[exception(trampoline = false)]
-unsafe fn HardFault() -> ! {
-    fatal::reset(Note::ProcessorFault)
-}
-
-#[exception]
-unsafe fn DefaultHandler(_number: i16) {
-    fatal::reset(Note::ProcessorFault)
-}
+wheeleg_board::ways_down!();
