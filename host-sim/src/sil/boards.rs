@@ -43,7 +43,7 @@ macro_rules! each {
 }
 
 /// One joint board.
-pub(super) struct JointBoard {
+pub(crate) struct JointBoard {
     application: JointApplication,
     sensor: AdcInput,
     foot: [Line; 4],
@@ -91,7 +91,7 @@ impl JointBoard {
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
-    pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+    pub(crate) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
         let parameters =
             stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
                 p.with(id, raw, true)
@@ -125,7 +125,7 @@ impl JointBoard {
     }
 
     /// On-times that become active at this tick edge, µs.
-    pub(super) fn active_on_us(&self) -> [u16; 4] {
+    pub(crate) fn active_on_us(&self) -> [u16; 4] {
         std::array::from_fn(|i| self.valves[i].preloaded())
     }
 
@@ -139,7 +139,7 @@ impl JointBoard {
     }
 
     /// Latches the inputs and runs the tick that starts now.
-    pub(super) fn tick(&mut self, now: Micros, code: u16, foot: [bool; 4]) -> TickReport {
+    pub(crate) fn tick(&mut self, now: Micros, code: u16, foot: [bool; 4]) -> TickReport {
         self.sensor.latch(code);
         for (line, closed) in self.foot.iter().zip(foot) {
             line.set_level(closed);
@@ -153,17 +153,17 @@ impl JointBoard {
     }
 
     /// Hands received bytes over; the last one ended at `t_end`.
-    pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+    pub(crate) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         each!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
     }
 
     /// What the application wants to send.
-    pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
+    pub(crate) fn take_transmission(&mut self) -> Option<Transmission> {
         each!(&mut self.application, node => node.take_transmission())
     }
 
     /// Internals after the last tick.
-    pub(super) fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
+    pub(crate) fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
         each!(&self.application, node => node.snapshot())
     }
 }

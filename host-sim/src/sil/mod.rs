@@ -16,6 +16,8 @@ mod world;
 
 use std::ops::ControlFlow;
 
+pub(crate) use self::boards::JointBoard;
+
 use self::observe::Observer;
 use self::operator::Operator;
 use self::world::{Happened, World};
