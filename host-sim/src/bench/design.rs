@@ -11,7 +11,7 @@ use wheeleg_node::sensor::SensorConfig;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 
-use super::firmware::Design;
+use super::firmware::{Design, Supervision};
 
 /// A controller of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -95,6 +95,19 @@ pub fn design(axis: &AxisParams, kind: Kind) -> Design {
             Correction::Pd
         },
         sensor: sensor(axis),
+        supervision: supervision(&facts),
+    }
+}
+
+/// No move takes three times as long as the whole stroke at full speed, or ends a
+/// tenth of the stroke off.
+fn supervision(facts: &Facts) -> Supervision {
+    let limit_s = 0.5 + 3.0 * facts.stroke_mm / facts.speed_mm_s;
+    Supervision {
+        // As fast as the parameter table allows: a step stays a step.
+        slew_rate: VelocityMmS::from_f64(5000.0),
+        following_error: PositionMm::from_f64((0.1 * facts.stroke_mm).max(2.0)),
+        following_time: Micros((limit_s.clamp(0.01, 10.0) * 1e6).round() as u32),
     }
 }
 

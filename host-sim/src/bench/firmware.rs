@@ -5,7 +5,8 @@ use wheeleg_control::joint::{Announced, ConfigError, JointConfig, JointControlle
 use wheeleg_control::joint::{Correction, JointInput};
 use wheeleg_control::pwm::{PwmTiming, ValvePwm};
 use wheeleg_node::sensor::SensorConfig;
-use wheeleg_units::{Micros, PositionMm, Ticks};
+use wheeleg_protocol::FaultBits;
+use wheeleg_units::{Micros, PositionMm, Ticks, VelocityMmS};
 
 use super::run::{Action, Board, Sample};
 
@@ -21,6 +22,19 @@ pub struct Design {
     pub correction: Correction,
     /// Calibration of the position sensor.
     pub sensor: SensorConfig,
+    /// What the whole board adds to the control path; see [`super::Node`].
+    pub supervision: Supervision,
+}
+
+/// Limits of a board around its control path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Supervision {
+    /// Largest rate of the reference.
+    pub slew_rate: VelocityMmS,
+    /// Error that is a fault when it lasts …
+    pub following_error: PositionMm,
+    /// … for this long.
+    pub following_time: Micros,
 }
 
 /// A joint board reduced to its control path.
@@ -90,6 +104,8 @@ impl Board for Firmware {
             on_us,
             settled: output.settled,
             measured_mm: measured.to_f64(),
+            faults: FaultBits::NONE,
+            driving: true,
         }
     }
 }

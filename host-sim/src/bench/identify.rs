@@ -3,6 +3,7 @@
 use wheeleg_control::axis::probe::DelayProbe;
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
+use wheeleg_protocol::FaultBits;
 use wheeleg_units::Micros;
 
 use super::firmware::{Design, Firmware};
@@ -27,6 +28,8 @@ impl Board for Probe {
             on_us: self.probe.tick(measured),
             settled: false,
             measured_mm: measured.to_f64(),
+            faults: FaultBits::NONE,
+            driving: true,
         }
     }
 }

@@ -165,7 +165,12 @@ mod tests {
                 }
             })
             .collect();
-        Trace { motion, rows }
+        Trace {
+            motion,
+            rows,
+            faults: wheeleg_protocol::FaultBits::NONE,
+            drove: true,
+        }
     }
 
     #[test]

@@ -26,20 +26,23 @@
 //!   comparison; [`optimal`] the bound that perfect knowledge gives; [`identify`]
 //!   finds the valves' delays at start-up, as a board would.
 
+pub mod commission;
 mod design;
 pub mod export;
 mod firmware;
 mod identify;
 mod metrics;
 mod motion;
+mod node;
 pub mod optimal;
 pub mod plant_check;
 mod run;
 pub mod suite;
 
 pub use design::{Kind, axis_data, design};
-pub use firmware::{Design, Firmware, TICK};
+pub use firmware::{Design, Firmware, Supervision, TICK};
 pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};
+pub use node::Node;
 pub use run::{Action, Bench, Board, Row, Sample, Trace};

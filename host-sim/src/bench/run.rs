@@ -3,6 +3,7 @@
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
+use wheeleg_protocol::FaultBits;
 use wheeleg_units::{AdcCode, PositionMm, VelocityMmS};
 
 use super::motion::{LoadEvent, Motion};
@@ -29,6 +30,10 @@ pub struct Action {
     pub settled: bool,
     /// Position as the board understands its reading \[mm\].
     pub measured_mm: f64,
+    /// Latched faults; a board without supervision has none.
+    pub faults: FaultBits,
+    /// The board is armed: its law drives the valves.
+    pub driving: bool,
 }
 
 /// A board on the bench.
@@ -70,6 +75,10 @@ pub struct Trace {
     pub motion: Motion,
     /// Rows; row k is at k ms.
     pub rows: Vec<Row>,
+    /// Every fault that the board had latched.
+    pub faults: FaultBits,
+    /// Whether the board drove from the first to the last tick.
+    pub drove: bool,
 }
 
 /// Plant and board, with the state that carries over from run to run: chamber
@@ -135,6 +144,7 @@ impl<B: Board> Bench<B> {
     ) -> Result<Trace, PlantError> {
         let ticks = (duration_s * 1000.0).round() as usize;
         let mut rows = Vec::with_capacity(ticks);
+        let (mut faults, mut drove) = (FaultBits::NONE, true);
         let start_air = self.state.core.cylinders[0].supply_mass_kg;
         let start_switches = self.switches();
         for k in 0..ticks {
@@ -173,6 +183,8 @@ impl<B: Board> Bench<B> {
                 air_kg: c.supply_mass_kg - start_air,
                 settled: action.settled,
             };
+            faults = faults.union(action.faults);
+            drove &= action.driving;
             watch(&row, &self.board);
             rows.push(row);
             self.axis.tick(&mut self.state, self.pending)?;
@@ -181,6 +193,8 @@ impl<B: Board> Bench<B> {
         Ok(Trace {
             motion: motion.clone(),
             rows,
+            faults,
+            drove,
         })
     }
 

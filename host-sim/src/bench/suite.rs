@@ -11,8 +11,9 @@ use serde::Serialize;
 use wheeleg_control::joint::ConfigError;
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::sensors::AdcNoise;
 
-use super::{Bench, Design, Firmware, Kind, LoadEvent, Metrics, Motion, Trace};
+use super::{Bench, Design, Firmware, Kind, LoadEvent, Metrics, Motion, Node, Trace};
 use super::{design, design_with, identify};
 
 /// An experiment could not be made.
@@ -34,6 +35,35 @@ pub enum BenchError {
         )
     )]
     Design(ConfigError),
+    /// A value that the board's parameter table does not hold.
+    #[error(
+        "the design needs `{name}` = {value} {unit}; a joint board allows {min} to {max} {unit}"
+    )]
+    #[diagnostic(
+        code(wheeleg::bench::parameter),
+        help(
+            "the axis's data lie outside what the joint board supports; see the parameter table in SPEC.md"
+        )
+    )]
+    Parameter {
+        /// Name in the table.
+        name: &'static str,
+        /// What the design needs.
+        value: f64,
+        /// Smallest value of the table.
+        min: f64,
+        /// Largest value of the table.
+        max: f64,
+        /// Unit.
+        unit: &'static str,
+    },
+    /// The board refuses the set of parameters.
+    #[error("{0}")]
+    #[diagnostic(
+        code(wheeleg::bench::board),
+        help("please report this with the axis file")
+    )]
+    Board(String),
 }
 
 /// What differs from the data sheet.
@@ -50,6 +80,11 @@ pub struct Factors {
     pub friction: f64,
     /// Factor on the valves' switching times.
     pub valve_delay: f64,
+    /// Spread between the valves: fill A and vent B switch slower by this share,
+    /// vent A and fill B faster.
+    pub valve_spread: f64,
+    /// Factor on the converter's noise.
+    pub noise: f64,
 }
 
 impl Factors {
@@ -60,6 +95,8 @@ impl Factors {
         supply_pa: None,
         friction: 1.0,
         valve_delay: 1.0,
+        valve_spread: 0.0,
+        noise: 1.0,
     };
 
     /// One combination of the random suite: load ±0.8, mass 1…8 kg, supply 4…7 bar
@@ -75,6 +112,7 @@ impl Factors {
             supply_pa: Some(1e5 * (4.0 + 3.0 * unit())),
             friction: 2.0_f64.powf(2.0 * unit() - 1.0),
             valve_delay: 2.0_f64.powf(2.0 * unit() - 1.0),
+            ..Self::NONE
         }
     }
 
@@ -95,8 +133,22 @@ impl Factors {
         f.coulomb_n *= self.friction;
         f.static_n *= self.friction;
         f.viscous_n_s_m *= self.friction;
-        for spread in &mut p.cylinder.timing_spread {
-            *spread *= self.valve_delay;
+        for (spread, sign) in p
+            .cylinder
+            .timing_spread
+            .iter_mut()
+            .zip([1.0, -1.0, -1.0, 1.0])
+        {
+            *spread *= self.valve_delay * (1.0 + sign * self.valve_spread);
+        }
+        match &mut p.adc.noise {
+            AdcNoise::Uniform {
+                half_width_lsb: width,
+            }
+            | AdcNoise::Gaussian { sigma_lsb: width } => {
+                *width *= self.noise;
+            }
+            AdcNoise::None => {}
         }
         p.load_n += self.load_share * force_left_n(&p);
         p
@@ -138,12 +190,12 @@ pub fn board(
     kind: Kind,
     start: StartUp,
     seed: u64,
-) -> Result<Firmware, BenchError> {
+) -> Result<Node, BenchError> {
     let design: Design = match start {
         StartUp::Sheet => design(sheet, kind),
         StartUp::Identified => design_with(sheet, identify(plant, sheet, seed)?, kind),
     };
-    Firmware::new(&design).map_err(BenchError::Design)
+    Node::new(&design)
 }
 
 /// Steps between two shares of the stroke, one after the other, from power-up:
