@@ -167,7 +167,7 @@ fn answers_start_after_the_turnaround() {
     let answer = rig
         .send(&Message::TransmitPosition(TransmitPosition {}), 77)
         .unwrap();
-    assert_eq!(answer.start_at, Micros(rig.now + 50));
+    assert_eq!(answer.start_at, Micros(rig.now + 100));
     let (envelope, Message::Position(position)) = decode(&answer) else {
         panic!();
     };

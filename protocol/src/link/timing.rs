@@ -12,9 +12,11 @@ pub const BAUD: u32 = 1_000_000;
 const BITS_PER_BYTE: u32 = 10;
 /// Bus cycle, µs.
 pub const CYCLE_US: u32 = 10_000;
-/// From the end of a frame to the start of the answer to it, µs: receiver time
-/// and driver switching.
-pub const TURNAROUND_US: u32 = 50;
+/// From the end of a frame to the start of the answer to it, µs: driver
+/// switching, and the work of the board. The worst case is the SYNC, which ends
+/// 20 µs after a tick edge: the conversion of that edge (23 µs), its tick and
+/// the SYNC itself come first, then the answer must stand ready in hardware.
+pub const TURNAROUND_US: u32 = 100;
 /// Idle line between slots, µs.
 pub const GAP_US: u32 = 20;
 /// Largest share of the cycle for cyclic traffic, per mille.
@@ -173,7 +175,7 @@ mod tests {
         assert_eq!(timing.frame_us(MessageType::Sync), 1020);
         assert_eq!(timing.frame_us(MessageType::SlotReply), 290);
         assert_eq!(timing.cyclic_us(), 1020 + 50 + 8 * (290 + 20));
-        assert_eq!(CYCLIC_SHARE_PERMILLE, 355);
+        assert_eq!(CYCLIC_SHARE_PERMILLE, 360);
         assert_eq!(timing.driver_limit_us(), 319);
     }
 

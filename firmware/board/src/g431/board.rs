@@ -111,6 +111,9 @@ impl<const WHEEL: bool> Board for G431<WHEEL> {
         let event = older(self.bus.pending(), latch::pending());
         match event {
             Some(Event::Tick(_)) => Some(Event::Tick(latch::take())),
+            // Bytes wait for the tick of an edge before them, whose conversion
+            // ends 22.6 µs after it; its end, or its deadline, wakes the loop.
+            Some(Event::Bytes(time)) if latch::edge_under_way(tick::edge(), time) => None,
             other => other,
         }
     }

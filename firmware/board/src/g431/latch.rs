@@ -7,7 +7,8 @@ use wheeleg_units::{AdcCode, Micros};
 /// Set by every handler, cleared by the main loop before it looks for work.
 static WAKE: AtomicBool = AtomicBool::new(false);
 static PENDING: AtomicBool = AtomicBool::new(false);
-static EDGE: AtomicU32 = AtomicU32::new(0);
+/// Edge of the newest tick that was latched; none before the first one, at time 0.
+static EDGE: AtomicU32 = AtomicU32::new(u32::MAX);
 static SAMPLE: AtomicU32 = AtomicU32::new(0);
 static PORT_A: AtomicU32 = AtomicU32::new(0);
 
@@ -54,6 +55,13 @@ pub fn pending() -> Option<Micros> {
     PENDING
         .load(Ordering::Acquire)
         .then(|| Micros(EDGE.load(Ordering::Relaxed)))
+}
+
+/// Whether an edge before `time` is still on its way: hardware has captured it at
+/// `captured`, and its inputs are being converted.
+#[inline]
+pub fn edge_under_way(captured: u32, time: Micros) -> bool {
+    captured != EDGE.load(Ordering::Acquire) && time.get().wrapping_sub(captured) as i32 > 0
 }
 
 /// Takes the waiting tick; its inputs are now those of the sensors below.
