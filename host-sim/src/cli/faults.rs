@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 
 use super::print;
 use crate::SimError;
-use crate::faults::{KINDS, KindInfo, not_implemented};
+use crate::faults::{KINDS, KindInfo};
 
 /// Arguments of `wheeleg faults`.
 #[derive(Debug, Args)]
@@ -53,9 +53,6 @@ fn listing(json: bool) -> String {
                 v.doc
             );
         }
-        if let Some(reason) = not_implemented(row.kind) {
-            let _ = writeln!(out, "      not implemented: {reason}");
-        }
     }
     out
 }
@@ -68,8 +65,6 @@ fn row_json(row: &KindInfo) -> serde_json::Value {
         "value": row.value.map(|v| serde_json::json!({
             "unit": v.unit, "min": v.min, "max": v.max, "default": v.default, "description": v.doc,
         })),
-        "implemented": not_implemented(row.kind).is_none(),
-        "reason": not_implemented(row.kind),
     })
 }
 

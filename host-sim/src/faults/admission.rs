@@ -1,20 +1,24 @@
-//! Which faults a run can have: what the simulation cannot do is refused, never
-//! left out in silence.
+//! Which faults a run can have: what makes no sense is refused, never left out
+//! in silence.
 
-use super::{FaultKind, FaultSpec};
+use super::FaultSpec;
 use crate::SimError;
 use crate::config::Scenario;
 
-/// Checks the faults of a scenario against its duration and against what is implemented.
+/// Checks the faults of a scenario against its duration and each other.
 ///
 /// # Errors
 /// [`SimError::Simulation`] with the first fault that cannot be, and why.
 pub fn check(scenario: &Scenario) -> Result<(), SimError> {
     for fault in &scenario.faults {
-        if let Some(reason) = not_implemented(fault.kind) {
+        if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
             return Err(SimError::simulation(
-                format!("the fault `{fault}` is not implemented: {reason}"),
-                "`wheeleg faults list` says which faults are",
+                format!("the fault `{fault}` cannot begin or end while the robot runs"),
+                format!(
+                    "a board is built so: write `{}{}@0s`",
+                    fault.kind.name(),
+                    fault.victim
+                ),
             ));
         }
         if fault.from_s > scenario.duration_s {
@@ -46,17 +50,4 @@ fn no_twins(faults: &[FaultSpec]) -> Result<(), SimError> {
         }
     }
     Ok(())
-}
-
-/// Why a fault of the catalogue cannot be injected, if it cannot.
-#[must_use]
-pub fn not_implemented(kind: FaultKind) -> Option<&'static str> {
-    match kind {
-        FaultKind::DuplicateAddress
-        | FaultKind::Babble
-        | FaultKind::BabbleUnguarded
-        | FaultKind::OtherInterface
-        | FaultKind::InvalidParameter => Some("the simulated boards have no such event yet"),
-        _ => None,
-    }
 }

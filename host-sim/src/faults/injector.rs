@@ -13,8 +13,10 @@ use wheeleg_plant::ground::GroundPatch;
 use wheeleg_plant::robot::{Plant, PlantState};
 use wheeleg_plant::sensors::{SensorFault, signal_rng};
 use wheeleg_plant::valve::ValveFault;
+use wheeleg_protocol::link::SlotTiming;
 
-use super::line::LineErrors;
+use super::interface::of_other;
+use super::line::{LineErrors, record, rubbish};
 use super::{FaultKind, FaultSpec, Victim};
 use rand::RngExt;
 
@@ -128,9 +130,37 @@ impl Injector {
         }
     }
 
-    /// Whether the board's transmitter works.
-    pub(crate) fn can_send(&self, address: u8) -> bool {
-        !self.strikes(FaultKind::NodeSilent, address)
+    /// What the board's driver puts on the line of a frame; `None`: nothing.
+    pub(crate) fn board_sends(&mut self, address: u8, bytes: Vec<u8>) -> Option<Vec<u8>> {
+        if self.strikes(FaultKind::NodeSilent, address)
+            || self.strikes(FaultKind::BabbleUnguarded, address)
+        {
+            return None;
+        }
+        if self.strikes(FaultKind::Babble, address) {
+            // A byte more would end behind the limit.
+            let limit = SlotTiming::DEFAULT.driver_limit_us() / SlotTiming::DEFAULT.bytes_us(1);
+            return Some(rubbish(limit as usize, &mut self.rng));
+        }
+        if self.strikes(FaultKind::OtherInterface, address) {
+            return Some(of_other(bytes));
+        }
+        Some(bytes)
+    }
+
+    /// What a driver that is stuck on sends in the time of so many bytes.
+    pub(crate) fn babble(&mut self, address: u8, bytes: usize) -> Option<Vec<u8>> {
+        let stuck = self.strikes(FaultKind::BabbleUnguarded, address);
+        stuck.then(|| rubbish(bytes, &mut self.rng))
+    }
+
+    /// The next frame of a stream that fills the line, at most `room` bytes long.
+    pub(crate) fn stream(&self, room: usize) -> Option<Vec<u8>> {
+        if self.is(FaultKind::BusFull) {
+            record(room)
+        } else {
+            None
+        }
     }
 
     /// What a sound line makes of a transmission, and how late it is, ns; as
@@ -288,11 +318,11 @@ fn rebuild(plant: &mut Plant, joint: usize, begin: bool, change: impl FnOnce(&mu
 }
 
 fn on_ground(fault: &FaultSpec, begin: bool, plant: &mut Plant) {
-    let sound = plant.params().clone();
-    let mechanics = &mut plant.assembly.mechanics;
     match fault.kind {
         FaultKind::FootSlips => {
-            mechanics.contact = sound.contact;
+            let sound = plant.params().contact;
+            let mechanics = &mut plant.assembly.mechanics;
+            mechanics.contact = sound;
             if begin {
                 let contact = &mut mechanics.contact;
                 contact.mu_static = contact.mu_static.min(fault.value);
@@ -300,7 +330,9 @@ fn on_ground(fault: &FaultSpec, begin: bool, plant: &mut Plant) {
             }
         }
         FaultKind::FootLosesContact => {
-            mechanics.ground = sound.ground;
+            let sound = plant.params().ground.clone();
+            let mechanics = &mut plant.assembly.mechanics;
+            mechanics.ground = sound;
             if begin {
                 // The wheels run on their own plane, so the ground may go under the feet alone.
                 for patch in &mut mechanics.ground.patches {

@@ -92,6 +92,10 @@ kinds! {
         "The master stops sending, in mid-cycle, and never comes back.";
     MasterFrozen = "master-frozen", Robot, None,
         "The master repeats its last SYNC: it sends, but its counter stands.";
+    MasterReset = "master-reset", Robot, value("ms", 1.0, 1000.0, 30.0, "time until it sends again"),
+        "The master is reset: it forgets everything and starts anew.";
+    ClientReset = "client-reset", Robot, None,
+        "The user's program is started anew and opens a new session at the master.";
     LayerOneStall = "layer1-stall", Robot, None,
         "Layer 1 of the master gives no set-points any more.";
     CommandFlood = "command-flood", Robot, value("1/cycle", 1.0, 1000.0, 100.0, "commands per bus cycle"),
@@ -107,9 +111,11 @@ kinds! {
     NodeHang = "node-hang", Board, None,
         "A board's program stops; its hardware goes on with the last outputs until the watchdog bites.";
     Babble = "babble", Board, None,
-        "A board sends rubbish without end; its driver-enable time limit cuts every burst off.";
+        "A board sends rubbish; its driver-enable time limit lets it through in its own slot only, and cuts it off there.";
     BabbleUnguarded = "babble-unguarded", Board, None,
         "A board sends rubbish without end, and its driver-enable time limit is broken too.";
+    BusFull = "bus-full", Robot, None,
+        "A stream of records fills all of the line that SYNC, slots and requests leave free.";
     DuplicateAddress = "duplicate-address", Board, None,
         "Another board with the same address straps is plugged in.";
     OtherInterface = "other-interface", Board, None,
@@ -163,7 +169,7 @@ kinds! {
     FootSlips = "foot-slips", Robot, value("1", 0.0, 1.0, 0.05, "coefficient of friction from then on"),
         "Feet and wheels stand on ice.";
     InvalidParameter = "invalid-parameter", Board, None,
-        "A parameter outside its limits is sent to a board.";
+        "A service tool writes parameters of a board: a value above its limit, an unknown number, a value of another type.";
     DiskFull = "disk-full", Robot, None,
         "The recorder can write no more.";
 }
@@ -174,6 +180,12 @@ impl FaultKind {
     pub fn info(self) -> &'static KindInfo {
         // The table is generated in the order of the variants.
         &KINDS[self as usize]
+    }
+
+    /// Whether it is so from power-up on, and does not begin.
+    #[must_use]
+    pub fn is_built_in(self) -> bool {
+        self == Self::OtherInterface
     }
 
     /// Its name.

@@ -1,6 +1,11 @@
 //! Errors of the bus line: flipped, lost and inserted bytes, late transmissions.
 
 use rand::{Rng, RngExt};
+use wheeleg_protocol::frame::{MAX_PAYLOAD, VERSION, encode, encoded_len};
+use wheeleg_protocol::{Address, Header, MAX_ENCODED, NODES};
+
+/// Message type of no message.
+const RECORD: u8 = 0x7F;
 
 /// Rates of the errors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -49,6 +54,30 @@ impl LineErrors {
             rng.random_range(0..=self.delay_ns)
         }
     }
+}
+
+/// Bytes without meaning.
+pub(super) fn rubbish(bytes: usize, rng: &mut impl Rng) -> Vec<u8> {
+    (0..bytes).map(|_| rng.random()).collect()
+}
+
+/// A sound frame of a type that nobody knows, from the last board to the master, as
+/// long as fits into `room` bytes; `None` if none does.
+pub(super) fn record(room: usize) -> Option<Vec<u8>> {
+    let payload = room.checked_sub(encoded_len(0))?.min(MAX_PAYLOAD);
+    let header = Header {
+        version: VERSION,
+        message_type: RECORD,
+        source: Address::new(NODES as u8)?,
+        destination: Address::MASTER,
+        sequence: 0,
+    };
+    let mut buffer = [0; MAX_ENCODED];
+    Some(
+        encode(&header, &[0x55; MAX_PAYLOAD][..payload], &mut buffer)
+            .ok()?
+            .to_vec(),
+    )
 }
 
 #[cfg(test)]
@@ -110,5 +139,19 @@ mod tests {
         let delays: Vec<u64> = (0..1000).map(|_| late.delay_ns(&mut rng)).collect();
         assert!(delays.iter().all(|d| *d <= 1000));
         assert!(delays.iter().any(|d| *d < 50) && delays.iter().any(|d| *d > 950));
+    }
+
+    #[test]
+    fn a_record_is_a_sound_frame_of_the_room_there_is() {
+        for room in [15, 16, 40, 199, 200, 1000] {
+            let bytes = record(room).expect("fits");
+            assert_eq!(bytes.len(), room.min(MAX_ENCODED));
+            let mut decoder = wheeleg_protocol::Decoder::new();
+            let sound = bytes
+                .iter()
+                .filter(|b| matches!(decoder.push(**b), Some(Ok(_))));
+            assert_eq!(sound.count(), 1);
+        }
+        assert_eq!(record(14), None);
     }
 }

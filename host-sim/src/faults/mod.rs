@@ -3,19 +3,21 @@
 //!
 //! * [`kind`]: the catalogue;
 //! * [`spec`]: one fault of a run, with target, value and time;
-//! * [`line`]: errors of the bus line;
+//! * [`line`]: errors of the bus line, and rubbish on it;
+//! * [`interface`]: boards of another interface version;
 //! * [`admission`]: which faults a run can have;
 //! * [`schedule`]: begins and ends in order;
 //! * [`injector`]: the faults under way, and what they do to signals.
 
 mod admission;
 mod injector;
+mod interface;
 mod kind;
 mod line;
 mod schedule;
 mod spec;
 
-pub use admission::{check, not_implemented};
+pub use admission::check;
 pub(crate) use injector::Injector;
 pub use kind::{FaultKind, KINDS, KindInfo, Place, ValueSpec};
 pub(crate) use schedule::Schedule;

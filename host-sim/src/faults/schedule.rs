@@ -18,11 +18,11 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// The schedule of `faults`.
+    /// The schedule of `faults`, without those that are there from power-up on.
     pub(crate) fn new(faults: &[FaultSpec]) -> Self {
         let ns = |s: f64| (s * 1e9).round() as u64;
         let mut changes: Vec<Change> = Vec::new();
-        for fault in faults {
+        for fault in faults.iter().filter(|f| !f.kind.is_built_in()) {
             let change = |at_s: f64, begin| Change {
                 at_ns: ns(at_s),
                 begin,

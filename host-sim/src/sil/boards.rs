@@ -58,6 +58,14 @@ fn identity(address: Address) -> NodeIdentity {
     }
 }
 
+/// Another processor behind the same straps.
+fn twin_identity(address: Address) -> NodeIdentity {
+    NodeIdentity {
+        address,
+        unique_id: [!address.raw(); 12],
+    }
+}
+
 fn rejected(address: Address, error: wheeleg_node::ConfigError) -> SimError {
     SimError::simulation(
         format!("the board of {address} refuses its configuration: {error:?}"),
@@ -92,6 +100,19 @@ impl JointBoard {
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(crate) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        Self::build(identity(address), stored)
+    }
+
+    /// Another board with the same straps, as [`Self::new`].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn twin(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        Self::build(twin_identity(address), stored)
+    }
+
+    fn build(who: NodeIdentity, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        let address = who.address;
         let parameters =
             stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
                 p.with(id, raw, true)
@@ -106,7 +127,6 @@ impl JointBoard {
             fill_b,
             vent_b,
         };
-        let who = identity(address);
         let application = if address.raw().is_multiple_of(3) {
             let [front, left, rear, right] = foot.clone();
             let switches = FootSwitches(front, left, rear, right);
@@ -202,6 +222,19 @@ impl WheelBoard {
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        Self::build(identity(address), stored)
+    }
+
+    /// Another board with the same straps, as [`Self::new`].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn twin(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        Self::build(twin_identity(address), stored)
+    }
+
+    fn build(who: NodeIdentity, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        let address = who.address;
         let parameters =
             stored_parameters(address, stored, WheelParameters::default(), |p, id, raw| {
                 p.with(id, raw, true)
@@ -213,7 +246,6 @@ impl WheelBoard {
             pulse: pulse.clone(),
             sign: sign.clone(),
         };
-        let who = identity(address);
         let application = if address.raw() == 7 {
             let switch = SupplySwitch(supply.clone());
             let valve = DumpPin(dump.clone());

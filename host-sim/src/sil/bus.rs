@@ -4,18 +4,26 @@
 //! (start bit, eight data bits, stop bit). Everybody but the sender receives
 //! it, whole, at the end of its last byte; the instant of that end is what a
 //! board's receiver time-stamps. Two drivers active at once corrupt each
-//! other's overlapping bytes (a wired AND of the two bytes) and are counted.
+//! other's overlapping bytes (a wired AND of the two bytes) and are counted; such
+//! bytes are on the line once, and who drives at the same time hears nothing,
+//! because a transceiver's receiver is off while its driver is on.
 //!
 //! Not modelled here: propagation (10 ns on two metres of cable, a thousandth
 //! of a byte), reflections, noise.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
 /// Bits on the line for one byte: start, eight data, stop.
 const BITS_PER_BYTE: u64 = 10;
 
-/// Who drives the line: a bus address (0 master, 1–8 nodes).
+/// Who drives the line: a bus address (0 master, 1–8 nodes), or something else
+/// that is on it ([`super::strangers`]).
 pub(super) type Driver = u8;
+
+/// How long the end of a transmission is remembered, ns: longer than any
+/// transmission lasts.
+const MEMORY_NS: u64 = 10_000_000;
 
 /// One stretch of bytes by one driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +36,8 @@ pub(super) struct Delivery {
     pub end_ns: u64,
     /// The bytes as received, after any collision.
     pub bytes: Vec<u8>,
+    /// Bytes that another delivery has already, where there was a collision.
+    shared: Option<Vec<bool>>,
 }
 
 /// Counters of the line, for telemetry and for the bandwidth budget.
@@ -49,6 +59,8 @@ pub(super) struct Bus {
     byte_ns: u64,
     under_way: VecDeque<Delivery>,
     counters: BusCounters,
+    /// Who drove from when to when, ns: the newest transmissions.
+    driven: VecDeque<(Driver, u64, u64)>,
     /// What was delivered at the present instant, if boards outside of this
     /// process still have to hear its last bytes.
     delivered: Option<Vec<Delivery>>,
@@ -63,6 +75,7 @@ impl Bus {
             byte_ns: BITS_PER_BYTE * 1_000_000_000 / u64::from(baud.max(1)),
             under_way: VecDeque::new(),
             counters: BusCounters::default(),
+            driven: VecDeque::new(),
             delivered: None,
         }
     }
@@ -82,14 +95,26 @@ impl Bus {
         self.counters.bytes += bytes.len() as u64;
         self.counters.frames += 1;
         self.counters.busy_ns += end_ns - start_ns;
-        let mut collided = false;
+        let mut shared = None;
         for other in &mut self.under_way {
             if other.start_ns < end_ns && start_ns < other.end_ns {
-                collided = true;
-                corrupt_overlap(self.byte_ns, other, start_ns, &mut bytes);
+                // Marked on both sides: neither driver hears the other.
+                other
+                    .shared
+                    .get_or_insert_with(|| vec![false; other.bytes.len()]);
+                let shared = shared.get_or_insert_with(|| vec![false; bytes.len()]);
+                corrupt_overlap(self.byte_ns, other, start_ns, &mut bytes, shared);
             }
         }
-        self.counters.collisions += u64::from(collided);
+        self.counters.collisions += u64::from(shared.is_some());
+        while self
+            .driven
+            .front()
+            .is_some_and(|(_, _, end)| end + MEMORY_NS < start_ns)
+        {
+            self.driven.pop_front();
+        }
+        self.driven.push_back((from, start_ns, end_ns));
         let at = self.under_way.partition_point(|d| d.end_ns <= end_ns);
         self.under_way.insert(
             at,
@@ -98,8 +123,40 @@ impl Bus {
                 start_ns,
                 end_ns,
                 bytes,
+                shared,
             },
         );
+    }
+
+    /// What `listener` hears of a delivery, and when the last byte of that ended,
+    /// ns; nothing of its own.
+    #[must_use]
+    pub(super) fn heard_by<'a>(
+        &self,
+        listener: Driver,
+        delivery: &'a Delivery,
+    ) -> Option<(Cow<'a, [u8]>, u64)> {
+        if delivery.from == listener {
+            return None;
+        }
+        let Some(shared) = &delivery.shared else {
+            return Some((Cow::Borrowed(&delivery.bytes), delivery.end_ns));
+        };
+        let drives = |begin_ns: u64, end_ns: u64| {
+            let mut driven = self.driven.iter();
+            driven.any(|(from, begin, end)| *from == listener && *begin < end_ns && begin_ns < *end)
+        };
+        let (mut heard, mut last_ns) = (Vec::new(), delivery.start_ns);
+        let mut begin_ns = delivery.start_ns;
+        for (byte, shared) in delivery.bytes.iter().zip(shared) {
+            let end_ns = begin_ns + self.byte_ns;
+            if !shared && !drives(begin_ns, end_ns) {
+                heard.push(*byte);
+                last_ns = end_ns;
+            }
+            begin_ns = end_ns;
+        }
+        (!heard.is_empty()).then_some((Cow::Owned(heard), last_ns))
     }
 
     /// Instant of the next delivery \[ns\].
@@ -145,9 +202,10 @@ impl Bus {
         let mut heard = Vec::new();
         let kept = self.delivered.iter().flatten();
         for delivery in kept.chain(&self.under_way).filter(|d| d.from != listener) {
-            for (i, byte) in (1..).zip(&delivery.bytes) {
-                let end_ns = delivery.start_ns + i * self.byte_ns;
-                if (after_ns + 1..=until_ns).contains(&end_ns) {
+            let shared = |i: usize| delivery.shared.as_ref().is_some_and(|shared| shared[i]);
+            for (i, byte) in delivery.bytes.iter().enumerate() {
+                let end_ns = delivery.start_ns + (i as u64 + 1) * self.byte_ns;
+                if !shared(i) && (after_ns + 1..=until_ns).contains(&end_ns) {
                     heard.push((end_ns, *byte));
                 }
             }
@@ -163,16 +221,23 @@ impl Bus {
     }
 }
 
-/// Wired AND of every pair of bytes that share line time.
-fn corrupt_overlap(byte_ns: u64, earlier: &mut Delivery, start_ns: u64, bytes: &mut [u8]) {
+/// Wired AND of every pair of bytes that share line time; `shared` marks those of `bytes`.
+fn corrupt_overlap(
+    byte_ns: u64,
+    earlier: &mut Delivery,
+    start_ns: u64,
+    bytes: &mut [u8],
+    shared: &mut [bool],
+) {
     for (i, a) in earlier.bytes.iter_mut().enumerate() {
         let a_start = earlier.start_ns + i as u64 * byte_ns;
-        for (j, b) in bytes.iter_mut().enumerate() {
+        for (j, (b, shared)) in bytes.iter_mut().zip(shared.iter_mut()).enumerate() {
             let b_start = start_ns + j as u64 * byte_ns;
             if a_start < b_start + byte_ns && b_start < a_start + byte_ns {
                 let both = *a & *b;
                 *a = both;
                 *b = both;
+                *shared = true;
             }
         }
     }
@@ -212,6 +277,34 @@ mod tests {
         let b = bus.take_due(u64::MAX).expect("second");
         assert_eq!(a.bytes, vec![0xF0, 0xF0, 0x00]);
         assert_eq!(b.bytes, vec![0x00, 0x0F, 0x0F]);
+    }
+
+    /// A third party hears the shared byte once, the drivers hear what the other
+    /// sent while they were silent themselves.
+    #[test]
+    fn who_drives_hears_nothing_and_a_shared_byte_is_heard_once() {
+        let mut bus = Bus::new(1_000_000);
+        bus.transmit(1, 0, vec![0xF1; 3]);
+        bus.transmit(2, 20_000, vec![0x1F; 3]);
+        let heard = |bus: &Bus, listener, delivery: &Delivery| {
+            let heard = bus.heard_by(listener, delivery);
+            heard.map(|(bytes, end_ns)| (bytes.into_owned(), end_ns))
+        };
+        let a = bus.take_due(u64::MAX).expect("first");
+        let b = bus.take_due(u64::MAX).expect("second");
+        assert_eq!(heard(&bus, 0, &a), Some((vec![0xF1, 0xF1, 0x11], 30_000)));
+        assert_eq!(heard(&bus, 0, &b), Some((vec![0x1F, 0x1F], 50_000)));
+        assert_eq!(heard(&bus, 1, &a), None);
+        assert_eq!(heard(&bus, 1, &b), Some((vec![0x1F, 0x1F], 50_000)));
+        assert_eq!(heard(&bus, 2, &a), Some((vec![0xF1, 0xF1], 20_000)));
+        // Two at the same time: neither hears anything.
+        bus.transmit(1, 100_000, vec![7; 2]);
+        bus.transmit(2, 100_000, vec![9; 2]);
+        let a = bus.take_due(u64::MAX).expect("first");
+        let b = bus.take_due(u64::MAX).expect("second");
+        assert_eq!((heard(&bus, 1, &b), heard(&bus, 2, &a)), (None, None));
+        assert_eq!(heard(&bus, 0, &a), Some((vec![1, 1], 120_000)));
+        assert_eq!(heard(&bus, 0, &b), None);
     }
 
     #[test]

@@ -6,16 +6,24 @@
 //! is simulated like the rest. Scenario time 0, where the record begins, is the
 //! instant at which the robot stands at rest in that pose.
 
+mod audit;
 mod boards;
 mod bus;
+mod edges;
 mod hal;
 mod observe;
 mod operator;
+mod power;
 mod setup;
+mod strangers;
+mod traffic;
 mod world;
 
 use std::ops::ControlFlow;
 
+use wheeleg_protocol::LinkQuality;
+
+pub use self::audit::LineAudit;
 pub(crate) use self::boards::JointBoard;
 
 use self::observe::Observer;
@@ -44,6 +52,10 @@ pub struct RunOutcome {
     pub stopped: bool,
     /// What boards outside of this process did, if there were any.
     pub pil: Option<PilSummary>,
+    /// Frames that were sent and accepted.
+    pub line: LineAudit,
+    /// Frames and errors that the master counted, by kind.
+    pub link: LinkQuality,
 }
 
 /// Runs a scenario and records it.
@@ -84,6 +96,9 @@ pub fn run_with(
     let mut operator = Operator::new(scenario, &robot.start_up);
     let mut observer = Observer::default();
     let mut schedule = Schedule::new(&scenario.faults);
+    for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
+        world.strike(fault, true)?;
+    }
     let cycle_ns = (robot.bus.cycle_s * 1e9).round() as u64;
     let duration_ns = (scenario.duration_s * 1e9).round() as u64;
     let mut start_ns: Option<u64> = None;
@@ -116,6 +131,9 @@ pub fn run_with(
                     act(&event.action, &mut world, &operator, t_ns, recorder)?;
                 }
                 operator.listen(&mut world, t_ns, recorder);
+                for note in world.take_notes() {
+                    recorder.event(t_ns, EventKind::Command, format!("service: {note}"));
+                }
             }
             (Happened::MasterCycle, started) => {
                 let record = world.master().take_telemetry();
@@ -143,6 +161,8 @@ pub fn run_with(
         pil: world
             .outside()
             .map(|outside| outside.summary(nodes, now_ns)),
+        line: world.audit(),
+        link: observer.link(),
     })
 }
 

@@ -5,7 +5,7 @@ use wheeleg_master::setpoint::Phase;
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
 use wheeleg_plant::robot::Outputs;
-use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction};
+use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality};
 
 use super::world::World;
 use crate::telemetry::{
@@ -272,6 +272,13 @@ impl Observer {
             began_ns.saturating_sub(start_ns),
             self.master_sample(world.master_alive()),
         );
+    }
+
+    /// Frames and errors that the master counted.
+    pub(super) fn link(&self) -> LinkQuality {
+        self.last
+            .map(|record| record.counters.link)
+            .unwrap_or_default()
     }
 
     fn master_sample(&mut self, alive: bool) -> MasterSample {

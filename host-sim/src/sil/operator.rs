@@ -252,8 +252,7 @@ impl<'a> Operator<'a> {
             );
             return Ok(());
         }
-        let now_us = world.now_ns() / 1000;
-        let text = match world.master().submit(command, now_us) {
+        let text = match world.submit(command) {
             Ok(_) => format!("{name}: accepted"),
             Err(reject) => format!("{name}: refused, {reject:?}"),
         };

@@ -6,14 +6,20 @@
 //! plant is advanced to a tick before its inputs are latched; bus events do
 //! not touch it.
 
+use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_pil_link as link;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::Address;
-use wheeleg_units::Micros;
 
+use super::audit::{Audit, LineAudit};
 use super::boards::{JointBoard, WheelBoard};
 use super::bus::Bus;
+use super::edges::Sensed;
+use super::power::{Client, Down};
+use super::strangers::Strangers;
+use super::traffic::{NS_PER_US, micros};
 use crate::SimError;
 use crate::config::{NodeParams, RobotConfig};
 use crate::faults::{FaultKind, FaultSpec, Injector, Victim};
@@ -21,27 +27,6 @@ use crate::pil::Outside;
 
 /// Joint tick, ns.
 pub(super) const JOINT_TICK_NS: u64 = 1_000_000;
-const NS_PER_US: u64 = 1_000;
-/// A stopped program is reset after this, ns: the independent watchdog of the
-/// boards (firmware/board/BOARD.md).
-const WATCHDOG_NS: u64 = 50_000_000;
-
-/// Why a board does not run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Down {
-    /// It runs.
-    No,
-    /// It has no power: all its outputs are off.
-    Off {
-        /// When power comes back, ns.
-        until_ns: u64,
-    },
-    /// Its program has stopped: its outputs stay as they are.
-    Hung {
-        /// When the watchdog bites, ns.
-        until_ns: u64,
-    },
-}
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,26 +43,31 @@ pub(super) enum Happened {
 
 /// Everything that is simulated.
 pub(super) struct World {
-    plant: Plant,
-    state: PlantState,
-    inputs: Inputs,
-    outputs: Outputs,
-    joints: [JointBoard; 6],
-    wheels: [WheelBoard; 2],
-    bus: Bus,
-    master: Master,
-    master_alive: bool,
-    cycle_ns: u64,
-    now_ns: u64,
-    next_joint_ns: u64,
-    next_wheel_ns: [u64; 2],
-    cycles: u64,
-    next_cycle_ns: u64,
-    tick_inputs: TickInputs,
-    faults: Injector,
-    down: [Down; 8],
-    outside: Option<Outside>,
-    stored: NodeParams,
+    pub(super) plant: Plant,
+    pub(super) state: PlantState,
+    pub(super) inputs: Inputs,
+    pub(super) outputs: Outputs,
+    pub(super) joints: [JointBoard; 6],
+    pub(super) wheels: [WheelBoard; 2],
+    pub(super) bus: Bus,
+    pub(super) audit: Audit,
+    pub(super) master: Master,
+    pub(super) master_alive: bool,
+    pub(super) cycle_ns: u64,
+    pub(super) now_ns: u64,
+    pub(super) next_joint_ns: u64,
+    pub(super) next_wheel_ns: [u64; 2],
+    pub(super) cycles: u64,
+    pub(super) next_cycle_ns: u64,
+    pub(super) tick_inputs: TickInputs,
+    pub(super) faults: Injector,
+    pub(super) down: [Down; 8],
+    pub(super) strangers: Strangers,
+    pub(super) config: MasterConfig,
+    pub(super) master_back_ns: Option<u64>,
+    pub(super) client: Client,
+    pub(super) outside: Option<Outside>,
+    pub(super) stored: NodeParams,
 }
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
@@ -105,22 +95,6 @@ impl TickInputs {
 
 const VALVE_TICK_US: u16 = 1000;
 
-/// What the joint boards read at a tick edge.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sensed {
-    codes: [u16; 6],
-    feet: [[bool; 4]; 6],
-}
-
-/// Whether the board at `address` works at `now_ns`: here unless it is down,
-/// outside unless it is in reset.
-fn runs(outside: Option<&Outside>, down: &[Down; 8], address: u8, now_ns: u64) -> bool {
-    down[usize::from(address) - 1] == Down::No
-        && outside
-            .and_then(|o| o.ticks(address, now_ns))
-            .unwrap_or(true)
-}
-
 /// Duty of a bridge, −1..=1.
 fn duty(outputs: &link::Outputs) -> f64 {
     let magnitude = f64::from(outputs.bridge_percent) / 100.0;
@@ -129,11 +103,6 @@ fn duty(outputs: &link::Outputs) -> f64 {
     } else {
         magnitude
     }
-}
-
-fn micros(ns: u64) -> Micros {
-    // The boards' clocks are 32-bit microsecond counters and wrap.
-    Micros((ns / NS_PER_US) as u32)
 }
 
 impl World {
@@ -178,6 +147,7 @@ impl World {
             wheel_sample_us: wheels[0].period_us(),
             ..master
         };
+        let mut brain = Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?;
         Ok(Self {
             outputs,
             plant,
@@ -193,7 +163,12 @@ impl World {
             ],
             wheels,
             bus,
-            master: Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?,
+            audit: Audit::default(),
+            client: Client::connect(&mut brain),
+            master: brain,
+            config: master,
+            master_back_ns: None,
+            strangers: Strangers::default(),
             master_alive: true,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
             now_ns: 0,
@@ -295,90 +270,15 @@ impl World {
         };
         for (i, address) in (0..6).zip(1..) {
             let now = micros(self.faults.clock_ns(address, self.now_ns));
-            if runs(self.outside.as_ref(), &self.down, address, self.now_ns) {
+            if self.runs(address) {
                 self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
             }
         }
+        self.strangers.joint_tick(self.now_ns);
         self.next_joint_ns += JOINT_TICK_NS;
+        self.babble(JOINT_TICK_NS);
         self.collect_transmissions();
-        self.offer_acyclic();
-        Ok(())
-    }
-
-    /// The edge of all joint boards outside, and the comparison of the outputs
-    /// that act from it on.
-    fn joint_edge_outside(&mut self, sensed: &Sensed) -> Result<(), SimError> {
-        let (now_ns, bus) = (self.now_ns, &self.bus);
-        let Some(outside) = &mut self.outside else {
-            return Ok(());
-        };
-        let mut edges: Vec<(u8, Option<link::Inputs>)> = (1..)
-            .zip(sensed.codes.iter().zip(sensed.feet))
-            .map(|(address, (code, feet))| {
-                let inputs = link::Inputs {
-                    adc: *code,
-                    switches: link::Switches::from_foot(feet),
-                    encoder: 0,
-                };
-                (address, Some(inputs))
-            })
-            .collect();
-        // The dump valve acts at once: its board is brought to this instant.
-        edges.push((7, None));
-        outside.run(now_ns, &edges, bus.byte_ns(), |address, after_ns| {
-            bus.heard(address, after_ns, now_ns)
-        })?;
-        self.restart_tripped()?;
-        for (board, address) in self.joints.iter().zip(1..) {
-            if runs(self.outside.as_ref(), &self.down, address, now_ns)
-                && let Some(outside) = &mut self.outside
-            {
-                outside.compare_outputs(now_ns, address, &board.active_outputs());
-            }
-        }
-        Ok(())
-    }
-
-    /// A board outside that was reset: the application beside it starts anew.
-    fn restart_tripped(&mut self) -> Result<(), SimError> {
-        for raw in 1..=8_u8 {
-            let trip = self.outside.as_mut().and_then(|o| o.take_trip(raw));
-            let Some(address) = trip.and_then(|_| Address::new(raw)) else {
-                continue;
-            };
-            self.start_anew(address)?;
-        }
-        Ok(())
-    }
-
-    /// The application of a board from its reset on.
-    fn start_anew(&mut self, address: Address) -> Result<(), SimError> {
-        let i = usize::from(address.raw()) - 1;
-        self.down[i] = Down::No;
-        if i < 6 {
-            self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
-        } else {
-            self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6])?;
-        }
-        Ok(())
-    }
-
-    /// Boards whose time without power, or in a stopped program, is over.
-    fn bring_up(&mut self) -> Result<(), SimError> {
-        for raw in 1..=8_u8 {
-            let until_ns = match self.down[usize::from(raw) - 1] {
-                Down::No => continue,
-                Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
-            };
-            let Some(address) = Address::new(raw).filter(|_| until_ns <= self.now_ns) else {
-                continue;
-            };
-            match &mut self.outside {
-                // Its own watchdog and its own start-up end the fault.
-                Some(outside) if outside.has(raw) => outside.set_power(raw, link::Power::Good),
-                _ => self.start_anew(address)?,
-            }
-        }
+        self.offer_line();
         Ok(())
     }
 
@@ -405,140 +305,13 @@ impl World {
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];
         let now_ns = self.faults.clock_ns(address, self.now_ns);
-        let board = &mut self.wheels[wheel];
-        if runs(self.outside.as_ref(), &self.down, address, self.now_ns) {
-            board.tick(micros(now_ns), edges, switch);
+        if self.runs(address) {
+            self.wheels[wheel].tick(micros(now_ns), edges, switch);
         }
-        self.next_wheel_ns[wheel] += u64::from(board.period_us()) * NS_PER_US;
+        self.strangers.wheel_sample(address, self.now_ns);
+        self.next_wheel_ns[wheel] += u64::from(self.wheels[wheel].period_us()) * NS_PER_US;
         self.collect_transmissions();
         Ok(())
-    }
-
-    /// The edge of a wheel board outside, and the comparison of its outputs.
-    fn wheel_edge_outside(
-        &mut self,
-        wheel: usize,
-        edges: i64,
-        switch: bool,
-    ) -> Result<(), SimError> {
-        let (now_ns, bus) = (self.now_ns, &self.bus);
-        let address = wheel as u8 + 7;
-        let Some(outside) = &mut self.outside else {
-            return Ok(());
-        };
-        let inputs = link::Inputs {
-            adc: 0,
-            switches: link::Switches::from_supply(switch),
-            // The counter wraps, as the board's does.
-            encoder: edges as i32,
-        };
-        let edge = [(address, Some(inputs))];
-        outside.run(now_ns, &edge, bus.byte_ns(), |address, after_ns| {
-            bus.heard(address, after_ns, now_ns)
-        })?;
-        self.restart_tripped()?;
-        if runs(self.outside.as_ref(), &self.down, address, now_ns)
-            && let Some(outside) = &mut self.outside
-        {
-            let here = self.wheels[wheel].active_outputs();
-            outside.compare_outputs(now_ns, address, &here);
-        }
-        Ok(())
-    }
-
-    fn master_cycle(&mut self) {
-        if self.master_alive {
-            self.master
-                .set_layer1_enabled(!self.faults.layer_one_stalls());
-            let sync = self.master.cycle(self.now_ns / NS_PER_US);
-            if let Some(bytes) = self.faults.master_sends(&sync) {
-                let master = Address::MASTER.raw();
-                transmit(&mut self.bus, &mut self.faults, master, self.now_ns, bytes);
-            }
-        }
-        self.cycles += 1;
-        let due_ns = self.cycles * self.cycle_ns;
-        self.next_cycle_ns = due_ns.saturating_add_signed(self.faults.cycle_jitter_ns());
-    }
-
-    fn deliver(&mut self) -> Result<(), SimError> {
-        while let Some(delivery) = self.bus.take_due(self.now_ns) {
-            let outside = self.outside.as_ref();
-            let t_end = |address| micros(self.faults.clock_ns(address, delivery.end_ns));
-            for (board, address) in self.joints.iter_mut().zip(1..) {
-                if delivery.from != address && runs(outside, &self.down, address, self.now_ns) {
-                    board.on_bus_bytes(&delivery.bytes, t_end(address));
-                }
-            }
-            for (board, address) in self.wheels.iter_mut().zip(7..) {
-                if delivery.from != address && runs(outside, &self.down, address, self.now_ns) {
-                    board.on_bus_bytes(&delivery.bytes, t_end(address));
-                }
-            }
-            if self.master_alive && delivery.from != Address::MASTER.raw() {
-                self.master
-                    .on_bus_bytes(&delivery.bytes, delivery.end_ns / NS_PER_US);
-            }
-        }
-        if let Some(outside) = &mut self.outside {
-            let (now_ns, bus) = (self.now_ns, &self.bus);
-            let all: [(u8, Option<link::Inputs>); 8] = std::array::from_fn(|i| (i as u8 + 1, None));
-            outside.run(now_ns, &all, bus.byte_ns(), |address, after_ns| {
-                bus.heard(address, after_ns, now_ns)
-            })?;
-            self.bus.forget_delivered();
-            self.restart_tripped()?;
-        }
-        self.collect_transmissions();
-        self.offer_acyclic();
-        Ok(())
-    }
-
-    /// Puts on the line what the boards want to send, at the times they chose.
-    fn collect_transmissions(&mut self) {
-        let now_ns = self.now_ns;
-        let bus = &mut self.bus;
-        let faults = &mut self.faults;
-        let outside = &mut self.outside;
-        let mut send = |from: u8, t: wheeleg_node::Transmission| {
-            if !faults.can_send(from) {
-                return;
-            }
-            // Start times are on the board's own clock.
-            let now = micros(faults.clock_ns(from, now_ns));
-            let ahead = t.start_at.get().wrapping_sub(now.get());
-            // More than half the counter's range ahead means: already past.
-            let ahead_ns = if ahead < 1 << 31 {
-                u64::from(ahead) * NS_PER_US
-            } else {
-                0
-            };
-            let (start_ns, bytes) = (now_ns + ahead_ns, t.bytes.to_vec());
-            match outside {
-                // What goes on the line is what the board outside sends.
-                Some(outside) if outside.has(from) => outside.expect_frame(from, start_ns, bytes),
-                _ => transmit(bus, faults, from, start_ns, bytes),
-            }
-        };
-        for (board, address) in self.joints.iter_mut().zip(1..) {
-            while let Some(t) = board.take_transmission() {
-                send(address, t);
-            }
-        }
-        for (board, address) in self.wheels.iter_mut().zip(7..) {
-            while let Some(t) = board.take_transmission() {
-                send(address, t);
-            }
-        }
-        if let Some(outside) = &mut self.outside {
-            for address in 1..=8 {
-                for (start_ns, bytes) in outside.take_frames(address) {
-                    if self.faults.can_send(address) {
-                        transmit(&mut self.bus, &mut self.faults, address, start_ns, bytes);
-                    }
-                }
-            }
-        }
     }
 
     /// The boards outside of this process.
@@ -546,55 +319,36 @@ impl World {
         self.outside.as_mut()
     }
 
-    /// Lets the master use the line for a request while nothing is on it or scheduled.
-    fn offer_acyclic(&mut self) {
-        if self.master_alive
-            && self.faults.master_requests()
-            && self.bus.next_delivery_ns().is_none()
-            && let Some(bytes) = self.master.next_acyclic(self.now_ns / NS_PER_US)
-        {
-            let master = Address::MASTER.raw();
-            let bytes = bytes.to_vec();
-            transmit(&mut self.bus, &mut self.faults, master, self.now_ns, bytes);
-        }
-    }
-
     /// A fault begins, or ends.
     ///
     /// # Errors
-    /// [`SimError`] if a board outside refuses it.
+    /// [`SimError`] if a board outside refuses it, or one that starts anew.
     pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
         self.faults
             .strike(fault, begin, &mut self.plant, &mut self.state);
-        let Victim::Board(address) = fault.victim else {
-            return Ok(());
-        };
-        let after_ns = |ns: u64| self.now_ns.saturating_add(ns);
-        let down = match fault.kind {
-            FaultKind::NodeOff if begin => Down::Off { until_ns: u64::MAX },
-            FaultKind::NodeOff => Down::Off { until_ns: 0 },
-            FaultKind::NodeReset if begin => Down::Off {
-                until_ns: after_ns(JOINT_TICK_NS),
-            },
-            FaultKind::BrownOut if begin => Down::Off {
-                until_ns: after_ns((fault.value * 1e6) as u64),
-            },
-            FaultKind::NodeHang if begin => Down::Hung {
-                until_ns: after_ns(WATCHDOG_NS),
-            },
-            _ => return Ok(()),
-        };
-        self.down[usize::from(address) - 1] = down;
-        let Some(outside) = &mut self.outside else {
-            return Ok(());
-        };
-        match down {
-            Down::Hung { .. } => outside.hook(address, link::Hook::StopProcessor),
-            _ => {
-                outside.set_power(address, link::Power::BrownOut);
-                Ok(())
+        match (fault.kind, fault.victim) {
+            (FaultKind::DuplicateAddress, Victim::Board(address)) if begin => {
+                self.strangers.plug_in(address, &self.stored)?;
             }
+            (FaultKind::DuplicateAddress, Victim::Board(address)) => {
+                self.strangers.unplug(address);
+            }
+            (FaultKind::InvalidParameter, Victim::Board(address)) if begin => {
+                self.strangers.write_parameters(address);
+            }
+            _ => {}
         }
+        self.strike_power(fault, begin)
+    }
+
+    /// What happened on the line beside the boards' own doing, in words; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<String> {
+        self.strangers.take_notes()
+    }
+
+    /// What a listener says that knows what was sent.
+    pub(super) fn audit(&self) -> LineAudit {
+        self.audit.counts()
     }
 
     /// The faults under way.
@@ -615,6 +369,15 @@ impl World {
     /// The master, for user commands and its events.
     pub(super) fn master(&mut self) -> &mut Master {
         &mut self.master
+    }
+
+    /// A command of the user's program.
+    ///
+    /// # Errors
+    /// See [`Reject`].
+    pub(super) fn submit(&mut self, command: Command) -> Result<Ticket, Reject> {
+        let now_us = self.now_ns / NS_PER_US;
+        self.client.submit(&mut self.master, command, now_us)
     }
 
     /// Simulated time since power-up, ns.
@@ -656,12 +419,6 @@ impl World {
     pub(super) fn plant(&self) -> &Plant {
         &self.plant
     }
-}
-
-/// Puts bytes on the line as the line lets them through.
-fn transmit(bus: &mut Bus, faults: &mut Injector, from: u8, start_ns: u64, bytes: Vec<u8>) {
-    let (received, late_ns) = faults.transmit(bytes);
-    bus.transmit(from, start_ns + late_ns, received);
 }
 
 fn unphysical(now_ns: u64, error: &wheeleg_plant::PlantError) -> SimError {

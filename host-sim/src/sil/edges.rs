@@ -1,0 +1,105 @@
+//! Tick edges of boards outside of this process: their inputs, and the comparison
+//! of their outputs with those of the native application beside them.
+
+use wheeleg_pil_link as link;
+use wheeleg_protocol::Address;
+
+use super::world::World;
+use crate::SimError;
+
+/// What the joint boards read at a tick edge.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sensed {
+    pub(super) codes: [u16; 6],
+    pub(super) feet: [[bool; 4]; 6],
+}
+
+impl World {
+    /// The edge of all joint boards outside, and the comparison of the outputs
+    /// that act from it on.
+    pub(super) fn joint_edge_outside(&mut self, sensed: &Sensed) -> Result<(), SimError> {
+        // The dump valve acts at once: its board is brought to this instant.
+        let mut edges: Vec<(u8, Option<link::Inputs>)> = vec![(7, None)];
+        for (address, (code, feet)) in (1..).zip(sensed.codes.iter().zip(sensed.feet)) {
+            let inputs = link::Inputs {
+                adc: *code,
+                switches: link::Switches::from_foot(feet),
+                encoder: 0,
+            };
+            edges.push((address, Some(inputs)));
+        }
+        edges.rotate_left(1);
+        self.run_outside(&edges)?;
+        for i in 0..6 {
+            let address = i as u8 + 1;
+            if self.runs(address)
+                && let Some(outside) = &mut self.outside
+            {
+                let here = self.joints[i].active_outputs();
+                outside.compare_outputs(self.now_ns, address, &here);
+            }
+        }
+        Ok(())
+    }
+
+    /// The edge of a wheel board outside, and the comparison of its outputs.
+    pub(super) fn wheel_edge_outside(
+        &mut self,
+        wheel: usize,
+        edges: i64,
+        switch: bool,
+    ) -> Result<(), SimError> {
+        let address = wheel as u8 + 7;
+        if self.outside.is_none() {
+            return Ok(());
+        }
+        let inputs = link::Inputs {
+            adc: 0,
+            switches: link::Switches::from_supply(switch),
+            // The counter wraps, as the board's does.
+            encoder: edges as i32,
+        };
+        self.run_outside(&[(address, Some(inputs))])?;
+        if self.runs(address)
+            && let Some(outside) = &mut self.outside
+        {
+            let here = self.wheels[wheel].active_outputs();
+            outside.compare_outputs(self.now_ns, address, &here);
+        }
+        Ok(())
+    }
+
+    /// Brings all boards outside to this instant, so that they have heard all
+    /// that was delivered.
+    pub(super) fn deliver_outside(&mut self) -> Result<(), SimError> {
+        if self.outside.is_some() {
+            let all: [(u8, Option<link::Inputs>); 8] = std::array::from_fn(|i| (i as u8 + 1, None));
+            self.run_outside(&all)?;
+            self.bus.forget_delivered();
+        }
+        Ok(())
+    }
+
+    fn run_outside(&mut self, edges: &[(u8, Option<link::Inputs>)]) -> Result<(), SimError> {
+        let (now_ns, bus) = (self.now_ns, &self.bus);
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        outside.run(now_ns, edges, bus.byte_ns(), |address, after_ns| {
+            bus.heard(address, after_ns, now_ns)
+        })?;
+        self.restart_tripped()
+    }
+
+    /// A board outside that was reset: the application beside it starts anew.
+    fn restart_tripped(&mut self) -> Result<(), SimError> {
+        for raw in 1..=8_u8 {
+            let trip = self.outside.as_mut().and_then(|o| o.take_trip(raw));
+            let Some(address) = trip.and_then(|_| Address::new(raw)) else {
+                continue;
+            };
+            self.start_anew(address)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,181 @@
+//! Power, resets and restarts: boards without power or with a stopped program,
+//! and a master or a user's program that starts anew.
+
+use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::{Reject, Request, Ticket};
+use wheeleg_master::master::LOCAL_DEADLINE_US;
+use wheeleg_master::{Master, MasterConfig};
+use wheeleg_pil_link as link;
+use wheeleg_protocol::Address;
+
+use super::boards::{JointBoard, WheelBoard};
+use super::world::{JOINT_TICK_NS, World};
+use crate::SimError;
+use crate::faults::{FaultKind, FaultSpec, Victim};
+
+/// A stopped program is reset after this, ns: the independent watchdog of the
+/// boards (firmware/board/BOARD.md).
+const WATCHDOG_NS: u64 = 50_000_000;
+/// What a master adds to the first number of its requests at every start, so that
+/// no board takes them for repetitions; any odd number would do.
+const SEQUENCE_STEP: u16 = 0x2F35;
+
+/// Why a board does not run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Down {
+    /// It runs.
+    No,
+    /// It has no power: all its outputs are off.
+    Off {
+        /// When power comes back, ns.
+        until_ns: u64,
+    },
+    /// Its program has stopped: its outputs stay as they are.
+    Hung {
+        /// When the watchdog bites, ns.
+        until_ns: u64,
+    },
+}
+
+/// The program through which the user gives commands: a client of the master.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Client {
+    next_id: u32,
+}
+
+impl Client {
+    /// Number of the client at the master.
+    const NUMBER: u8 = 1;
+
+    /// A program that has just been started and opens its session.
+    pub(super) fn connect(master: &mut Master) -> Self {
+        master.open_session(Self::NUMBER);
+        Self { next_id: 1 }
+    }
+
+    /// Gives a command.
+    ///
+    /// # Errors
+    /// See [`Reject`].
+    pub(super) fn submit(
+        &mut self,
+        master: &mut Master,
+        command: Command,
+        now_us: u64,
+    ) -> Result<Ticket, Reject> {
+        let request = Request {
+            client: Self::NUMBER,
+            id: self.next_id,
+            deadline_us: now_us.saturating_add(LOCAL_DEADLINE_US),
+            command,
+        };
+        self.next_id += 1;
+        master.submit_request(request, now_us)
+    }
+}
+
+impl World {
+    /// Whether the board at `address` works: here unless it is down, outside
+    /// unless it is in reset.
+    pub(super) fn runs(&self, address: u8) -> bool {
+        let outside = self.outside.as_ref();
+        self.down[usize::from(address) - 1] == Down::No
+            && outside
+                .and_then(|o| o.ticks(address, self.now_ns))
+                .unwrap_or(true)
+    }
+
+    /// The application of a board from its reset on.
+    pub(super) fn start_anew(&mut self, address: Address) -> Result<(), SimError> {
+        let i = usize::from(address.raw()) - 1;
+        self.down[i] = Down::No;
+        if i < 6 {
+            self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
+        } else {
+            self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6])?;
+        }
+        Ok(())
+    }
+
+    /// Boards whose time without power, or in a stopped program, is over; a
+    /// master that has been reset.
+    pub(super) fn bring_up(&mut self) -> Result<(), SimError> {
+        for raw in 1..=8_u8 {
+            let until_ns = match self.down[usize::from(raw) - 1] {
+                Down::No => continue,
+                Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
+            };
+            let Some(address) = Address::new(raw).filter(|_| until_ns <= self.now_ns) else {
+                continue;
+            };
+            match &mut self.outside {
+                // Its own watchdog and its own start-up end the fault.
+                Some(outside) if outside.has(raw) => outside.set_power(raw, link::Power::Good),
+                _ => self.start_anew(address)?,
+            }
+        }
+        if self.master_back_ns.is_some_and(|at| at <= self.now_ns) {
+            self.master_back_ns = None;
+            self.restart_master()?;
+        }
+        Ok(())
+    }
+
+    /// A master that remembers nothing. Whoever was connected to it reconnects.
+    fn restart_master(&mut self) -> Result<(), SimError> {
+        let first_sequence = self.config.first_sequence.wrapping_add(SEQUENCE_STEP);
+        self.config = MasterConfig {
+            first_sequence,
+            ..self.config
+        };
+        self.master = Master::new(self.config).map_err(|e| {
+            SimError::simulation(format!("the master does not start again: {e:?}"), "")
+        })?;
+        self.master_alive = true;
+        Ok(())
+    }
+
+    /// What a fault does to the power of a board or to a program.
+    ///
+    /// # Errors
+    /// [`SimError`] if a board outside refuses it.
+    pub(super) fn strike_power(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
+        let after_ns = |ms: f64| self.now_ns.saturating_add((ms * 1e6) as u64);
+        match fault.kind {
+            FaultKind::MasterReset if begin => {
+                self.master_alive = false;
+                self.master_back_ns = Some(after_ns(fault.value));
+            }
+            FaultKind::ClientReset if begin => self.client = Client::connect(&mut self.master),
+            _ => {}
+        }
+        let Victim::Board(address) = fault.victim else {
+            return Ok(());
+        };
+        let down = match fault.kind {
+            FaultKind::NodeOff if begin => Down::Off { until_ns: u64::MAX },
+            FaultKind::NodeOff => Down::Off { until_ns: 0 },
+            FaultKind::NodeReset if begin => Down::Off {
+                until_ns: self.now_ns.saturating_add(JOINT_TICK_NS),
+            },
+            FaultKind::BrownOut if begin => Down::Off {
+                until_ns: after_ns(fault.value),
+            },
+            FaultKind::NodeHang if begin => Down::Hung {
+                until_ns: self.now_ns.saturating_add(WATCHDOG_NS),
+            },
+            _ => return Ok(()),
+        };
+        self.down[usize::from(address) - 1] = down;
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        match down {
+            Down::Hung { .. } => outside.hook(address, link::Hook::StopProcessor),
+            _ => {
+                outside.set_power(address, link::Power::BrownOut);
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! What goes on the line and who hears it.
+
+use wheeleg_protocol::Address;
+use wheeleg_units::Micros;
+
+use super::audit::Audit;
+use super::bus::{Bus, Driver};
+use super::strangers;
+use super::world::World;
+use crate::SimError;
+use crate::faults::Injector;
+
+pub(super) const NS_PER_US: u64 = 1_000;
+
+pub(super) fn micros(ns: u64) -> Micros {
+    // The boards' clocks are 32-bit microsecond counters and wrap.
+    Micros((ns / NS_PER_US) as u32)
+}
+
+/// Start of a transmission on the line's clock, ns, from the board's own: `now` is
+/// what that shows at `now_ns`.
+fn start_ns(now_ns: u64, now: Micros, start_at: Micros) -> u64 {
+    let ahead = start_at.get().wrapping_sub(now.get());
+    // More than half the counter's range ahead means: already past.
+    if ahead < 1 << 31 {
+        now_ns + u64::from(ahead) * NS_PER_US
+    } else {
+        now_ns
+    }
+}
+
+/// Puts bytes on the line as the line lets them through.
+fn transmit(
+    bus: &mut Bus,
+    audit: &mut Audit,
+    faults: &mut Injector,
+    from: Driver,
+    start_ns: u64,
+    bytes: Vec<u8>,
+) {
+    audit.sent(&bytes);
+    let (received, late_ns) = faults.transmit(bytes);
+    bus.transmit(from, start_ns + late_ns, received);
+}
+
+impl World {
+    pub(super) fn transmit(&mut self, from: Driver, start_ns: u64, bytes: Vec<u8>) {
+        let (bus, audit) = (&mut self.bus, &mut self.audit);
+        transmit(bus, audit, &mut self.faults, from, start_ns, bytes);
+    }
+
+    /// The master's cycle begins: SYNC.
+    pub(super) fn master_cycle(&mut self) {
+        if self.master_alive {
+            let stalls = self.faults.layer_one_stalls();
+            self.master.set_layer1_enabled(!stalls);
+            let sync = self.master.cycle(self.now_ns / NS_PER_US);
+            if let Some(bytes) = self.faults.master_sends(&sync) {
+                self.transmit(Address::MASTER.raw(), self.now_ns, bytes);
+            }
+        }
+        self.cycles += 1;
+        let due_ns = self.cycles * self.cycle_ns;
+        self.next_cycle_ns = due_ns.saturating_add_signed(self.faults.cycle_jitter_ns());
+    }
+
+    /// Hands over what has reached its end on the line.
+    pub(super) fn deliver(&mut self) -> Result<(), SimError> {
+        while let Some(delivery) = self.bus.take_due(self.now_ns) {
+            for address in 1..=8_u8 {
+                if !self.runs(address) {
+                    continue;
+                }
+                let Some((bytes, end_ns)) = self.bus.heard_by(address, &delivery) else {
+                    continue;
+                };
+                let t_end = micros(self.faults.clock_ns(address, end_ns));
+                let i = usize::from(address) - 1;
+                match self.joints.get_mut(i) {
+                    Some(board) => board.on_bus_bytes(&bytes, t_end),
+                    None => self.wheels[i - 6].on_bus_bytes(&bytes, t_end),
+                }
+            }
+            let master = Address::MASTER.raw();
+            if self.master_alive
+                && let Some((bytes, end_ns)) = self.bus.heard_by(master, &delivery)
+            {
+                self.master.on_bus_bytes(&bytes, end_ns / NS_PER_US);
+            }
+            self.strangers.hear(&self.bus, &delivery);
+            if let Some((bytes, _)) = self.bus.heard_by(strangers::AUDITOR, &delivery) {
+                self.audit.heard(&bytes);
+            }
+        }
+        self.deliver_outside()?;
+        self.collect_transmissions();
+        self.offer_line();
+        Ok(())
+    }
+
+    /// Puts on the line what the boards want to send, at the times they chose.
+    pub(super) fn collect_transmissions(&mut self) {
+        let now_ns = self.now_ns;
+        let (bus, audit) = (&mut self.bus, &mut self.audit);
+        let (faults, outside) = (&mut self.faults, &mut self.outside);
+        let mut send = |from: u8, t: wheeleg_node::Transmission| {
+            // Start times are on the board's own clock.
+            let now = micros(faults.clock_ns(from, now_ns));
+            let start_ns = start_ns(now_ns, now, t.start_at);
+            let Some(bytes) = faults.board_sends(from, t.bytes.to_vec()) else {
+                return;
+            };
+            match outside {
+                // What goes on the line is what the board outside sends.
+                Some(outside) if outside.has(from) => outside.expect_frame(from, start_ns, bytes),
+                _ => transmit(bus, audit, faults, from, start_ns, bytes),
+            }
+        };
+        for (board, address) in self.joints.iter_mut().zip(1..) {
+            while let Some(t) = board.take_transmission() {
+                send(address, t);
+            }
+        }
+        for (board, address) in self.wheels.iter_mut().zip(7..) {
+            while let Some(t) = board.take_transmission() {
+                send(address, t);
+            }
+        }
+        while let Some((from, t)) = self.strangers.take_transmission() {
+            let start_ns = start_ns(now_ns, micros(now_ns), t.start_at);
+            transmit(bus, audit, faults, from, start_ns, t.bytes.to_vec());
+        }
+        if let Some(outside) = outside {
+            for address in 1..=8 {
+                for (start_ns, bytes) in outside.take_frames(address) {
+                    if let Some(bytes) = faults.board_sends(address, bytes) {
+                        transmit(bus, audit, faults, address, start_ns, bytes);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lets the master use the line for a request while nothing is on it or
+    /// scheduled, then a service tool, then whoever has a stream to send.
+    pub(super) fn offer_line(&mut self) {
+        if self.bus.next_delivery_ns().is_some() {
+            return;
+        }
+        let now_us = self.now_ns / NS_PER_US;
+        if self.master_alive
+            && self.faults.master_requests()
+            && let Some(bytes) = self.master.next_acyclic(now_us)
+        {
+            self.transmit(Address::MASTER.raw(), self.now_ns, bytes.to_vec());
+            return;
+        }
+        let left_ns = self.next_cycle_ns.saturating_sub(self.now_ns);
+        if let Some(bytes) = self.strangers.service_request(now_us, left_ns) {
+            self.transmit(strangers::SERVICE, self.now_ns, bytes);
+            return;
+        }
+        let room = (left_ns / self.bus.byte_ns()) as usize;
+        if let Some(bytes) = self.faults.stream(room) {
+            self.transmit(strangers::STREAM, self.now_ns, bytes);
+        }
+    }
+
+    /// What boards whose driver is stuck on send in the tick that begins now.
+    pub(super) fn babble(&mut self, tick_ns: u64) {
+        let bytes = (tick_ns / self.bus.byte_ns()) as usize;
+        for address in 1..=8_u8 {
+            if self.runs(address)
+                && let Some(rubbish) = self.faults.babble(address, bytes)
+            {
+                self.transmit(address, self.now_ns, rubbish);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_start_that_is_past_is_now_and_the_counter_may_wrap() {
+        let at = |now: u32, start: u32| start_ns(5_000_000, Micros(now), Micros(start));
+        assert_eq!(at(100, 350), 5_250_000);
+        assert_eq!(at(350, 100), 5_000_000);
+        assert_eq!(at(u32::MAX - 9, 40), 5_050_000);
+    }
+}
