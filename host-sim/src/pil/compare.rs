@@ -9,6 +9,7 @@ use std::fmt;
 
 use wheeleg_pil_link::{Inputs, Outputs};
 
+use super::channel::{Channel, Count, Counts};
 use super::choice::NODE_NAMES;
 
 /// The first thing that differed.
@@ -43,10 +44,8 @@ impl fmt::Display for Difference {
 /// Counts of a comparison.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Comparison {
-    /// Bits compared.
-    pub bits: u64,
-    /// Bits that differed.
-    pub differing: u64,
+    /// Bits by channel, for each address from 1.
+    pub counts: [Counts; 8],
     /// Ticks compared.
     pub ticks: u64,
     /// Transmissions compared.
@@ -56,35 +55,69 @@ pub struct Comparison {
 }
 
 impl Comparison {
+    /// Bits of all boards by channel.
+    #[must_use]
+    pub fn by_channel(&self) -> Counts {
+        self.counts.iter().fold(Counts::default(), |mut sum, one| {
+            sum.merge(one);
+            sum
+        })
+    }
+
+    /// All bits.
+    #[must_use]
+    pub fn total(&self) -> Count {
+        self.by_channel().total()
+    }
+
+    /// Bits of the board at `address` by channel.
+    pub(crate) fn of(&mut self, address: u8) -> &mut Counts {
+        &mut self.counts[usize::from(address).clamp(1, 8) - 1]
+    }
+
     /// Compares two values of `width` bits.
-    fn value(&mut self, width: u32, (here, there): (u64, u64), what: impl FnOnce() -> Difference) {
-        self.bits += u64::from(width);
+    fn value(
+        &mut self,
+        address: u8,
+        channel: Channel,
+        width: u32,
+        (here, there): (u64, u64),
+        what: impl FnOnce() -> Difference,
+    ) {
         let differing = (here ^ there).count_ones();
+        self.of(address)
+            .of(channel)
+            .add(u64::from(width), u64::from(differing));
         if differing > 0 {
-            self.differing += u64::from(differing);
             self.first.get_or_insert_with(what);
         }
     }
 
-    /// Outputs that act from the edge at `at_ns` on.
-    pub(crate) fn outputs(&mut self, at_ns: u64, address: u8, here: &Outputs, there: &Outputs) {
-        let field = |field: &str, here: u64, there: u64| Difference {
+    /// Compares two values of a board's pins at `at_ns`.
+    fn pins(&mut self, at_ns: u64, address: u8, channel: Channel, width: u32, pair: (u64, u64)) {
+        self.value(address, channel, width, pair, || Difference {
             at_ns,
             address,
-            field: field.to_owned(),
-            here: here.to_string(),
-            there: there.to_string(),
-        };
+            field: channel.name().to_owned(),
+            here: pair.0.to_string(),
+            there: pair.1.to_string(),
+        });
+    }
+
+    /// Outputs that act from the edge at `at_ns` on.
+    pub(crate) fn outputs(&mut self, at_ns: u64, address: u8, here: &Outputs, there: &Outputs) {
         self.ticks += 1;
         if address <= 6 {
-            const VALVES: [&str; 4] = ["fill A", "vent A", "fill B", "vent B"];
-            for (i, name) in VALVES.iter().enumerate() {
-                let pair = (
-                    u64::from(here.valve_on_us[i]),
-                    u64::from(there.valve_on_us[i]),
-                );
-                let name = format!("on-time of {name} in µs");
-                self.value(16, pair, || field(&name, pair.0, pair.1));
+            const VALVES: [Channel; 4] = [
+                Channel::FillA,
+                Channel::VentA,
+                Channel::FillB,
+                Channel::VentB,
+            ];
+            let pairs = here.valve_on_us.iter().zip(there.valve_on_us);
+            for (channel, (here, there)) in VALVES.into_iter().zip(pairs) {
+                let pair = (u64::from(*here), u64::from(there));
+                self.pins(at_ns, address, channel, 16, pair);
             }
             return;
         }
@@ -94,42 +127,31 @@ impl Comparison {
             u64::from(o.bridge_percent) | u64::from(backward) << 8
         };
         let pair = (signed(here), signed(there));
-        self.value(9, pair, || {
-            field("bridge drive in % (+256 backward)", pair.0, pair.1)
-        });
+        self.pins(at_ns, address, Channel::Bridge, 9, pair);
         let pair = (u64::from(here.dump), u64::from(there.dump));
-        self.value(1, pair, || field("dump valve", pair.0, pair.1));
+        self.pins(at_ns, address, Channel::Dump, 1, pair);
     }
 
     /// Inputs of the tick at `at_ns`: latched here, and as seen there.
     pub(crate) fn inputs(&mut self, at_ns: u64, address: u8, here: &Inputs, there: &Inputs) {
-        let field = |field: &'static str, pair: (u64, u64)| Difference {
-            at_ns,
-            address,
-            field: field.to_owned(),
-            here: pair.0.to_string(),
-            there: pair.1.to_string(),
-        };
         if address <= 6 {
             let pair = (u64::from(here.adc), u64::from(there.adc));
-            self.value(16, pair, || field("converter code", pair));
+            self.pins(at_ns, address, Channel::Converter, 16, pair);
             if address.is_multiple_of(3) {
                 let foot = |i: &Inputs| u64::from(i.switches.0 & wheeleg_pil_link::Switches::FOOT);
                 let pair = (foot(here), foot(there));
-                self.value(4, pair, || field("foot switches", pair));
+                self.pins(at_ns, address, Channel::Feet, 4, pair);
             }
             return;
         }
         // The hardware's counter has 16 bits; the driver extends it.
         let count = |i: &Inputs| u64::from(i.encoder as u16);
         let pair = (count(here), count(there));
-        self.value(16, pair, || field("encoder count, low 16 bits", pair));
+        self.pins(at_ns, address, Channel::Encoder, 16, pair);
         if address == 7 {
-            let pair = (
-                u64::from(here.switches.supply()),
-                u64::from(there.switches.supply()),
-            );
-            self.value(1, pair, || field("supply switch", pair));
+            let supply = |i: &Inputs| u64::from(i.switches.supply());
+            let pair = (supply(here), supply(there));
+            self.pins(at_ns, address, Channel::Supply, 1, pair);
         }
     }
 
@@ -158,17 +180,19 @@ impl Comparison {
         };
         let (Some((start, bytes)), Some((start_there, bytes_there))) = (here, there) else {
             // All bits of what the other side lacks.
-            let length = here.or(there).map_or(0, |(_, b)| b.len() as u64);
-            self.bits += 64 + 8 * length;
-            self.differing += 64 + 8 * length;
+            let bits = 8 * here.or(there).map_or(0, |(_, b)| b.len() as u64);
+            self.of(address).of(Channel::FrameStart).add(64, 64);
+            self.of(address).of(Channel::FrameBytes).add(bits, bits);
             self.first.get_or_insert_with(what);
             return;
         };
-        self.value(64, (start, start_there), what);
+        let starts = (start, start_there);
+        self.value(address, Channel::FrameStart, 64, starts, what);
         let longest = bytes.len().max(bytes_there.len());
         let byte = |b: &[u8], i: usize| b.get(i).map_or(0x100, |b| u64::from(*b));
         for i in 0..longest {
-            self.value(8, (byte(bytes, i), byte(bytes_there, i)), what);
+            let pair = (byte(bytes, i), byte(bytes_there, i));
+            self.value(address, Channel::FrameBytes, 8, pair, what);
         }
     }
 }
@@ -186,10 +210,16 @@ mod tests {
         };
         let mut there = here;
         comparison.outputs(1_000_000, 3, &here, &there);
-        assert_eq!((comparison.bits, comparison.differing), (64, 0));
+        let counted = |c: &Comparison| (c.total().bits, c.total().differing);
+        assert_eq!(counted(&comparison), (64, 0));
         there.valve_on_us[1] ^= 2;
         comparison.outputs(2_000_000, 3, &here, &there);
-        assert_eq!((comparison.bits, comparison.differing), (128, 1));
+        assert_eq!(counted(&comparison), (128, 1));
+        let vent = comparison.counts[2].figures();
+        assert_eq!(vent[1].channel, "on-time of vent A in µs");
+        assert_eq!((vent[1].compared_bits, vent[1].differing_bits), (32, 1));
+        assert_eq!(vent.len(), 4, "channels of a joint's outputs alone");
+        assert_eq!(comparison.counts[3].total(), Count::default());
         let first = comparison.first.clone().expect("a difference");
         let text = first.to_string();
         for part in ["0.002000 s", "joint3", "vent A", "350", "348"] {
@@ -205,7 +235,7 @@ mod tests {
         let differing = |here, there| {
             let mut comparison = Comparison::default();
             comparison.frame(0, 8, here, there);
-            comparison.differing
+            comparison.total().differing
         };
         let frame: &[u8] = &[1, 2, 0];
         assert_eq!(differing(Some((5, frame)), Some((5, frame))), 0);
@@ -224,7 +254,7 @@ mod tests {
             ..here
         };
         comparison.outputs(0, 7, &here, &there);
-        assert_eq!(comparison.differing, 0);
+        assert_eq!(comparison.total().differing, 0);
         let driven = Outputs {
             bridge_percent: 40,
             ..there
@@ -234,6 +264,6 @@ mod tests {
             ..driven
         };
         comparison.outputs(0, 7, &forward, &driven);
-        assert_eq!(comparison.differing, 1);
+        assert_eq!(comparison.total().differing, 1);
     }
 }

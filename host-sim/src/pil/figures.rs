@@ -3,6 +3,7 @@
 use serde::Serialize;
 use wheeleg_pil_link::{Figures, Hello};
 
+use super::channel::{ChannelFigures, Count};
 use super::choice::NODE_NAMES;
 
 /// Figures of one board.
@@ -16,6 +17,10 @@ pub struct BoardFigures {
     pub digest: String,
     /// What it runs on.
     pub host: String,
+    /// Bits compared with the application in this process.
+    pub compared_bits: u64,
+    /// Bits that differed.
+    pub differing_bits: u64,
     /// Ticks worked off.
     pub ticks: u64,
     /// Instructions of a tick, interrupt entry and main loop included, median.
@@ -35,7 +40,13 @@ pub struct BoardFigures {
 }
 
 impl BoardFigures {
-    pub(crate) fn new(address: u8, hello: &Hello, figures: &Figures, ticks: &[u32]) -> Self {
+    pub(crate) fn new(
+        address: u8,
+        hello: &Hello,
+        figures: &Figures,
+        ticks: &[u32],
+        compared: Count,
+    ) -> Self {
         let mut sorted = ticks.to_vec();
         sorted.sort_unstable();
         Self {
@@ -48,6 +59,8 @@ impl BoardFigures {
                 .map(|b| format!("{b:02x}"))
                 .collect(),
             host: hello.host.to_string(),
+            compared_bits: compared.bits,
+            differing_bits: compared.differing,
             ticks: ticks.len() as u64,
             tick_instructions_median: sorted.get(sorted.len() / 2).copied().unwrap_or(0),
             tick_instructions_worst: sorted.last().copied().unwrap_or(0),
@@ -73,6 +86,8 @@ pub struct PilSummary {
     pub compared_ticks: u64,
     /// Transmissions compared.
     pub compared_frames: u64,
+    /// The same by channel, all boards together.
+    pub channels: Vec<ChannelFigures>,
     /// The first difference, in words.
     pub first_difference: Option<String>,
     /// The boards outside.

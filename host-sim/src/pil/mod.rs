@@ -1,5 +1,6 @@
 //! Processor in the loop: boards that run outside of this process.
 
+mod channel;
 pub mod choice;
 mod compare;
 mod figures;
@@ -10,6 +11,8 @@ pub mod qemu;
 mod store;
 pub mod unicorn;
 
+pub use channel::{Channel, ChannelFigures, Count, Counts};
+pub(crate) use choice::NODE_NAMES;
 pub use choice::{NodeChoice, NodeKind, Nodes};
 pub use compare::{Comparison, Difference};
 pub use figures::{BoardFigures, PilSummary};

@@ -436,17 +436,27 @@ impl Outside {
     /// Comparison and figures, at the end of a run.
     pub(crate) fn summary(&mut self, nodes: &Nodes, now_ns: u64) -> PilSummary {
         self.finish(now_ns);
-        let figures = |b: &Board| {
-            BoardFigures::new(b.address, &b.hello, &b.ran.figures, &b.tick_instructions)
+        let compared = &mut self.comparison;
+        let mut figures = |b: &Board| {
+            BoardFigures::new(
+                b.address,
+                &b.hello,
+                &b.ran.figures,
+                &b.tick_instructions,
+                compared.of(b.address).total(),
+            )
         };
+        let boards = self.boards.iter().map(&mut figures).collect();
+        let total = self.comparison.total();
         PilSummary {
             nodes: nodes.0.iter().map(ToString::to_string).collect(),
-            compared_bits: self.comparison.bits,
-            differing_bits: self.comparison.differing,
+            compared_bits: total.bits,
+            differing_bits: total.differing,
+            channels: self.comparison.by_channel().figures(),
             compared_ticks: self.comparison.ticks,
             compared_frames: self.comparison.frames,
             first_difference: self.comparison.first.as_ref().map(ToString::to_string),
-            boards: self.boards.iter().map(figures).collect(),
+            boards,
         }
     }
 }
