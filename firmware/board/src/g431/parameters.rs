@@ -5,14 +5,13 @@ use crate::store::Store;
 
 /// Puts the stored values over `defaults`, one by one. A value that the
 /// application refuses, because it is from another version, keeps its default.
-pub fn load<P, R>(defaults: P, with: impl Fn(&P, u16, i32) -> Result<P, R>) -> P {
+pub fn load<P: Copy, R>(defaults: P, with: impl Fn(&P, u16, i32) -> Result<P, R>) -> P {
     // SAFETY: the one use of the pages; it ends here.
     let store = Store::new(unsafe { ParameterPages::steal() });
-    let mut parameters = defaults;
-    store.load(|record| {
-        if let Ok(changed) = with(&parameters, record.id, record.raw) {
-            parameters = changed;
+    let loaded = store.load(defaults, |parameters, record| {
+        if let Ok(changed) = with(parameters, record.id, record.raw) {
+            *parameters = changed;
         }
     });
-    parameters
+    loaded.map_or(defaults, |(parameters, _)| parameters)
 }

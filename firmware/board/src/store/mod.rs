@@ -96,7 +96,6 @@ impl From<FlashError> for SaveError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Whole {
     page: usize,
-    count: usize,
     sequence: u32,
 }
 
@@ -112,20 +111,25 @@ impl<F: Flash> Store<F> {
         Self { flash }
     }
 
-    /// Hands every record of the newest whole set to `take`, in the order in
-    /// which they were saved; gives the set's sequence number, or `None` if there
-    /// is no whole set.
-    pub fn load(&self, mut take: impl FnMut(Record)) -> Option<u32> {
-        let newest = self.newest()?;
-        for word in 1..=newest.count {
-            let record = self
-                .flash
-                .read(newest.page, word)
-                .and_then(Record::from_word);
-            // A set that was whole a moment ago and now is not: none of the rest.
-            take(record?);
-        }
-        Some(newest.sequence)
+    /// Puts every record of the newest whole set over `defaults`, in the order in
+    /// which they were saved; gives the result and the set's sequence number, or
+    /// `None` if there is no whole set.
+    ///
+    /// A word torn by a power cut may read differently each time. So the records
+    /// count only if the checksum holds for what `put` was really given, and the
+    /// other page is looked at where it does not: never a part of a set.
+    pub fn load<T: Copy>(
+        &self,
+        defaults: T,
+        mut put: impl FnMut(&mut T, Record),
+    ) -> Option<(T, u32)> {
+        let newest = self.newest()?.page;
+        let other = 1_usize.saturating_sub(newest);
+        [newest, other].into_iter().find_map(|page| {
+            let mut set = defaults;
+            let whole = self.read(page, &mut |record| put(&mut set, record))?;
+            Some((set, whole.sequence))
+        })
     }
 
     /// Saves a set. Erasing takes about 22 ms on the board's part, in which the
@@ -174,21 +178,28 @@ impl<F: Flash> Store<F> {
 
     /// The set in a page, if it is whole.
     fn whole(&self, page: usize) -> Option<Whole> {
+        self.read(page, &mut |_| {})
+    }
+
+    /// Hands the records of a page to `take`; gives the set if it was whole.
+    fn read(&self, page: usize, take: &mut dyn FnMut(Record)) -> Option<Whole> {
         let header = self.flash.read(page, 0)?;
         let count = usize::from((header >> 16) as u16);
         if header as u16 != MAGIC || count > RECORDS_MAX {
             return None;
         }
         let mut digest = CRC.digest();
-        for word in 0..=count {
-            digest.update(&self.flash.read(page, word)?.to_le_bytes());
+        digest.update(&header.to_le_bytes());
+        for index in 1..=count {
+            let word = self.flash.read(page, index)?;
+            digest.update(&word.to_le_bytes());
+            take(Record::from_word(word)?);
         }
         let crc = digest.finalize();
         let commit = self.flash.read(page, count.saturating_add(1))?;
         let agrees = commit as u32 == crc && (commit >> 32) as u32 == !crc;
         agrees.then_some(Whole {
             page,
-            count,
             sequence: (header >> 32) as u32,
         })
     }

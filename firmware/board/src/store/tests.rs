@@ -1,6 +1,7 @@
 //! The store under power cuts at every word.
 
 use super::*;
+use core::cell::Cell;
 use proptest::prelude::*;
 
 /// How far the operation that the power cut hits gets.
@@ -24,6 +25,8 @@ struct Mock {
     /// Operations until the power is cut, and what becomes of the last one.
     cut: Option<(usize, Torn)>,
     erasures: usize,
+    /// A word, the readings for which it lasts, and what it reads as afterwards.
+    fades: Option<(usize, usize, Cell<u32>, Option<u64>)>,
 }
 
 impl Mock {
@@ -32,6 +35,7 @@ impl Mock {
             pages: core::array::from_fn(|_| vec![Some(u64::MAX); WORDS]),
             cut: None,
             erasures: 0,
+            fades: None,
         }
     }
 
@@ -55,6 +59,14 @@ impl Mock {
 
 impl Flash for Mock {
     fn read(&self, page: usize, word: usize) -> Option<u64> {
+        if let Some((fading_page, fading_word, left, then)) = &self.fades
+            && (*fading_page, *fading_word) == (page, word)
+        {
+            match left.get() {
+                0 => return *then,
+                readings => left.set(readings - 1),
+            }
+        }
         *self.pages.get(page)?.get(word)?
     }
 
@@ -97,9 +109,15 @@ fn set(seed: i32, count: usize) -> Vec<Record> {
 }
 
 fn loaded(flash: &Mock) -> (Option<u32>, Vec<Record>) {
-    let mut records = Vec::new();
-    let sequence = Store::new(flash.clone()).load(|record| records.push(record));
-    (sequence, records)
+    const NONE: Record = Record { id: 0, raw: 0 };
+    let loaded = Store::new(flash.clone()).load((0, [NONE; WORDS]), |(count, set), record| {
+        set[*count] = record;
+        *count += 1;
+    });
+    match loaded {
+        Some(((count, set), sequence)) => (Some(sequence), set[..count].to_vec()),
+        None => (None, Vec::new()),
+    }
 }
 
 /// A flash that has seen `saves` saves, and the newest set.
@@ -210,6 +228,30 @@ fn one_flipped_bit_anywhere_makes_the_copy_worthless() {
             let mut flash = flash.clone();
             flash.pages[1][word] = flash.pages[1][word].map(|w| w ^ 1 << bit);
             assert_eq!(loaded(&flash), (Some(0), first.clone()), "{word} {bit}");
+        }
+    }
+}
+
+/// The records before the word that could not be read any more were once handed
+/// over, and stayed, with defaults for the rest.
+#[test]
+fn a_word_that_fades_while_it_is_read_leaves_no_part_of_a_set() {
+    for saves in [1, 2] {
+        let (flash, newest) = after(saves);
+        let page = saves as usize - 1;
+        let older = if saves == 2 { set(0, 30) } else { Vec::new() };
+        for word in 0..32 {
+            // Readings of this word until it cannot be read, or reads wrong.
+            for readings in 0..3 {
+                for then in [None, Some(0)] {
+                    let mut flash = flash.clone();
+                    flash.fades = Some((page, word, Cell::new(readings), then));
+                    let (_, found) = loaded(&flash);
+                    let sound = readings > 1;
+                    let expected = if sound { &newest } else { &older };
+                    assert_eq!(&found, expected, "{saves} {word} {readings} {then:?}");
+                }
+            }
         }
     }
 }
