@@ -10,6 +10,7 @@ pub mod analysis;
 pub mod bench;
 pub mod check;
 pub mod cli;
+pub mod compare;
 pub mod config;
 pub mod error;
 pub mod export;

@@ -23,6 +23,19 @@ pub enum Motion {
         /// Reference after \[m\].
         to_m: f64,
     },
+    /// Whole periods of a sinusoid from its lowest point; it ends where it began.
+    Sine {
+        /// Start \[s\].
+        at_s: f64,
+        /// Period \[s\].
+        period_s: f64,
+        /// Number of periods.
+        periods: u32,
+        /// Reference before and after \[m\].
+        from_m: f64,
+        /// Reference at the crest \[m\].
+        crest_m: f64,
+    },
 }
 
 impl Motion {
@@ -40,7 +53,7 @@ impl Motion {
     #[must_use]
     pub const fn start_s(&self) -> f64 {
         match *self {
-            Self::Step { at_s, .. } | Self::SCurve { at_s, .. } => at_s,
+            Self::Step { at_s, .. } | Self::SCurve { at_s, .. } | Self::Sine { at_s, .. } => at_s,
         }
     }
 
@@ -48,7 +61,9 @@ impl Motion {
     #[must_use]
     pub const fn from_m(&self) -> f64 {
         match *self {
-            Self::Step { from_m, .. } | Self::SCurve { from_m, .. } => from_m,
+            Self::Step { from_m, .. } | Self::SCurve { from_m, .. } | Self::Sine { from_m, .. } => {
+                from_m
+            }
         }
     }
 
@@ -57,6 +72,7 @@ impl Motion {
     pub const fn to_m(&self) -> f64 {
         match *self {
             Self::Step { to_m, .. } | Self::SCurve { to_m, .. } => to_m,
+            Self::Sine { from_m, .. } => from_m,
         }
     }
 
@@ -77,6 +93,23 @@ impl Motion {
                 let rate = 30.0 * s * s * (1.0 - s) * (1.0 - s) / duration_s;
                 (from_m + d * shape, d * rate)
             }
+            Self::Sine {
+                at_s,
+                period_s,
+                periods,
+                from_m,
+                crest_m,
+            } => {
+                let t = t_s - at_s;
+                if t <= 0.0 || t >= period_s * f64::from(periods) {
+                    return (from_m, 0.0);
+                }
+                let (half, w) = (0.5 * (crest_m - from_m), std::f64::consts::TAU / period_s);
+                (
+                    from_m + half * (1.0 - (w * t).cos()),
+                    half * w * (w * t).sin(),
+                )
+            }
         }
     }
 }
@@ -93,6 +126,30 @@ pub struct LoadEvent {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_sinusoid_reaches_its_crest_and_ends_where_it_began() {
+        let m = Motion::Sine {
+            at_s: 0.1,
+            period_s: 2.0,
+            periods: 2,
+            from_m: 0.05,
+            crest_m: 0.11,
+        };
+        let near = |t: f64, x: f64, v: f64| {
+            let (at, rate) = m.at(t);
+            assert!(
+                (at - x).abs() < 1e-12 && (rate - v).abs() < 1e-12,
+                "{t}: {at} {rate}"
+            );
+        };
+        near(0.0, 0.05, 0.0);
+        near(0.6, 0.08, 0.03 * std::f64::consts::PI);
+        near(1.1, 0.11, 0.0);
+        near(3.6, 0.08, -0.03 * std::f64::consts::PI);
+        near(4.2, 0.05, 0.0);
+        assert_eq!((m.from_m(), m.to_m(), m.start_s()), (0.05, 0.05, 0.1));
+    }
 
     #[test]
     fn the_s_curve_ends_at_rest_and_its_rate_is_its_slope() {

@@ -8,6 +8,7 @@
 
 use std::num::NonZeroU8;
 
+use wheeleg_control::joint::JointConfig;
 use wheeleg_node::mode::ModeRules as _;
 use wheeleg_protocol::link::CYCLE_US;
 use wheeleg_protocol::{
@@ -52,6 +53,7 @@ impl Node {
     /// table, or the board refuses the set.
     pub fn new(design: &Design) -> Result<Self, BenchError> {
         let address = Address::joint(JOINT).unwrap_or(Address::MASTER);
+        JointConfig::new(&design.gains, TICK).map_err(BenchError::Design)?;
         let stored: Vec<(u16, i32)> = commission(design)?
             .into_iter()
             .map(|(parameter, raw)| (parameter.id(), raw))

@@ -21,7 +21,7 @@ use super::metrics::SETTLED_BAND_M;
 type Schedule = [f64; 6];
 
 /// Horizon of the search \[s\].
-const HORIZON_S: f64 = 0.9;
+pub const HORIZON_S: f64 = 0.9;
 
 /// Result of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,7 +13,7 @@ use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
-use super::{Bench, Design, Firmware, Kind, LoadEvent, Metrics, Motion, Node, Trace};
+use super::{Bench, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
 
 /// An experiment could not be made.
@@ -99,17 +99,18 @@ impl Factors {
         noise: 1.0,
     };
 
-    /// One combination of the random suite: load ±0.8, mass 1…8 kg, supply 4…7 bar
-    /// gauge, friction and valve delay 0.5…2; mass, friction and delay uniform in
-    /// their logarithm.
+    /// One combination of the random suite: load ±0.8, mass 2/3 to 16/3 of the
+    /// sheet's, supply from 2 bar below to 1 bar above the sheet's, friction and
+    /// valve delay 0.5…2; mass, friction and delay uniform in their logarithm.
     #[must_use]
-    pub fn random(seed: u64) -> Self {
+    pub fn random(sheet: &AxisParams, seed: u64) -> Self {
+        let gauge = sheet.supply.set_pressure_pa - sheet.gas.ambient_pressure_pa;
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut unit = || rng.random_range(0.0..1.0_f64);
         Self {
             load_share: 0.8 * (2.0 * unit() - 1.0),
-            mass_kg: Some(8.0_f64.powf(unit())),
-            supply_pa: Some(1e5 * (4.0 + 3.0 * unit())),
+            mass_kg: Some(sheet.moving_mass_kg * 2.0 / 3.0 * 8.0_f64.powf(unit())),
+            supply_pa: Some(gauge + 1e5 * (3.0 * unit() - 2.0)),
             friction: 2.0_f64.powf(2.0 * unit() - 1.0),
             valve_delay: 2.0_f64.powf(2.0 * unit() - 1.0),
             ..Self::NONE
@@ -180,26 +181,100 @@ pub enum StartUp {
     Identified,
 }
 
-/// A board for the plant of `factors`, designed from the sheet.
+/// The design of a controller for a plant of which it knows the sheet and,
+/// after [`StartUp::Identified`], the valves' delays.
 ///
 /// # Errors
 /// [`BenchError`].
-pub fn board(
+pub fn designed(
     sheet: &AxisParams,
     plant: &AxisParams,
     kind: Kind,
     start: StartUp,
     seed: u64,
-) -> Result<Node, BenchError> {
-    let design: Design = match start {
+) -> Result<Design, BenchError> {
+    Ok(match start {
         StartUp::Sheet => design(sheet, kind),
         StartUp::Identified => design_with(sheet, identify(plant, sheet, seed)?, kind),
-    };
-    Node::new(&design)
+    })
 }
 
-/// Steps between two shares of the stroke, one after the other, from power-up:
-/// the first is the learning move.
+/// A supervised board on its plant, moved from place to place.
+pub struct Rig {
+    bench: Bench<Node>,
+    at_m: f64,
+}
+
+impl Rig {
+    /// Power-up of a board with a design on a plant at rest.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn new(plant: &AxisParams, design: &Design, seed: u64) -> Result<Self, BenchError> {
+        Ok(Self {
+            bench: Bench::new(plant, seed, Node::new(design)?)?,
+            at_m: plant.initial_stroke_m,
+        })
+    }
+
+    /// Plant and board.
+    #[must_use]
+    pub fn bench(&self) -> &Bench<Node> {
+        &self.bench
+    }
+
+    /// Where the reference stands \[m\].
+    #[must_use]
+    pub const fn at_m(&self) -> f64 {
+        self.at_m
+    }
+
+    /// A step of the reference, recorded from 0.05 s before it.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn step(&mut self, to_m: f64, seconds: f64) -> Result<Trace, BenchError> {
+        self.step_with(to_m, &[], seconds)
+    }
+
+    /// A step with loads that change.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn step_with(
+        &mut self,
+        to_m: f64,
+        loads: &[LoadEvent],
+        seconds: f64,
+    ) -> Result<Trace, BenchError> {
+        let motion = Motion::Step {
+            at_s: LEAD_S,
+            from_m: self.at_m,
+            to_m,
+        };
+        self.run(&motion, loads, seconds)
+    }
+
+    /// Any motion; it must begin where the reference stands.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn run(
+        &mut self,
+        motion: &Motion,
+        loads: &[LoadEvent],
+        seconds: f64,
+    ) -> Result<Trace, BenchError> {
+        self.at_m = motion.to_m();
+        Ok(self.bench.run(motion, loads, seconds)?)
+    }
+}
+
+/// Recording before a motion begins \[s\].
+pub const LEAD_S: f64 = 0.05;
+
+/// Steps to one place after the other, from power-up: the first is the learning
+/// move.
 ///
 /// # Errors
 /// [`BenchError`].
@@ -213,109 +288,12 @@ pub fn steps(
     seconds: f64,
 ) -> Result<Vec<Trace>, BenchError> {
     let plant = factors.plant(sheet);
-    let board = board(sheet, &plant, kind, start, seed)?;
-    let mut bench = Bench::new(&plant, seed, board)?;
-    let mut from_m = plant.initial_stroke_m;
-    let mut traces = Vec::with_capacity(targets_m.len());
-    for &to_m in targets_m {
-        let step = Motion::Step {
-            at_s: 0.05,
-            from_m,
-            to_m,
-        };
-        traces.push(bench.run(&step, &[], seconds)?);
-        from_m = to_m;
-    }
-    Ok(traces)
-}
-
-/// An S-curve after a learning step there and back, extending and retracting.
-///
-/// # Errors
-/// [`BenchError`].
-pub fn s_curves(
-    sheet: &AxisParams,
-    kind: Kind,
-    seed: u64,
-    from_m: f64,
-    to_m: f64,
-    duration_s: f64,
-) -> Result<[Metrics; 2], BenchError> {
-    let board = board(sheet, sheet, kind, StartUp::Sheet, seed)?;
-    let mut bench = Bench::new(sheet, seed, board)?;
-    let mut at_m = sheet.initial_stroke_m;
-    for target_m in [to_m, from_m] {
-        let step = Motion::Step {
-            at_s: 0.05,
-            from_m: at_m,
-            to_m: target_m,
-        };
-        bench.run(&step, &[], 2.0)?;
-        at_m = target_m;
-    }
-    let mut curve = |from_m: f64, to_m: f64| {
-        let motion = Motion::SCurve {
-            at_s: 0.05,
-            duration_s,
-            from_m,
-            to_m,
-        };
-        bench
-            .run(&motion, &[], duration_s + 1.0)
-            .map(|t| Metrics::of(&t))
-    };
-    Ok([curve(from_m, to_m)?, curve(to_m, from_m)?])
-}
-
-/// Loss of contact: a force of `load_n` is taken away in mid-move and comes back
-/// 0.4 s later. Gives the trace and the largest error from 0.5 s after the
-/// return on \[mm\].
-///
-/// # Errors
-/// [`BenchError`].
-pub fn contact_loss(
-    sheet: &AxisParams,
-    kind: Kind,
-    seed: u64,
-    load_n: f64,
-) -> Result<(Trace, f64), BenchError> {
-    let mut loaded = sheet.clone();
-    loaded.load_n = load_n;
-    let stroke_m = sheet.cylinder.stroke_m;
-    let (low_m, high_m) = (0.22 * stroke_m, 0.78 * stroke_m);
-    let board = board(sheet, &loaded, kind, StartUp::Sheet, seed)?;
-    let mut bench = Bench::new(&loaded, seed, board)?;
-    let mut at_m = loaded.initial_stroke_m;
-    for to_m in [high_m, low_m] {
-        bench.run(
-            &Motion::Step {
-                at_s: 0.05,
-                from_m: at_m,
-                to_m,
-            },
-            &[],
-            2.0,
-        )?;
-        at_m = to_m;
-    }
-    let events = [
-        LoadEvent {
-            at_s: 0.15,
-            load_n: 0.0,
-        },
-        LoadEvent { at_s: 0.55, load_n },
-    ];
-    let motion = Motion::Step {
-        at_s: 0.05,
-        from_m: low_m,
-        to_m: high_m,
-    };
-    let trace = bench.run(&motion, &events, 2.5)?;
-    let worst = trace.rows[1050..]
+    let design = designed(sheet, &plant, kind, start, seed)?;
+    let mut rig = Rig::new(&plant, &design, seed)?;
+    targets_m
         .iter()
-        .map(|r| (r.stroke_m - high_m).abs())
-        .fold(0.0, f64::max);
-    Ok((trace, worst * 1e3))
+        .map(|to_m| rig.step(*to_m, seconds))
+        .collect()
 }
 
 /// The retract move from the extended end stop, after the controller has pushed

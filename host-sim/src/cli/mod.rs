@@ -2,6 +2,7 @@
 
 mod channels;
 mod check;
+mod compare;
 mod export;
 mod faults;
 mod figures;
@@ -54,6 +55,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
+    /// Compare controllers on one or more axes; writes report, figures and tables.
+    Compare(compare::CompareArgs),
     /// Check the pneumatic plant of an axis, or export it for another integrator.
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
         Some(Command::Channels(args)) => channels::command(&args),
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
+        Some(Command::Compare(args)) => compare::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
     };

@@ -7,25 +7,13 @@ use super::audit::Status;
 use super::charts::short;
 use super::precision::LIMIT_M;
 use crate::SimError;
-use crate::report::{plot::Figure, style};
+use crate::report::{pictures, plot::Figure, style};
 
 const TEMPLATE: &str = include_str!("page.html");
 
 pub(super) fn render(results: &Results, figures: &[(Figure, String)]) -> Result<String, SimError> {
     let mut env = Environment::new();
     env.add_template("page.html", TEMPLATE)?;
-    let pictures: Vec<Value> = figures
-        .iter()
-        .map(|(figure, svg)| {
-            context! {
-                id => &*figure.id,
-                title => &*figure.title,
-                short => figure.title.split(':').next(),
-                caption => &*figure.caption,
-                svg => Value::from_safe_string(svg.clone()),
-            }
-        })
-        .collect();
     let axes: Vec<Value> = results
         .checks
         .iter()
@@ -77,7 +65,7 @@ pub(super) fn render(results: &Results, figures: &[(Figure, String)]) -> Result<
     Ok(env.get_template("page.html")?.render(context! {
         style => Value::from_safe_string(style().to_owned()),
         version => env!("CARGO_PKG_VERSION"),
-        figures => pictures,
+        figures => pictures(figures),
         axes => axes,
         misprints => misprints,
         equations => results

@@ -18,6 +18,20 @@ pub(crate) fn style() -> &'static str {
     sheet.map_or("", |(sheet, _)| sheet)
 }
 
+/// Figures with their SVG text as values of a template.
+pub(crate) fn pictures(figures: &[(Figure, String)]) -> Vec<Value> {
+    let value = |(figure, svg): &(Figure, String)| {
+        context! {
+            id => &*figure.id,
+            title => &*figure.title,
+            short => figure.title.split(':').next(),
+            caption => &*figure.caption,
+            svg => Value::from_safe_string(svg.clone()),
+        }
+    };
+    figures.iter().map(value).collect()
+}
+
 /// Events as lines of a table: time, kind, text. What several boards report at
 /// the same time in the same words becomes one line that names them all.
 fn grouped(events: &[Row<EventSample>]) -> Vec<(f64, &str, String)> {
@@ -79,18 +93,7 @@ pub(super) fn render(
             }
         })
         .collect();
-    let figures: Vec<Value> = figures
-        .iter()
-        .map(|(figure, svg)| {
-            context! {
-                id => &*figure.id,
-                title => &*figure.title,
-                short => figure.title.split(':').next(),
-                caption => &*figure.caption,
-                svg => Value::from_safe_string(svg.clone()),
-            }
-        })
-        .collect();
+    let figures = pictures(figures);
     let start = source.analysis.start_s;
     let delays: Vec<Value> = source
         .analysis

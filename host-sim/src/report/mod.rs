@@ -5,7 +5,7 @@ mod html;
 pub(crate) mod plot;
 mod summary;
 
-pub(crate) use html::style;
+pub(crate) use html::{pictures, style};
 pub use summary::{RunInfo, Summary};
 
 use std::path::{Path, PathBuf};

@@ -1,11 +1,16 @@
 //! Drawing of figures: stacked panels of lines, and rasters, to PNG and SVG.
 
+mod bars;
+
 use std::path::Path;
 use std::sync::Once;
 
 use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
+
+pub(crate) use bars::{Bars, Column};
 
 use crate::SimError;
 
@@ -97,6 +102,8 @@ pub(crate) enum Content {
     },
     /// A map: one colour per cell.
     Heat(Heat),
+    /// Bars, without an axis.
+    Bars(Bars),
 }
 
 /// Cells of a map, from the lower left, row by row upwards.
@@ -120,7 +127,8 @@ pub(crate) struct Panel {
     pub(crate) height: u32,
 }
 
-/// A figure: panels one below the other, with a common time axis.
+/// A figure: panels one below the other, with a common axis below the last before
+/// bars or the end.
 pub(crate) struct Figure {
     /// File name without extension.
     pub(crate) id: String,
@@ -151,9 +159,21 @@ fn fonts() {
 }
 
 impl Figure {
+    /// Height of the axis below panel `i`: bars have none.
+    fn axis(&self, i: usize) -> u32 {
+        let is_bars = |p: &Panel| matches!(p.content, Content::Bars(_));
+        let last = self.panels.get(i + 1).is_none_or(is_bars);
+        if last && !is_bars(&self.panels[i]) {
+            AXIS_HEIGHT
+        } else {
+            0
+        }
+    }
+
     fn size(&self) -> (u32, u32) {
-        let panels: u32 = self.panels.iter().map(|p| p.height + TITLE_HEIGHT).sum();
-        (WIDTH, panels + AXIS_HEIGHT)
+        let panels = self.panels.iter().enumerate();
+        let heights = panels.map(|(i, p)| p.height + TITLE_HEIGHT + self.axis(i));
+        (WIDTH, heights.sum())
     }
 
     /// The figure as SVG text.
@@ -199,10 +219,9 @@ impl Figure {
         scale: u32,
     ) -> Result<(), String> {
         root.fill(&colour::PAPER).map_err(text)?;
-        let last = self.panels.len().saturating_sub(1);
         let mut rest = root.clone();
         for (i, panel) in self.panels.iter().enumerate() {
-            let axis = if i == last { AXIS_HEIGHT } else { 0 };
+            let axis = self.axis(i);
             let height = (panel.height + TITLE_HEIGHT + axis) * scale;
             let (area, below) = rest.split_vertically(height);
             panel.draw(&area, scale, axis * scale)?;
@@ -211,6 +230,8 @@ impl Figure {
         root.present().map_err(text)
     }
 }
+
+type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 fn text<E: std::fmt::Display>(error: E) -> String {
     error.to_string()
@@ -241,6 +262,7 @@ impl Panel {
                 ..
             } => self.lines(&body, scale, (axis_px, x_label), series, limits, *y_range),
             Content::Heat(heat) => self.heat(&body, scale, axis_px, heat),
+            Content::Bars(bars) => bars.draw(&body, scale, self.height),
         }
     }
 
@@ -258,7 +280,7 @@ impl Panel {
             Content::Lines { y_label, .. } | Content::Curves { y_label, .. } => {
                 format!("{} {y_label}", self.title)
             }
-            Content::Raster { .. } => self.title.clone(),
+            Content::Raster { .. } | Content::Bars(_) => self.title.clone(),
             Content::Heat(heat) => format!("{}: {}", self.title, heat.legend),
         };
         head.draw_text(&words, &title, (LEFT as i32 * s, y))
@@ -283,6 +305,41 @@ impl Panel {
         Ok(())
     }
 
+    /// A chart over the panel's abscissa.
+    fn chart<'a, B: DrawingBackend>(
+        &self,
+        body: &'a DrawingArea<B, Shift>,
+        scale: u32,
+        axis_px: u32,
+        (y0, y1): (f64, f64),
+    ) -> Result<Chart<'a, B>, String> {
+        let (x0, x1) = self.x_range;
+        ChartBuilder::on(body)
+            .margin_right(14 * scale)
+            .margin_top(3 * scale)
+            .margin_bottom(5 * scale)
+            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
+            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
+            .build_cartesian_2d(x0..x1, y0..y1)
+            .map_err(text)
+    }
+
+    /// Marks the panel's times from `y0` to `y1`.
+    fn draw_marks<B: DrawingBackend>(
+        &self,
+        chart: &mut Chart<'_, B>,
+        scale: u32,
+        (y0, y1): (f64, f64),
+    ) -> Result<(), String> {
+        let (x0, x1) = self.x_range;
+        for mark in self.marks.iter().filter(|m| (x0..=x1).contains(*m)) {
+            let stroke = colour::LIMIT.stroke_width(scale);
+            let line = PathElement::new(vec![(*mark, y0), (*mark, y1)], stroke);
+            chart.draw_series(std::iter::once(line)).map_err(text)?;
+        }
+        Ok(())
+    }
+
     fn lines<B: DrawingBackend>(
         &self,
         body: &DrawingArea<B, Shift>,
@@ -293,14 +350,7 @@ impl Panel {
         (y0, y1): (f64, f64),
     ) -> Result<(), String> {
         let (x0, x1) = self.x_range;
-        let mut chart = ChartBuilder::on(body)
-            .margin_right(14 * scale)
-            .margin_top(3 * scale)
-            .margin_bottom(5 * scale)
-            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
-            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
-            .build_cartesian_2d(x0..x1, y0..y1)
-            .map_err(text)?;
+        let mut chart = self.chart(body, scale, axis_px, (y0, y1))?;
         let font = (FONT, 13 * scale).into_font().color(&colour::INK);
         let mut mesh = chart.configure_mesh();
         mesh.bold_line_style(colour::GRID.stroke_width(scale))
@@ -326,15 +376,7 @@ impl Panel {
                 )))
                 .map_err(text)?;
         }
-        for mark in self.marks.iter().filter(|m| (x0..=x1).contains(*m)) {
-            let stroke = colour::LIMIT.stroke_width(scale);
-            chart
-                .draw_series(std::iter::once(PathElement::new(
-                    vec![(*mark, y0), (*mark, y1)],
-                    stroke,
-                )))
-                .map_err(text)?;
-        }
+        self.draw_marks(&mut chart, scale, (y0, y1))?;
         for line in series {
             let columns = 2 * (WIDTH - LEFT) as usize;
             let points: Vec<(f64, f64)> = thin(&line.points, self.x_range, columns)
@@ -366,14 +408,7 @@ impl Panel {
     ) -> Result<(), String> {
         let (x0, x1) = self.x_range;
         let n = rows.len().max(1) as f64;
-        let mut chart = ChartBuilder::on(body)
-            .margin_right(14 * scale)
-            .margin_top(3 * scale)
-            .margin_bottom(5 * scale)
-            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
-            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
-            .build_cartesian_2d(x0..x1, 0.0..n)
-            .map_err(text)?;
+        let mut chart = self.chart(body, scale, axis_px, (0.0, n))?;
         let font = (FONT, 13 * scale).into_font().color(&colour::INK);
         let mut mesh = chart.configure_mesh();
         mesh.bold_line_style(colour::GRID.stroke_width(scale))
@@ -420,15 +455,7 @@ impl Panel {
             let _ = bx;
             body.draw_text(&row.label, &font, at).map_err(text)?;
         }
-        for mark in self.marks.iter().filter(|m| (x0..=x1).contains(*m)) {
-            let stroke = colour::LIMIT.stroke_width(scale);
-            chart
-                .draw_series(std::iter::once(PathElement::new(
-                    vec![(*mark, 0.0), (*mark, n)],
-                    stroke,
-                )))
-                .map_err(text)?;
-        }
+        self.draw_marks(&mut chart, scale, (0.0, n))?;
         Ok(())
     }
 }
@@ -442,14 +469,7 @@ impl Panel {
         heat: &Heat,
     ) -> Result<(), String> {
         let ((x0, x1), (y0, y1)) = (self.x_range, heat.y_range);
-        let mut chart = ChartBuilder::on(body)
-            .margin_right(14 * scale)
-            .margin_top(3 * scale)
-            .margin_bottom(5 * scale)
-            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
-            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
-            .build_cartesian_2d(x0..x1, y0..y1)
-            .map_err(text)?;
+        let mut chart = self.chart(body, scale, axis_px, (y0, y1))?;
         let columns = heat.columns.max(1);
         let rows = heat.values.len().div_ceil(columns).max(1);
         let largest = heat.values.iter().copied().fold(0.0, f64::max);

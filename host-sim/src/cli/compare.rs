@@ -1,0 +1,154 @@
+//! `wheeleg compare`: every controller on the same plants, moves and inputs.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::print;
+use crate::SimError;
+use crate::bench::Kind;
+use crate::compare::{self, CaseId, Comparison, Move, Options};
+use crate::config::axis::AXES;
+
+/// Arguments of `wheeleg compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    /// Built-in axis or path of an axis file; may be given several times
+    /// [default: all built-in axes].
+    #[arg(long = "axis", value_name = "AXIS")]
+    axes: Vec<String>,
+    /// Controller; may be given several times [default: all].
+    #[arg(long = "controller", value_name = "NAME", value_parser = controller)]
+    controllers: Vec<Kind>,
+    /// Move; may be given several times [default: all as on the sheet, step-100 and
+    /// s-curve with factors changed].
+    #[arg(long = "move", value_name = "MOVE", value_parser = motion)]
+    moves: Vec<Move>,
+    /// Number of seeds for the cases as on the sheet.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=u64::MAX - 1000))]
+    seed: u64,
+    /// Random combinations of factors per axis [default: 200; 20 with --quick].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    combinations: Option<u64>,
+    /// One seed, fewer factors and combinations, a coarser bound.
+    #[arg(long)]
+    quick: bool,
+    /// Threads [default: as many as the machine has].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Folder for report, figures and tables. Results of an earlier run in it move to
+    /// its folder `previous`.
+    #[arg(long, value_name = "DIR", default_value = "runs/compare")]
+    out: PathBuf,
+    /// Play one case alone, by its id in the tables:
+    /// AXIS/CONTROLLER/MOVE/VARIATION/SEED.
+    #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "quick"])]
+    case: Option<CaseId>,
+    /// Print all cases as JSON on stdout, an array of one object each.
+    #[arg(long)]
+    json: bool,
+}
+
+fn controller(name: &str) -> Result<Kind, String> {
+    Kind::of_name(name).ok_or_else(|| format!("known: {}", Kind::ALL.map(Kind::name).join(", ")))
+}
+
+fn motion(name: &str) -> Result<Move, String> {
+    Move::of_name(name).ok_or_else(|| format!("known: {}", Move::ALL.map(Move::name).join(", ")))
+}
+
+/// What was given, each once; all if nothing was.
+fn chosen<T: Clone + PartialEq>(given: &[T], all: &[T]) -> Vec<T> {
+    let mut list = Vec::new();
+    for item in if given.is_empty() { all } else { given } {
+        if !list.contains(item) {
+            list.push(item.clone());
+        }
+    }
+    list
+}
+
+/// Plays, writes and prints.
+pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, SimError> {
+    let built_in: Vec<String> = AXES.iter().map(|(name, ..)| (*name).to_owned()).collect();
+    let axes = chosen(&args.axes, &built_in);
+    if let Some(id) = &args.case {
+        return case(id, &axes, args);
+    }
+    let options = Options {
+        axes,
+        kinds: chosen(&args.controllers, &Kind::ALL),
+        moves: (!args.moves.is_empty()).then(|| chosen(&args.moves, &[])),
+        seeds: if args.quick { 1 } else { args.seeds },
+        seed: args.seed,
+        combinations: args
+            .combinations
+            .unwrap_or(if args.quick { 20 } else { 200 }),
+        quick: args.quick,
+        threads: args.threads.map_or(0, usize::from),
+    };
+    let finished = Comparison::run(&options)?.write(&args.out)?;
+    let comparison = &finished.comparison;
+    if args.json {
+        return print(&comparison.to_json());
+    }
+    let mut out = String::new();
+    for axis in &comparison.axes {
+        let name = &axis.config.name;
+        let _ = writeln!(
+            out,
+            "{name}\n  {:<12}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}{:>10}{:>10}",
+            "",
+            "error mm",
+            "overshoot",
+            "settled s",
+            "worst s",
+            "ratio",
+            "S-curve",
+            "rest sw.",
+            "recovery"
+        );
+        for (kind, cells) in comparison.table(name) {
+            let _ = writeln!(
+                out,
+                "  {:<12}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}{:>10}{:>10}",
+                kind.name(),
+                cells[0],
+                cells[2],
+                cells[4],
+                cells[5],
+                cells[6],
+                cells[7],
+                cells[11],
+                cells[13]
+            );
+        }
+    }
+    let alarms = comparison.false_alarms().count();
+    let infeasible = comparison.infeasible().len();
+    let _ = writeln!(
+        out,
+        "cases       {}, false alarms {alarms}, infeasible corners {infeasible}\nreport      {}",
+        comparison.rows.len(),
+        finished.report.display()
+    );
+    print(&out)
+}
+
+fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, SimError> {
+    let single = compare::play(id, axes)?;
+    let figures = single.write(&args.out)?;
+    let row = serde_json::to_string_pretty(&single.row).unwrap_or_default();
+    let mut out = format!("{row}\n");
+    if !args.json {
+        for figure in figures {
+            let _ = writeln!(out, "{}", figure.display());
+        }
+    }
+    print(&out)
+}

@@ -1,0 +1,440 @@
+//! One case: controller, axis, move, variation and seed, and what came of it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Serialize;
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_protocol::FaultBits;
+
+use super::moves::{CONTACT_S, Move, Played, RECOVERY_S};
+use super::variation::{UnknownVariation, Variation};
+use crate::bench::suite::{BenchError, Rig, StartUp};
+use crate::bench::{Delays, Kind, Metrics, Trace, design, design_with, identify};
+
+/// Smallest static margin of a feasible case: a quarter more force than the load.
+pub const MARGIN: f64 = 1.25;
+/// Error within which a move has recovered from the loss of contact \[m\].
+const RECOVERED_M: f64 = 2e-3;
+
+/// Name of a case: `axis/controller/move/variation/seed`, from which alone it can be
+/// played again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaseId {
+    /// Name of the axis.
+    pub axis: String,
+    /// Controller.
+    pub kind: Kind,
+    /// Move.
+    pub motion: Move,
+    /// What differs from the sheet.
+    pub variation: Variation,
+    /// Seed of the converter's noise.
+    pub seed: u64,
+}
+
+/// A text that is no case.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BadCaseId {
+    /// Not five parts.
+    #[error(
+        "`{0}` is no case: write AXIS/CONTROLLER/MOVE/VARIATION/SEED, as in bench-vq110u/predictive/step-100/load=0.8/1"
+    )]
+    Parts(String),
+    /// Unknown controller.
+    #[error("`{0}` is no controller: {names}", names = names(&Kind::ALL.map(Kind::name)))]
+    Controller(String),
+    /// Unknown move.
+    #[error("`{0}` is no move: {names}", names = names(&Move::ALL.map(Move::name)))]
+    Move(String),
+    /// Unknown variation.
+    #[error(transparent)]
+    Variation(#[from] UnknownVariation),
+    /// No number.
+    #[error("`{0}` is no seed: a whole number from 0 to {max}", max = u64::MAX)]
+    Seed(String),
+}
+
+pub(crate) fn names(list: &[&str]) -> String {
+    list.join(", ")
+}
+
+impl fmt::Display for CaseId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, motion) = (self.kind.name(), self.motion.name());
+        write!(
+            f,
+            "{}/{kind}/{motion}/{}/{}",
+            self.axis, self.variation, self.seed
+        )
+    }
+}
+
+impl FromStr for CaseId {
+    type Err = BadCaseId;
+
+    fn from_str(text: &str) -> Result<Self, BadCaseId> {
+        // From the right: an axis may have any name.
+        let parts: Vec<&str> = text.rsplitn(5, '/').collect();
+        let [seed, variation, motion, kind, axis] = parts[..] else {
+            return Err(BadCaseId::Parts(text.to_owned()));
+        };
+        Ok(Self {
+            axis: axis.to_owned(),
+            kind: Kind::of_name(kind).ok_or_else(|| BadCaseId::Controller(kind.to_owned()))?,
+            motion: Move::of_name(motion).ok_or_else(|| BadCaseId::Move(motion.to_owned()))?,
+            variation: variation.parse()?,
+            seed: seed.parse().map_err(|_| BadCaseId::Seed(seed.to_owned()))?,
+        })
+    }
+}
+
+/// A plant that differs from its sheet, and what a board finds out of it at
+/// start-up: common to all controllers and moves.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Name of the axis.
+    pub axis: String,
+    /// Its data sheet.
+    pub sheet: AxisParams,
+    /// What differs.
+    pub variation: Variation,
+    /// Seed.
+    pub seed: u64,
+    plant: AxisParams,
+    margin: f64,
+    delays: Option<Delays>,
+}
+
+impl Scene {
+    /// The scene; looks for the valves' delays where the variation says so.
+    ///
+    /// # Errors
+    /// [`BenchError`] if the plant refuses its parameters.
+    pub fn new(
+        axis: &str,
+        sheet: &AxisParams,
+        variation: Variation,
+        seed: u64,
+    ) -> Result<Self, BenchError> {
+        let factors = variation.factors(sheet);
+        let plant = factors.plant(sheet);
+        let margin = factors.static_margin(sheet);
+        let delays = match variation.start_up() {
+            StartUp::Identified if margin >= feasible_margin() => identify(&plant, sheet, seed)?,
+            _ => None,
+        };
+        Ok(Self {
+            axis: axis.to_owned(),
+            sheet: sheet.clone(),
+            variation,
+            seed,
+            plant,
+            margin,
+            delays,
+        })
+    }
+
+    /// Whether the cylinder can carry the load at all.
+    #[must_use]
+    pub fn is_feasible(&self) -> bool {
+        self.margin >= feasible_margin()
+    }
+
+    /// The plant without a move's own load.
+    #[must_use]
+    pub const fn plant(&self) -> &AxisParams {
+        &self.plant
+    }
+
+    /// The name of one of its cases.
+    #[must_use]
+    pub fn id(&self, kind: Kind, motion: Move) -> CaseId {
+        CaseId {
+            axis: self.axis.clone(),
+            kind,
+            motion,
+            variation: self.variation,
+            seed: self.seed,
+        }
+    }
+
+    /// Plays one case. `None` if the scene is not feasible.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn play(&self, kind: Kind, motion: Move) -> Result<Option<Played>, BenchError> {
+        if !self.is_feasible() {
+            return Ok(None);
+        }
+        let design = match self.variation.start_up() {
+            StartUp::Sheet => design(&self.sheet, kind),
+            StartUp::Identified => design_with(&self.sheet, self.delays, kind),
+        };
+        let plant = motion.plant(&self.plant, &self.sheet);
+        let mut rig = Rig::new(&plant, &design, self.seed)?;
+        motion.play(&mut rig, &self.sheet, plant.load_n).map(Some)
+    }
+
+    /// The row of a case. `bound_s` are the time-optimal times of the measured
+    /// moves, where known.
+    #[must_use]
+    pub fn row(
+        &self,
+        kind: Kind,
+        motion: Move,
+        played: Option<&Played>,
+        bound_s: Option<[f64; 2]>,
+    ) -> Row {
+        let plant = motion.plant(&self.plant, &self.sheet);
+        let factors = self.variation.factors(&self.sheet);
+        let gauge_pa = plant.supply.set_pressure_pa - plant.gas.ambient_pressure_pa;
+        let t_on_s = self
+            .delays
+            .map_or(self.sheet.cylinder.fill_valve.t_on_s, |d| d.t_on_s);
+        let case = CaseFacts {
+            id: self.id(kind, motion).to_string(),
+            axis: self.axis.clone(),
+            controller: kind,
+            motion,
+            variation: self.variation.to_string(),
+            seed: self.seed,
+            load_n: plant.load_n,
+            mass_kg: plant.moving_mass_kg,
+            supply_bar_g: gauge_pa * 1e-5,
+            friction: factors.friction,
+            valve_delay: factors.valve_delay,
+            valve_spread: factors.valve_spread,
+            noise: factors.noise,
+            static_margin: self.margin.min(1e3),
+            feasible: self.is_feasible(),
+            delays: match self.variation.start_up() {
+                StartUp::Sheet => "sheet",
+                StartUp::Identified if self.delays.is_some() => "identified",
+                StartUp::Identified => "not found",
+            },
+            valve_t_on_ms: t_on_s * 1e3,
+        };
+        Row {
+            case,
+            figures: played.map_or_else(Figures::default, |p| Figures::of(motion, p, bound_s)),
+        }
+    }
+}
+
+/// [`MARGIN`] less rounding: a load of 80 % of the force left has it exactly.
+fn feasible_margin() -> f64 {
+    MARGIN * (1.0 - 1e-9)
+}
+
+/// One case in tables and JSON.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Which case.
+    #[serde(flatten)]
+    pub case: CaseFacts,
+    /// Figures of merit.
+    #[serde(flatten)]
+    pub figures: Figures,
+}
+
+/// What was played.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CaseFacts {
+    /// Name, for `--case`.
+    pub id: String,
+    /// Axis.
+    pub axis: String,
+    /// Controller.
+    pub controller: Kind,
+    /// Move.
+    #[serde(rename = "move")]
+    pub motion: Move,
+    /// What differs from the sheet.
+    pub variation: String,
+    /// Seed.
+    pub seed: u64,
+    /// Force on the rod at the start, positive extends \[N\].
+    pub load_n: f64,
+    /// Moving mass \[kg\].
+    pub mass_kg: f64,
+    /// Supply \[bar gauge\].
+    pub supply_bar_g: f64,
+    /// Factor on friction.
+    pub friction: f64,
+    /// Factor on the valves' delays.
+    pub valve_delay: f64,
+    /// Spread between the valves, ± share.
+    pub valve_spread: f64,
+    /// Factor on the converter's noise.
+    pub noise: f64,
+    /// Force left over the load, at most 1000 for no load.
+    pub static_margin: f64,
+    /// Margin at least [`MARGIN`]; other cases are listed, not played.
+    pub feasible: bool,
+    /// Where the board has its valve delays from.
+    pub delays: &'static str,
+    /// Opening delay that the board works with \[ms\].
+    pub valve_t_on_ms: f64,
+}
+
+/// Figures of a case: the worse of its measured moves. What a move does not have
+/// is absent.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Figures {
+    /// Mean error of the last 0.2 s, signed, of the larger magnitude \[mm\].
+    pub steady_error_mm: Option<f64>,
+    /// Past the target, in the direction of the move \[mm\].
+    pub overshoot_mm: Option<f64>,
+    /// 10 to 90 % of the move \[s\].
+    pub rise_s: Option<f64>,
+    /// Until within ±1 mm for good \[s\]; absent if it never is.
+    pub settle_s: Option<f64>,
+    /// Root mean square of the error \[mm\].
+    pub rms_mm: Option<f64>,
+    /// Largest error \[mm\].
+    pub worst_mm: Option<f64>,
+    /// First millimetre \[s\].
+    pub start_delay_s: Option<f64>,
+    /// Largest speed \[mm/s\].
+    pub peak_speed_mm_s: Option<f64>,
+    /// Poppet movements per second of all four valves.
+    pub switches_per_s: Option<f64>,
+    /// Poppet movements in 10 s at rest.
+    pub rest_switches: Option<u64>,
+    /// Air from the supply for one measured move \[normal litres, ISO 8778\].
+    pub air_nl: Option<f64>,
+    /// From the return of the load until within 2 mm for good \[s\].
+    pub recovery_s: Option<f64>,
+    /// Largest error from 0.5 s after the return of the load \[mm\].
+    pub contact_error_mm: Option<f64>,
+    /// Turns of more than 0.2 mm in the last second.
+    pub reversals: Option<u32>,
+    /// Three turns or more.
+    pub limit_cycle: Option<bool>,
+    /// Settling time over that of perfect knowledge, the worse direction.
+    pub ratio_to_bound: Option<f64>,
+    /// Overshoot of the first move after power-up \[mm\].
+    pub first_overshoot_mm: Option<f64>,
+    /// Settling time of the first move \[s\].
+    pub first_settle_s: Option<f64>,
+    /// Mean error at the end of the first move \[mm\].
+    pub first_steady_error_mm: Option<f64>,
+    /// Faults that the board's supervision latched, by name; empty if none.
+    pub faults: String,
+    /// The supervision stopped the board in the case.
+    pub stopped: Option<bool>,
+}
+
+/// The larger; `None` if any is.
+fn worst(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
+    let all: Option<Vec<f64>> = values.into_iter().collect();
+    all?.into_iter().reduce(f64::max)
+}
+
+impl Figures {
+    /// Works the figures of a played case out.
+    #[must_use]
+    pub fn of(motion: Move, played: &Played, bound_s: Option<[f64; 2]>) -> Self {
+        let all: Vec<Metrics> = played.measured.iter().map(Metrics::of).collect();
+        let of = |f: &dyn Fn(&Metrics) -> f64| worst(all.iter().map(|m| Some(f(m))));
+        let step = matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact();
+        let steady = all.iter().map(|m| m.steady_error_mm);
+        let first = Metrics::of(&played.first);
+        let traces = || std::iter::once(&played.first).chain(&played.measured);
+        let faults = traces().fold(FaultBits::NONE, |bits, t| bits.union(t.faults));
+        let fault_names: Vec<&str> = faults.iter().map(|f| f.name()).collect();
+        let reversals = all.iter().map(|m| m.reversals).max();
+        Self {
+            steady_error_mm: steady.reduce(|a, b| if b.abs() > a.abs() { b } else { a }),
+            overshoot_mm: of(&|m| m.overshoot_mm)
+                .filter(|_| motion != Move::Sine && motion != Move::Hold),
+            rise_s: worst(all.iter().map(|m| m.rise_s)).filter(|_| step),
+            settle_s: worst(all.iter().map(|m| m.settle_s)).filter(|_| step),
+            rms_mm: of(&|m| m.rms_mm),
+            worst_mm: of(&|m| m.worst_mm),
+            start_delay_s: worst(all.iter().map(|m| m.start_delay_s)).filter(|_| step),
+            peak_speed_mm_s: of(&|m| m.peak_speed_mm_s),
+            switches_per_s: of(&|m| m.switches_per_s),
+            rest_switches: played.measured[0]
+                .rows
+                .last()
+                .map(|r| r.switches)
+                .filter(|_| motion == Move::Hold),
+            air_nl: of(&|m| m.air_dm3),
+            recovery_s: recovery(&played.measured[0]).filter(|_| motion.loses_contact()),
+            contact_error_mm: contact_error(&played.measured[0]).filter(|_| motion.loses_contact()),
+            reversals,
+            limit_cycle: Some(all.iter().any(Metrics::limit_cycle)),
+            ratio_to_bound: bound_s.and_then(|bound| {
+                worst(
+                    all.iter()
+                        .zip(bound)
+                        .map(|(m, b)| m.settle_s.map(|s| s / b)),
+                )
+            }),
+            first_overshoot_mm: Some(first.overshoot_mm),
+            first_settle_s: first.settle_s,
+            first_steady_error_mm: Some(first.steady_error_mm),
+            faults: fault_names.join(" "),
+            stopped: Some(traces().any(|t| !t.drove)),
+        }
+    }
+}
+
+/// Errors from the return of the load on \[m\].
+fn after_return(
+    trace: &Trace,
+    wait_s: f64,
+) -> impl DoubleEndedIterator<Item = f64> + ExactSizeIterator {
+    let from = ((CONTACT_S[1] + wait_s) * 1e3).round() as usize;
+    let to_m = trace.motion.to_m();
+    let rows = trace.rows.get(from..).unwrap_or_default();
+    rows.iter().map(move |r| (r.stroke_m - to_m).abs())
+}
+
+fn recovery(trace: &Trace) -> Option<f64> {
+    let errors = after_return(trace, 0.0);
+    let count = errors.len();
+    let last_outside = errors.rev().position(|e| e > RECOVERED_M);
+    match last_outside {
+        Some(0) => None,
+        Some(k) => Some((count - k) as f64 * 1e-3),
+        None => Some(0.0),
+    }
+}
+
+fn contact_error(trace: &Trace) -> Option<f64> {
+    after_return(trace, RECOVERY_S)
+        .reduce(f64::max)
+        .map(|m| m * 1e3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_case_comes_back_from_its_name() {
+        for name in [
+            "bench-vq110u/predictive/step-100/nominal/1",
+            "a/b/on-off/contact/load=-0.8/0",
+            "x/fuzzy-id/s-curve/combination=7/18446744073709551615",
+        ] {
+            let id: CaseId = name.parse().expect("a case");
+            assert_eq!(id.to_string(), name);
+        }
+        let error = |text: &str| text.parse::<CaseId>().expect_err("wrong").to_string();
+        assert!(error("predictive").contains("AXIS/CONTROLLER"));
+        assert!(error("a/best/hold/nominal/1").contains("`best`"));
+        assert!(error("a/pwm-p/jump/nominal/1").contains("step-100"));
+        assert!(error("a/pwm-p/hold/windy/1").contains("load=SHARE"));
+        assert!(error("a/pwm-p/hold/nominal/-1").contains("seed"));
+    }
+
+    #[test]
+    fn a_worst_without_all_values_is_none() {
+        assert_eq!(worst([Some(1.0), Some(3.0)]), Some(3.0));
+        assert_eq!(worst([Some(1.0), None]), None);
+    }
+}

@@ -1,0 +1,212 @@
+//! The moves of the comparison, each from power-up.
+
+use wheeleg_plant::axis::AxisParams;
+
+use crate::bench::suite::{BenchError, LEAD_S, Rig, force_left_n};
+use crate::bench::{LoadEvent, Motion, Trace};
+
+/// What a case asks of the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Move {
+    /// 20 mm back and out.
+    #[serde(rename = "step-20")]
+    Step20,
+    /// 100 mm back and out.
+    #[serde(rename = "step-100")]
+    Step100,
+    /// 64 mm out and back, in 1 s each, without a jerk.
+    SCurve,
+    /// Two periods of 2 s, 60 mm from crest to crest.
+    Sine,
+    /// At rest for 10 s after a step.
+    Hold,
+    /// A load against the move is taken away in its middle and comes back 0.4 s later.
+    Contact,
+    /// The same with a load that helps.
+    ContactHelped,
+}
+
+/// Distances of the moves on one axis: those of the names, or less where the
+/// stroke is too short for them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
+    /// The large step, about the middle: lower and upper end \[m\].
+    pub large_m: [f64; 2],
+    /// The small step \[m\].
+    pub small_m: f64,
+    /// The S-curve, about the middle \[m\].
+    pub curve_m: [f64; 2],
+    /// The sinusoid \[m\].
+    pub sine_m: [f64; 2],
+    /// Load of the loss of contact \[N\].
+    pub contact_n: f64,
+}
+
+impl Sizes {
+    /// Sizes for an axis: 100, 20, 64 and 60 mm, but at most 56, 11, 36 and 34 % of
+    /// the stroke; 42 % of the force left on the weaker side (60 N on the bench axis).
+    #[must_use]
+    pub fn of(sheet: &AxisParams) -> Self {
+        let stroke_m = sheet.cylinder.stroke_m;
+        let about = |size_m: f64, share: f64| {
+            let size_m = size_m.min(share * stroke_m);
+            let low_m = 0.5 * (stroke_m - size_m);
+            [low_m, low_m + size_m]
+        };
+        Self {
+            large_m: about(0.1, 0.56),
+            small_m: 0.02_f64.min(0.112 * stroke_m),
+            curve_m: about(0.064, 0.36),
+            sine_m: about(0.06, 0.34),
+            contact_n: (0.42 * force_left_n(sheet)).round(),
+        }
+    }
+}
+
+/// A played move: the first move after power-up, then what is measured.
+#[derive(Debug, Clone)]
+pub struct Played {
+    /// The first move, in which the board learns.
+    pub first: Trace,
+    /// What is measured, in the order of the name's text.
+    pub measured: Vec<Trace>,
+}
+
+/// Time for a step \[s\].
+pub const STEP_S: f64 = 2.5;
+/// Time at rest that is watched for switches \[s\].
+pub const REST_S: f64 = 10.0;
+/// When the load goes and when it comes back, from the start of the recording \[s\].
+pub const CONTACT_S: [f64; 2] = [0.15, 0.55];
+/// From the return of the load to the time when the error counts \[s\].
+pub const RECOVERY_S: f64 = 0.5;
+
+impl Move {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Step20,
+        Self::Step100,
+        Self::SCurve,
+        Self::Sine,
+        Self::Hold,
+        Self::Contact,
+        Self::ContactHelped,
+    ];
+
+    /// Name in reports and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Step20 => "step-20",
+            Self::Step100 => "step-100",
+            Self::SCurve => "s-curve",
+            Self::Sine => "sine",
+            Self::Hold => "hold",
+            Self::Contact => "contact",
+            Self::ContactHelped => "contact-helped",
+        }
+    }
+
+    /// The move of a name.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|m| m.name() == name)
+    }
+
+    /// The load of a foot on the ground \[N\], none for most moves. The move that is
+    /// measured extends, so a negative one is against it.
+    #[must_use]
+    pub fn contact_n(self, sheet: &AxisParams) -> f64 {
+        match self {
+            Self::Contact => -Sizes::of(sheet).contact_n,
+            Self::ContactHelped => Sizes::of(sheet).contact_n,
+            _ => 0.0,
+        }
+    }
+
+    /// The plant at power-up: pressed from the start where contact is to be lost.
+    #[must_use]
+    pub fn plant(self, plant: &AxisParams, sheet: &AxisParams) -> AxisParams {
+        let mut loaded = plant.clone();
+        loaded.load_n += self.contact_n(sheet);
+        loaded
+    }
+
+    /// Whether contact is lost and found.
+    #[must_use]
+    pub const fn loses_contact(self) -> bool {
+        matches!(self, Self::Contact | Self::ContactHelped)
+    }
+
+    /// Plays the move with a board that was just switched on, on [`Move::plant`],
+    /// whose load is `load_n`.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn play(
+        self,
+        rig: &mut Rig,
+        sheet: &AxisParams,
+        load_n: f64,
+    ) -> Result<Played, BenchError> {
+        let sizes = Sizes::of(sheet);
+        let [low_m, high_m] = sizes.large_m;
+        let mut steps = |list: &[f64]| -> Result<Vec<Trace>, BenchError> {
+            list.iter().map(|to_m| rig.step(*to_m, STEP_S)).collect()
+        };
+        let (mut moves, measured) = match self {
+            Self::Step20 => (steps(&[high_m])?, steps(&[high_m - sizes.small_m, high_m])?),
+            Self::Step100 => (steps(&[high_m])?, steps(&[low_m, high_m])?),
+            Self::SCurve => {
+                let [from_m, to_m] = sizes.curve_m;
+                let first = steps(&[to_m, from_m])?;
+                let mut curve = |from_m: f64, to_m: f64| {
+                    let motion = Motion::SCurve {
+                        at_s: LEAD_S,
+                        duration_s: 1.0,
+                        from_m,
+                        to_m,
+                    };
+                    rig.run(&motion, &[], 2.0)
+                };
+                (first, vec![curve(from_m, to_m)?, curve(to_m, from_m)?])
+            }
+            Self::Sine => {
+                let [from_m, crest_m] = sizes.sine_m;
+                let first = steps(&[crest_m, from_m])?;
+                let motion = Motion::Sine {
+                    at_s: LEAD_S,
+                    period_s: 2.0,
+                    periods: 2,
+                    from_m,
+                    crest_m,
+                };
+                (first, vec![rig.run(&motion, &[], 5.0)?])
+            }
+            Self::Hold => {
+                let first = steps(&[high_m, low_m])?;
+                (first, vec![rig.run(&Motion::hold(low_m), &[], REST_S)?])
+            }
+            Self::Contact | Self::ContactHelped => {
+                let first = steps(&[high_m, low_m])?;
+                let [gone_s, back_s] = CONTACT_S;
+                let events = [
+                    LoadEvent {
+                        at_s: gone_s,
+                        load_n: load_n - self.contact_n(sheet),
+                    },
+                    LoadEvent {
+                        at_s: back_s,
+                        load_n,
+                    },
+                ];
+                (first, vec![rig.step_with(high_m, &events, STEP_S)?])
+            }
+        };
+        Ok(Played {
+            first: moves.remove(0),
+            measured,
+        })
+    }
+}
