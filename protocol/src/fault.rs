@@ -199,8 +199,6 @@ fault_table!(
         "Restart the master: its control loop is stuck while its transmitter repeats. Then clear the fault.";
     SlotOverrun = 3, bit 2, "A reply could not be sent within its slot; the driver was cut off.",
         "Check the baud rate and the clock of this board, then clear the fault.";
-    VersionMismatch = 4, bit 3, "The master was built from another interface definition.",
-        "Install master and board firmware of the same release; identify names both versions.";
     SensorRange = 32, bit 4, "The position sensor reads outside its range.",
         "Check the potentiometer wiring for an open or short circuit, then clear the fault.";
     SensorRate = 33, bit 5, "The position jumped faster than the axis can move.",
@@ -225,6 +223,8 @@ fault_table!(
         "Report this with the firmware version, then clear the fault.";
     DuplicateAddress = 43, bit 15, "Another board answers at this address.",
         "Set the address straps so that every board has its own address, then restart the boards.";
+    NoMotion = 44, bit 3, "The valves gave the air for a motion of the axis, and it did not come.",
+        "Check the potentiometer, valves, tubes and load of this axis, then clear the fault.";
 });
 
 fault_table!(

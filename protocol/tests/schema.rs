@@ -251,7 +251,7 @@ fn fault_numbers_keep_to_their_ranges_and_bits_are_unique() {
             .chain(LIMITS.windows(2))
             .all(|pair| pair[0].code < pair[1].code)
     );
-    for code in [0, 5, 31, 44, 95, 128, 255] {
+    for code in [0, 4, 31, 45, 95, 128, 255] {
         assert_eq!(Fault::from_code(code), None);
     }
     assert_eq!(FaultClass::of(0), None);
@@ -264,7 +264,8 @@ fn permanent_numbers_stay() {
     let faults: Vec<u8> = Fault::ALL.iter().map(|fault| fault.code()).collect();
     assert_eq!(
         faults,
-        [1, 2, 3, 4, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43]
+        // 4 stood for what Nack says with VersionMismatch, and is not used again.
+        [1, 2, 3, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44]
     );
     assert_eq!(
         (

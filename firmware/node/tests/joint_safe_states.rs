@@ -217,10 +217,38 @@ fn sensor_fault_is_cleared_only_once_the_sensor_is_sound() {
 }
 
 #[test]
-fn blocked_joint_is_a_following_error_after_its_time() {
+fn joint_that_reads_like_one_at_rest_is_held_200_ms_after_motion_was_expected() {
+    // A frozen potentiometer, a stuck valve, a blocked piston: all read like this.
+    for end in [175.0, 5.0] {
+        let mut rig = JointRig::tracking(Hold);
+        let (mut expected_at, start) = (None, rig.now);
+        while rig.node.mode() == Mode::Tracking {
+            rig.run_cycles(1, Some(setpoint(end, Hold)));
+            if rig.node.snapshot().motion_overdue > Micros::ZERO {
+                expected_at = expected_at.or(Some(rig.now));
+            }
+        }
+        assert!(rig.node.faults().contains(Fault::NoMotion));
+        assert!(!rig.any_open());
+        // At full drive the air for 2 mm is there after 0.39 s.
+        let expected_at = expected_at.expect("before the fault");
+        assert!((380_000..=450_000).contains(&(expected_at - start)));
+        assert!((190_000..=210_000).contains(&(rig.now - expected_at)));
+        // Latched, until it is cleared.
+        rig.run_cycles(5, Some(setpoint(end, Hold)));
+        assert_eq!(rig.node.mode(), Mode::Hold);
+        assert!(matches!(rig.clear(), Message::Ack(_)));
+        assert_eq!(rig.node.mode(), Mode::Idle);
+    }
+}
+
+#[test]
+fn joint_that_creeps_is_a_following_error_after_its_time() {
     let mut rig = JointRig::tracking(Hold);
     let start = rig.now;
     while rig.node.mode() == Mode::Tracking {
+        // 5 mm/s: too slow, but a motion.
+        rig.move_to(100.0 + f64::from(rig.now - start) * 5e-6);
         rig.run_cycles(1, Some(setpoint(175.0, Hold)));
     }
     let took_ms = (rig.now - start) / 1000;

@@ -174,7 +174,7 @@ mod tests {
         let timing = SlotTiming::DEFAULT;
         assert_eq!(timing.frame_us(MessageType::Sync), 1020);
         assert_eq!(timing.frame_us(MessageType::SlotReply), 290);
-        assert_eq!(timing.cyclic_us(), 1020 + 50 + 8 * (290 + 20));
+        assert_eq!(timing.cyclic_us(), 1020 + 100 + 8 * (290 + 20));
         assert_eq!(CYCLIC_SHARE_PERMILLE, 360);
         assert_eq!(timing.driver_limit_us(), 319);
     }
@@ -214,7 +214,7 @@ mod tests {
         assert!(!timing.exchange_fits(MessageType::Identify, start - 1));
         assert!(timing.exchange_fits(MessageType::Identify, start));
         // Identify 15 bytes, Identity 40 bytes.
-        let exchange = 150 + 50 + 400 + 20;
+        let exchange = 150 + 100 + 400 + 20;
         assert_eq!(timing.exchange_us(MessageType::Identify), Some(exchange));
         assert!(timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange));
         assert!(!timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange + 1));

@@ -61,10 +61,10 @@ ENUMS = {
                    7: "Armed", 8: "Duplicate", 9: "Expired", 10: "UnknownParameter", 11: "ReadOnly",
                    12: "VersionMismatch", 13: "FaultLatched", 14: "WrongBoard", 15: "LinkDown", 16: "NotReady"},
 }
-FAULTS = {1: "LinkLost", 2: "StaleMaster", 3: "SlotOverrun", 4: "VersionMismatch", 32: "SensorRange",
+FAULTS = {1: "LinkLost", 2: "StaleMaster", 3: "SlotOverrun", 32: "SensorRange",
           33: "SensorRate", 34: "FollowingError", 35: "TickOverrun", 36: "ParameterCorrupt", 37: "StateCorrupt",
           38: "SupplyLost", 39: "EmergencyStop", 40: "OverTravel", 41: "EncoderFault", 42: "WatchdogReset",
-          43: "DuplicateAddress"}
+          43: "DuplicateAddress", 44: "NoMotion"}
 INTS = {"u8": ("B", 0, 2**8 - 1), "u16": ("<H", 0, 2**16 - 1), "u32": ("<I", 0, 2**32 - 1),
         "u64": ("<Q", 0, 2**64 - 1), "i16": ("<h", -2**15, 2**15 - 1), "i32": ("<i", -2**31, 2**31 - 1)}
 # Checked numbers: wire integer, range, text.

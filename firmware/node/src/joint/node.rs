@@ -2,6 +2,7 @@
 
 use core::hash::Hash;
 
+use super::expectation::MotionWatch;
 use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
@@ -25,6 +26,7 @@ pub(super) struct TickState {
     pub(super) reference: PositionMm,
     pub(super) measured: PositionMm,
     pub(super) following: Ticks,
+    pub(super) motion: MotionWatch,
     boot_ticks: Ticks,
 }
 
@@ -86,6 +88,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 reference: PositionMm::ZERO,
                 measured: PositionMm::ZERO,
                 following: Ticks::ZERO,
+                motion: MotionWatch::default(),
                 boot_ticks: Ticks::ZERO,
             },
             fixed_seal: Seal::default(),

@@ -1,5 +1,6 @@
 //! From the mode and the control law to the four valve outputs of a tick.
 
+use super::expectation::MotionWatch;
 use super::node::JointNode;
 use super::reference::{Target, TickReference, advance};
 use crate::JOINT_TICK;
@@ -49,6 +50,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.pwm.tick(&output.openings)
         };
         self.controller.sent(on_times);
+        self.expect_motion(&on_times, output.settled, now);
         let mut limits = limit_bits(&output.limits, output.settled);
         if slew_limited {
             limits.insert(Limit::SlewLimited);
@@ -59,11 +61,25 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         on_times
     }
 
+    /// Whether the piston follows what the valves were told.
+    fn expect_motion(&mut self, on_times: &OnTimes, settled: bool, now: Micros) {
+        let state = &mut self.state;
+        if settled || !self.core.mode().may_drive() {
+            state.motion = MotionWatch::closed(state.measured);
+        } else if state
+            .motion
+            .sample(on_times, state.measured, &self.settings.motion)
+        {
+            self.axis_fault(Fault::NoMotion, now);
+        }
+    }
+
     /// No control: the valves do what the mode says, the reference follows the
     /// measured stroke.
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
         self.state.reference = self.state.measured;
         self.state.following = Ticks::ZERO;
+        self.state.motion = MotionWatch::closed(self.state.measured);
         self.target = Target::at(self.state.measured);
         let velocity = self.controller.observe(self.state.measured);
         let on_times = if self.core.mode() == Mode::Exhaust {
@@ -99,6 +115,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             pulses: on_times.map(|on| Micros(u32::from(on))),
             switches: self.switches.state(),
             faults: self.core.supervisor.faults().latched(),
+            motion_overdue: self
+                .state
+                .motion
+                .overdue(self.state.measured, &self.settings.motion),
             ..self.snapshot
         };
     }

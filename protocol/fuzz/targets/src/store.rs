@@ -1,0 +1,257 @@
+//! The parameter store under power cuts, flash errors, rotting and unsteady
+//! words: whatever happened, the reader gives one of the sets that were saved,
+//! whole, or none, and none only if no page is sound; a set that was saved is
+//! not given up before the next one stands (P1, P6).
+
+use arbitrary::{Arbitrary, Unstructured};
+use wheeleg_board::store::{PAGES, RECORDS_MAX, Record, SaveError, Store, WORDS};
+use wheeleg_node::parameters::JointParameters;
+use wheeleg_protocol::param::JOINT_PARAMS;
+
+use crate::chip::{Chip, Mishap, Port, Torn, draw};
+
+/// Most saves of a run.
+const SAVES_MAX: u32 = 40;
+
+type Set = Vec<Record>;
+
+#[derive(Clone, Copy, Debug, Arbitrary)]
+enum Action {
+    /// A set of as many records is saved, and all goes well.
+    Save(u8),
+    /// The same, and it does not.
+    Mishap(u8, Mishap),
+    /// The power goes at the last word, on which all depends.
+    Commit(u8, Torn),
+    /// More records than a page holds.
+    TooMany,
+    /// Up to three bits of a word have flipped.
+    Rot(bool, u8, [u8; 3]),
+    /// A word can no longer be read, or not always.
+    Fade(bool, u8, Option<u8>),
+}
+
+/// What a page may hold.
+#[derive(Debug, Default)]
+struct Page {
+    /// Sets that may still be read from it.
+    possible: Vec<Set>,
+    /// The set that it holds without any damage.
+    sound: Option<Set>,
+    /// Some of it may read differently each time.
+    unsteady: bool,
+}
+
+struct Play {
+    chip: Chip,
+    pages: [Page; PAGES],
+    /// The page with the newest set, if that is sound.
+    newest: Option<usize>,
+    saves: u32,
+}
+
+/// The first bytes say what the flash holds at first, the rest are actions.
+pub fn run(data: &[u8]) {
+    let mut u = Unstructured::new(data);
+    let Ok(content) = u.arbitrary() else {
+        return;
+    };
+    let mut play = Play {
+        chip: Chip::new(content),
+        pages: Default::default(),
+        newest: None,
+        saves: 0,
+    };
+    play.load();
+    while play.saves < SAVES_MAX
+        && !u.is_empty()
+        && let Ok(action) = u.arbitrary::<Action>()
+    {
+        play.act(action);
+        play.load();
+    }
+}
+
+impl Play {
+    fn act(&mut self, action: Action) {
+        let place = |second, word: u8| (usize::from(second), usize::from(word));
+        match action {
+            Action::Save(size) => self.save(size, None),
+            Action::Mishap(size, mishap) => self.save(size, Some(mishap)),
+            Action::Commit(size, torn) => {
+                // Behind the erasure, the header and the records.
+                let mishap = Mishap {
+                    after: (size % 64) + 2,
+                    torn,
+                    cut: true,
+                };
+                self.save(size % 64, Some(mishap));
+            }
+            Action::TooMany => {
+                let set = vec![Record { id: 1, raw: 2 }; RECORDS_MAX + 1];
+                let before = self.chip.operations;
+                let saved = Store::new(Port(&mut self.chip)).save(&set);
+                assert_eq!(saved, Err(SaveError::TooMany));
+                assert_eq!(self.chip.operations, before, "refused, and touched");
+            }
+            Action::Rot(second, word, bits) => {
+                let (page, word) = place(second, word);
+                self.chip.rot(page, word, bits);
+                self.damaged(page);
+            }
+            Action::Fade(second, word, unsteady) => {
+                let (page, word) = place(second, word);
+                self.chip.fade(page, word, unsteady);
+                self.damaged(page);
+                self.pages[page].unsteady |= unsteady.is_some();
+            }
+        }
+    }
+
+    fn damaged(&mut self, page: usize) {
+        self.pages[page].sound = None;
+        if self.newest == Some(page) {
+            self.newest = None;
+        }
+    }
+
+    /// A set like no other of this run, some of its records real parameters.
+    fn set(&self, size: u8) -> Set {
+        let mut state = draw(self.saves);
+        (0..usize::from(size).min(RECORDS_MAX))
+            .map(|index| {
+                state = draw(state);
+                let row = &JOINT_PARAMS[index % JOINT_PARAMS.len()];
+                let span = row.max.abs_diff(row.min).max(1);
+                let (id, raw) = match state >> 30 {
+                    0 => (state as u16, state as i32),
+                    1 => (row.id, state as i32),
+                    _ => (row.id, row.min.saturating_add_unsigned(state % span)),
+                };
+                Record { id, raw }
+            })
+            .collect()
+    }
+
+    fn save(&mut self, size: u8, mishap: Option<Mishap>) {
+        self.saves += 1;
+        let set = self.set(size);
+        let (erased, written) = (self.chip.erased, self.chip.written);
+        let unsteady = self.pages.iter().any(|page| page.unsteady);
+        self.chip.power(mishap);
+        let saved = Store::new(Port(&mut self.chip)).save(&set);
+        let touched = |page: usize| self.chip.erased[page] != erased[page];
+        for page in 0..PAGES {
+            let writes = (self.chip.written[page] - written[page]) as usize;
+            assert!(touched(page) || writes == 0, "written and not erased");
+            if !touched(page) {
+                continue;
+            }
+            // What reads differently each time may look newer than it is.
+            assert!(
+                unsteady || self.newest != Some(page),
+                "the newest set is erased before the next one stands"
+            );
+            // An erasure that was torn may have left what was there.
+            let whole = writes == set.len() + 2;
+            if writes > 0 {
+                self.pages[page] = Page::default();
+            } else {
+                self.pages[page].sound = None;
+                self.pages[page].unsteady |= matches!(
+                    mishap,
+                    Some(Mishap {
+                        torn: Torn::Unsteady(_),
+                        ..
+                    })
+                );
+            }
+            if whole {
+                self.pages[page].possible.push(set.clone());
+            }
+            let torn_at = mishap.map(|mishap| (usize::from(mishap.after), mishap.torn));
+            match torn_at {
+                Some((at, Torn::Unsteady(_))) if at < set.len() + 3 => {
+                    self.pages[page].unsteady = true;
+                }
+                _ if saved.is_ok() => {
+                    self.pages[page].sound = Some(set.clone());
+                    self.newest = Some(page);
+                }
+                _ => {}
+            }
+            if !self.pages.iter().any(|page| page.sound.is_some()) {
+                self.newest = None;
+            }
+        }
+        match saved {
+            Ok(_) => assert_eq!(self.loaded().as_ref(), Some(&set), "saved, it says"),
+            Err(error) => {
+                assert_eq!(error, SaveError::Flash);
+                assert!(mishap.is_some() || unsteady, "failed for no reason");
+            }
+        }
+    }
+
+    fn loaded(&mut self) -> Option<Set> {
+        const NONE: Record = Record { id: 0, raw: 0 };
+        let store = Store::new(Port(&mut self.chip));
+        let loaded = store.load((0, [NONE; WORDS]), |(count, set), record| {
+            set[*count] = record;
+            *count += 1;
+        });
+        loaded.map(|((count, set), _)| set[..count].to_vec())
+    }
+
+    /// What the reader gives, and whether it may.
+    fn load(&mut self) {
+        self.chip.power(None);
+        let loaded = self.loaded();
+        match &loaded {
+            None => {
+                let sound = self.pages.iter().any(|page| page.sound.is_some());
+                assert!(!sound, "a sound page is passed over");
+            }
+            Some(set) => {
+                let known = self.pages.iter().any(|page| page.possible.contains(set));
+                assert!(known, "never saved: {set:?}");
+            }
+        }
+        if let Some(newest) = self.newest
+            && loaded != self.pages[newest].sound
+        {
+            // The save behind it got as far as its last word.
+            let other = &self.pages[1 - newest];
+            let newer = loaded.as_ref().is_some_and(|set| other.possible.last() == Some(set));
+            assert!(newer, "the newest set is not the one that is read");
+            if !other.unsteady {
+                self.newest = Some(1 - newest);
+                self.pages[1 - newest].sound = loaded.clone();
+            }
+        }
+        self.parameters(loaded.as_deref());
+    }
+
+    /// The same with the board's parameters: every value keeps to its limits.
+    fn parameters(&mut self, set: Option<&[Record]>) {
+        let put = |held: &mut JointParameters, record: Record| {
+            if let Ok(changed) = held.with(record.id, record.raw, true) {
+                *held = changed;
+            }
+        };
+        let defaults = JointParameters::default();
+        let store = Store::new(Port(&mut self.chip));
+        let held = store.load(defaults, put).map_or(defaults, |(held, _)| held);
+        for row in JOINT_PARAMS {
+            let raw = held.by_id(row.id).expect("a row of the table");
+            assert!(row.permits(raw), "{}: {raw}", row.name);
+        }
+        if !self.pages.iter().any(|page| page.unsteady) {
+            let mut expected = defaults;
+            for record in set.unwrap_or_default() {
+                put(&mut expected, *record);
+            }
+            assert_eq!(held, expected);
+        }
+    }
+}
