@@ -23,6 +23,8 @@ const START_UP_NS: u64 = 100_000_000;
 /// From the voltage detector's threshold to the brown-out reset (ASSUMED: a
 /// capacitor that lasts so long) [ns].
 const FALL_NS: u64 = 20_000;
+/// The byte between bus frames.
+const DELIMITER: u8 = 0;
 /// Edges between two looks at the stack.
 const STACK_EVERY: u32 = 64;
 
@@ -43,6 +45,8 @@ pub(crate) struct Board {
     edges: u32,
     trip: Option<Trip>,
     power_lost_in_save: bool,
+    /// Received bytes are not worked off.
+    owes: bool,
 }
 
 impl Board {
@@ -64,6 +68,7 @@ impl Board {
             edges: 0,
             trip: None,
             power_lost_in_save: false,
+            owes: false,
         }
     }
 
@@ -225,7 +230,8 @@ impl Board {
         if let Stop::Reset(cause) = stop {
             return Err(format!("reset {cause:#x} in the start-up code"));
         }
-        self.reply()
+        let outputs = self.outputs();
+        self.reply(outputs)
     }
 
     fn machine(&mut self) -> Result<&mut Machine, String> {
@@ -270,6 +276,9 @@ impl Board {
     fn run(&mut self, run: &Run) -> Result<Ran, String> {
         self.deliver(run)?;
         self.supply(run.power)?;
+        // Only behind a delimiter is there anything to work off; before one, the
+        // next byte of the frame would come late.
+        self.owes |= run.received.last() == Some(&DELIMITER);
         if let Some(inputs) = run.edge {
             self.edge_ns = run.until_ns;
             if let Some(before) = run.until_ns.checked_sub(6) {
@@ -279,19 +288,38 @@ impl Board {
             self.advance(run.until_ns + BEYOND_EDGE_NS, Until::Cycle)?;
             self.edges = self.edges.wrapping_add(1);
             self.check_edge(run.until_ns)?;
+            let outputs = self.outputs();
+            self.work_off(run.until_ns)?;
+            self.reply(outputs)
         } else {
-            // Never through a tick edge: its inputs come with a run of its own.
-            let state = self.machine()?.state();
-            let edge = state.soc.tick_timer().overflow_at();
-            let running = self.running;
-            let cap = self.machine()?.state().soc.time;
-            let cap = edge
-                .filter(|_| running)
-                .map_or(u64::MAX, |cycle| cap.ns_of(cycle).saturating_sub(6));
-            let until = Until::Asleep(cap.min(run.until_ns + WORK_NS));
-            self.advance(cap.min(run.until_ns), until)?;
+            let cap = self.before_next_edge()?;
+            self.advance(cap.min(run.until_ns), Until::Cycle)?;
+            self.work_off(run.until_ns)?;
+            let outputs = self.outputs();
+            self.reply(outputs)
         }
-        self.reply()
+    }
+
+    /// Last instant before the next tick edge, whose inputs come with a run of
+    /// its own.
+    fn before_next_edge(&mut self) -> Result<u64, String> {
+        let running = self.running;
+        let soc = &self.machine()?.state().soc;
+        let edge = soc.tick_timer().overflow_at().filter(|_| running);
+        Ok(edge.map_or(u64::MAX, |cycle| soc.time.ns_of(cycle).saturating_sub(6)))
+    }
+
+    /// Runs on until all that was received is worked off, so that the
+    /// transmissions it leads to are known in time. What a tick edge cuts short
+    /// goes on in the next run.
+    fn work_off(&mut self, now_ns: u64) -> Result<(), String> {
+        if self.owes {
+            let cap = self.before_next_edge()?;
+            let longest = cap.min(now_ns + WORK_NS);
+            self.advance(cap.min(now_ns), Until::Asleep(longest))?;
+            self.owes = !self.machine()?.rests();
+        }
+        Ok(())
     }
 
     /// The board's tick timer keeps the simulator's time.
@@ -366,6 +394,7 @@ impl Board {
 
     fn tripped(&mut self, at_ns: u64, cause: u32) {
         self.running = false;
+        self.owes = false;
         self.announced = None;
         self.figures.resets = self.figures.resets.saturating_add(1);
         self.trip = Some(Trip {
@@ -469,9 +498,8 @@ impl Board {
         (inputs, state.soc.time.ns_of(seen.edge))
     }
 
-    fn reply(&mut self) -> Result<Ran, String> {
+    fn reply(&mut self, outputs: Outputs) -> Result<Ran, String> {
         let sent = self.sent()?;
-        let outputs = self.outputs();
         let (seen, seen_at_ns) = self.seen();
         let period_us = self.period_us() as u32;
         self.measure()?;

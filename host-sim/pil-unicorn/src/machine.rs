@@ -465,6 +465,12 @@ impl Machine {
         Ok((bottom + free as u32) & !3)
     }
 
+    /// Whether the processor sleeps, or was stopped for good.
+    pub(crate) fn rests(&self) -> bool {
+        let state = self.state();
+        self.asleep || state.stop_processor || state.stop_main_loop
+    }
+
     /// Runs to `ns`. Unless `started`, stops as soon as the tick timer runs.
     ///
     /// # Errors
