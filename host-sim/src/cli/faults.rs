@@ -1,12 +1,14 @@
 //! `wheeleg faults`: what can go wrong, and what the robot does about it.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::print;
+use super::{TARGETS_MISSED, print};
 use crate::SimError;
+use crate::faults::matrix::{self, Verdict};
 use crate::faults::{KINDS, KindInfo};
 
 /// Arguments of `wheeleg faults`.
@@ -24,13 +26,102 @@ enum FaultsCommand {
         #[arg(long)]
         json: bool,
     },
+    /// List the rows of the fault matrix: what goes wrong, when, what must come of it.
+    Rows,
+    /// Run rows of the fault matrix and hold them against what must come of them; writes
+    /// report and summary. Exit code 1 if a row does not come out as it must.
+    Run(RunArgs),
 }
 
-/// Lists faults.
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// All rows; those that are not implemented are listed and not counted.
+    #[arg(long, required_unless_present = "row")]
+    all: bool,
+    /// One row, as `wheeleg faults rows` names it; may be given several times.
+    #[arg(long, value_name = "ID", conflicts_with = "all")]
+    row: Vec<String>,
+    /// Seed of all noise, and of the instants.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results. Results of an earlier run in it move to its folder `previous`.
+    #[arg(long, value_name = "DIR", default_value = "runs/faults")]
+    out: PathBuf,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Lists faults and rows, or runs rows.
 pub(super) fn command(args: &FaultsArgs) -> Result<ExitCode, SimError> {
-    match args.command {
-        FaultsCommand::List { json } => print(&listing(json)),
+    match &args.command {
+        FaultsCommand::List { json } => print(&listing(*json)),
+        FaultsCommand::Rows => print(&rows()),
+        FaultsCommand::Run(args) => run(args),
     }
+}
+
+fn rows() -> String {
+    let mut out = String::from("Rows of the fault matrix (wheeleg faults run --row ID):\n\n");
+    for row in matrix::ROWS {
+        let strikes: Vec<&str> = row.strikes.iter().map(|s| s.what).collect();
+        let what = match row.not_implemented() {
+            Some(reason) => format!("not implemented: {reason}"),
+            None => format!("{}; {}", strikes.join(", "), row.phase.words()),
+        };
+        let _ = writeln!(out, "  {:26} {what}", row.id);
+    }
+    out
+}
+
+fn run(args: &RunArgs) -> Result<ExitCode, SimError> {
+    let rows = matrix::select(&args.row)?;
+    let finished = matrix::write(&rows, args.seed, &args.out)?;
+    if args.json {
+        print(&format!("{:#}\n", finished.summary))?;
+    } else {
+        print(&verdicts(&finished))?;
+    }
+    Ok(if finished.passed() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(TARGETS_MISSED)
+    })
+}
+
+fn verdicts(finished: &matrix::Finished) -> String {
+    let mut out = format!(
+        "{:15}  {:26} {:>9} {:>9} {:>9} {:>9}  latched\n",
+        "verdict", "row", "detected", "commanded", "telemetry", "physical"
+    );
+    let ms = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} ms"));
+    for o in &finished.outcomes {
+        let m = &o.measured;
+        let _ = write!(out, "{:15}  {:26}", o.verdict.words(), o.row.id);
+        if o.verdict != Verdict::NotImplemented {
+            let times = [m.detected_ms, m.commanded_ms, m.sensed_ms, m.physical_ms].map(ms);
+            let _ = write!(
+                out,
+                " {:>9} {:>9} {:>9} {:>9}",
+                times[0], times[1], times[2], times[3]
+            );
+            let _ = write!(out, "  {}", if m.latched { "yes" } else { "no" });
+        }
+        out.push('\n');
+        for failure in &o.failures {
+            let _ = writeln!(out, "{:17}{failure}", "");
+        }
+    }
+    let count = |verdict| matrix::count(&finished.outcomes, verdict);
+    let _ = writeln!(
+        out,
+        "\n{} rows as they must be, {} not, {} not implemented\nreport  {}",
+        count(Verdict::Pass),
+        count(Verdict::Fail),
+        count(Verdict::NotImplemented),
+        finished.report.display()
+    );
+    out
 }
 
 fn listing(json: bool) -> String {

@@ -7,6 +7,7 @@
 //! * [`interface`]: boards of another interface version;
 //! * [`admission`]: which faults a run can have;
 //! * [`schedule`]: begins and ends in order;
+//! * [`matrix`]: every fault with what must come of it, measured;
 //! * [`injector`]: the faults under way, and what they do to signals.
 
 mod admission;
@@ -14,6 +15,7 @@ mod injector;
 mod interface;
 mod kind;
 mod line;
+pub mod matrix;
 mod schedule;
 mod spec;
 

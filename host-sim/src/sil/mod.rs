@@ -154,6 +154,11 @@ pub fn run_with(
         }
     }
     let now_ns = world.now_ns();
+    let link = observer.link();
+    if link.errors() > 0 {
+        let t_ns = now_ns - start_ns.unwrap_or(now_ns);
+        recorder.event(t_ns, EventKind::Info, link_text(&link));
+    }
     Ok(RunOutcome {
         recorded_s: start_ns.map_or(0.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9),
         simulated_s: now_ns as f64 * 1e-9,
@@ -162,8 +167,30 @@ pub fn run_with(
             .outside()
             .map(|outside| outside.summary(nodes, now_ns)),
         line: world.audit(),
-        link: observer.link(),
+        link,
     })
+}
+
+/// What the master counted on the line, in words.
+fn link_text(link: &LinkQuality) -> String {
+    let kinds = [
+        ("overflow", link.overflow),
+        ("truncated", link.truncated),
+        ("short", link.short),
+        ("crc", link.crc),
+        ("version", link.version),
+        ("length", link.length),
+        ("address", link.address),
+    ];
+    let kinds = kinds.iter().filter(|(_, count)| *count > 0);
+    let kinds: Vec<String> = kinds
+        .map(|(kind, count)| format!("{kind} {count}"))
+        .collect();
+    format!(
+        "master: {} sound frames heard, broken ones: {}",
+        link.frames,
+        kinds.join(", ")
+    )
 }
 
 /// Carries out one event of the scenario.

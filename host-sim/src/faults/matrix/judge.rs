@@ -1,0 +1,220 @@
+//! Holds what was measured against what must come of a row.
+
+use super::measure::Measured;
+use super::row::{Expect, Row, Stop};
+use super::run::Ran;
+use crate::config::RobotConfig;
+
+/// Wheels must stand within this after their ramp may begin at the latest, ms.
+const WHEEL_STOP_MS: f64 = 440.0;
+/// Sampling of the log and rounding of times, ms.
+const TICK_MS: f64 = 1.0;
+/// Load of the line that counts as full.
+const FULL: f64 = 0.95;
+/// What degrades may leave its course by this before it is stopped, mm.
+const DEGRADED_MM: f64 = 40.0;
+/// From the detection to the safe state, where the begin of the trouble is chance, ms.
+const REACTION_MS: f64 = 60.0;
+
+/// How a row came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// As it must.
+    Pass,
+    /// Not as it must.
+    Fail,
+    /// It was not run.
+    NotImplemented,
+}
+
+impl Verdict {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Pass => "PASS",
+            Self::Fail => "FAIL",
+            Self::NotImplemented => "not implemented",
+        }
+    }
+}
+
+/// A row with what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The row.
+    pub row: Row,
+    /// Whether it came out as it must.
+    pub verdict: Verdict,
+    /// What did not, or why it was not run.
+    pub failures: Vec<String>,
+    /// What was measured.
+    pub measured: Measured,
+    /// The faults as they were injected.
+    pub faults: Vec<String>,
+}
+
+impl Outcome {
+    pub(super) fn not_implemented(row: Row, reason: &str) -> Self {
+        Self {
+            row,
+            verdict: Verdict::NotImplemented,
+            failures: vec![reason.to_owned()],
+            measured: Measured::default(),
+            faults: Vec::new(),
+        }
+    }
+}
+
+/// Collects what is wrong.
+#[derive(Default)]
+struct Failures(Vec<String>);
+
+impl Failures {
+    fn check(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        if !holds {
+            self.0.push(what());
+        }
+    }
+
+    /// A time that must be known and at most `limit`.
+    fn within(&mut self, what: &str, value: Option<f64>, limit: f64) {
+        match value {
+            Some(ms) if ms <= limit + 1e-6 => {}
+            Some(ms) => self
+                .0
+                .push(format!("{what} after {ms:.1} ms, allowed {limit:.1}")),
+            None => self.0.push(format!("{what}: never")),
+        }
+    }
+}
+
+/// Judges a run.
+pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Outcome {
+    let mut f = Failures::default();
+    match row.expect {
+        Expect::Stop(expected) => {
+            stop(&mut f, &row, &expected, &m);
+            f.within(
+                "valves physically shut",
+                m.physical_ms,
+                expected.all_ms + closing_ms(robot) + TICK_MS,
+            );
+        }
+        Expect::GoesOn { deviation_mm } => goes_on(&mut f, deviation_mm, &m),
+        Expect::Degrades => degrades(&mut f, &m),
+        Expect::NoArming => f.check(ran.error.is_some(), || "the robot gets ready".to_owned()),
+        Expect::NotImplemented(_) => {}
+    }
+    if let (Some(error), false) = (&ran.error, row.expect == Expect::NoArming) {
+        f.0.push(format!("the run ended early: {error}"));
+    }
+    f.check(m.wrong_frames == 0, || {
+        format!("{} frames accepted that nobody sent", m.wrong_frames)
+    });
+    for words in row.reads {
+        f.check(m.reads.iter().any(|line| line.contains(words)), || {
+            format!("the user does not read `{words}`")
+        });
+    }
+    f.check(!m.reads.iter().any(|line| line.contains("WRONG")), || {
+        "a board takes what it must refuse".to_owned()
+    });
+    let answering = row.answering;
+    f.check(m.replies >= answering, || {
+        format!("only {} boards answer, {answering} must", m.replies)
+    });
+    if row.strikes.iter().any(|s| s.what == "bus-full") {
+        f.check(m.bus_load >= FULL, || {
+            format!("the line is loaded to {:.2} only", m.bus_load)
+        });
+    }
+    let verdict = if f.0.is_empty() {
+        Verdict::Pass
+    } else {
+        Verdict::Fail
+    };
+    Outcome {
+        row,
+        verdict,
+        failures: f.0,
+        measured: m,
+        faults: ran.faults.iter().map(ToString::to_string).collect(),
+    }
+}
+
+/// Closing time of the slowest valve with its line, ms.
+fn closing_ms(robot: &RobotConfig) -> f64 {
+    let valves = robot.plant.cylinders.iter();
+    let closing = valves.map(|c| c.fill_valve.t_off_s.max(c.vent_valve.t_off_s) + c.line_delay_s);
+    closing.fold(0.0, f64::max) * 1e3
+}
+
+fn stop(f: &mut Failures, row: &Row, expected: &Stop, m: &Measured) {
+    let [from, to] = expected.detected_ms;
+    f.within("detected", m.detected_ms, to);
+    if let Some(ms) = m.detected_ms {
+        f.check(ms >= from - 1e-6, || {
+            format!("detected after {ms:.1} ms, not before {from:.1}")
+        });
+    }
+    if expected.axis > 0 {
+        f.within(
+            "valves of the axis commanded shut",
+            m.own_commanded_ms,
+            expected.own_ms,
+        );
+    }
+    f.within("all valves commanded shut", m.commanded_ms, expected.all_ms);
+    f.within("all boards tell a safe mode", m.sensed_ms, expected.all_ms);
+    f.within(
+        "both wheels stand",
+        m.wheels_stand_ms,
+        expected.all_ms + WHEEL_STOP_MS,
+    );
+    f.check(m.latched, || "not latched".to_owned());
+    if row.estop {
+        f.within("supply dump commanded", m.dump_ms, expected.all_ms);
+    }
+}
+
+fn goes_on(f: &mut Failures, limit_mm: f64, m: &Measured) {
+    f.check(!m.stopped, || "the motion stops".to_owned());
+    if let Some(ms) = m.detected_ms {
+        f.0.push(format!(
+            "a fault is latched, or all axes hold, after {ms:.1} ms"
+        ));
+    }
+    match m.deviation_mm {
+        Some(mm) => f.check(mm <= limit_mm, || {
+            format!("a stroke deviates by {mm:.3} mm, allowed {limit_mm}")
+        }),
+        None => f.0.push("nothing to compare with".to_owned()),
+    }
+}
+
+fn degrades(f: &mut Failures, m: &Measured) {
+    match m.detected_ms {
+        None => {
+            f.check(!m.stopped, || "stopped without a reason".to_owned());
+            if let Some(mm) = m.deviation_mm {
+                f.check(mm <= DEGRADED_MM, || {
+                    format!("a stroke deviates by {mm:.1} mm")
+                });
+            }
+        }
+        Some(detected) => {
+            f.check(m.stopped, || "detected, but not all axes stop".to_owned());
+            f.within(
+                "all valves commanded shut",
+                m.commanded_ms,
+                detected + REACTION_MS,
+            );
+            f.within(
+                "all boards tell a safe mode",
+                m.sensed_ms,
+                detected + REACTION_MS,
+            );
+        }
+    }
+}

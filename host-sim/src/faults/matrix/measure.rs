@@ -1,0 +1,351 @@
+//! What is measured of a row: latencies on commanded, sensed and physical signals,
+//! latching, deviation, and what the user can read.
+
+use serde::Serialize;
+
+use super::row::{Expect, Row, Since};
+use super::run::Ran;
+use crate::faults::{FaultKind, FaultSpec, Victim};
+use crate::telemetry::{JointSample, Recording, Row as Sample};
+
+const TICK_S: f64 = 1e-3;
+/// Armed and tracking.
+const DRIVING: [u8; 2] = [2, 3];
+const EXHAUST: u8 = 5;
+/// A rim slower than this stands, mm/s.
+const STANDING_MM_S: f64 = 5.0;
+/// Motion that tells a reading that stands from rest, mm.
+const EXPECTED_MM: f64 = 2.0;
+/// Trapped air is watched for this long after the stop, s.
+const HELD_S: f64 = 0.5;
+
+/// What was measured. Times in ms count from the row's instant; `None`: never.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Measured {
+    /// Instant of the fault, s of scenario time.
+    pub at_s: f64,
+    /// Instant from which times count, s of scenario time.
+    pub since_s: f64,
+    /// First latched fault of a board, or the master's HOLD.
+    pub detected_ms: Option<f64>,
+    /// Valves of the struck axis commanded shut for good (a wheel: ramp begun).
+    pub own_commanded_ms: Option<f64>,
+    /// The same of the slowest axis.
+    pub commanded_ms: Option<f64>,
+    /// Telemetry of the slowest axis shows a safe mode.
+    pub sensed_ms: Option<f64>,
+    /// Valves of the slowest axis physically shut.
+    pub physical_ms: Option<f64>,
+    /// Both rims stand.
+    pub wheels_stand_ms: Option<f64>,
+    /// Supply dump valve commanded open.
+    pub dump_ms: Option<f64>,
+    /// Largest sensed movement of a held joint in the half second after the stop, mm.
+    pub held_mm: Option<f64>,
+    /// Largest deviation of a true stroke from the same run without the fault, mm.
+    pub deviation_mm: Option<f64>,
+    /// No axis drives at the end.
+    pub stopped: bool,
+    /// No axis drives again, though the cause may be gone and arming was asked for.
+    pub latched: bool,
+    /// Frames that a receiver accepted and nobody had sent.
+    pub wrong_frames: u64,
+    /// Largest load of a bus cycle after the instant.
+    pub bus_load: f64,
+    /// Fewest boards that answered in a cycle in the 0.3 s after the instant.
+    pub replies: u8,
+    /// Messages that the log did not take.
+    pub dropped: u64,
+    /// Everything that the user reads of it, in order of time.
+    pub reads: Vec<String>,
+}
+
+/// A struck axis, 0 to 7, and what cannot be seen of it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Blind {
+    /// Boards without power or program: their telemetry stands still.
+    dark: [bool; 8],
+    /// Valves that do not obey, as bits of `valves_open`.
+    stuck: [u8; 6],
+}
+
+impl Blind {
+    fn of(faults: &[FaultSpec]) -> Self {
+        let mut blind = Self::default();
+        for fault in faults {
+            match (fault.kind, fault.victim) {
+                (
+                    FaultKind::NodeOff
+                    | FaultKind::NodeReset
+                    | FaultKind::NodeHang
+                    | FaultKind::BrownOut,
+                    Victim::Board(address),
+                ) => blind.dark[usize::from(address) - 1] = true,
+                (FaultKind::ValveStuckOpen, Victim::Valve(joint, valve)) => {
+                    blind.stuck[joint] |= 1 << valve;
+                }
+                _ => {}
+            }
+        }
+        blind
+    }
+}
+
+/// Measures a run.
+pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measured {
+    let r = &ran.recording;
+    let at_s = ran.at_s;
+    let since_s = since(row, at_s, sound);
+    let ms = |t_s: f64| (t_s - since_s) * 1e3;
+    let blind = Blind::of(&ran.faults);
+    let axis = match row.expect {
+        Expect::Stop(stop) => usize::from(stop.axis),
+        _ => 0,
+    };
+    let mut m = Measured {
+        at_s,
+        since_s,
+        wrong_frames: ran.line.wrong,
+        dropped: r.dropped,
+        detected_ms: detected_s(r, at_s).map(ms),
+        reads: reads(ran),
+        ..Measured::default()
+    };
+    let shut: Vec<Option<f64>> = (0..8).map(|i| shut_s(r, i, since_s, &blind)).collect();
+    let safe: Vec<Option<f64>> = (0..8).map(|i| safe_s(r, i, since_s, &blind)).collect();
+    m.own_commanded_ms = (axis > 0).then(|| shut[axis - 1]).flatten().map(ms);
+    m.commanded_ms = worst(&shut).map(ms);
+    m.sensed_ms = worst(&safe).map(ms);
+    let physical: Vec<Option<f64>> = (0..6)
+        .map(|i| {
+            open_until_s(&r.joints[i], since_s, |s| {
+                s.valves_open & !blind.stuck[i] != 0
+            })
+        })
+        .collect();
+    m.physical_ms = worst(&physical).map(ms);
+    m.wheels_stand_ms = stand_s(r, since_s).map(ms);
+    let dump = r.supply.iter();
+    let mut dump = dump.filter(|s| s.t_s() >= since_s - 1e-9);
+    m.dump_ms = dump.find(|s| s.v.dump_commanded).map(|s| ms(s.t_s()));
+    m.stopped = m.commanded_ms.is_some() && m.sensed_ms.is_some();
+    m.latched = m.stopped && ran.arming_asked;
+    m.held_mm = worst(&safe).and_then(|from_s| held_mm(r, from_s));
+    m.deviation_mm = sound.and_then(|sound| deviation_mm(r, sound, at_s));
+    let after = |t: f64| t >= since_s;
+    let loads = r.bus.iter().filter(|b| after(b.t_s()));
+    m.bus_load = loads.fold(0.0, |most, b| b.v.load.max(most));
+    // A cycle's replies are known, and logged, at the begin of the next.
+    let soon = r.bus.iter();
+    let soon = soon.filter(|b| b.t_s() > at_s + 0.02 && b.t_s() < at_s + 0.3);
+    m.replies = soon.map(|b| b.v.replies).min().unwrap_or(0);
+    m
+}
+
+/// Instant from which the row counts.
+fn since(row: &Row, at_s: f64, sound: Option<&Recording>) -> f64 {
+    let begin_s = if row.estop {
+        at_s + super::run::ESTOP_S
+    } else {
+        at_s
+    };
+    let Expect::Stop(stop) = row.expect else {
+        return begin_s;
+    };
+    match (stop.since, sound) {
+        (Since::Motion(joint), Some(sound)) => {
+            let rows = &sound.joints[usize::from(joint) - 1];
+            let mut after = rows.iter().skip_while(|r| r.t_s() < at_s - 1e-9);
+            let Some(begin) = after.next().map(|r| r.v.position_mm) else {
+                return begin_s;
+            };
+            let moved = after.find(|r| (r.v.position_mm - begin).abs() >= EXPECTED_MM);
+            moved.map_or(begin_s, Sample::t_s)
+        }
+        _ => begin_s,
+    }
+}
+
+/// Largest; `None` if any is unknown.
+fn worst(times: &[Option<f64>]) -> Option<f64> {
+    times
+        .iter()
+        .try_fold(f64::NEG_INFINITY, |worst, t| Some(worst.max((*t)?)))
+}
+
+/// First latched fault of any board, or the master's HOLD, at or after `from_s`.
+fn detected_s(r: &Recording, from_s: f64) -> Option<f64> {
+    let from_ns = (from_s * 1e9).round() as u64;
+    let joints = r.joints.iter().filter_map(|rows| {
+        rows.iter()
+            .find(|s| s.t_ns >= from_ns && s.v.faults != 0)
+            .map(Sample::t_s)
+    });
+    let wheels = r.wheels.iter().filter_map(|rows| {
+        rows.iter()
+            .find(|s| s.t_ns >= from_ns && s.v.faults != 0)
+            .map(Sample::t_s)
+    });
+    let hold = r
+        .events
+        .iter()
+        .find(|e| e.t_ns >= from_ns && e.v.text.starts_with("master: all axes hold"));
+    let all = joints.chain(wheels).chain(hold.map(Sample::t_s));
+    all.min_by(f64::total_cmp)
+}
+
+/// End of the last sample in which `open` holds outside of a staged exhaust; `None`
+/// if that is the last sample of all, `from_s` if there is none.
+fn open_until_s(
+    rows: &[Sample<JointSample>],
+    from_s: f64,
+    open: impl Fn(&JointSample) -> bool,
+) -> Option<f64> {
+    let open = |s: &JointSample| open(s) && s.mode != EXHAUST;
+    let last = rows
+        .iter()
+        .rposition(|r| r.t_s() >= from_s - 1e-9 && open(&r.v));
+    until_s(last, rows, from_s)
+}
+
+fn until_s<S>(last: Option<usize>, rows: &[Sample<S>], from_s: f64) -> Option<f64> {
+    match last {
+        Some(i) if i + 1 == rows.len() => None,
+        Some(i) => Some(rows[i].t_s() + TICK_S),
+        None => Some(from_s),
+    }
+}
+
+/// When the outputs of an axis, 0 to 7, were commanded off for good.
+fn shut_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64> {
+    match r.joints.get(axis) {
+        Some(rows) => open_until_s(rows, from_s, |s| {
+            s.fill_a_us | s.vent_a_us | s.fill_b_us | s.vent_b_us != 0
+        }),
+        None => safe_s(r, axis, from_s, blind),
+    }
+}
+
+/// When the telemetry of an axis, 0 to 7, showed a safe mode for good.
+fn safe_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64> {
+    if blind.dark[axis] {
+        return Some(from_s);
+    }
+    let after = |t_s: f64| t_s >= from_s - 1e-9;
+    match r.joints.get(axis) {
+        Some(rows) => {
+            let drives = |s: &Sample<JointSample>| after(s.t_s()) && DRIVING.contains(&s.v.mode);
+            until_s(rows.iter().rposition(drives), rows, from_s)
+        }
+        None => {
+            let rows = &r.wheels[axis - 6];
+            let last = rows
+                .iter()
+                .rposition(|s| after(s.t_s()) && DRIVING.contains(&s.v.mode));
+            until_s(last, rows, from_s)
+        }
+    }
+}
+
+fn stand_s(r: &Recording, from_s: f64) -> Option<f64> {
+    let times: Vec<Option<f64>> = r
+        .wheels
+        .iter()
+        .map(|rows| {
+            let last = rows
+                .iter()
+                .rposition(|s| s.t_s() >= from_s - 1e-9 && s.v.velocity_mm_s.abs() > STANDING_MM_S);
+            until_s(last, rows, from_s)
+        })
+        .collect();
+    worst(&times)
+}
+
+fn held_mm(r: &Recording, from_s: f64) -> Option<f64> {
+    let ranges = r.joints.iter().filter_map(|rows| {
+        let held = crate::analysis::window(rows, from_s, from_s + HELD_S);
+        let held: Vec<f64> = held
+            .iter()
+            .filter(|s| s.v.mode != EXHAUST)
+            .map(|s| s.v.sensed_mm)
+            .collect();
+        let low = held.iter().copied().min_by(f64::total_cmp)?;
+        let high = held.iter().copied().max_by(f64::total_cmp)?;
+        Some(high - low)
+    });
+    ranges.max_by(f64::total_cmp)
+}
+
+fn deviation_mm(r: &Recording, sound: &Recording, from_s: f64) -> Option<f64> {
+    let from_ns = (from_s * 1e9).round() as u64;
+    let pairs = r.joints.iter().zip(&sound.joints);
+    let pairs = pairs.flat_map(|(struck, sound)| struck.iter().zip(sound));
+    let after = pairs.filter(|(struck, sound)| struck.t_ns >= from_ns && struck.t_ns == sound.t_ns);
+    after
+        .map(|(struck, sound)| (struck.v.position_mm - sound.v.position_mm).abs())
+        .max_by(f64::total_cmp)
+}
+
+/// What the user reads from the instant on, each line once.
+fn reads(ran: &Ran) -> Vec<String> {
+    let from_ns = (ran.at_s * 1e9).round() as u64;
+    let events = ran.recording.events.iter();
+    let events = events.filter(|e| e.t_ns >= from_ns && e.v.kind != "contact");
+    let mut lines: Vec<String> = Vec::new();
+    let dropped = ran.recording.dropped;
+    let told = (dropped > 0).then(|| format!("{dropped} messages could not be written to the log"));
+    let texts = events.map(|e| format!("{:.3} s: {}", e.t_s(), e.v.text));
+    for line in texts.chain(told).chain(ran.error.clone()) {
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(energised: impl Fn(u64) -> bool) -> Vec<Sample<JointSample>> {
+        (0..1000)
+            .map(|ms| Sample {
+                t_ns: ms * 1_000_000,
+                v: JointSample {
+                    fill_a_us: if energised(ms) { 500 } else { 0 },
+                    mode: if energised(ms) { 3 } else { 4 },
+                    ..JointSample::default()
+                },
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_end_of_the_last_pulse_counts_and_one_that_goes_on_has_none() {
+        let open = |s: &JointSample| s.fill_a_us != 0;
+        let until = |energised: &dyn Fn(u64) -> bool| open_until_s(&rows(energised), 0.5, open);
+        let close = |found: Option<f64>, s: f64| (found.expect("shut") - s).abs() < 1e-9;
+        assert!(close(until(&|ms| ms < 540), 0.540));
+        assert!(close(until(&|ms| ms < 540 || ms == 700), 0.701));
+        assert!(close(until(&|ms| ms < 300), 0.5));
+        assert_eq!(until(&|_| true), None);
+    }
+
+    #[test]
+    fn a_latched_fault_and_the_masters_hold_are_detections() {
+        let mut r = Recording::default();
+        r.joints[2] = rows(|_| true);
+        r.joints[2][640].v.faults = 1;
+        r.joints[2][100].v.faults = 1;
+        assert_eq!(detected_s(&r, 0.5), Some(0.640));
+        r.events.push(Sample {
+            t_ns: 560_000_000,
+            v: crate::telemetry::EventSample {
+                kind: "fault".to_owned(),
+                text: "master: all axes hold: E-stop".to_owned(),
+            },
+        });
+        assert_eq!(detected_s(&r, 0.5), Some(0.560));
+        assert_eq!(detected_s(&r, 0.7), None);
+    }
+}

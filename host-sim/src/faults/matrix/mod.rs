@@ -1,0 +1,112 @@
+//! The fault matrix (host-sim/FAULTS.md): a table of what can go wrong with what must
+//! come of it, run on the simulated robot and held against what was measured.
+//!
+//! * [`row`], [`rows`]: the table;
+//! * [`run`]: one run per row;
+//! * [`measure`]: latencies, latching, deviation, words;
+//! * [`judge`]: measured against expected;
+//! * [`page`]: report and JSON.
+
+mod judge;
+mod measure;
+mod page;
+mod row;
+mod rows;
+mod run;
+
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+pub use judge::{Outcome, Verdict};
+pub use measure::Measured;
+pub use row::{Expect, Phase, Row, Since, Stop, Strike, Variant};
+pub use rows::ROWS;
+pub use run::{run, select};
+
+use crate::{SimError, output};
+
+/// What came of a run of the matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finished {
+    /// Rows in the order of the table.
+    pub outcomes: Vec<Outcome>,
+    /// Contents of `summary.json`.
+    pub summary: serde_json::Value,
+    /// The page.
+    pub report: PathBuf,
+}
+
+impl Finished {
+    /// Whether no row that was run failed.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        count(&self.outcomes, Verdict::Fail) == 0
+    }
+}
+
+/// Rows that came out so.
+#[must_use]
+pub fn count(outcomes: &[Outcome], verdict: Verdict) -> usize {
+    outcomes.iter().filter(|o| o.verdict == verdict).count()
+}
+
+/// Runs rows and writes `report.html` and `summary.json` into `folder`. Results of an
+/// earlier run in it are set aside in its folders `previous`, `previous-2`, …
+///
+/// # Errors
+/// [`SimError`] if a run without a fault fails or something cannot be written.
+pub fn write(rows: &[&'static Row], seed: u64, folder: &Path) -> Result<Finished, SimError> {
+    output::prepare(folder)?;
+    let bar = progress_bar(rows.len() as u64);
+    let outcomes = run(rows, seed, &|row| {
+        bar.inc(1);
+        bar.set_message(row.id);
+    });
+    bar.finish_and_clear();
+    let outcomes = outcomes?;
+    let summary = page::summary(&outcomes, seed);
+    let save = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|e| SimError::output("write", &path, e))?;
+        Ok::<_, SimError>(path)
+    };
+    save("summary.json", format!("{summary:#}\n"))?;
+    let report = save("report.html", page::render(&outcomes, seed)?)?;
+    Ok(Finished {
+        outcomes,
+        summary,
+        report,
+    })
+}
+
+fn progress_bar(rows: u64) -> ProgressBar {
+    // Draws on stderr, and only if that is a terminal.
+    let bar = ProgressBar::new(rows);
+    let style = ProgressStyle::with_template("faults {wide_bar} {pos}/{len}  {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_a_wrong_one_is_named() {
+        for (i, row) in ROWS.iter().enumerate() {
+            assert!(
+                ROWS[..i].iter().all(|other| other.id != row.id),
+                "{}",
+                row.id
+            );
+        }
+        assert_eq!(select(&[]).expect("all").len(), ROWS.len());
+        let one = |id: &str| select(&[id.to_owned()]).map(|rows| rows[0].id);
+        assert_eq!(one("pot-open").expect("a row"), "pot-open");
+        let unknown = one("pot-opn").expect_err("no row").to_string();
+        assert!(unknown.contains("did you mean `pot-open`"), "{unknown}");
+        let refused = one("ui-replay").expect_err("not implemented").to_string();
+        assert!(refused.contains("not implemented"), "{refused}");
+    }
+}

@@ -1,0 +1,232 @@
+//! What a row of the matrix says: what goes wrong, when, and what must come of it.
+
+/// When the fault begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// From power-up on.
+    PowerUp,
+    /// Standing in the start pose.
+    Stand,
+    /// Up to 0.1 s before the foot is lifted for the second step.
+    BeforeLift,
+    /// Up to 0.1 s before the foot reaches forward.
+    BeforeReach,
+    /// Foot in the air, between reaching out and lowering.
+    Flight,
+    /// Up to 0.1 s before the foot is lowered.
+    BeforeLower,
+    /// Wheels push the robot over the standing foot.
+    Push,
+    /// At the very start of the walk.
+    Start,
+}
+
+impl Phase {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::PowerUp => "from power-up on",
+            Self::Stand => "standing",
+            Self::BeforeLift => "walking, before the lift",
+            Self::BeforeReach => "walking, before the reach",
+            Self::Flight => "walking, foot in the air",
+            Self::BeforeLower => "walking, before the lowering",
+            Self::Push => "walking, wheels push",
+            Self::Start => "walking, from the start on",
+        }
+    }
+}
+
+/// A fault of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strike {
+    /// As on the command line, without the time.
+    pub what: &'static str,
+    /// Begin after the row's instant, s.
+    pub after_s: f64,
+    /// Duration, s; infinite: it stays.
+    pub lasts_s: f64,
+}
+
+/// What must come of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Expect {
+    /// Every axis is stopped and stays so.
+    Stop(Stop),
+    /// The motion goes on.
+    GoesOn {
+        /// Largest deviation of a stroke from the same run without the fault, mm.
+        deviation_mm: f64,
+    },
+    /// The motion goes on, or every axis is stopped and stays so; what was not on
+    /// the line is not acted on.
+    Degrades,
+    /// The robot does not arm.
+    NoArming,
+    /// It cannot be injected, and why.
+    NotImplemented(&'static str),
+}
+
+/// Limits of a stop, ms after the instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop {
+    /// The axis that the fault strikes, by bus address; 0: none, or all.
+    pub axis: u8,
+    /// First latched fault or the master's HOLD: not before, not after.
+    pub detected_ms: [f64; 2],
+    /// Valves of the axis commanded shut, its mode safe.
+    pub own_ms: f64,
+    /// The same of all axes.
+    pub all_ms: f64,
+    /// From when on the instant counts.
+    pub since: Since,
+}
+
+/// The instant from which latencies count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Since {
+    /// The begin of the fault.
+    Fault,
+    /// The stroke of this joint has moved 2 mm in the same run without the fault: only
+    /// then can a reading that stands, or a valve that does nothing, be told from rest.
+    Motion(u8),
+}
+
+/// Which robot it happens to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Variant {
+    /// As in the robot file.
+    Plain,
+    /// With the touch-down reflex on.
+    Reflex,
+    /// Walks 18 steps, 60 s.
+    Long,
+}
+
+/// One row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Its name.
+    pub id: &'static str,
+    /// What goes wrong.
+    pub strikes: &'static [Strike],
+    /// Whether the E-stop is pressed 100 ms after the instant; latencies count from then.
+    pub estop: bool,
+    /// When.
+    pub phase: Phase,
+    /// To which robot.
+    pub variant: Variant,
+    /// What must come of it.
+    pub expect: Expect,
+    /// Boards that must go on answering in their slots.
+    pub answering: u8,
+    /// What the user must be able to read: all of it.
+    pub reads: &'static [&'static str],
+    /// Anything that the numbers do not tell.
+    pub note: &'static str,
+}
+
+impl Row {
+    /// Why it cannot be run, if it cannot.
+    #[must_use]
+    pub fn not_implemented(&self) -> Option<&'static str> {
+        match self.expect {
+            Expect::NotImplemented(reason) => Some(reason),
+            _ => None,
+        }
+    }
+}
+
+/// It stays.
+pub(super) const FOR_GOOD: f64 = f64::INFINITY;
+
+/// A row of the matrix.
+pub(super) const fn row(
+    id: &'static str,
+    strikes: &'static [Strike],
+    phase: Phase,
+    expect: Expect,
+    reads: &'static [&'static str],
+) -> Row {
+    Row {
+        id,
+        strikes,
+        estop: false,
+        phase,
+        variant: Variant::Plain,
+        expect,
+        answering: 0,
+        reads,
+        note: "",
+    }
+}
+
+/// A row that cannot be run.
+pub(super) const fn missing(id: &'static str, reason: &'static str) -> Row {
+    row(id, &[], Phase::Stand, Expect::NotImplemented(reason), &[])
+}
+
+impl Row {
+    pub(super) const fn noted(mut self, note: &'static str) -> Self {
+        self.note = note;
+        self
+    }
+
+    pub(super) const fn of(mut self, variant: Variant) -> Self {
+        self.variant = variant;
+        self
+    }
+
+    pub(super) const fn answering(mut self, boards: u8) -> Self {
+        self.answering = boards;
+        self
+    }
+
+    pub(super) const fn with_estop(mut self) -> Self {
+        self.estop = true;
+        self
+    }
+}
+
+/// A fault that begins at the instant.
+pub(super) const fn at(what: &'static str, lasts_s: f64) -> Strike {
+    Strike {
+        what,
+        after_s: 0.0,
+        lasts_s,
+    }
+}
+
+/// A stop of all axes, none of them struck itself.
+pub(super) const fn stop(detected_ms: [f64; 2], all_ms: f64) -> Expect {
+    Expect::Stop(Stop {
+        axis: 0,
+        detected_ms,
+        own_ms: all_ms,
+        all_ms,
+        since: Since::Fault,
+    })
+}
+
+/// A stop of one axis by its own board, of the others by the master.
+pub(super) const fn stop_axis(axis: u8, detected_ms: [f64; 2], own_ms: f64, all_ms: f64) -> Expect {
+    Expect::Stop(Stop {
+        axis,
+        detected_ms,
+        own_ms,
+        all_ms,
+        since: Since::Fault,
+    })
+}
+
+/// A stop within 200 ms of 2 mm of expected motion of an axis.
+pub(super) const fn stop_moving(axis: u8) -> Expect {
+    Expect::Stop(Stop {
+        axis,
+        detected_ms: [-150.0, 200.0],
+        own_ms: 203.0,
+        all_ms: 240.0,
+        since: Since::Motion(axis),
+    })
+}

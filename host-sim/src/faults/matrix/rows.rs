@@ -1,0 +1,205 @@
+//! The table: every row of the fault matrix (host-sim/FAULTS.md).
+
+use super::row::{
+    Expect, FOR_GOOD, Phase, Row, Strike, Variant, at, missing, row, stop, stop_axis, stop_moving,
+};
+
+/// Watchdog of 50 ms and one bus cycle; not before the watchdog time less the
+/// cycle that has just been heard.
+const LINK_MS: [f64; 2] = [38.0, 60.0];
+/// Valves shut, or wheel ramp begun, after loss of the link, ms.
+const LINK_SHUT_MS: f64 = 60.0;
+/// Three missed replies in a row: they are known at the begin of the next cycle.
+const ABSENT_MS: [f64; 2] = [19.0, 41.0];
+/// Then the others are asked to brake, one after the other, ms.
+const ABSENT_SHUT_MS: f64 = 60.0;
+/// Two ticks of the board, and the tick in which the fault begins.
+const SENSOR_MS: [f64; 2] = [0.9, 3.1];
+/// A board stops in the tick in which it sees the fault, ms.
+const SENSOR_SHUT_MS: f64 = 4.1;
+/// The next reply tells the master, and the next cycle asks the others to brake, ms.
+const OTHERS_MS: f64 = 35.0;
+/// Two bus cycles and a tick: every board has heard the E-stop, ms.
+const ESTOP_MS: f64 = 23.0;
+
+const ETHERNET: &str = "there is no Ethernet user interface yet";
+const UPDATE: &str = "there is no firmware update over the bus yet";
+const SOFT: &str = "there is no soft terrain yet";
+
+const fn later(what: &'static str, after_s: f64, lasts_s: f64) -> Strike {
+    Strike {
+        what,
+        after_s,
+        lasts_s,
+    }
+}
+
+const fn goes_on(deviation_mm: f64) -> Expect {
+    Expect::GoesOn { deviation_mm }
+}
+
+/// Every row, in the order of the matrix.
+#[rustfmt::skip]
+pub const ROWS: &[Row] = &[
+    // Master stops sending.
+    row("master-silent/flight", &[at("master-silent", 0.2)], Phase::Flight,
+        stop(LINK_MS, LINK_SHUT_MS), &["No SYNC arrived", "Check that the master runs"]),
+    row("master-silent/push", &[at("master-silent", 0.2)], Phase::Push,
+        stop(LINK_MS, LINK_SHUT_MS), &["No SYNC arrived"]),
+    row("master-silent/lowering", &[at("master-silent", FOR_GOOD)], Phase::BeforeLower,
+        stop(LINK_MS, LINK_SHUT_MS), &["No SYNC arrived"]),
+    // Its counter is frozen.
+    row("master-frozen/flight", &[at("master-frozen", 0.2)], Phase::Flight,
+        stop(LINK_MS, LINK_SHUT_MS), &["cycle counter does not advance", "Restart the master"]),
+    row("master-frozen/push", &[at("master-frozen", 0.2)], Phase::Push,
+        stop(LINK_MS, LINK_SHUT_MS), &["cycle counter does not advance"]),
+    // One node silent, reset, babbling, with the address of another.
+    row("node-silent/joint", &[at("node-silent:joint3", 0.3)], Phase::Flight,
+        stop(ABSENT_MS, ABSENT_SHUT_MS), &["joint 3 is lost", "joint 3 missed three cycles"]).answering(7),
+    row("node-silent/wheel", &[at("node-silent:wheel7", 0.3)], Phase::Push,
+        stop(ABSENT_MS, ABSENT_SHUT_MS), &["wheel 7 is lost"]).answering(7),
+    row("node-off/joint", &[at("node-off:joint2", FOR_GOOD)], Phase::Push,
+        stop_axis(2, ABSENT_MS, 1.1, ABSENT_SHUT_MS), &["joint 2 is lost"]).answering(7),
+    row("node-off/wheel", &[at("node-off:wheel8", FOR_GOOD)], Phase::Push,
+        stop_axis(8, ABSENT_MS, 1.1, ABSENT_SHUT_MS), &["wheel 8 is lost"]).answering(7),
+    row("node-reset/joint", &[at("node-reset:joint3", FOR_GOOD)], Phase::Flight,
+        stop_axis(3, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 3", "reset"]),
+    row("babble/guarded", &[at("babble:joint5", 0.3)], Phase::Push,
+        stop(ABSENT_MS, ABSENT_SHUT_MS), &["joint 5 is lost"]).answering(7)
+        .noted("the other seven boards' slots are unaffected"),
+    row("babble/unguarded", &[at("babble-unguarded:joint5", 0.3)], Phase::Push,
+        stop([9.0, 60.0], LINK_SHUT_MS), &["babble"]),
+    row("duplicate-address/joint", &[at("duplicate-address:joint4", FOR_GOOD)], Phase::Push,
+        stop([9.0, 1000.0], 1000.0), &["joint 4", "address straps"])
+        .noted("a board that is plugged in is silent for its self-test; its first reply collides after that"),
+    row("duplicate-address/wheel", &[at("duplicate-address:wheel8", FOR_GOOD)], Phase::Push,
+        stop([9.0, 1000.0], 1000.0), &["wheel 8", "address straps"])
+        .noted("as above"),
+    row("e-stop/walking", &[], Phase::Flight,
+        stop([0.9, ESTOP_MS], ESTOP_MS), &["E-stop"]).with_estop(),
+    row("e-stop/bus-full", &[at("bus-full", FOR_GOOD)], Phase::Push,
+        stop([0.9, ESTOP_MS], ESTOP_MS), &["E-stop", "Emergency stop."]).with_estop()
+        .noted("the line is loaded to more than 95 %"),
+    // The line.
+    row("bit-errors/1e-6", &[at("bit-errors=1e-6", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
+    row("bit-errors/1e-5", &[at("bit-errors=1e-5", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
+    row("bit-errors/1e-4", &[at("bit-errors=1e-4", FOR_GOOD)], Phase::Flight, Expect::Degrades, &["crc"]),
+    row("bit-errors/1e-3", &[at("bit-errors=1e-3", FOR_GOOD)], Phase::Flight,
+        stop([0.0, 200.0], 260.0), &["crc", "missed three cycles"]),
+    row("bit-errors/60s", &[at("bit-errors=1e-4", FOR_GOOD)], Phase::Start, Expect::Degrades, &["crc"])
+        .of(Variant::Long),
+    row("bytes-lost", &[at("bytes-lost=1e-3", FOR_GOOD)], Phase::Flight, Expect::Degrades, &["crc"]),
+    row("bytes-inserted", &[at("bytes-inserted=1e-3", FOR_GOOD)], Phase::Flight, Expect::Degrades, &["crc"]),
+    row("frames-delayed/15us", &[at("frames-delayed=15", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
+    row("frames-delayed/500us", &[at("frames-delayed=500", FOR_GOOD)], Phase::Flight,
+        stop([0.0, 200.0], 260.0), &["crc", "missed three cycles"]),
+    // Potentiometer.
+    row("pot-open", &[at("pot-open:joint3", 0.3)], Phase::Flight,
+        stop_axis(3, SENSOR_MS, SENSOR_SHUT_MS, OTHERS_MS), &["joint 3: The position sensor reads outside", "potentiometer wiring"]),
+    row("pot-short", &[at("pot-short:joint2", 0.3)], Phase::Push,
+        stop_axis(2, SENSOR_MS, SENSOR_SHUT_MS, OTHERS_MS), &["joint 2: The position sensor reads outside"]),
+    row("pot-noisy", &[at("pot-noisy:joint3=10", 0.3)], Phase::Flight,
+        stop_axis(3, [0.9, 20.0], 21.0, 55.0), &["joint 3: The position jumped"]),
+    row("pot-frozen/lowering", &[at("pot-frozen:joint3", FOR_GOOD)], Phase::BeforeLower,
+        stop_moving(3), &["joint 3:"]),
+    row("pot-frozen/reach", &[at("pot-frozen:joint2", FOR_GOOD)], Phase::BeforeReach,
+        stop_moving(2), &["joint 2:"]),
+    // Foot switches.
+    row("foot-switch-on", &[at("foot-switch-on:left.front", FOR_GOOD)], Phase::Flight,
+        goes_on(0.001), &["left foot", "switch"]),
+    row("foot-switch-off", &[at("foot-switch-off:left.back", FOR_GOOD)], Phase::Flight,
+        goes_on(0.001), &["left foot", "switch"]),
+    row("foot-switch-on/reflex", &[at("foot-switch-on:left.front", FOR_GOOD)], Phase::Flight,
+        goes_on(200.0), &["left foot", "switch"]).of(Variant::Reflex)
+        .noted("the reflex stops the lowering where it believes the ground: the foot stays higher than it should"),
+    row("foot-switch-off/reflex", &[at("foot-switch-off:left.back", FOR_GOOD)], Phase::Flight,
+        goes_on(200.0), &["left foot", "switch"]).of(Variant::Reflex),
+    // Encoder.
+    row("encoder-lost", &[at("encoder-lost:wheel7", FOR_GOOD)], Phase::Push,
+        stop_axis(7, [0.0, 100.0], 103.0, 140.0), &["wheel 7: The encoder"]),
+    row("encoder-reversed", &[at("encoder-reversed:wheel8", FOR_GOOD)], Phase::Push,
+        stop_axis(8, [0.0, 100.0], 103.0, 140.0), &["wheel 8: The encoder"]),
+    // Valves.
+    row("valve-stuck-shut/fill", &[at("valve-stuck-shut:joint3.fill-a", FOR_GOOD)], Phase::BeforeLower,
+        stop_moving(3), &["joint 3:", "valve"]),
+    row("valve-stuck-shut/vent", &[at("valve-stuck-shut:joint2.vent-b", FOR_GOOD)], Phase::BeforeReach,
+        stop_moving(2), &["joint 2:", "valve"]),
+    row("valve-stuck-open/fill", &[at("valve-stuck-open:joint3.fill-a", FOR_GOOD)], Phase::BeforeLift,
+        stop_moving(3), &["joint 3:", "valve"]),
+    row("valve-stuck-open/vent", &[at("valve-stuck-open:joint2.vent-a", FOR_GOOD)], Phase::BeforeReach,
+        stop_moving(2), &["joint 2:", "valve"]),
+    row("valve-slow", &[at("valve-slow:joint3.fill-a=8", FOR_GOOD)], Phase::BeforeLower,
+        stop_moving(3), &["joint 3:", "valve"]),
+    row("valve-leaking", &[at("valve-leak:joint3=10000", FOR_GOOD)], Phase::BeforeLower,
+        stop_moving(3), &["joint 3:", "valve"]),
+    // Supply.
+    row("supply-sag", &[at("supply-sag=2", FOR_GOOD)], Phase::Flight,
+        stop([0.0, 100.0], 140.0), &["supply"]),
+    row("supply-lost", &[at("supply-lost", FOR_GOOD)], Phase::Flight,
+        stop([0.0, 100.0], 140.0), &["supply"]),
+    row("tube-burst", &[at("tube-burst", FOR_GOOD)], Phase::Flight,
+        stop([0.0, 100.0], 140.0), &["supply"]),
+    // Load and ground.
+    row("load-step", &[at("load-step:joint3=60", 0.5)], Phase::Flight, goes_on(60.0), &[]),
+    row("foot-loses-contact", &[at("foot-loses-contact=0.03", FOR_GOOD)], Phase::Push, goes_on(40.0), &[]),
+    row("foot-slips", &[at("foot-slips=0.05", FOR_GOOD)], Phase::Push, goes_on(40.0), &[]),
+    missing("foot-sinks", SOFT),
+    // Brown-out.
+    row("brown-out/motion", &[at("brown-out:joint2=30", FOR_GOOD)], Phase::Push,
+        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2", "power"]),
+    row("brown-out/supply-board", &[at("brown-out:wheel7=30", FOR_GOOD)], Phase::Push,
+        stop_axis(7, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 7", "power"]),
+    row("brown-out/save", &[at("brown-out:joint3=30", FOR_GOOD)], Phase::Stand,
+        stop_axis(3, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 3", "parameters saved"])
+        .noted("needs a request to save; the store itself is tested with power cut at every word (firmware/board)"),
+    missing("brown-out/update", UPDATE),
+    // Processor.
+    row("processor-hang", &[at("node-hang:joint3", FOR_GOOD)], Phase::Flight,
+        stop_axis(3, [0.0, 60.0], 51.1, 75.0), &["joint 3: The board was reset by its hardware watchdog"])
+        .noted("the watchdog period is 50 ms (firmware/board/BOARD.md), not the 20 ms of the matrix: a flash save stalls the board for about 20 ms"),
+    row("stack-overflow", &[at("node-reset:joint2", FOR_GOOD)], Phase::Push,
+        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2", "reset"])
+        .noted("as seen from outside: the fault handler of the image resets the board; the images' worst stack is bounded by `cargo xtask sizes`"),
+    row("panic", &[at("node-reset:wheel8", FOR_GOOD)], Phase::Push,
+        stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 8", "reset"])
+        .noted("as seen from outside: the panic handler resets the board; the link check proves that no panic is reachable"),
+    // Time.
+    row("clock-drift/200ppm", &[at("clock-drift:joint6=200", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
+    row("clock-drift/beyond", &[at("clock-drift:joint6=-30000", FOR_GOOD)], Phase::Flight,
+        stop([0.0, 500.0], 540.0), &["joint 6", "slot"]),
+    row("cycle-jitter/1ms", &[at("cycle-jitter=1", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
+    // Master's layers.
+    row("fifo-full", &[at("command-flood=100", 0.5)], Phase::Flight, goes_on(0.001), &["refused, QueueFull"]),
+    row("layer1-stall/flight", &[at("layer1-stall", 0.3)], Phase::Flight,
+        stop([89.0, 111.0], 140.0), &["layer 1 gave nothing for 100 ms"]),
+    row("layer1-stall/push", &[at("layer1-stall", 0.3)], Phase::Push,
+        stop([89.0, 111.0], 140.0), &["layer 1 gave nothing for 100 ms"]),
+    row("layer1-panic", &[at("master-silent", FOR_GOOD)], Phase::Push,
+        stop(LINK_MS, LINK_SHUT_MS), &["No SYNC arrived"])
+        .noted("both layers are one program: it ends, and the boards see a master that is silent"),
+    // User interface.
+    missing("ui-link-lost", ETHERNET),
+    missing("ui-half-open", ETHERNET),
+    missing("ui-slow", ETHERNET),
+    missing("ui-reconnects", ETHERNET),
+    missing("ui-second-client", ETHERNET),
+    missing("ui-bad-mac", ETHERNET),
+    missing("ui-replay", ETHERNET),
+    // Parameters.
+    row("invalid-parameter/joint", &[at("invalid-parameter:joint3", FOR_GOOD)], Phase::Push, goes_on(0.001),
+        &["joint 3 refuses proportional above its limit", "joint 3 refuses parameter 0x7FFF",
+          "joint 3 refuses proportional as a float, not a number", "parameter proportional unchanged"]),
+    row("invalid-parameter/wheel", &[at("invalid-parameter:wheel7", FOR_GOOD)], Phase::Stand, goes_on(0.001),
+        &["wheel 7 refuses", "refuses parameter 0x7FFF", "unchanged"]),
+    // Versions.
+    row("version-mismatch/joint", &[at("other-interface:joint4", FOR_GOOD)], Phase::PowerUp,
+        Expect::NoArming, &["joint 4 has interface", "the master has", "will not arm"]),
+    row("version-mismatch/wheel", &[at("other-interface:wheel7", FOR_GOOD)], Phase::PowerUp,
+        Expect::NoArming, &["wheel 7 has interface", "the master has", "will not arm"]),
+    // Host.
+    row("disk-full", &[at("disk-full", FOR_GOOD)], Phase::Flight, goes_on(0.0), &["messages could not be written"]),
+    row("log-writer-slow",
+        &[later("disk-full", 0.0, 0.1), later("disk-full", 0.3, 0.1), later("disk-full", 0.6, 0.1)],
+        Phase::Flight, goes_on(0.0), &["messages could not be written"])
+        .noted("a writer that cannot keep up takes nothing for a third of the time"),
+];

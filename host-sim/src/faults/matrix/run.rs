@@ -1,0 +1,267 @@
+//! Runs rows of the matrix on the simulated robot, two at a time.
+
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use super::judge::{Outcome, judge};
+use super::measure::{Measured, measure};
+use super::row::{Expect, Phase, Row, Variant};
+use super::rows::ROWS;
+use crate::SimError;
+use crate::config::{
+    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
+};
+use crate::faults::{FaultSpec, check};
+use crate::run::DEFAULT_SCENARIO;
+use crate::sil::{self, LineAudit};
+use crate::telemetry::{Recorder, Recording};
+
+/// Rows at a time.
+const THREADS: usize = 2;
+/// E-stop after the instant, s.
+pub(super) const ESTOP_S: f64 = 0.1;
+/// A run goes on for this long after the instant, s.
+const AFTER_S: f64 = 2.0;
+/// Arming is asked for this long after the instant, s.
+const ARM_S: f64 = 1.4;
+/// Steps and duration of the long walk.
+const LONG_STEPS: u16 = 18;
+const LONG_S: f64 = 60.0;
+/// No instant lies behind this plus [`AFTER_S`], s.
+const SOUND_S: f64 = 6.0;
+
+/// A run of a row.
+pub(super) struct Ran {
+    pub(super) at_s: f64,
+    pub(super) faults: Vec<FaultSpec>,
+    pub(super) recording: Recording,
+    pub(super) line: LineAudit,
+    /// Arming was asked for after the instant.
+    pub(super) arming_asked: bool,
+    /// The run ended before its time, and why.
+    pub(super) error: Option<String>,
+}
+
+/// The robots and their runs without faults.
+struct Robots {
+    scenario: Scenario,
+    robots: [RobotConfig; 3],
+    /// Walking as plain robot, walking with reflex, standing.
+    sound: [OnceLock<Result<Recording, String>>; 3],
+    seed: u64,
+}
+
+impl Robots {
+    fn new(seed: u64) -> Result<Self, SimError> {
+        let scenario = builtin::scenario(DEFAULT_SCENARIO)?;
+        let plain = builtin::robot_of(&scenario.robot, DEFAULT_SCENARIO)?;
+        let mut reflex = plain.clone();
+        reflex.gait.touchdown_reflex = true;
+        let mut long = plain.clone();
+        long.gait.steps = LONG_STEPS;
+        Ok(Self {
+            scenario,
+            robots: [plain, reflex, long],
+            sound: Default::default(),
+            seed,
+        })
+    }
+
+    fn robot(&self, variant: Variant) -> &RobotConfig {
+        match variant {
+            Variant::Plain => &self.robots[0],
+            Variant::Reflex => &self.robots[1],
+            Variant::Long => &self.robots[2],
+        }
+    }
+
+    fn scenario(&self, stands: bool, duration_s: f64) -> Scenario {
+        let leg = LegChoice::Left;
+        Scenario {
+            duration_s,
+            motion: if stands {
+                Motion::Stand
+            } else {
+                Motion::SquareWave { leg }
+            },
+            events: Vec::new(),
+            faults: Vec::new(),
+            targets: TargetSet::None,
+            ..self.scenario.clone()
+        }
+    }
+
+    /// The same run without the fault; `None` for the long walk.
+    fn sound(&self, row: &Row) -> Result<Option<&Recording>, SimError> {
+        let stands = stands(row.phase);
+        let index = match (row.variant, stands) {
+            (Variant::Plain, false) => 0,
+            (Variant::Reflex, _) => 1,
+            (Variant::Plain, true) => 2,
+            (Variant::Long, _) => return Ok(None),
+        };
+        let run = self.sound[index].get_or_init(|| {
+            let scenario = self.scenario(stands, SOUND_S);
+            let (recording, _, error) = simulate(&scenario, self.robot(row.variant), self.seed);
+            error.map_or(Ok(recording), Err)
+        });
+        run.as_ref()
+            .map(Some)
+            .map_err(|e| SimError::simulation(format!("the run without a fault fails: {e}"), ""))
+    }
+
+    fn run(&self, row: &Row) -> Result<Outcome, SimError> {
+        if let Some(reason) = row.not_implemented() {
+            return Ok(Outcome::not_implemented(*row, reason));
+        }
+        let robot = self.robot(row.variant);
+        let at_s = instant_s(row, robot, self.seed);
+        let faults = faults(row, at_s)?;
+        let long = row.variant == Variant::Long;
+        let duration_s = if long { LONG_S } else { at_s + AFTER_S };
+        let mut scenario = self.scenario(stands(row.phase), duration_s);
+        scenario.faults.clone_from(&faults);
+        let event = |at_s: f64, action| ScenarioEvent { at_s, action };
+        if row.estop {
+            scenario
+                .events
+                .push(event(at_s + ESTOP_S, EventAction::EStop));
+        }
+        let arming_asked = matches!(row.expect, Expect::Stop(_));
+        if arming_asked {
+            scenario.events.push(event(at_s + ARM_S, arm()));
+        }
+        check(&scenario)?;
+        let (recording, line, error) = simulate(&scenario, robot, self.seed);
+        let ran = Ran {
+            at_s,
+            faults,
+            recording,
+            line,
+            arming_asked,
+            error,
+        };
+        let measured: Measured = measure(row, &ran, self.sound(row)?);
+        Ok(judge(*row, robot, &ran, measured))
+    }
+}
+
+fn arm() -> EventAction {
+    EventAction::Command {
+        name: "Arm".to_owned(),
+        joint: None,
+        stroke_m: None,
+        travel_m: None,
+    }
+}
+
+fn stands(phase: Phase) -> bool {
+    matches!(phase, Phase::Stand | Phase::PowerUp)
+}
+
+/// A run in memory; an error ends it and is told.
+fn simulate(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+) -> (Recording, LineAudit, Option<String>) {
+    let mut recorder = Recorder::in_memory();
+    let go_on = &mut |_| ControlFlow::Continue(());
+    let (line, error) = match sil::run(scenario, robot, seed, &mut recorder, go_on) {
+        Ok(outcome) => (outcome.line, None),
+        Err(e) => (LineAudit::default(), Some(e.to_string())),
+    };
+    match recorder.finish() {
+        Ok(recording) => (recording, line, error),
+        Err(e) => (Recording::default(), line, error.or(Some(e.to_string()))),
+    }
+}
+
+/// The instant of a row, s: somewhere in its phase, by the seed, on a whole tick.
+fn instant_s(row: &Row, robot: &RobotConfig, seed: u64) -> f64 {
+    let gait = &robot.gait;
+    let (from_s, to_s) = match row.phase {
+        Phase::PowerUp => return 0.0,
+        Phase::Stand => (0.5, 0.6),
+        Phase::Start => (0.1, 0.2),
+        Phase::BeforeReach => (gait.reach_s - 0.1, gait.reach_s),
+        Phase::Flight => (gait.reach_s + 0.1, gait.lower_s - 0.1),
+        Phase::BeforeLower => (gait.lower_s - 0.1, gait.lower_s),
+        Phase::Push => (gait.push_s + 0.2, gait.push_s + 0.8),
+        Phase::BeforeLift => (gait.period_s - 0.1, gait.period_s),
+    };
+    let name = blake3::hash(format!("{} {seed}", row.id).as_bytes());
+    let share = f64::from(name.as_bytes()[0]) / 256.0;
+    ((from_s + share * (to_s - from_s)) * 1e3).round() * 1e-3
+}
+
+/// The faults of a row at its instant.
+fn faults(row: &Row, at_s: f64) -> Result<Vec<FaultSpec>, SimError> {
+    row.strikes
+        .iter()
+        .map(|strike| {
+            let from_s = at_s + strike.after_s;
+            let mut text = format!("{}@{from_s:.3}s", strike.what);
+            if strike.lasts_s.is_finite() {
+                text.push_str(&format!("..{:.3}s", from_s + strike.lasts_s));
+            }
+            text.parse().map_err(|e: crate::faults::SpecError| {
+                SimError::simulation(format!("row {}: {e}", row.id), "please report this")
+            })
+        })
+        .collect()
+}
+
+/// Rows by name; all where `ids` is empty.
+///
+/// # Errors
+/// [`SimError::Simulation`] for a name that no row has, and for one that is not implemented.
+pub fn select(ids: &[String]) -> Result<Vec<&'static Row>, SimError> {
+    if ids.is_empty() {
+        return Ok(ROWS.iter().collect());
+    }
+    let find = |id: &String| {
+        let row = ROWS.iter().find(|row| row.id == id).ok_or_else(|| {
+            let nearest = crate::config::closest(id, ROWS.iter().map(|row| row.id));
+            let nearest = nearest.map_or_else(String::new, |n| format!("; did you mean `{n}`?"));
+            SimError::simulation(
+                format!("the fault matrix has no row `{id}`{nearest}"),
+                "`wheeleg faults rows` prints all of them",
+            )
+        })?;
+        row.not_implemented().map_or(Ok(row), |reason| {
+            Err(SimError::simulation(
+                format!("the row `{id}` is not implemented: {reason}"),
+                "`wheeleg faults rows` says which rows are",
+            ))
+        })
+    };
+    ids.iter().map(find).collect()
+}
+
+/// Runs rows; `progress` is told each as it is done.
+///
+/// # Errors
+/// [`SimError`] if a run without a fault fails, or a row of the table is wrong.
+pub fn run(
+    rows: &[&'static Row],
+    seed: u64,
+    progress: &(dyn Fn(&Row) + Sync),
+) -> Result<Vec<Outcome>, SimError> {
+    let robots = Robots::new(seed)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(THREADS)
+        .build()
+        .map_err(|e| SimError::simulation(format!("cannot start threads: {e}"), ""))?;
+    pool.install(|| {
+        rows.par_iter()
+            .map(|row| {
+                let outcome = robots.run(row);
+                progress(row);
+                outcome
+            })
+            .collect()
+    })
+}
