@@ -31,7 +31,7 @@ const INSTRUMENTATION: [&str; 6] = [
 /// A fuzz target: name, longest input, whether it needs the simulator, what it is.
 struct Target(&'static str, u32, bool, &'static str);
 
-const TARGETS: [Target; 7] = [
+const TARGETS: [Target; 10] = [
     Target(
         "decoder",
         2000,
@@ -68,7 +68,20 @@ const TARGETS: [Target; 7] = [
         false,
         "the master under commands and failing boards",
     ),
+    Target(
+        "store",
+        400,
+        false,
+        "the parameter store under power cuts and worn flash",
+    ),
+    Target(
+        "remote",
+        2000,
+        false,
+        "the line to bench boards, read by both sides",
+    ),
     Target("scenario", 40_000, true, "scenario and robot files"),
+    Target("files", 60_000, true, "reference vectors and axis files"),
 ];
 
 /// Seconds for each target in the test suite.

@@ -152,7 +152,11 @@ fn read<T: DeserializeOwned>(frame: &[u8]) -> Option<(u8, T)> {
     if checksum(content) != u32::from_le_bytes(*crc) {
         return None;
     }
-    postcard::from_bytes(content).ok()
+    match postcard::take_from_bytes(content) {
+        // The message is all there is.
+        Ok((message, [])) => Some(message),
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -242,6 +246,29 @@ mod tests {
             .expect("fits")
             .to_vec();
         assert_eq!(push_all::<Request>(&theirs), vec![Ok((2, stretch))]);
+    }
+
+    /// Found by the fuzz target `remote`: each side passed over bytes behind the
+    /// message in a way of its own.
+    #[test]
+    fn bytes_behind_the_message_are_no_part_of_a_frame_for_either_side() {
+        let mut room = [0; 8];
+        let message = postcard::to_slice(&(3_u8, Request::Bye), &mut room).expect("fits");
+        let crc = |bytes: &[u8]| checksum(bytes).to_le_bytes();
+        let sound = [&*message, &crc(message)].concat();
+        let within = [&*message, &[0]].concat();
+        let within = [within.as_slice(), &crc(&within)].concat();
+        let behind = [sound.as_slice(), &[0, 7]].concat();
+        for (content, good) in [(sound, true), (within, false), (behind, false)] {
+            let mut out = [0; MAX_FRAME];
+            let length = cobs(content.iter(), &mut out).expect("fits");
+            let stream = out.get(..length).expect("in the buffer");
+            let expected = good.then_some((3, Request::Bye));
+            let board = push_all::<Request>(stream).pop().expect("a frame");
+            assert_eq!(board.ok(), expected);
+            let host = link::Deframer::new().next::<Request>(&mut &*stream);
+            assert_eq!(host.ok().flatten(), expected);
+        }
     }
 
     #[test]

@@ -62,7 +62,11 @@ pub fn encode<'a, T: Serialize>(
 pub fn decode<T: DeserializeOwned>(frame: &mut [u8]) -> Result<(u8, T), FrameError> {
     let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Damaged)?;
     let content = frame.get(..length).ok_or(FrameError::Damaged)?;
-    postcard::from_bytes_crc32(content, CRC.digest()).map_err(|_| FrameError::Damaged)
+    match postcard::take_from_bytes_crc32(content, CRC.digest()) {
+        // Nothing may stand behind the checksum, which does not cover it.
+        Ok((message, [])) => Ok(message),
+        _ => Err(FrameError::Damaged),
+    }
 }
 
 /// Finds the frames in a stream of bytes.

@@ -145,6 +145,10 @@ impl<F: Flash> Store<F> {
         let newest = self.newest();
         let page = newest.map_or(0, |copy| 1_usize.saturating_sub(copy.page));
         let sequence = newest.map_or(0, |copy| copy.sequence.wrapping_add(1));
+        if newest.is_none() {
+            // What can hardly be read may look whole some day, with any number.
+            self.flash.erase(1)?;
+        }
         self.flash.erase(page)?;
         let mut digest = CRC.digest();
         let header = u64::from(MAGIC) | (records.len() as u64) << 16 | u64::from(sequence) << 32;

@@ -121,7 +121,11 @@ impl Chip {
         }
         match &mut self.mishap {
             None => Ok(()),
-            Some(Mishap { after: 0, torn, cut }) => {
+            Some(Mishap {
+                after: 0,
+                torn,
+                cut,
+            }) => {
                 let (torn, cut) = (*torn, *cut);
                 self.mishap = None;
                 self.dead = cut;

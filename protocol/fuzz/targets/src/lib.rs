@@ -16,7 +16,10 @@
 //! (`cargo test`) all call the same functions.
 
 mod action;
+mod chip;
 pub mod decoder;
+#[cfg(feature = "sim")]
+pub mod files;
 pub mod frames;
 mod handler;
 pub mod joint;
@@ -24,8 +27,10 @@ pub mod master;
 mod observer;
 pub mod parse;
 pub mod reference;
+pub mod remote;
 #[cfg(feature = "sim")]
 pub mod scenario;
+pub mod store;
 pub mod wheel;
 
 #[path = "../../../../firmware/node/tests/common/mod.rs"]
@@ -69,9 +74,22 @@ pub const TARGETS: &[Target] = &[
         name: "master",
         run: master::run,
     },
+    Target {
+        name: "store",
+        run: store::run,
+    },
+    Target {
+        name: "remote",
+        run: remote::run,
+    },
     #[cfg(feature = "sim")]
     Target {
         name: "scenario",
         run: scenario::run,
+    },
+    #[cfg(feature = "sim")]
+    Target {
+        name: "files",
+        run: files::run,
     },
 ];

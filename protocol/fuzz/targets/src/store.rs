@@ -140,11 +140,10 @@ impl Play {
         let unsteady = self.pages.iter().any(|page| page.unsteady);
         self.chip.power(mishap);
         let saved = Store::new(Port(&mut self.chip)).save(&set);
-        let touched = |page: usize| self.chip.erased[page] != erased[page];
         for page in 0..PAGES {
             let writes = (self.chip.written[page] - written[page]) as usize;
-            assert!(touched(page) || writes == 0, "written and not erased");
-            if !touched(page) {
+            if self.chip.erased[page] == erased[page] {
+                assert_eq!(writes, 0, "written and not erased");
                 continue;
             }
             // What reads differently each time may look newer than it is.
@@ -152,36 +151,21 @@ impl Play {
                 unsteady || self.newest != Some(page),
                 "the newest set is erased before the next one stands"
             );
+            self.damaged(page);
             // An erasure that was torn may have left what was there.
-            let whole = writes == set.len() + 2;
             if writes > 0 {
                 self.pages[page] = Page::default();
-            } else {
-                self.pages[page].sound = None;
-                self.pages[page].unsteady |= matches!(
-                    mishap,
-                    Some(Mishap {
-                        torn: Torn::Unsteady(_),
-                        ..
-                    })
-                );
             }
-            if whole {
+            if writes == set.len() + 2 {
                 self.pages[page].possible.push(set.clone());
             }
-            let torn_at = mishap.map(|mishap| (usize::from(mishap.after), mishap.torn));
-            match torn_at {
-                Some((at, Torn::Unsteady(_))) if at < set.len() + 3 => {
-                    self.pages[page].unsteady = true;
-                }
-                _ if saved.is_ok() => {
-                    self.pages[page].sound = Some(set.clone());
-                    self.newest = Some(page);
-                }
-                _ => {}
-            }
-            if !self.pages.iter().any(|page| page.sound.is_some()) {
-                self.newest = None;
+            let operations = set.len() + 3;
+            self.pages[page].unsteady |= mishap.is_some_and(|mishap| {
+                matches!(mishap.torn, Torn::Unsteady(_)) && usize::from(mishap.after) < operations
+            });
+            if saved.is_ok() {
+                self.pages[page].sound = Some(set.clone());
+                self.newest = Some(page);
             }
         }
         match saved {
@@ -222,7 +206,9 @@ impl Play {
         {
             // The save behind it got as far as its last word.
             let other = &self.pages[1 - newest];
-            let newer = loaded.as_ref().is_some_and(|set| other.possible.last() == Some(set));
+            let newer = loaded
+                .as_ref()
+                .is_some_and(|set| other.possible.last() == Some(set));
             assert!(newer, "the newest set is not the one that is read");
             if !other.unsteady {
                 self.newest = Some(1 - newest);

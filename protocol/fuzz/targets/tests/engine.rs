@@ -30,9 +30,12 @@ engine! {
     joint: 1_500, 2_000;
     wheel: 700, 2_000;
     master: 200, 1_000;
+    store: 2_000, 400;
+    remote: 5_000, 2_000;
 }
 
 #[cfg(feature = "sim")]
 engine! {
     scenario: 2_000, 400;
+    files: 2_000, 400;
 }
