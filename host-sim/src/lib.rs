@@ -23,5 +23,6 @@ pub mod report;
 pub mod run;
 pub mod sil;
 pub mod telemetry;
+pub mod tune;
 
 pub use error::SimError;

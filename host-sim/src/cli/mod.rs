@@ -10,6 +10,7 @@ mod list;
 mod params;
 mod plant;
 mod run;
+mod tune;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -57,6 +58,8 @@ enum Command {
     Figures(figures::FiguresArgs),
     /// Compare controllers on one or more axes; writes report, figures and tables.
     Compare(compare::CompareArgs),
+    /// Find gains and delays of one axis; writes a report and parameters for a board.
+    Tune(tune::TuneArgs),
     /// Check the pneumatic plant of an axis, or export it for another integrator.
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
@@ -76,6 +79,7 @@ pub fn main() -> ExitCode {
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
         Some(Command::Compare(args)) => compare::command(&args),
+        Some(Command::Tune(args)) => tune::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
     };

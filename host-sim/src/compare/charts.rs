@@ -98,7 +98,7 @@ impl Comparison {
 }
 
 /// A panel of lines over time; `y` is its range, or what the lines need.
-fn panel(
+pub(crate) fn panel(
     title: &str,
     unit: &str,
     end_s: f64,
