@@ -368,6 +368,68 @@ fn every_source_file_can_be_read_in_one_sitting() {
     assert!(long.is_empty(), "{long:?}");
 }
 
+/// Features of the board crate that plant a mistake in its images.
+const MUTANT: &str = "mutant";
+
+#[test]
+fn images_that_are_wrong_on_purpose_are_built_by_their_own_step_alone() {
+    let packages = packages();
+    let board = packages["wheeleg-board"]["features"].clone();
+    let board = board.as_object().expect("features");
+    let mutants: BTreeSet<&str> = board
+        .keys()
+        .map(String::as_str)
+        .filter(|name| name.starts_with("mutant-"))
+        .collect();
+    assert!(mutants.len() >= 4, "{mutants:?}");
+    for (name, package) in &packages {
+        let features = package["features"].as_object().expect("features");
+        for (feature, enabled) in features {
+            let inside = name == "wheeleg-board" && feature.starts_with(MUTANT);
+            let enabled = enabled.to_string();
+            assert!(
+                inside || !enabled.contains(MUTANT),
+                "{name}: the feature {feature} enables {enabled}"
+            );
+        }
+        // A dependency could enable it, too.
+        for dependency in package["dependencies"].as_array().expect("dependencies") {
+            let enabled = dependency["features"].to_string();
+            assert!(!enabled.contains(MUTANT), "{name}: {dependency}");
+        }
+    }
+    // One place builds them, and it knows all of them; the list of the images that
+    // are flashed has none.
+    let builder = "xtask/src/firmware.rs";
+    let source = fs::read_to_string(root().join(builder)).expect(builder);
+    let listed: BTreeSet<&str> = source
+        .split('"')
+        .filter(|word| word.starts_with("mutant-"))
+        .collect();
+    assert_eq!(listed, mutants);
+    let images = source.split("const IMAGES").nth(1).expect("the images");
+    let images = images.split("];").next().expect("their list");
+    assert!(
+        images.contains("\"joint\"") && !images.contains(MUTANT),
+        "{images}"
+    );
+    // Beside it, only the sources of the mistakes and the test that finds them.
+    for (name, text) in files() {
+        let theirs = name.starts_with("firmware/board/src/g431/")
+            || [
+                builder,
+                "firmware/board/Cargo.toml",
+                "tests/tests/pil_mutants.rs",
+                "tests/tests/workspace.rs",
+            ]
+            .contains(&name.as_str());
+        if !name.ends_with(".md") && !theirs {
+            let found = mutants.iter().find(|mutant| text.contains(**mutant));
+            assert_eq!(found, None, "{name}");
+        }
+    }
+}
+
 #[test]
 fn no_test_is_switched_off_or_asserts_nothing() {
     let ignore = concat!("#[ig", "nore");

@@ -26,6 +26,20 @@ const IMAGES: [(&str, &[&str]); 2] = [
 /// Images that drive outputs: the ones with budgets.
 pub(crate) const SHIPPED: [&str; 2] = ["joint", "wheel"];
 
+/// Images that are wrong on purpose, which the comparison on emulated boards must
+/// find: the feature, and what is then wrong.
+pub(crate) const MUTANTS: [(&str, &str); 4] = [
+    ("mutant-valve-pins", "fill A and vent A are swapped"),
+    (
+        "mutant-pwm-polarity",
+        "outputs are on when they should be off",
+    ),
+    ("mutant-adc-scale", "the converter's sum is halved"),
+    ("mutant-encoder", "the encoder counts the wrong way"),
+];
+/// The mark that such an image carries (firmware/board/src/g431/mutant.rs).
+const MUTANT_MARK: &str = "THIS_IMAGE_IS_WRONG_ON_PURPOSE";
+
 /// What a reachable panic leaves for the linker to complain about.
 const PANIC_SYMBOL: &str = "this_image_can_panic";
 
@@ -50,7 +64,11 @@ pub(crate) fn steps(report: &mut Report) {
 
 /// Builds all images and says how.
 pub(crate) fn build() -> StepResult<Vec<Image>> {
-    let way = set_up(TARGET)?;
+    build_by(set_up(TARGET)?)
+}
+
+/// Builds all images in one of the ways.
+pub(crate) fn build_by(way: Way) -> StepResult<Vec<Image>> {
     println!("    way: {}", way.describe());
     let folder = target_dir().join("firmware");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -66,6 +84,9 @@ pub(crate) fn build() -> StepResult<Vec<Image>> {
             fs::copy(products(way).join(name), &elf)
                 .with_context(|| format!("cannot copy the image {name}"))?;
             let contents = Elf::read(&elf)?;
+            if contents.has_symbol(MUTANT_MARK) {
+                return Err(anyhow::anyhow!("{name} is wrong on purpose").into());
+            }
             let hash = contents.flash_hash();
             println!(
                 "    {:<10} {:>6} bytes in flash  blake3 {}  {}",
@@ -78,6 +99,34 @@ pub(crate) fn build() -> StepResult<Vec<Image>> {
         }
     }
     Ok(images)
+}
+
+/// Builds the images that are wrong on purpose, each pair into a folder of its own
+/// below the one it gives: `<folder>/<feature>/joint.elf`. Never beside the images
+/// that are flashed.
+pub(crate) fn mutants() -> StepResult<PathBuf> {
+    let way = set_up(TARGET)?;
+    let folder = target_dir().join("firmware-mutants");
+    for (feature, what) in MUTANTS {
+        let mut command = cargo(way, "build", feature)?;
+        for name in SHIPPED {
+            command.args(["--bin", name]);
+        }
+        run(&mut command)?;
+        let place = folder.join(feature);
+        fs::create_dir_all(&place).with_context(|| format!("cannot make {}", place.display()))?;
+        for name in SHIPPED {
+            let elf = place.join(format!("{name}.elf"));
+            fs::copy(products(way).join(name), &elf)
+                .with_context(|| format!("cannot copy the image {name}"))?;
+            let marked = Elf::read(&elf)?.has_symbol(MUTANT_MARK);
+            if !marked {
+                return Err(anyhow::anyhow!("{}: no mark of a mutant", elf.display()).into());
+            }
+        }
+        println!("    {feature}: {what}");
+    }
+    Ok(folder)
 }
 
 /// Links each image with a panic handler that does not exist. A third program,

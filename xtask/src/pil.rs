@@ -63,6 +63,17 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
             .env("WHEELEG_IMAGES", &images))?;
         Ok(())
     });
+    report.step("board support that is wrong on purpose is found", || {
+        let mutants = firmware::mutants()?;
+        let test = ["test", "--locked", "--package", "wheeleg-tests"];
+        run(cargo()
+            .args(test)
+            .args(["--features", "pil", "--test", "pil_mutants"])
+            .env("WHEELEG_PIL", &emulator)
+            .env("WHEELEG_IMAGES", &images)
+            .env("WHEELEG_MUTANTS", mutants))?;
+        Ok(())
+    });
     let figures = report.step("three steps on eight emulated boards", || {
         figures(&emulator, &images)
     });

@@ -152,6 +152,7 @@ pub(super) fn render(
         },
         scenario_text => &*source.scenario.description,
         robot_text => &*source.robot.description,
+        pil => summary.pil.as_ref().map(super::boards::context),
         factor => format!("{:.1}", summary.realtime_factor),
         simulated => format!("{:.2}", summary.simulated_s),
         wall => format!("{:.2}", summary.wall_s),

@@ -1,5 +1,6 @@
 //! What a run leaves behind: figures, tables, summary and one HTML page.
 
+mod boards;
 mod figures;
 mod html;
 pub(crate) mod plot;
@@ -117,6 +118,61 @@ mod tests {
         }
         assert!(page.contains(&summary.hash) && page.contains("cylinder.bore"));
         assert!(page.contains("latched the step of the command"));
+    }
+
+    #[test]
+    fn the_page_shows_what_boards_outside_did_and_what_differed() {
+        use crate::pil::{BoardFigures, ChannelFigures, PilSummary};
+        let page = |differing: u64| {
+            let (folder, mut summary) = report("master-lost");
+            let robot = builtin::robot("wheeleg-2003").expect("built in");
+            let scenario = builtin::scenario("master-lost").expect("built in");
+            let recording = testing::from_reference(&robot, 0.25, 0.0);
+            let analysis = analysis::analyse(&scenario, &robot, &recording);
+            let mut nodes = vec!["sil".to_owned(); 8];
+            nodes[2] = "pil".to_owned();
+            summary.pil = Some(PilSummary {
+                nodes,
+                compared_bits: 1_234_567,
+                differing_bits: differing,
+                channels: vec![ChannelFigures {
+                    channel: "converter code",
+                    compared_bits: 1_234_567,
+                    differing_bits: differing,
+                }],
+                compared_ticks: 10_000,
+                compared_frames: 1_000,
+                first_difference: (differing > 0).then(|| "7 here, 8 there".to_owned()),
+                boards: vec![BoardFigures {
+                    node: "joint3".to_owned(),
+                    image: "joint".to_owned(),
+                    digest: "40842fedd013525c".to_owned(),
+                    host: "STM32G431CB, somewhere".to_owned(),
+                    compared_bits: 1_234_567,
+                    differing_bits: differing,
+                    ticks: 10_000,
+                    tick_instructions_median: 1_111,
+                    tick_instructions_worst: 1_444,
+                    longest_awake_instructions: 2_000,
+                    stack_used_bytes: 3_456,
+                    stack_size_bytes: 24_576,
+                    resets: 0,
+                    late_bytes: 0,
+                }],
+            });
+            let (r, a) = (&recording, &analysis);
+            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            std::fs::read_to_string(folder.path().join("report.html")).expect("written")
+        };
+        let (equal, other) = (page(0), page(5));
+        for word in ["joint3", "40842fedd013525c", "converter code", "1\u{2009}444", "natively"] {
+            assert!(equal.contains(word), "{word}");
+        }
+        assert!(equal.contains("0 bits differ<") && !equal.contains("first difference"));
+        assert!(other.contains("5 bits differ") && other.contains("7 here, 8 there"));
+        let native = report("master-lost");
+        let native = std::fs::read_to_string(native.0.path().join("report.html")).expect("written");
+        assert!(!native.contains("id=\"boards\""), "no boards outside, no section");
     }
 
     #[test]

@@ -174,6 +174,11 @@ impl Elf {
         Ok(start - end)
     }
 
+    /// Whether the image has a symbol.
+    pub(crate) fn has_symbol(&self, name: &str) -> bool {
+        self.symbol(name).is_ok()
+    }
+
     /// Address of a symbol.
     pub(super) fn symbol(&self, name: &str) -> Result<u64> {
         let found = self.symbols.iter().find(|(symbol, _)| symbol == name);

@@ -45,6 +45,8 @@ pub(super) fn start() {
     adc.cfgr2().write(|r| {
         r.set_rovse(true);
         r.set_ovsr(SIXTEEN);
+        #[cfg(feature = "mutant-adc-scale")]
+        r.set_ovss(1);
     });
     adc.ier().write(|r| r.set_eosie(true));
     adc.cr().modify(|r| r.set_adstart(true));

@@ -103,6 +103,8 @@ pub(super) fn configure() -> HBridge<Pulse, Sign> {
         r.set_ocpe(0, true);
     });
     tim.ccer().write(|r| r.set_cce(0, true));
+    #[cfg(feature = "mutant-pwm-polarity")]
+    tim.ccer().modify(|r| r.set_ccp(0, true));
     tim.bdtr().write(|r| {
         r.set_bke(0, true);
         r.set_bkp(0, Bkp::ACTIVE_LOW);

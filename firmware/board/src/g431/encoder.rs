@@ -17,7 +17,8 @@ pub(super) fn start() -> WheelEncoder {
         }
     });
     // A inverted: B before A counts up, as on the HCTL-1100.
-    tim.ccer().write(|r| r.set_ccp(0, true));
+    tim.ccer()
+        .write(|r| r.set_ccp(0, cfg!(not(feature = "mutant-encoder"))));
     tim.smcr().write(|r| r.set_sms(Sms::ENCODER_MODE_3));
     tim.cnt().write(|r| r.set_cnt(0));
     tim.cr1().modify(|r| r.set_cen(true));

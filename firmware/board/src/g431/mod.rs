@@ -22,6 +22,8 @@ pub mod identity;
 pub mod inhibit;
 #[cfg(feature = "outputs")]
 pub mod latch;
+#[cfg(feature = "mutant")]
+mod mutant;
 #[cfg(feature = "outputs")]
 pub mod parameters;
 pub mod pins;

@@ -19,6 +19,8 @@ pub struct Start {
 
 /// First steps of both kinds of board: reset cause, watchdog, clock, straps.
 pub fn start() -> Start {
+    #[cfg(feature = "mutant")]
+    super::mutant::mark();
     let cause = fatal::take_cause();
     watchdog::start();
     let source = clock::start();

@@ -40,7 +40,11 @@ impl<const N: usize> SetDutyCycle for Valve<N> {
 }
 
 /// The four valves, fill A, vent A, fill B, vent B.
+#[cfg(not(feature = "mutant-valve-pins"))]
 pub type Valves = FourValves<Valve<0>, Valve<1>, Valve<2>, Valve<3>>;
+/// Wrong on purpose.
+#[cfg(feature = "mutant-valve-pins")]
+pub type Valves = FourValves<Valve<1>, Valve<0>, Valve<2>, Valve<3>>;
 
 /// Sets up the four channels, shut, and hands them the pins. The timer's time
 /// base is set up already and stands still.
@@ -53,6 +57,8 @@ pub(super) fn configure() -> Valves {
             r.set_ocpe(channel % 2, true);
         });
         tim.ccer().modify(|r| r.set_cce(channel, true));
+        #[cfg(feature = "mutant-pwm-polarity")]
+        tim.ccer().modify(|r| r.set_ccp(channel, true));
     }
     tim.cr1().modify(|r| r.set_arpe(true));
     tim.bdtr().write(|r| {
