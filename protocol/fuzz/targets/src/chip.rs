@@ -95,6 +95,11 @@ impl Chip {
         self.dead = false;
     }
 
+    /// Whether what was given has happened.
+    pub(crate) const fn struck(&self) -> bool {
+        self.mishap.is_none()
+    }
+
     /// Flips bits of a word, at most three.
     pub(crate) fn rot(&mut self, page: usize, word: usize, bits: [u8; 3]) {
         if let Word::Steady(value) = &mut self.pages[page][word] {
