@@ -12,6 +12,7 @@ pub mod check;
 pub mod cli;
 pub mod compare;
 pub mod config;
+pub mod delay;
 pub mod error;
 pub mod export;
 pub mod faults;

@@ -60,12 +60,6 @@ const C_PROGRAMS: [(&str, &[&str], &str); 7] = [
 /// Groups in the order in which they run.
 const GROUPS: [&str; 6] = ["leg", "robot", "pneu", "fuzzy", "filter", "proto"];
 
-/// Groups that the C references have and our program has not.
-const WITHOUT_OURS: [(&str, &str); 1] = [(
-    "pneu",
-    "the plant has no interface for the reference's simpler cylinder",
-)];
-
 /// A program of a round.
 struct Program {
     path: PathBuf,
@@ -90,14 +84,12 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let mut programs = references.unwrap_or_default();
     for (path, label) in ours.into_iter().flatten() {
         for group in GROUPS {
-            if WITHOUT_OURS.iter().all(|(name, _)| *name != group) {
-                programs.push(Program {
-                    path: path.clone(),
-                    arguments: vec![group.to_owned()],
-                    label: Some(label),
-                    group: Some(group),
-                });
-            }
+            programs.push(Program {
+                path: path.clone(),
+                arguments: vec![group.to_owned()],
+                label: Some(label),
+                group: Some(group),
+            });
         }
     }
     let others = report.step("bench: further peers", || {
@@ -110,9 +102,6 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let table = report.step("bench: rounds", || Ok(rounds(&programs, options)?));
     if let Some(table) = &table {
         print!("{table}");
-        for (group, why) in WITHOUT_OURS {
-            println!("no row of ours in `{group}`: {why}");
-        }
         for row in table.verdicts() {
             report.step(format!("bench: {}", row.name()), || Ok(row.verdict()?));
         }

@@ -25,6 +25,7 @@ pub mod friction;
 pub mod ground;
 pub mod hash;
 pub mod motor;
+pub mod reference;
 pub mod robot;
 pub mod sensors;
 pub mod supply;

@@ -3,6 +3,7 @@
 mod channels;
 mod check;
 mod compare;
+mod delay;
 mod export;
 mod faults;
 mod figures;
@@ -56,6 +57,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
+    /// Measure and explain the start delay of a pneumatic joint; writes a report.
+    Delay(delay::DelayArgs),
     /// Compare controllers on one or more axes; writes report, figures and tables.
     Compare(compare::CompareArgs),
     /// Find gains and delays of one axis; writes a report and parameters for a board.
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Some(Command::Channels(args)) => channels::command(&args),
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
+        Some(Command::Delay(args)) => delay::command(&args),
         Some(Command::Compare(args)) => compare::command(&args),
         Some(Command::Tune(args)) => tune::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),

@@ -7,7 +7,7 @@ pub mod force;
 mod page;
 pub mod precision;
 pub mod section6;
-mod tables;
+pub(crate) mod tables;
 
 use std::path::{Path, PathBuf};
 

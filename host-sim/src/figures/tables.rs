@@ -111,7 +111,8 @@ fn misprints(folder: &Path, results: &Results) -> Result<(), SimError> {
     table(folder, "printed-versus-corrected", &header, rows)
 }
 
-fn table(
+/// Writes one table: `folder`/`name`.csv.
+pub(crate) fn table(
     folder: &Path,
     name: &str,
     header: &[&str],

@@ -7,6 +7,7 @@
 mod control;
 mod leg;
 mod measure;
+mod pneu;
 mod proto;
 mod robot;
 
@@ -15,9 +16,10 @@ use std::process::ExitCode;
 /// A group of cases and what runs it.
 type Group = (&'static str, fn());
 
-const GROUPS: [Group; 5] = [
+const GROUPS: [Group; 6] = [
     ("leg", leg::run),
     ("robot", robot::run),
+    ("pneu", pneu::run),
     ("fuzzy", control::fuzzy),
     ("filter", control::filter),
     ("proto", proto::run),

@@ -26,13 +26,15 @@ pub(crate) fn timed(work: impl FnOnce()) -> Took {
     }
 }
 
+/// The work's multiple, `PEERS_SCALE`.
+pub(crate) fn scale() -> f64 {
+    let text = env::var("PEERS_SCALE").ok();
+    text.and_then(|text| text.parse().ok()).unwrap_or(1.0)
+}
+
 /// Repetitions: `full` times `PEERS_SCALE`, plus one, as in the C programs.
 pub(crate) fn repetitions(full: f64) -> usize {
-    let scale = env::var("PEERS_SCALE")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(1.0);
-    (full * scale) as usize + 1
+    (full * scale()) as usize + 1
 }
 
 /// Prints nanoseconds per item.
@@ -43,5 +45,15 @@ pub(crate) fn put_ns(case: &str, detail: &str, took: Took, items: usize, check: 
         "RESULT\t{case}\t{peer}{detail}\tns\t{:.6}\t{:.6}\t{check}",
         per(took.cpu_s),
         per(took.wall_s)
+    );
+}
+
+/// Prints simulated seconds per second of processor and wall time.
+pub(crate) fn put_realtime(case: &str, detail: &str, took: Took, simulated_s: f64, check: &str) {
+    let peer = env::var("PEERS_LABEL").unwrap_or_else(|_| "wheeleg".to_owned());
+    println!(
+        "RESULT\t{case}\t{peer}{detail}\tx_realtime\t{:.6}\t{:.6}\t{check}",
+        simulated_s / took.cpu_s,
+        simulated_s / took.wall_s
     );
 }

@@ -50,6 +50,8 @@ enum Bound {
     Ratio(f64),
     /// Median time (ns).
     Nanoseconds(f64),
+    /// Simulated time over processor time, at least.
+    RealTime(f64),
 }
 
 /// Target of a case: bound, step beyond, and the check value that shows the same work.
@@ -77,6 +79,17 @@ const fn ratio(
     }
 }
 
+/// A row without a reference.
+const fn real_time(case: &'static str, bound: f64, beyond: f64) -> Target {
+    Target {
+        case,
+        reference: "",
+        bound: Bound::RealTime(bound),
+        beyond,
+        check: "",
+    }
+}
+
 const fn time(case: &'static str, reference: &'static str, bound: f64, beyond: f64) -> Target {
     Target {
         case,
@@ -89,7 +102,7 @@ const fn time(case: &'static str, reference: &'static str, bound: f64, beyond: f
 
 /// The cases with a reference. An empty check value means that the peers' work differs in kind (see
 /// `tests/peers/README.md`) and the check is read by people.
-const TARGETS: [Target; 10] = [
+const TARGETS: [Target; 12] = [
     ratio("leg_id_rpp", "c_ref", 1.0, 0.5, "sum=16615.296029922"),
     ratio("leg_id_rpr", "c_ref", 1.0, 0.5, "sum=10957.805119700"),
     ratio("leg_fd_rpp", "c_ref", 1.0, 0.5, "sum=-17827.297042"),
@@ -110,6 +123,9 @@ const TARGETS: [Target; 10] = [
     ),
     // Its check value depends on the scale: it is compared with the reference's of the same round.
     ratio("robot_fd_14dof", "c_ref_casadi_codegen", 2.0, 1.2, "="),
+    // As with the robot: how long the loop runs depends on the scale.
+    ratio("pneu", "c_ref_rk4_100us", 1.0, 0.5, "="),
+    real_time("pneu_full", 250.0, 400.0),
     time("fuzzy", "c_ref_call", 15.0, 8.0),
     time("filter_1", "c_ref_biquad_q31", 5.0, 4.0),
     time("proto", "c_ref_packed_crc16_cobs", 400.0, 200.0),
@@ -245,12 +261,12 @@ impl Table {
     fn judge(&self, target: &Target, figures: &Figures) -> Result<String, String> {
         let peers = self.peers(target.case);
         let reference = peers.iter().find(|(name, _)| name == target.reference);
-        let Some((_, reference)) = reference else {
+        if reference.is_none() && !target.reference.is_empty() {
             return Err(format!("no result of {}", target.reference));
-        };
-        let expected = match target.check {
-            "=" => reference.check.as_str(),
-            check => check,
+        }
+        let expected = match (target.check, reference) {
+            ("=", Some((_, reference))) => reference.check.as_str(),
+            (check, _) => check,
         };
         if !expected.is_empty() && figures.check != expected {
             return Err(format!("check {} instead of {expected}", figures.check));
@@ -261,7 +277,14 @@ impl Table {
         let (values, limit, unit) = match target.bound {
             Bound::Ratio(limit) => (self.ratios(target.case, figures), limit, "x reference"),
             Bound::Nanoseconds(limit) => (figures.cpu.values().copied().collect(), limit, "ns"),
+            Bound::RealTime(limit) => (
+                figures.cpu.values().copied().collect(),
+                limit,
+                "x real time",
+            ),
         };
+        // The faster, the more of it.
+        let at_least = matches!(target.bound, Bound::RealTime(_));
         let Some([low, median, high]) = spread(&values) else {
             return Err("no round with both".to_owned());
         };
@@ -272,9 +295,12 @@ impl Table {
             short(high),
             target.beyond
         );
-        if median > limit {
+        let worse = |value: f64, than: f64| {
+            if at_least { value < than } else { value > than }
+        };
+        if worse(median, limit) {
             Err(text)
-        } else if median > target.beyond {
+        } else if worse(median, target.beyond) {
             Ok(format!("{text}: met"))
         } else {
             Ok(format!("{text}: beyond"))
@@ -380,6 +406,34 @@ mod tests {
         assert!(text.starts_with("0.60 x reference (0.60..0.60)"), "{text}");
         assert!(text.ends_with(": met"), "{text}");
         assert!(verdict(&table, "leg_fd_rpp").is_err(), "nothing was run");
+    }
+
+    #[test]
+    fn a_real_time_factor_is_met_from_its_bound_on() {
+        for (factor, met) in [(249.0, None), (251.0, Some("met")), (401.0, Some("beyond"))] {
+            let mut table = Table::default();
+            let text = format!("RESULT\tpneu_full\twheeleg\tx_realtime\t{factor}\t1\t");
+            table.add(0, Sample::parse(&text).unwrap().unwrap());
+            match (verdict(&table, "pneu_full"), met) {
+                (Ok(text), Some(word)) => assert!(text.ends_with(word), "{text}"),
+                (Err(_), None) => {}
+                (got, _) => panic!("{factor}: {got:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_simulator_is_compared_by_its_factor_upside_down() {
+        let line = |peer: &str, factor: f64| {
+            let text = format!("RESULT\tpneu\t{peer}\tx_realtime\t{factor}\t1\tsame");
+            Sample::parse(&text).unwrap().unwrap()
+        };
+        for (ours, met) in [(700.0, false), (840.0, true)] {
+            let mut table = Table::default();
+            table.add(0, line("c_ref_rk4_100us", 780.0));
+            table.add(0, line("wheeleg_rk4_100us", ours));
+            assert_eq!(verdict(&table, "pneu").is_ok(), met, "{ours}");
+        }
     }
 
     #[test]
