@@ -26,8 +26,10 @@ const TICK_LINES: [usize; 2] = [16 + 18, 16 + 28];
 /// Blocks kept for messages.
 const TRACE: usize = 16;
 
-/// Address at which no block begins: run until stopped.
-const NOWHERE: u64 = 0xFFFF_FFFE;
+/// Address at which no block begins: run until stopped. The engine looks it up
+/// at every stop, so it is executable memory, of a page that the part lacks.
+const NOWHERE_PAGE: u64 = 0x1000_0000;
+const NOWHERE: u64 = NOWHERE_PAGE + 0x800;
 
 /// How far to run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -225,8 +227,8 @@ impl Machine {
             stop_main_loop: false,
             stop_processor: false,
         };
-        let mut uc =
-            Unicorn::new_with_data(Arch::ARM, Mode::THUMB | Mode::MCLASS, state).map_err(engine)?;
+        // The mode for M-class processors would override the model with an M33.
+        let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, state).map_err(engine)?;
         uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)
             .map_err(engine)?;
         let code = FLASH_SIZE as usize - STORE_SIZE;
@@ -234,7 +236,12 @@ impl Machine {
             .map_err(engine)?;
         uc.mem_write(u64::from(FLASH_BASE), &image.flash[..code])
             .map_err(engine)?;
-        uc.mem_map(u64::from(RAM_BASE), u64::from(RAM_SIZE), Prot::ALL)
+        uc.mem_map(NOWHERE_PAGE, 0x1000, Prot::READ | Prot::EXEC)
+            .map_err(engine)?;
+        // Nothing of an image is executed from RAM; the engine stores faster to
+        // where no code can be.
+        let data = Prot::READ | Prot::WRITE;
+        uc.mem_map(u64::from(RAM_BASE), u64::from(RAM_SIZE), data)
             .map_err(engine)?;
         let mut machine = Self { uc, asleep: false };
         machine.hooks().map_err(engine)?;
@@ -260,7 +267,8 @@ impl Machine {
                         let cycle = state.cycle;
                         match state.soc.read(base + offset as u32, size, cycle) {
                             Ok(value) => {
-                                state.touched();
+                                // A read takes flags away at most: nothing is due sooner.
+                                state.nvic.lines = state.soc.lines();
                                 u64::from(value)
                             }
                             Err(what) => {
@@ -343,16 +351,20 @@ impl Machine {
             state.trace[state.trace_at % TRACE] = address as u32;
             state.trace_at += 1;
         })?;
-        uc.add_mem_hook(
-            HookType::MEM_INVALID,
-            1,
-            0,
-            |uc, kind, address, size, value| {
-                uc.get_data_mut().unanswered =
-                    format!("{kind:?} of {size} bytes at {address:#010x} (value {value:#x})");
-                false
-            },
-        )?;
+        // Around RAM: where a hook of memory stands, every store takes the slow way.
+        let ram_end = u64::from(RAM_BASE + RAM_SIZE);
+        for (begin, end) in [(0, u64::from(RAM_BASE) - 1), (ram_end, u64::from(u32::MAX))] {
+            uc.add_mem_hook(
+                HookType::MEM_INVALID,
+                begin,
+                end,
+                |uc, kind, address, size, value| {
+                    uc.get_data_mut().unanswered =
+                        format!("{kind:?} of {size} bytes at {address:#010x} (value {value:#x})");
+                    false
+                },
+            )?;
+        }
         uc.add_intr_hook(|uc, number| {
             let state = uc.get_data_mut();
             match number {
@@ -378,7 +390,14 @@ impl Machine {
         let word = |i: usize| {
             u32::from_le_bytes([vectors[i], vectors[i + 1], vectors[i + 2], vectors[i + 3]])
         };
-        for register in [R::PRIMASK, R::BASEPRI, R::FAULTMASK, R::CONTROL, R::IPSR] {
+        for register in [
+            R::PRIMASK,
+            R::BASEPRI,
+            R::FAULTMASK,
+            R::CONTROL,
+            R::IPSR,
+            R::APSR_NZCV,
+        ] {
             self.set(register, 0)?;
         }
         self.set(R::SP, word(0))?;

@@ -1,5 +1,7 @@
 //! Processor cycles against the simulator's nanoseconds.
 
+const SECOND_NS: i64 = 1_000_000_000;
+
 /// The clock has had `hz` since `cycle`, which was `ns`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Time {
@@ -40,8 +42,10 @@ impl Time {
 
     /// Time of a cycle, negative before time zero [ns].
     pub(crate) fn signed_ns(&self, cycle: u64) -> i64 {
-        let cycles = i128::from(cycle) - i128::from(self.cycle);
-        (i128::from(self.ns) + cycles * 1_000_000_000 / i128::from(self.hz)) as i64
+        let cycles = cycle as i64 - self.cycle as i64;
+        let (whole, rest) = (cycles / self.hz as i64, cycles % self.hz as i64);
+        // The rest is below a second: below 2^30 · 2^30.
+        self.ns + whole * SECOND_NS + rest * SECOND_NS / self.hz as i64
     }
 
     /// Time of a cycle, 0 before time zero [ns].
@@ -51,10 +55,11 @@ impl Time {
 
     /// First cycle that is not before `ns`.
     pub(crate) fn cycle_of(&self, ns: u64) -> u64 {
-        let ahead = i128::from(ns) - i128::from(self.ns);
-        let hz = i128::from(self.hz);
-        let cycles = (ahead * hz + 999_999_999).div_euclid(1_000_000_000);
-        (i128::from(self.cycle) + cycles).max(0) as u64
+        let ahead = ns as i64 - self.ns;
+        let (whole, rest) = (ahead.div_euclid(SECOND_NS), ahead.rem_euclid(SECOND_NS));
+        let hz = self.hz as i64;
+        let cycles = whole * hz + (rest * hz + SECOND_NS - 1) / SECOND_NS;
+        (self.cycle as i64 + cycles).max(0) as u64
     }
 
     /// Cycles in `ns` nanoseconds.

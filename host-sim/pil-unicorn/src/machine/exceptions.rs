@@ -51,11 +51,18 @@ impl Machine {
         let mut handler = [0; 4];
         self.memory(vector, &mut handler)?;
         self.set(R::IPSR, n as u32)?;
+        self.mode_changed(xpsr)?;
         self.set(R::PC, u32::from_le_bytes(handler) | 1)?;
         let state = self.uc.get_data_mut();
         state.nvic.enter(n);
         state.woken_by(n);
         Ok(())
+    }
+
+    /// Makes the engine see that thread or handler mode has begun, which decides
+    /// whether a jump to 0xFFFF_FFFx is a return: it looks when flags are written.
+    fn mode_changed(&mut self, flags: u32) -> Result<(), String> {
+        self.set(R::APSR_NZCV, flags)
     }
 
     /// Unstacks the frame (ARMv7-M B1.5.8).
@@ -73,6 +80,7 @@ impl Machine {
         }
         self.set(R::SP, sp + 0x20 + (word(7) >> 9 & 1) * 4)?;
         self.set(R::XPSR, word(7) & !(1 << 9))?;
+        self.mode_changed(word(7))?;
         self.set(R::PC, word(6) | 1)?;
         let left = self.uc.get_data_mut().nvic.leave();
         left.map(drop)

@@ -112,3 +112,11 @@ fn an_unmodelled_register_ends_the_run_by_its_name() {
         "{error}"
     );
 }
+
+#[test]
+fn an_instruction_of_a_later_processor_is_refused() {
+    // tt r0, r1 of ARMv8-M.
+    let mut machine = machine(&[0xE841, 0xF000], &[]);
+    let error = machine.run(1_000, Until::Cycle, true).expect_err("no TT");
+    assert!(error.contains("INSN_INVALID"), "{error}");
+}

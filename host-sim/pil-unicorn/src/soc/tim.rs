@@ -171,13 +171,16 @@ impl Tim {
         if !self.runs() || self.encoder_mode() {
             return None;
         }
+        let reaches =
+            |end: u32| self.since + (u64::from(end) + 1 - u64::from(self.base)) * self.divider();
         // Beyond its end a counter goes on to the end of its bits.
-        let end = if self.base > self.arr_now || self.count(self.seen) > self.arr_now {
-            u64::from(self.top())
-        } else {
-            u64::from(self.arr_now)
-        };
-        Some(self.since + (end + 1 - u64::from(self.base)) * self.divider())
+        if self.base <= self.arr_now {
+            let at = reaches(self.arr_now);
+            if at > self.seen {
+                return Some(at);
+            }
+        }
+        Some(reaches(self.top()))
     }
 
     fn listens_to_update(&self) -> bool {
@@ -210,16 +213,26 @@ impl Tim {
         if !self.runs() {
             return None;
         }
-        let overflow = self.overflow_at();
-        let update = overflow
-            .filter(|_| self.listens_to_update())
-            .map(|at| (at, Event::Update));
-        let matches = (0..4).filter_map(|c| Some((self.match_at(c)?, Event::Match(c))));
-        // A match beyond the overflow of a counter that reloads comes after it.
-        let in_reach = |(at, _): &(u64, Event)| {
-            self.arr_now == self.top() || overflow.is_none_or(|end| *at < end)
-        };
-        update.into_iter().chain(matches.filter(in_reach)).min()
+        let (mut next, mut end) = (None, u64::MAX);
+        if self.arr_now != self.top() || self.listens_to_update() {
+            let overflow = self.overflow_at();
+            if self.listens_to_update() {
+                next = overflow.map(|at| (at, Event::Update));
+            }
+            // A match beyond the overflow of a counter that reloads comes after it.
+            if self.arr_now != self.top() {
+                end = overflow.unwrap_or(u64::MAX);
+            }
+        }
+        for channel in 0..4 {
+            if let Some(at) = self.match_at(channel)
+                && at < end
+                && next.is_none_or(|n| (at, Event::Match(channel)) < n)
+            {
+                next = Some((at, Event::Match(channel)));
+            }
+        }
+        next
     }
 
     /// Carries out an event at its cycle.
