@@ -8,7 +8,7 @@
 mod exceptions;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, HookType, Mode, Prot, RegisterARM as R, Unicorn, uc_error,
+    Arch, ArmCpuModel, HookType, Mode, Prot, RegisterARM as R, TlbEntry, TlbType, Unicorn, uc_error,
 };
 
 use crate::image::{FLASH_BASE, FLASH_SIZE, Image, RAM_BASE, RAM_SIZE};
@@ -365,6 +365,21 @@ impl Machine {
                 },
             )?;
         }
+        // Addresses are what they are. Of the default memory map this leaves out
+        // that RAM can be executed: the engine would look for code at every store.
+        uc.ctl_set_tlb_type(TlbType::VIRTUAL)?;
+        uc.add_tlb_hook(0, u64::from(u32::MAX), move |_, address, _| {
+            let ram = (u64::from(RAM_BASE)..ram_end).contains(&address);
+            let perms = if ram {
+                Prot::READ | Prot::WRITE
+            } else {
+                Prot::ALL
+            };
+            Some(TlbEntry {
+                paddr: address,
+                perms,
+            })
+        })?;
         uc.add_intr_hook(|uc, number| {
             let state = uc.get_data_mut();
             match number {
