@@ -29,6 +29,13 @@ pub(crate) fn steps(report: &mut Report) {
             Ok(())
         });
     }
+    report.step("plant: scipy sees a spoilt parameter", || {
+        let python = tools::python()?;
+        run(command(python)
+            .args(["tests/python/check_plant.py", "--spoil"])
+            .arg(folder.join(AXES[0]).with_extension("json")))?;
+        Ok(())
+    });
 }
 
 fn export(folder: &Path) -> Result<()> {

@@ -4,6 +4,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 use wheeleg_plant::axis::{Axis, AxisParams};
+use wheeleg_plant::chamber::GasModel;
 
 use super::suite::BenchError;
 use super::{Bench, Firmware, Kind, Motion, Trace, design};
@@ -11,20 +12,52 @@ use super::{Bench, Firmware, Kind, Motion, Trace, design};
 /// Length of each sequence \[ms\].
 const TICKS: usize = 600;
 
-/// Parameters, and per sequence: on-times of every tick (µs, fill A, vent A,
-/// fill B, vent B), stroke \[m\] and pressures \[Pa\] at every tick's start.
+/// Laws of the closed-loop sequences.
+const LAWS: [Kind; 4] = [Kind::Predictive, Kind::FuzzyPd, Kind::PwmPid, Kind::OnOff];
+
+/// The axis as it is, and with every choice of the model that it leaves out. Per plant: parameters,
+/// and per sequence the on-times of every tick (µs, fill A, vent A, fill B, vent B), stroke \[m\] and
+/// pressures \[Pa\] at every tick's start.
 ///
 /// # Errors
 /// [`BenchError`].
 pub fn sequences(name: &str, params: &AxisParams) -> Result<Value, BenchError> {
+    let full = with_every_choice(params);
+    let plants = [
+        plant("as it is", params, 1..=4, &LAWS)?,
+        plant("every choice", &full, 5..=6, &LAWS[..2])?,
+    ];
+    Ok(json!({ "axis": name, "plants": plants }))
+}
+
+/// Heat exchange, friction that grows with pressure, a load, unequal valves.
+fn with_every_choice(params: &AxisParams) -> AxisParams {
+    let mut p = params.clone();
+    p.cylinder.gas_model = GasModel::Thermal {
+        heat_transfer_w_m2_k: 60.0,
+    };
+    p.cylinder.friction.pressure_area_m2 = 1e-5;
+    // An eighth of what the supply can push.
+    let area_m2 = std::f64::consts::FRAC_PI_4 * p.cylinder.bore_m.powi(2);
+    p.load_n -= 0.125 * area_m2 * (p.supply.set_pressure_pa - p.gas.ambient_pressure_pa);
+    p.cylinder.timing_spread = [1.3, 0.8, 1.0, 1.2];
+    p
+}
+
+fn plant(
+    name: &str,
+    params: &AxisParams,
+    seeds: std::ops::RangeInclusive<u64>,
+    laws: &[Kind],
+) -> Result<Value, BenchError> {
     let mut cases = Vec::new();
-    for seed in 1..=4 {
+    for seed in seeds {
         cases.push(open_loop(params, seed)?);
     }
-    for kind in [Kind::Predictive, Kind::PwmPid, Kind::OnOff] {
+    for &kind in laws {
         cases.push(closed_loop(params, kind)?);
     }
-    Ok(json!({ "axis": name, "parameters": params, "cases": cases }))
+    Ok(json!({ "name": name, "parameters": params, "cases": cases }))
 }
 
 /// Random modes of 10 to 60 ms, from a third of the stroke.

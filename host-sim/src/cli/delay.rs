@@ -9,6 +9,7 @@ use clap::Args;
 use super::print;
 use crate::SimError;
 use crate::config::builtin;
+use crate::delay::trial::{Law, Start};
 use crate::delay::{self, Options, Study};
 use crate::run::DEFAULT_ROBOT;
 
@@ -112,14 +113,20 @@ fn text(study: &Study) -> String {
         let verdict = if p.holds { "yes" } else { "no" };
         let _ = writeln!(out, "  {:18} {verdict:4} {}", p.id, p.measured);
     }
-    match study.notice.enough_s() {
-        Some(s) => {
+    for start in [Start::HomeHeld, Start::HomeRest] {
+        for row in study.notice.of(Law::Default, start) {
+            let worst = row
+                .delay_s
+                .map_or_else(|| "never".to_owned(), |d| format!("{d:.3} s"));
             let _ = writeln!(
                 out,
-                "notice     {s} s are enough for the bar from the held home"
+                "notice     {:14} {:.2} s: worst {worst}, early {:.2} mm{}",
+                start.name(),
+                row.notice_s,
+                row.early_mm,
+                if row.meets() { "  meets 0.08 s" } else { "" }
             );
         }
-        None => out.push_str("notice     none up to 0.4 s is enough from the held home\n"),
     }
     out
 }

@@ -226,8 +226,6 @@ fn scaling(study: &Study) -> Figure {
     let top = p.scaling.iter().map(|s| s.delay_s).fold(0.0, f64::max);
     // s·Pa/1e5 per m³ reads best as s·bar.
     let to_bar = 1e-5;
-    let mut factors: Vec<f64> = p.scaling.iter().map(|s| s.factor).collect();
-    factors.dedup();
     let five = [
         colour::LIMIT,
         colour::ROBOT,
@@ -235,28 +233,24 @@ fn scaling(study: &Study) -> Figure {
         colour::MODEL,
         colour::THIRD,
     ];
-    let mut series: Vec<Series> = factors
+    let mut tubes: Vec<f64> = p.scaling.iter().map(|s| s.tube).collect();
+    tubes.sort_by(f64::total_cmp);
+    tubes.dedup();
+    let series: Vec<Series> = tubes
         .iter()
         .zip(five)
-        .map(|(factor, c)| {
-            let points = p.scaling.iter().filter(|s| s.factor == *factor);
+        .map(|(tube, c)| {
+            let points = p.scaling.iter().filter(|s| s.tube == *tube);
             let points = points.map(|s| (s.ratio_s_pa * to_bar, s.delay_s)).collect();
-            line(&format!("C × {factor}"), c, points)
+            line(&format!("tubes × {tube}"), c, points)
         })
         .collect();
-    series.push(line(
-        "line fitted",
-        colour::COMMAND,
-        [0.0, most]
-            .map(|x| (x * to_bar, p.line.offset + p.line.slope * x))
-            .into(),
-    ));
     Figure {
         id: "scaling".to_owned(),
         title: "Delay over volume by conductance".to_owned(),
         caption: format!(
-            "Held home, paper's law, tubes of 0 to 36 cm³ along each line. One straight line: R² = {:.4}, {:.3} s at the origin. A transport delay or a filter would give a horizontal line.",
-            p.line.r_squared, p.line.offset
+            "Held home, paper's law, C × 0.5 to 2 along each line. With the robot's own tubes: R² = {:.4}, {:.3} s at the origin. A transport delay or a filter would give horizontal lines.",
+            p.own_line.r_squared, p.own_line.offset
         ),
         panels: vec![curves(
             "start delay",

@@ -6,7 +6,7 @@ use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
 use super::trial::{Law, Outcome, Start, Trial};
-use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, run_all};
+use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, median, quantile, run_all};
 use crate::SimError;
 
 /// Notice \[s\].
@@ -33,6 +33,8 @@ pub struct Noticed {
     pub load_n: f64,
     /// Notice \[s\].
     pub notice_s: f64,
+    /// Median start delay \[s\]; `None` if a start never came.
+    pub median_s: Option<f64>,
     /// Largest start delay \[s\]; `None` if a start never came.
     pub delay_s: Option<f64>,
     /// Largest motion between notice and command \[mm\].
@@ -67,10 +69,10 @@ impl Notice {
             .filter(move |r| r.law == law && r.start == start && r.load_n == 0.0)
     }
 
-    /// Shortest notice from which on every longer one meets the bar, at home, held \[s\].
+    /// Shortest notice from which on every longer one meets the bar, without load \[s\].
     #[must_use]
-    pub fn enough_s(&self) -> Option<f64> {
-        let rows: Vec<&Noticed> = self.of(Law::Default, Start::HomeHeld).collect();
+    pub fn enough_s(&self, start: Start) -> Option<f64> {
+        let rows: Vec<&Noticed> = self.of(Law::Default, start).collect();
         let first = rows.iter().rposition(|r| !r.meets()).map_or(0, |i| i + 1);
         rows.get(first).map(|r| r.notice_s)
     }
@@ -105,15 +107,17 @@ pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Notic
     let rows = cases
         .iter()
         .zip(outcomes.chunks(each))
-        .map(|(&(law, start, load_n, notice_s), group)| Noticed {
-            law,
-            start,
-            load_n,
-            notice_s,
-            delay_s: group
-                .iter()
-                .try_fold(0.0, |worst: f64, o| o.delay_s.map(|d| worst.max(d))),
-            early_mm: group.iter().map(|o| o.early_mm).fold(0.0, f64::max),
+        .map(|(&(law, start, load_n, notice_s), group)| {
+            let delays: Option<Vec<f64>> = group.iter().map(|o| o.delay_s).collect();
+            Noticed {
+                law,
+                start,
+                load_n,
+                notice_s,
+                median_s: delays.as_deref().and_then(median),
+                delay_s: delays.as_deref().and_then(|d| quantile(d, 1.0)),
+                early_mm: group.iter().map(|o| o.early_mm).fold(0.0, f64::max),
+            }
         })
         .collect();
     let home = outcomes.swap_remove((NOTICES_S.len() - 1) * each);

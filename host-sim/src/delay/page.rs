@@ -61,16 +61,29 @@ pub(super) fn findings(study: &Study) -> Vec<String> {
         seconds(a.base_s),
         seconds(a.without_swap_s)
     ));
-    list.push(match study.notice.enough_s() {
-        Some(notice_s) => format!(
-            "With a notice of {notice_s} s or more the default law starts from the held home within {} s, and has not moved 1 mm before.",
-            super::NOTICED_LIMIT_S
-        ),
-        None => format!(
-            "No notice up to 0.4 s brings the start from the held home within {} s.",
-            super::NOTICED_LIMIT_S
-        ),
-    });
+    for start in [Start::HomeHeld, Start::HomeRest] {
+        let last = study.notice.of(Law::Default, start).last();
+        list.push(match (study.notice.enough_s(start), last) {
+            (Some(0.0), Some(last)) => format!(
+                "Default law, {}: it starts within {} s without any notice; with 0.4 s within {} s.",
+                start.name(),
+                super::NOTICED_LIMIT_S,
+                maybe(last.delay_s)
+            ),
+            (Some(notice_s), _) => format!(
+                "Default law, {}: announced {notice_s} s before or earlier, it starts within {} s, and has not moved 1 mm before.",
+                start.name(),
+                super::NOTICED_LIMIT_S
+            ),
+            (None, last) => format!(
+                "Default law, {}: no notice up to 0.4 s brings every start within {} s; with 0.4 s the median is {} s and the worst {} s.",
+                start.name(),
+                super::NOTICED_LIMIT_S,
+                maybe(last.and_then(|l| l.median_s)),
+                maybe(last.and_then(|l| l.delay_s))
+            ),
+        });
+    }
     list
 }
 
@@ -166,6 +179,7 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
                 start => r.start.name(),
                 load => format!("{:+.0}", r.load_n).replace('-', "−"),
                 notice => r.notice_s,
+                median => maybe(r.median_s),
                 delay => maybe(r.delay_s),
                 early => format!("{:.2}", r.early_mm),
                 meets => r.meets(),
@@ -178,11 +192,8 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
             .of(law, Start::HomeHeld)
             .map_or(f64::NAN, |d| d.median_s)
     };
-    let noticed = study
-        .notice
-        .of(Law::Default, Start::HomeHeld)
-        .last()
-        .cloned();
+    let announced = |start| study.notice.of(Law::Default, start).last().cloned();
+    let (noticed, noticed_rest) = (announced(Start::HomeHeld), announced(Start::HomeRest));
     let band = PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S;
     Ok(env.get_template("page.html")?.render(context! {
         style => Value::from_safe_string(style().to_owned()),
@@ -212,6 +223,8 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
         default_home => seconds(home(Law::Default)),
         noticed => maybe(noticed.as_ref().and_then(|n| n.delay_s)),
         noticed_meets => noticed.is_some_and(|n| n.meets()),
+        noticed_rest => maybe(noticed_rest.as_ref().and_then(|n| n.delay_s)),
+        noticed_rest_meets => noticed_rest.is_some_and(|n| n.meets()),
         cycle_ms => 1e3 * study.bus.cycle_s,
         frame_ms => format!("{:.2}", 1e3 * study.bus.frame_s),
     })?)

@@ -20,8 +20,8 @@ use crate::SimError;
 const SEEDS: u64 = 6;
 /// Factors on the conductance of all valves.
 const FACTORS: [f64; 5] = [0.5, 0.7, 1.0, 1.4, 2.0];
-/// Tube volume of each chamber \[m³\].
-const VOLUMES_M3: [f64; 5] = [0.0, 6e-6, 12e-6, 24e-6, 36e-6];
+/// Factors on the volume of the tubes.
+const TUBES: [f64; 5] = [0.0, 0.5, 1.0, 2.0, 3.0];
 /// Bores with the rods that belong to them \[m\].
 const BORES_M: [(f64, f64); 3] = [(0.016, 0.006), (0.020, 0.008), (0.025, 0.010)];
 
@@ -67,6 +67,8 @@ fn prediction(
 pub struct Scaled {
     /// Factor on the conductance.
     pub factor: f64,
+    /// Factor on the volume of the tubes.
+    pub tube: f64,
     /// Volume of the counter chamber with its tube \[m³\].
     pub volume_m3: f64,
     /// Volume over conductance of valve and tube in series \[s Pa\].
@@ -108,8 +110,10 @@ pub struct Predictions {
     pub list: Vec<Prediction>,
     /// Conductance by volume.
     pub scaling: Vec<Scaled>,
-    /// Delay over volume/conductance.
+    /// Delay over volume/conductance, all points.
     pub line: Line,
+    /// Delay over volume/conductance with the robot's own tubes.
+    pub own_line: Line,
     /// Bores.
     pub bores: Vec<Bored>,
     /// Stroke time from the held home, valves thrown open \[s\].
@@ -174,27 +178,28 @@ fn scaling(axis: &AxisParams, bar: &ProgressBar) -> Result<Vec<Scaled>, SimError
     let mut points = Vec::new();
     let mut trials = Vec::new();
     for factor in FACTORS {
-        for volume_m3 in VOLUMES_M3 {
+        for tube in TUBES {
             let mut trial = home(axis);
             conductance(&mut trial, factor);
-            trial.axis.cylinder.line_volume_m3 = volume_m3;
+            trial.axis.cylinder.line_volume_m3 *= tube;
             let c = &trial.axis.cylinder;
             let area_m2 = std::f64::consts::FRAC_PI_4 * c.bore_m * c.bore_m;
-            let volume_m3 = area_m2 * c.stroke_m + c.dead_volume_a_m3 + volume_m3;
+            let volume_m3 = area_m2 * c.stroke_m + c.dead_volume_a_m3 + c.line_volume_m3;
             let path = match &c.line_flow {
                 Some(line) => line.in_series(&c.vent_valve.flow),
                 None => c.vent_valve.flow,
             };
             let ratio = volume_m3 / path.conductance_m3_s_pa;
-            points.push((factor, volume_m3, ratio));
+            points.push((factor, tube, volume_m3, ratio));
             trials.push(trial);
         }
     }
     let delays = delays(&trials, bar)?;
     let rows = points.iter().zip(delays);
     Ok(rows
-        .map(|(&(factor, volume_m3, ratio_s_pa), delay_s)| Scaled {
+        .map(|(&(factor, tube, volume_m3, ratio_s_pa), delay_s)| Scaled {
             factor,
+            tube,
             volume_m3,
             ratio_s_pa,
             delay_s,
@@ -289,10 +294,11 @@ pub fn measure(
     };
     let hands = delays(&[prepared(Before::Vented), prepared(Before::Balanced)], bar)?;
     let scaling = scaling(axis, bar)?;
-    let line = fit(&scaling
-        .iter()
-        .map(|s| (s.ratio_s_pa, s.delay_s))
-        .collect::<Vec<_>>());
+    let points = |tubes: &[f64]| -> Vec<(f64, f64)> {
+        let of = scaling.iter().filter(|s| tubes.contains(&s.tube));
+        of.map(|s| (s.ratio_s_pa, s.delay_s)).collect()
+    };
+    let (line, own_line) = (fit(&points(&TUBES)), fit(&points(&[1.0])));
     let stroke_s = thrown(axis)?.travel_s.ok_or_else(never)?;
     let bores = bores(axis, stroke_s, bar)?;
 
@@ -305,25 +311,21 @@ pub fn measure(
     let rests = [Start::MidExtend, Start::MidRetract].map(|s| of(Law::Paper, s).0);
     let rest_s = 0.5 * (rests[0] + rests[1]);
     let reversal_s = of(Law::Paper, Start::Reversal).0;
-    let at_base = |factor: f64| {
-        let tube = axis.cylinder.line_volume_m3;
-        let near = |s: &&Scaled| s.factor == factor;
-        let volume = axis.cylinder.dead_volume_a_m3
-            + tube
-            + std::f64::consts::FRAC_PI_4 * axis.cylinder.bore_m.powi(2) * axis.cylinder.stroke_m;
-        let mut rows: Vec<&Scaled> = scaling.iter().filter(near).collect();
-        rows.sort_by(|a, b| {
-            let far = |s: &Scaled| (s.volume_m3 - volume).abs();
-            far(a).total_cmp(&far(b))
-        });
-        rows.first().map_or(f64::NAN, |s| s.delay_s)
+    let at = |factor: f64, tube: f64| {
+        let found = scaling
+            .iter()
+            .find(|s| s.factor == factor && s.tube == tube);
+        found.map_or(f64::NAN, |s| s.delay_s)
     };
-    let with_c = at_base(0.5) / at_base(2.0);
+    let with_c = at(0.5, 1.0) / at(2.0, 1.0);
+    let growing = FACTORS
+        .iter()
+        .all(|f| TUBES.windows(2).all(|w| at(*f, w[0]) < at(*f, w[1])));
     let announced = |notice_s: f64| {
         notice
             .of(Law::Default, Start::HomeHeld)
             .find(|r| r.notice_s == notice_s)
-            .and_then(|r| r.delay_s)
+            .and_then(|r| r.median_s)
             .unwrap_or(f64::NAN)
     };
     let gain_s = announced(0.0) - announced(0.4);
@@ -366,22 +368,41 @@ pub fn measure(
             (0.03, 0.07),
         ),
         prediction(
-            "V/C",
-            "the delay grows in proportion to (stroke volume + tube)/C: R² at least 0.98 …",
+            "1/C",
+            "the delay grows in proportion to 1/C: R² at least 0.98 over C × 0.5 to 2 …",
+            format!("R² {:.4}", own_line.r_squared),
+            own_line.r_squared,
+            (0.98, 1.0),
+        ),
+        prediction(
+            "offset",
+            "… and what is left at 1/C = 0 is switching, wave and inertia: 0 to 0.05 s",
+            format!("{:.3} s", own_line.offset),
+            own_line.offset,
+            (0.0, 0.05),
+        ),
+        prediction(
+            "volume",
+            "the delay grows with the volume of the tubes, at every C (1: yes)",
             format!(
-                "R² {:.4} over {} points, C × 0.5 to 2, tubes 0 to 36 cm³",
+                "tubes × 0, 1, 3: {:.3}, {:.3}, {:.3} s",
+                at(1.0, 0.0),
+                at(1.0, 1.0),
+                at(1.0, 3.0)
+            ),
+            f64::from(u8::from(growing)),
+            (1.0, 1.0),
+        ),
+        prediction(
+            "V/C",
+            "one straight line in (stroke volume + tube)/C holds for all of them: R² at least 0.98",
+            format!(
+                "R² {:.4} over {} points: a tube counts for more than its volume, for it adds to both chambers",
                 line.r_squared,
                 scaling.len()
             ),
             line.r_squared,
             (0.98, 1.0),
-        ),
-        prediction(
-            "offset",
-            "… and what is left at V/C = 0 is switching and inertia: 0 to 0.05 s",
-            format!("{:.3} s", line.offset),
-            line.offset,
-            (0.0, 0.05),
         ),
         prediction(
             "in-stroke",
@@ -410,9 +431,9 @@ pub fn measure(
         ),
         prediction(
             "look-ahead",
-            "venting ahead of an announced move gains 0.15 to 0.2 s (default law, notice 0.4 s)",
+            "venting ahead of an announced move gains 0.15 to 0.2 s from the held home (default law, notice 0.4 s)",
             format!(
-                "{gain_s:.3} s: {:.3} s without, {:.3} s with notice, worst of the seeds",
+                "{gain_s:.3} s: {:.3} s without, {:.3} s with notice, medians",
                 announced(0.0),
                 announced(0.4)
             ),
@@ -441,6 +462,7 @@ pub fn measure(
         list,
         scaling,
         line,
+        own_line,
         bores,
         stroke_s,
     })

@@ -72,11 +72,17 @@ pub(super) fn write(folder: &Path, study: &Study) -> Result<(), SimError> {
     ];
     table(folder, "predictions", &header, rows)?;
     let rows = p.scaling.iter().map(|s| {
-        [s.factor, s.volume_m3, s.ratio_s_pa, s.delay_s]
+        [s.factor, s.tube, s.volume_m3, s.ratio_s_pa, s.delay_s]
             .map(|v| v.to_string())
             .to_vec()
     });
-    let header = ["C factor", "volume [m3]", "V/C [s Pa]", "delay [s]"];
+    let header = [
+        "C factor",
+        "tube factor",
+        "volume [m3]",
+        "V/C [s Pa]",
+        "delay [s]",
+    ];
     table(folder, "scaling", &header, rows)?;
     let rows = p.bores.iter().map(|b| {
         let mut row = vec![b.bore_m.to_string(), b.scaled.to_string()];
@@ -97,6 +103,7 @@ pub(super) fn write(folder: &Path, study: &Study) -> Result<(), SimError> {
             r.start.name().to_owned(),
             r.load_n.to_string(),
             r.notice_s.to_string(),
+            optional(r.median_s),
             optional(r.delay_s),
             r.early_mm.to_string(),
             r.meets().to_string(),
@@ -107,6 +114,7 @@ pub(super) fn write(folder: &Path, study: &Study) -> Result<(), SimError> {
         "start",
         "load [N]",
         "notice [s]",
+        "median delay [s]",
         "worst delay [s]",
         "worst early motion [mm]",
         "meets",
