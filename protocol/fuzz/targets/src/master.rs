@@ -195,6 +195,8 @@ struct Play {
     /// Admitted commands without an outcome.
     open: Vec<Ticket>,
     last_sync: Option<Sync>,
+    /// The newest SYNC was made in a stop.
+    last_held: bool,
     cycles: u32,
     next_id: u32,
 }
@@ -218,6 +220,7 @@ pub fn run(data: &[u8]) {
         stalled: 0,
         open: Vec::new(),
         last_sync: None,
+        last_held: false,
         cycles: 0,
         next_id: 0,
     };
@@ -358,8 +361,10 @@ impl Play {
             );
         }
         let sync = sync_of(&bytes);
-        self.check_sync(&sync, start, held && holds);
+        // An E-stop is taken between two SYNCs: the one before it knew nothing of it.
+        self.check_sync(&sync, start, self.last_held && held && holds);
         self.last_sync = Some(sync);
+        self.last_held = holds;
         self.heard = [None; NODES];
         self.replies(&sync, start);
         self.requests(start);
