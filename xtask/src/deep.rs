@@ -10,7 +10,7 @@ use clap::Args;
 
 use crate::process::{ask, cargo, command, output, root};
 use crate::report::{Report, StepResult};
-use crate::{fuzz, mutants};
+use crate::{fuzz, mutants, pil};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -18,7 +18,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 5] = [
+const CHECKS: [Check; 6] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -31,7 +31,7 @@ const CHECKS: [Check; 5] = [
         3,
         streams,
     ),
-    Check("fuzz", "libFuzzer, 10 minutes per target", 75, fuzzing),
+    Check("fuzz", "libFuzzer, 10 minutes per target", 110, fuzzing),
     Check(
         "engine",
         "the second engine (bolero), 2 minutes per target",
@@ -41,8 +41,14 @@ const CHECKS: [Check; 5] = [
     Check(
         "mutants",
         "mutations of the code that decides safe states",
-        120,
+        30,
         mutations,
+    ),
+    Check(
+        "second-way",
+        "images by Debian's compiler through the suite of the emulated boards",
+        15,
+        pil::second_way,
     ),
 ];
 
