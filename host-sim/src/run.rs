@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{RobotConfig, Scenario, builtin};
 use crate::faults::{self, FaultSpec};
-use crate::pil::Nodes;
+use crate::pil::{Nodes, Outside};
 use crate::report::{self, RunInfo, Summary};
 use crate::sil;
 use crate::telemetry::Recorder;
@@ -69,6 +69,8 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
         .out
         .clone()
         .unwrap_or_else(|| crate::cli::default_out(&scenario.name, seed));
+    // A board that does not answer must not cost the results of the run before.
+    let boards = Outside::connect(&options.nodes, &robot)?;
     output::prepare(&folder)?;
     let mut recorder = Recorder::create(&folder.join("log.mcap"))?;
     provenance(&mut recorder, &scenario, &robot, seed);
@@ -77,7 +79,8 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
     let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst));
     let bar = progress_bar(&scenario);
     let begun = Instant::now();
-    let outcome = sil::run_with(
+    let outcome = sil::run_on(
+        boards,
         &scenario,
         &robot,
         seed,
@@ -138,4 +141,33 @@ fn progress_bar(scenario: &Scenario) -> ProgressBar {
     bar.set_prefix(scenario.name.clone());
     bar.set_message(format!("{:.0} s simulated", scenario.duration_s));
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pil::NodeKind;
+
+    #[test]
+    fn a_port_that_does_not_open_costs_no_earlier_results() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path().join("results");
+        std::fs::create_dir(&folder).expect("created");
+        std::fs::write(folder.join("summary.json"), "earlier").expect("written");
+        let mut nodes = Nodes::default();
+        nodes.0[0] = NodeKind::Hil(temporary.path().join("no-port"));
+        let options = Options {
+            scenario: DEFAULT_SCENARIO.to_owned(),
+            robot: None,
+            seed: None,
+            nodes,
+            faults: Vec::new(),
+            out: Some(folder.clone()),
+        };
+        let error = run(&options).expect_err("no such port").to_string();
+        assert!(error.contains("no-port"), "{error}");
+        let kept = std::fs::read_to_string(folder.join("summary.json"));
+        assert_eq!(kept.expect("kept"), "earlier");
+        assert!(!folder.join("previous").exists() && !folder.join("log.mcap").exists());
+    }
 }

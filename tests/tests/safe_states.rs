@@ -23,18 +23,14 @@ const EXHAUST: u8 = 5;
 /// Outlets of both chambers, in the bits of the log.
 const VENTS: u8 = 0b1010;
 
-/// Twelve instants spread over the three steps, at random within their twelfths
-/// (the same every time: a hash of the number).
-fn instants() -> Vec<f64> {
-    (0..12_u64)
-        .map(|k| {
-            let mut x = k.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            let share = (x >> 40) as f64 / (1_u64 << 24) as f64;
-            // On the grid of the samples.
-            ((0.1 + (k as f64 + share) * 9.8 / 12.0) * 1e3).round() * 1e-3
-        })
-        .collect()
+/// Instant `k` of `n` spread over the three steps, at random within its part (the
+/// same every time: a hash of the number).
+fn spread(k: u64, n: u64) -> f64 {
+    let mut x = k.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let share = (x >> 40) as f64 / (1_u64 << 24) as f64;
+    // On the grid of the samples.
+    ((0.1 + (k as f64 + share) * 9.8 / n as f64) * 1e3).round() * 1e-3
 }
 
 /// Whether the stepping foot is in the air at `t_s` by the clock of the gait;
@@ -167,7 +163,7 @@ fn assert_latched(recording: &Recording, from_s: f64, safe: &[u8]) {
 fn losing_the_master_at_any_instant_is_safe() {
     let robot = robot();
     let (mut flights, mut stances, mut rolling, mut closings) = (0, 0, 0, 0);
-    for t in instants() {
+    for t in (0..12).map(|k| spread(k, 12)) {
         let scenario = gait(LegChoice::Left, t + 2.0, &[(t, EventAction::KillMaster)]);
         let recording = run(&scenario, &robot, 1);
         closings += assert_shut(&recording, t, REACTION_S);
@@ -236,6 +232,47 @@ fn losing_the_master_at_any_instant_is_safe() {
     );
     assert!(rolling >= 2, "{rolling} with turning wheels");
     assert!(closings >= 6, "{closings} valves caught open");
+}
+
+/// A hundred instants over the whole walk, at random (the same every time): every axis
+/// is in its safe state in time, and stays there although the master comes back.
+#[test]
+fn losing_the_master_at_a_hundred_instants_is_latched_in_time() {
+    let robot = robot();
+    let instants: Vec<f64> = (0..100).map(|k| spread(k, 100)).collect();
+    let half = instants.len() / 2;
+    let moving = std::thread::scope(|threads| {
+        let work = |part: &'static str, instants: Vec<f64>| {
+            let robot = &robot;
+            threads.spawn(move || instants.iter().map(|t| lose_master(robot, *t, part)).sum())
+        };
+        let first = work("first", instants[..half].to_vec());
+        let second: std::thread::ScopedJoinHandle<'_, u32> =
+            work("second", instants[half..].to_vec());
+        first.join().expect("first half") + second.join().expect("second half")
+    });
+    // At most instants some valve or wheel was driven, so that there was something to stop.
+    assert!(moving >= 60, "something moves at {moving} instants");
+}
+
+/// Loses the master for 100 ms from `t` on; 1 if a valve was driven within 20 ms before.
+fn lose_master(robot: &wheeleg_sim::config::RobotConfig, t: f64, part: &str) -> u32 {
+    let mut scenario = gait(LegChoice::Left, t + 0.25, &[]);
+    let text = format!("master-silent@{t:.3}s..{:.3}s", t + 0.1);
+    scenario.faults.push(text.parse().expect("a fault"));
+    let recording = run(&scenario, robot, 1);
+    for (joint, rows) in recording.joints.iter().enumerate() {
+        let shut_s = last(window(rows, t, f64::INFINITY), t, energised).unwrap_or(0.0);
+        assert!(
+            shut_s <= REACTION_S,
+            "{part} half, lost at {t} s: joint {} commanded until {shut_s} s",
+            joint + 1
+        );
+    }
+    assert_latched(&recording, t + REACTION_S, &[HOLD]);
+    let before =
+        |rows: &Vec<Row<JointSample>>| window(rows, t - 0.02, t).iter().any(|r| energised(&r.v));
+    u32::from(recording.joints.iter().any(before))
 }
 
 /// E-stop in flight, in the push and at rest.

@@ -31,6 +31,8 @@ pub(crate) struct Injector {
     line: LineErrors,
     /// Encoder count at the begin of an encoder fault, per wheel.
     encoder_at: [Option<i64>; 2],
+    /// Simulated time at the begin of a clock fault, per board, ns.
+    clock_from_ns: [u64; 8],
     last_sync: Vec<u8>,
 }
 
@@ -42,6 +44,7 @@ impl Injector {
             rng: signal_rng(seed, "faults"),
             line: LineErrors::default(),
             encoder_at: [None; 2],
+            clock_from_ns: [0; 8],
             last_sync: Vec::new(),
         }
     }
@@ -51,9 +54,13 @@ impl Injector {
         &mut self,
         fault: &FaultSpec,
         begin: bool,
+        now_ns: u64,
         plant: &mut Plant,
         state: &mut PlantState,
     ) {
+        if let (FaultKind::ClockDrift, Victim::Board(address)) = (fault.kind, fault.victim) {
+            self.clock_from_ns[usize::from(address) - 1] = now_ns;
+        }
         if begin {
             self.active.push(*fault);
         } else {
@@ -217,9 +224,20 @@ impl Injector {
             .of(FaultKind::ClockDrift)
             .filter(|f| f.victim == Victim::Board(address));
         // The drift begins with the fault; before it the clock was right.
+        let since_ns = now_ns.saturating_sub(self.clock_from_ns[usize::from(address) - 1]);
         drift.fold(now_ns, |t, f| {
-            let since_ns = now_ns as f64 - f.from_s * 1e9;
-            t.saturating_add_signed((since_ns * f.value * 1e-6) as i64)
+            t.saturating_add_signed((since_ns as f64 * f.value * 1e-6) as i64)
+        })
+    }
+
+    /// How long a board's clock takes for `ahead_us` on it, ns.
+    pub(crate) fn duration_ns(&self, address: u8, ahead_us: u32) -> u64 {
+        let ahead_ns = u64::from(ahead_us) * 1_000;
+        let drift = self
+            .of(FaultKind::ClockDrift)
+            .filter(|f| f.victim == Victim::Board(address));
+        drift.fold(ahead_ns, |ns, f| {
+            (ns as f64 / (1.0 + f.value * 1e-6)).round() as u64
         })
     }
 

@@ -90,9 +90,26 @@ pub fn run_with(
     recorder: &mut Recorder,
     progress: &mut dyn FnMut(f64) -> Control,
 ) -> Result<RunOutcome, SimError> {
+    let boards = Outside::connect(nodes, robot)?;
+    run_on(boards, scenario, robot, seed, nodes, recorder, progress)
+}
+
+/// As [`run_with`], on boards that are connected already; `None`: all here.
+///
+/// # Errors
+/// As [`run_with`].
+pub(crate) fn run_on(
+    boards: Option<Outside>,
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    nodes: &Nodes,
+    recorder: &mut Recorder,
+    progress: &mut dyn FnMut(f64) -> Control,
+) -> Result<RunOutcome, SimError> {
     let plant = setup::plant(scenario, robot);
     let master = setup::master(scenario, robot);
-    let mut world = World::new(robot, &plant, master, seed, Outside::connect(nodes, robot)?)?;
+    let mut world = World::new(robot, &plant, master, seed, boards)?;
     let mut operator = Operator::new(scenario, &robot.start_up);
     let mut observer = Observer::default();
     let mut schedule = Schedule::new(&scenario.faults);

@@ -20,8 +20,8 @@ use crate::config::NodeParams;
 const TWIN: Driver = 0x40;
 /// The service tool.
 pub(super) const SERVICE: Driver = 0x80;
-/// A stream that fills the line.
-pub(super) const STREAM: Driver = 0x81;
+/// A stream that fills the line: the last wheel board sends it.
+pub(super) const STREAM: Driver = 8;
 /// Listens only.
 pub(super) const AUDITOR: Driver = 0xFE;
 

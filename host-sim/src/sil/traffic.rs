@@ -17,16 +17,11 @@ pub(super) fn micros(ns: u64) -> Micros {
     Micros((ns / NS_PER_US) as u32)
 }
 
-/// Start of a transmission on the line's clock, ns, from the board's own: `now` is
-/// what that shows at `now_ns`.
-fn start_ns(now_ns: u64, now: Micros, start_at: Micros) -> u64 {
+/// How far a start lies ahead on the board's own clock, µs, when that shows `now`.
+fn ahead_us(now: Micros, start_at: Micros) -> u32 {
     let ahead = start_at.get().wrapping_sub(now.get());
     // More than half the counter's range ahead means: already past.
-    if ahead < 1 << 31 {
-        now_ns + u64::from(ahead) * NS_PER_US
-    } else {
-        now_ns
-    }
+    if ahead < 1 << 31 { ahead } else { 0 }
 }
 
 /// Puts bytes on the line as the line lets them through.
@@ -66,7 +61,11 @@ impl World {
 
     /// Hands over what has reached its end on the line.
     pub(super) fn deliver(&mut self) -> Result<(), SimError> {
+        // A node's frame is answered by no node: boards outside hear it in their
+        // next run, which saves most of the ways to them and back.
+        let mut answerable = false;
         while let Some(delivery) = self.bus.take_due(self.now_ns) {
+            answerable |= !(1..=8).contains(&delivery.from);
             for address in 1..=8_u8 {
                 if !self.runs(address) {
                     continue;
@@ -92,7 +91,9 @@ impl World {
                 self.audit.heard(&bytes);
             }
         }
-        self.deliver_outside()?;
+        if answerable {
+            self.deliver_outside()?;
+        }
         self.collect_transmissions();
         self.offer_line();
         Ok(())
@@ -106,7 +107,7 @@ impl World {
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
             // Start times are on the board's own clock.
             let now = micros(faults.clock_ns(from, now_ns));
-            let start_ns = start_ns(now_ns, now, t.start_at);
+            let start_ns = now_ns + faults.duration_ns(from, ahead_us(now, t.start_at));
             let Some(bytes) = faults.board_sends(from, t.bytes.to_vec()) else {
                 return;
             };
@@ -127,7 +128,8 @@ impl World {
             }
         }
         while let Some((from, t)) = self.strangers.take_transmission() {
-            let start_ns = start_ns(now_ns, micros(now_ns), t.start_at);
+            let ahead_us = ahead_us(micros(now_ns), t.start_at);
+            let start_ns = now_ns + u64::from(ahead_us) * NS_PER_US;
             transmit(bus, audit, faults, from, start_ns, t.bytes.to_vec());
         }
         if let Some(outside) = outside {
@@ -185,9 +187,9 @@ mod tests {
 
     #[test]
     fn a_start_that_is_past_is_now_and_the_counter_may_wrap() {
-        let at = |now: u32, start: u32| start_ns(5_000_000, Micros(now), Micros(start));
-        assert_eq!(at(100, 350), 5_250_000);
-        assert_eq!(at(350, 100), 5_000_000);
-        assert_eq!(at(u32::MAX - 9, 40), 5_050_000);
+        let ahead = |now: u32, start: u32| ahead_us(Micros(now), Micros(start));
+        assert_eq!(ahead(100, 350), 250);
+        assert_eq!(ahead(350, 100), 0);
+        assert_eq!(ahead(u32::MAX - 9, 40), 50);
     }
 }

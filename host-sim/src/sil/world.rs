@@ -324,8 +324,8 @@ impl World {
     /// # Errors
     /// [`SimError`] if a board outside refuses it, or one that starts anew.
     pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
-        self.faults
-            .strike(fault, begin, &mut self.plant, &mut self.state);
+        let (plant, state) = (&mut self.plant, &mut self.state);
+        self.faults.strike(fault, begin, self.now_ns, plant, state);
         match (fault.kind, fault.victim) {
             (FaultKind::DuplicateAddress, Victim::Board(address)) if begin => {
                 self.strangers.plug_in(address, &self.stored)?;

@@ -40,6 +40,8 @@ pub struct Measured {
     pub wheels_stand_ms: Option<f64>,
     /// Supply dump valve commanded open.
     pub dump_ms: Option<f64>,
+    /// Pressure switch open, as its board sees it.
+    pub supply_switch_ms: Option<f64>,
     /// Largest sensed movement of a held joint in the half second after the stop, mm.
     pub held_mm: Option<f64>,
     /// Largest deviation of a true stroke from the same run without the fault, mm.
@@ -107,7 +109,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
         since_s,
         wrong_frames: ran.line.wrong,
         dropped: r.dropped,
-        detected_ms: detected_s(r, at_s).map(ms),
+        detected_ms: detected_s(r, at_s, heard(&ran.faults)).map(ms),
         reads: reads(ran),
         ..Measured::default()
     };
@@ -125,9 +127,9 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
         .collect();
     m.physical_ms = worst(&physical).map(ms);
     m.wheels_stand_ms = stand_s(r, since_s).map(ms);
-    let dump = r.supply.iter();
-    let mut dump = dump.filter(|s| s.t_s() >= since_s - 1e-9);
-    m.dump_ms = dump.find(|s| s.v.dump_commanded).map(|s| ms(s.t_s()));
+    let supply = || r.supply.iter().filter(|s| s.t_s() >= since_s - 1e-9);
+    m.dump_ms = supply().find(|s| s.v.dump_commanded).map(|s| ms(s.t_s()));
+    m.supply_switch_ms = supply().find(|s| !s.v.pressure_switch).map(|s| ms(s.t_s()));
     m.stopped = m.commanded_ms.is_some() && m.sensed_ms.is_some();
     m.latched = m.stopped && ran.arming_asked;
     m.held_mm = worst(&safe).and_then(|from_s| held_mm(r, from_s));
@@ -173,8 +175,15 @@ fn worst(times: &[Option<f64>]) -> Option<f64> {
         .try_fold(f64::NEG_INFINITY, |worst, t| Some(worst.max((*t)?)))
 }
 
-/// First latched fault of any board, or the master's HOLD, at or after `from_s`.
-fn detected_s(r: &Recording, from_s: f64) -> Option<f64> {
+/// Whether the boards still hear the master: if not, its HOLD is no detection.
+fn heard(faults: &[FaultSpec]) -> bool {
+    let cut = [FaultKind::MasterSilent, FaultKind::MasterFrozen];
+    !faults.iter().any(|f| cut.contains(&f.kind))
+}
+
+/// First latched fault of any board, or the HOLD of a master that is heard, at or
+/// after `from_s`.
+fn detected_s(r: &Recording, from_s: f64, master_heard: bool) -> Option<f64> {
     let from_ns = (from_s * 1e9).round() as u64;
     let joints = r.joints.iter().filter_map(|rows| {
         rows.iter()
@@ -186,10 +195,9 @@ fn detected_s(r: &Recording, from_s: f64) -> Option<f64> {
             .find(|s| s.t_ns >= from_ns && s.v.faults != 0)
             .map(Sample::t_s)
     });
-    let hold = r
-        .events
-        .iter()
-        .find(|e| e.t_ns >= from_ns && e.v.text.starts_with("master: all axes hold"));
+    let hold = r.events.iter().find(|e| {
+        master_heard && e.t_ns >= from_ns && e.v.text.starts_with("master: all axes hold")
+    });
     let all = joints.chain(wheels).chain(hold.map(Sample::t_s));
     all.min_by(f64::total_cmp)
 }
@@ -337,7 +345,7 @@ mod tests {
         r.joints[2] = rows(|_| true);
         r.joints[2][640].v.faults = 1;
         r.joints[2][100].v.faults = 1;
-        assert_eq!(detected_s(&r, 0.5), Some(0.640));
+        assert_eq!(detected_s(&r, 0.5, true), Some(0.640));
         r.events.push(Sample {
             t_ns: 560_000_000,
             v: crate::telemetry::EventSample {
@@ -345,7 +353,12 @@ mod tests {
                 text: "master: all axes hold: E-stop".to_owned(),
             },
         });
-        assert_eq!(detected_s(&r, 0.5), Some(0.560));
-        assert_eq!(detected_s(&r, 0.7), None);
+        assert_eq!(detected_s(&r, 0.5, true), Some(0.560));
+        assert_eq!(
+            detected_s(&r, 0.5, false),
+            Some(0.640),
+            "nobody hears the master"
+        );
+        assert_eq!(detected_s(&r, 0.7, true), None);
     }
 }

@@ -100,7 +100,7 @@ pub enum Variant {
     Plain,
     /// With the touch-down reflex on.
     Reflex,
-    /// Walks 18 steps, 60 s.
+    /// Walks 18 steps, a minute.
     Long,
 }
 
@@ -115,6 +115,8 @@ pub struct Row {
     pub estop: bool,
     /// When.
     pub phase: Phase,
+    /// How long the run goes on after the instant, s.
+    pub after_s: f64,
     /// To which robot.
     pub variant: Variant,
     /// What must come of it.
@@ -138,6 +140,9 @@ impl Row {
     }
 }
 
+/// A run goes on for this long after the instant, s.
+const AFTER_S: f64 = 2.0;
+
 /// It stays.
 pub(super) const FOR_GOOD: f64 = f64::INFINITY;
 
@@ -154,6 +159,7 @@ pub(super) const fn row(
         strikes,
         estop: false,
         phase,
+        after_s: AFTER_S,
         variant: Variant::Plain,
         expect,
         answering: 0,
@@ -170,6 +176,11 @@ pub(super) const fn missing(id: &'static str, reason: &'static str) -> Row {
 impl Row {
     pub(super) const fn noted(mut self, note: &'static str) -> Self {
         self.note = note;
+        self
+    }
+
+    pub(super) const fn lasting(mut self, after_s: f64) -> Self {
+        self.after_s = after_s;
         self
     }
 

@@ -22,15 +22,12 @@ use crate::telemetry::{Recorder, Recording};
 const THREADS: usize = 2;
 /// E-stop after the instant, s.
 pub(super) const ESTOP_S: f64 = 0.1;
-/// A run goes on for this long after the instant, s.
-const AFTER_S: f64 = 2.0;
-/// Arming is asked for this long after the instant, s.
-const ARM_S: f64 = 1.4;
-/// Steps and duration of the long walk.
+/// Arming is asked for this long before the end, s.
+const ARM_S: f64 = 0.6;
+/// Steps of the long walk.
 const LONG_STEPS: u16 = 18;
-const LONG_S: f64 = 60.0;
-/// No instant lies behind this plus [`AFTER_S`], s.
-const SOUND_S: f64 = 6.0;
+/// Duration of the runs without faults, s: no run that is compared is longer.
+const SOUND_S: f64 = 7.0;
 
 /// A run of a row.
 pub(super) struct Ran {
@@ -119,8 +116,7 @@ impl Robots {
         let robot = self.robot(row.variant);
         let at_s = instant_s(row, robot, self.seed);
         let faults = faults(row, at_s)?;
-        let long = row.variant == Variant::Long;
-        let duration_s = if long { LONG_S } else { at_s + AFTER_S };
+        let duration_s = at_s + row.after_s;
         let mut scenario = self.scenario(stands(row.phase), duration_s);
         scenario.faults.clone_from(&faults);
         let event = |at_s: f64, action| ScenarioEvent { at_s, action };
@@ -129,9 +125,9 @@ impl Robots {
                 .events
                 .push(event(at_s + ESTOP_S, EventAction::EStop));
         }
-        let arming_asked = matches!(row.expect, Expect::Stop(_));
+        let arming_asked = matches!(row.expect, Expect::Stop(_) | Expect::Degrades);
         if arming_asked {
-            scenario.events.push(event(at_s + ARM_S, arm()));
+            scenario.events.push(event(duration_s - ARM_S, arm()));
         }
         check(&scenario)?;
         let (recording, line, error) = simulate(&scenario, robot, self.seed);

@@ -1,0 +1,139 @@
+//! The fault matrix: every row of host-sim/FAULTS.md is run, and comes out as it must or
+//! as the shortfalls of that file say; no fault trips where there is none.
+
+mod sil;
+
+use std::collections::BTreeSet;
+
+use sil::{robot, run, scenario, story};
+use wheeleg_sim::config::builtin;
+use wheeleg_sim::faults::matrix::{self, Expect, ROWS, Verdict};
+use wheeleg_sim::faults::{FaultKind, KINDS};
+
+const DOCUMENT: &str = include_str!("../../host-sim/FAULTS.md");
+
+/// Names between back-ticks in a text.
+fn names(text: &str) -> BTreeSet<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
+/// Rows that the document's table lists, in its last column.
+fn documented() -> BTreeSet<&'static str> {
+    let lines = DOCUMENT.lines().filter(|line| line.starts_with("| "));
+    let lines = lines.filter_map(|line| line.trim_end_matches(" |").rsplit_once('|'));
+    lines.flat_map(|(_, rows)| names(rows)).collect()
+}
+
+/// Rows that are known not to come out as they must.
+fn shortfalls() -> BTreeSet<&'static str> {
+    let (_, rest) = DOCUMENT
+        .split_once("<!-- begin shortfalls -->")
+        .expect("begin");
+    let (list, _) = rest.split_once("<!-- end shortfalls -->").expect("end");
+    let lines = list.lines().filter(|line| line.starts_with("- "));
+    lines
+        .flat_map(|line| names(line.split(':').next().unwrap_or(line)))
+        .collect()
+}
+
+#[test]
+fn the_table_has_the_rows_of_the_document() {
+    let listed = documented();
+    let coded: BTreeSet<&str> = ROWS.iter().map(|row| row.id).collect();
+    assert_eq!(listed, coded);
+    assert!(
+        coded.len() == ROWS.len() && ROWS.len() >= 70,
+        "{}",
+        ROWS.len()
+    );
+    // What is not implemented is what the document says, and nothing else.
+    let (_, rest) = DOCUMENT.split_once("## Not implemented").expect("section");
+    let (section, _) = rest.split_once("##").expect("next section");
+    for row in ROWS {
+        let stated = names(section).contains(row.id)
+            || (row.id.starts_with("ui-") && names(section).contains("ui-"));
+        let missing = matches!(row.expect, Expect::NotImplemented(_));
+        assert_eq!(stated, missing, "{}", row.id);
+    }
+}
+
+/// A fault that no row injects would be one that nobody has measured.
+#[test]
+fn every_fault_of_the_catalogue_is_in_a_row() {
+    // Restarts have tests of their own (restart.rs).
+    let elsewhere = [FaultKind::MasterReset, FaultKind::ClientReset];
+    for kind in KINDS.iter().filter(|k| !elsewhere.contains(&k.kind)) {
+        let strikes = ROWS.iter().flat_map(|row| row.strikes);
+        let name = |what: &str| what.split([':', '=']).next().unwrap_or("").to_owned();
+        let found = strikes.map(|s| name(s.what)).any(|n| n == kind.name);
+        assert!(found, "no row injects {}", kind.name);
+    }
+}
+
+#[test]
+fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
+    let rows: Vec<_> = ROWS.iter().collect();
+    let outcomes = matrix::run(&rows, 1, &|_| {}).expect("the runs without faults");
+    assert_eq!(outcomes.len(), ROWS.len());
+    let known = shortfalls();
+    let mut wrong = String::new();
+    for o in &outcomes {
+        let id = o.row.id;
+        let failed = o.verdict == Verdict::Fail;
+        if failed && !known.contains(id) {
+            wrong += &format!(
+                "{id} fails: {:?}\n  {}\n",
+                o.failures,
+                o.measured.reads.join("\n  ")
+            );
+        }
+        if !failed && known.contains(id) {
+            wrong += &format!("{id} is a known shortfall and comes out as it must\n");
+        }
+        // Whatever else a row lacks: nothing is ever acted on that nobody sent.
+        assert_eq!(o.measured.wrong_frames, 0, "{id}");
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+    for id in known {
+        assert!(ROWS.iter().any(|row| row.id == id), "no row {id}");
+    }
+}
+
+/// A run without faults has none: over every scenario in which nothing goes wrong.
+#[test]
+fn nothing_trips_without_a_fault() {
+    let robot = robot();
+    let mut quiet = 0;
+    for (name, ..) in builtin::SCENARIOS {
+        let scenario = scenario(name);
+        if !scenario.events.is_empty() || !scenario.faults.is_empty() {
+            continue;
+        }
+        quiet += 1;
+        let recording = run(&scenario, &robot, 2);
+        for (i, rows) in recording.joints.iter().enumerate() {
+            let tripped = rows.iter().find(|r| r.v.faults != 0);
+            assert!(
+                tripped.is_none(),
+                "{name}, joint {}\n{}",
+                i + 1,
+                story(&recording)
+            );
+        }
+        for (i, rows) in recording.wheels.iter().enumerate() {
+            let tripped = rows.iter().find(|r| r.v.faults != 0);
+            assert!(
+                tripped.is_none(),
+                "{name}, wheel {}\n{}",
+                i + 7,
+                story(&recording)
+            );
+        }
+        let holds = recording
+            .events
+            .iter()
+            .find(|e| e.v.text.contains("all axes hold"));
+        assert!(holds.is_none(), "{name}\n{}", story(&recording));
+    }
+    assert!(quiet >= 7, "{quiet} scenarios without faults");
+}
