@@ -1,5 +1,7 @@
 //! One emulated board: requests in, replies out.
 
+use std::collections::VecDeque;
+
 use wheeleg_pil_link::{
     Figures, Halt, Hello, Hook, Inputs, LINK_VERSION, Nonvolatile, Outputs, Power, Ran, Reply,
     Request, Run, Sent, Straps, Switches, Trip, text,
@@ -39,7 +41,8 @@ pub(crate) struct Board {
     first_edge_ns: u64,
     grid_ns: u64,
     power: Power,
-    announced: Option<(u64, Vec<u8>)>,
+    /// Transmissions that were told and have not gone out yet.
+    announced: VecDeque<(u64, Vec<u8>)>,
     figures: Figures,
     retired: u64,
     edges: u32,
@@ -62,7 +65,7 @@ impl Board {
             first_edge_ns: 0,
             grid_ns: 1_000_000,
             power: Power::Good,
-            announced: None,
+            announced: VecDeque::new(),
             figures: Figures::default(),
             retired: 0,
             edges: 0,
@@ -230,8 +233,8 @@ impl Board {
         if let Stop::Reset(cause) = stop {
             return Err(format!("reset {cause:#x} in the start-up code"));
         }
-        let outputs = self.outputs();
-        self.reply(outputs)
+        let shown = self.shown();
+        self.reply(shown)
     }
 
     fn machine(&mut self) -> Result<&mut Machine, String> {
@@ -288,15 +291,15 @@ impl Board {
             self.advance(run.until_ns + BEYOND_EDGE_NS, Until::Cycle)?;
             self.edges = self.edges.wrapping_add(1);
             self.check_edge(run.until_ns)?;
-            let outputs = self.outputs();
+            let shown = self.shown();
             self.work_off(run.until_ns)?;
-            self.reply(outputs)
+            self.reply(shown)
         } else {
             let cap = self.before_next_edge()?;
             self.advance(cap.min(run.until_ns), Until::Cycle)?;
             self.work_off(run.until_ns)?;
-            let outputs = self.outputs();
-            self.reply(outputs)
+            let shown = self.shown();
+            self.reply(shown)
         }
     }
 
@@ -395,7 +398,7 @@ impl Board {
     fn tripped(&mut self, at_ns: u64, cause: u32) {
         self.running = false;
         self.owes = false;
-        self.announced = None;
+        self.announced.clear();
         self.figures.resets = self.figures.resets.saturating_add(1);
         self.trip = Some(Trip {
             at_ns,
@@ -498,9 +501,25 @@ impl Board {
         (inputs, state.soc.time.ns_of(seen.edge))
     }
 
-    fn reply(&mut self, outputs: Outputs) -> Result<Ran, String> {
-        let sent = self.sent()?;
+    /// What the board shows now: outputs, and the newest tick that was worked off.
+    fn shown(&mut self) -> Ran {
         let (seen, seen_at_ns) = self.seen();
+        let state = self.machine.as_ref().map(Machine::state);
+        Ran {
+            outputs: self.outputs(),
+            seen,
+            seen_at_ns,
+            figures: Figures {
+                tick_instructions: state.map_or(0, |state| state.tick_instructions as u32),
+                ..Figures::default()
+            },
+            ..Ran::default()
+        }
+    }
+
+    /// What the board has shown at an edge, and the rest of the reply as of now.
+    fn reply(&mut self, shown: Ran) -> Result<Ran, String> {
+        let sent = self.sent()?;
         let period_us = self.period_us() as u32;
         self.measure()?;
         let trip = self.trip;
@@ -508,13 +527,14 @@ impl Board {
             self.trip = self.trip.filter(|t| t.running_ns == 0);
         }
         Ok(Ran {
-            outputs,
-            seen,
-            seen_at_ns,
             period_us,
             sent,
-            figures: self.figures,
+            figures: Figures {
+                tick_instructions: shown.figures.tick_instructions,
+                ..self.figures
+            },
             trip,
+            ..shown
         })
     }
 
@@ -533,11 +553,7 @@ impl Board {
         let started = machine.state_mut().soc.started.take();
         let armed = machine.state().soc.armed(cycle);
         for (start, address, length) in started.into_iter().chain(armed) {
-            if self
-                .announced
-                .as_ref()
-                .is_some_and(|(told, _)| *told == start)
-            {
+            if self.announced.back().is_some_and(|told| told.0 == start) {
                 continue;
             }
             let mut bytes = vec![0; length as usize];
@@ -549,10 +565,14 @@ impl Board {
                 bytes: copy,
             };
             let _ = sent.push(frame);
-            self.announced = Some((start, bytes));
+            self.announced.push_back((start, bytes));
         }
         for frame in std::mem::take(&mut machine.state_mut().soc.gone) {
-            let told = self.announced.as_ref();
+            // Told before it: replaced, or cut off by the driver's time limit.
+            while self.announced.front().is_some_and(|told| told.0 < frame.0) {
+                self.announced.pop_front();
+            }
+            let told = self.announced.front();
             if told != Some(&frame) {
                 let text = |(start, bytes): &(u64, Vec<u8>)| {
                     format!("{} bytes at {} ns", bytes.len(), time.ns_of(*start))
@@ -574,7 +594,6 @@ impl Board {
         let state = machine.state();
         let retired = state.retired;
         self.figures.instructions = (retired - self.retired) as u32;
-        self.figures.tick_instructions = state.tick_instructions as u32;
         self.figures.longest_awake = state.longest_awake as u32;
         self.figures.driver_timeouts = state.soc.driver_timeouts;
         self.retired = retired;

@@ -266,6 +266,12 @@ impl Outside {
         }
     }
 
+    /// Up to when all boards outside have heard the line, ns.
+    pub(crate) fn heard_by_all_ns(&self) -> u64 {
+        let heard = self.boards.iter().map(|board| board.heard_ns);
+        heard.min().unwrap_or(u64::MAX)
+    }
+
     /// Queues a run of one board to `now_ns`, with what it has heard.
     fn queue(
         &mut self,

@@ -61,8 +61,8 @@ pub(super) struct Bus {
     counters: BusCounters,
     /// Who drove from when to when, ns: the newest transmissions.
     driven: VecDeque<(Driver, u64, u64)>,
-    /// What was delivered at the present instant, if boards outside of this
-    /// process still have to hear its last bytes.
+    /// What was delivered and boards outside of this process still have to hear,
+    /// if there are any.
     delivered: Option<Vec<Delivery>>,
 }
 
@@ -182,10 +182,10 @@ impl Bus {
         self.delivered.get_or_insert_default();
     }
 
-    /// All boards have heard what was delivered.
-    pub(super) fn forget_delivered(&mut self) {
+    /// All boards have heard what ended at or before `heard_ns`.
+    pub(super) fn forget_delivered(&mut self, heard_ns: u64) {
         if let Some(kept) = &mut self.delivered {
-            kept.clear();
+            kept.retain(|delivery| delivery.end_ns > heard_ns);
         }
     }
 
@@ -316,7 +316,9 @@ mod tests {
         assert_eq!(bus.heard(1, 0, 20_000), Vec::new());
         assert!(bus.take_due(30_000).is_some());
         assert_eq!(bus.heard(2, 20_000, 30_000), vec![(30_000, 9)]);
-        bus.forget_delivered();
+        bus.forget_delivered(29_999);
+        assert_eq!(bus.heard(2, 20_000, 30_000), vec![(30_000, 9)], "kept");
+        bus.forget_delivered(30_000);
         assert_eq!(bus.heard(2, 20_000, 30_000), Vec::new());
     }
 

@@ -69,15 +69,11 @@ impl World {
         Ok(())
     }
 
-    /// Brings all boards outside to this instant, so that they have heard all
-    /// that was delivered.
+    /// Brings all boards outside to this instant, so that they answer what was
+    /// delivered just now.
     pub(super) fn deliver_outside(&mut self) -> Result<(), SimError> {
-        if self.outside.is_some() {
-            let all: [(u8, Option<link::Inputs>); 8] = std::array::from_fn(|i| (i as u8 + 1, None));
-            self.run_outside(&all)?;
-            self.bus.forget_delivered();
-        }
-        Ok(())
+        let all: [(u8, Option<link::Inputs>); 8] = std::array::from_fn(|i| (i as u8 + 1, None));
+        self.run_outside(&all)
     }
 
     fn run_outside(&mut self, edges: &[(u8, Option<link::Inputs>)]) -> Result<(), SimError> {
@@ -88,6 +84,7 @@ impl World {
         outside.run(now_ns, edges, bus.byte_ns(), |address, after_ns| {
             bus.heard(address, after_ns, now_ns)
         })?;
+        self.bus.forget_delivered(outside.heard_by_all_ns());
         self.restart_tripped()
     }
 
