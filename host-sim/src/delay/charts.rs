@@ -104,9 +104,12 @@ fn starts(study: &Study) -> Figure {
         panel
     };
     let mut panels = vec![panel(Law::Paper), panel(Law::Default)];
-    // The legend of seven lines fits once.
-    if let Some(Content::Curves { series, .. }) = panels.get_mut(1).map(|p| &mut p.content) {
-        series.iter_mut().for_each(|s| s.label.clear());
+    // The legend of seven lines is too long for one panel: four and three.
+    for (i, panel) in panels.iter_mut().enumerate() {
+        if let Content::Curves { series, .. } = &mut panel.content {
+            let unnamed = if i == 0 { 4..7 } else { 0..4 };
+            series[unnamed].iter_mut().for_each(|s| s.label.clear());
+        }
     }
     Figure {
         id: "starts".to_owned(),
