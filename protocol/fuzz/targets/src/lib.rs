@@ -11,6 +11,7 @@
 //! | P6 | no message sequence energises an output of a disarmed board; a stop is latched; the safe state comes within its deadline |
 //! | P7 | two implementations agree (`protocol/conformance`) |
 //! | P8 | handlers behind a valid CRC hold P1 too |
+//! | P9 | a saved parameter set is read whole, or an older one, or none; never a mix |
 //!
 //! libFuzzer (`cargo xtask fuzz`), bolero and the replay of the corpus
 //! (`cargo test`) all call the same functions.

@@ -1,7 +1,7 @@
 //! The parameter store under power cuts, flash errors, rotting and unsteady
 //! words: whatever happened, the reader gives one of the sets that were saved,
 //! whole, or none, and none only if no page is sound; a set that was saved is
-//! not given up before the next one stands (P1, P6).
+//! not given up before the next one stands (P1, P9).
 
 use arbitrary::{Arbitrary, Unstructured};
 use wheeleg_board::store::{PAGES, RECORDS_MAX, Record, SaveError, Store, WORDS};
