@@ -107,6 +107,12 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Within a millimetre of an end stop.
+    #[must_use]
+    pub fn at_stop(&self, model: &AxisModel) -> bool {
+        self.stroke < STOP_ZONE || self.stroke > model.stroke.saturating_sub(STOP_ZONE)
+    }
+
     /// One tick: predicts with the pressure force of that tick, corrects with
     /// the measured stroke.
     #[inline]

@@ -23,6 +23,10 @@
 //! * **Announced moves.** With a move announced, the force is brought to the edge
 //!   of slipping in its direction: the counter chamber vents and the drive
 //!   chamber fills ahead of time, and the piston stands.
+//! * **Pressure swap.** A chamber vents no faster than its valve lets it. In an
+//!   announced move, and in one from an end stop, the other chamber makes up for what
+//!   it still has too much, and gives way as it falls: the force is there as soon as
+//!   either chamber can make it.
 
 use super::gas::{ChamberRates, Pressures, Wanted};
 use super::learn::Learner;
@@ -49,6 +53,8 @@ const PATIENCE: u16 = 500;
 /// … by one band in so many ticks, up to three bands in all.
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 9;
+/// A chamber lags whose pressure is so much above its target (10 kPa in 1/256 Pa).
+const LAG: i32 = 10_000 << 8;
 /// Ticks outside three bands before the end of rest.
 const RELEASE_TICKS: u16 = 4;
 
@@ -84,6 +90,9 @@ pub struct Predictive {
     near: u16,
     /// Where the piston stood when the next move was announced.
     awaits: Option<i32>,
+    /// The drive chamber makes up for what the counter chamber still has too much,
+    /// in a move that extends (true) or retracts.
+    makes_up: Option<bool>,
     settled: bool,
     primed: bool,
 }
@@ -108,6 +117,7 @@ impl Predictive {
             released: 0,
             near: 0,
             awaits: None,
+            makes_up: None,
             settled: false,
             primed: false,
             model,
@@ -220,6 +230,13 @@ impl Predictive {
         };
         if input.announced.is_none() {
             self.awaits = None;
+        }
+        if awaited.is_some() || (stands && self.motion.at_stop(&self.model)) {
+            let to = match input.announced {
+                Some(announced) if awaited.is_some() => announced.reference.raw(),
+                _ => reference,
+            };
+            self.makes_up = Some(to > self.motion.stroke);
         }
         let force = match awaited {
             Some(force) => force,
@@ -469,9 +486,15 @@ impl Predictive {
     }
 
     /// Chamber pressures for a force, and the pulses that make them.
-    fn pulses(&self, force: i32, ahead: &Ahead) -> Drive {
+    fn pulses(&mut self, force: i32, ahead: &Ahead) -> Drive {
+        let (mut target, limited) = targets(&self.model, force);
+        if let Some(extends) = self.makes_up {
+            match made_up(&self.model, force, target, ahead.pressures, extends) {
+                Some(other) => target = other,
+                None => self.makes_up = None,
+            }
+        }
         let model = &self.model;
-        let (target, limited) = targets(model, force);
         let mut on = [0; 4];
         let (mut a, mut b) = (ahead.a, ahead.b);
         let missing = |change: i32, rates: &ChamberRates| Wanted {
@@ -577,33 +600,65 @@ fn speed_law(error: i32, brake: i32, inertia: &Inertia, top: i32) -> (i32, i32) 
     )
 }
 
-/// Pressures whose force is `force`, as near as the supply allows.
+/// A pressure that valves can make.
+#[inline]
+fn possible(model: &AxisModel, pressure: i32) -> i32 {
+    pressure.max(model.low).min(model.high)
+}
+
+/// Pressure of B that makes `force` with `a` in A: (pA AA − rod − F) / AB.
+#[inline]
+fn b_of(model: &AxisModel, force: i32, a: i32) -> i32 {
+    scaled(a, model.area_ratio, 24).saturating_sub(scaled(
+        force.saturating_add(model.force_rod),
+        model.pressure_b,
+        12,
+    ))
+}
+
+/// Pressure of A that makes `force` with `b` in B.
+#[inline]
+fn a_of(model: &AxisModel, force: i32, b: i32) -> i32 {
+    let sum = force
+        .saturating_add(model.force_rod)
+        .saturating_add(scaled(b, model.force_b, 32));
+    scaled(sum, model.pressure_a, 12)
+}
+
+/// Pressures whose force is `force`, as near as the supply allows, about the mean.
 #[inline]
 fn targets(model: &AxisModel, force: i32) -> (Pressures, bool) {
-    let limit = |p: i32| p.max(model.low).min(model.high);
-    // B from A and the force: (pA AA − rod − F) / AB.
-    let b_of = |a: i32| {
-        scaled(a, model.area_ratio, 24).saturating_sub(scaled(
-            force.saturating_add(model.force_rod),
-            model.pressure_b,
-            12,
-        ))
-    };
-    let a = limit(
+    let a = possible(
+        model,
         model
             .mean
             .saturating_add(scaled(force, model.half_pressure_a, 12)),
     );
-    let b = b_of(a);
-    let bounded = limit(b);
+    let b = b_of(model, force, a);
+    let bounded = possible(model, b);
     if bounded == b {
         return (Pressures { a, b }, false);
     }
-    let rest =
-        force
-            .saturating_add(model.force_rod)
-            .saturating_add(scaled(bounded, model.force_b, 32));
-    let wished = scaled(rest, model.pressure_a, 12);
-    let a = limit(wished);
+    let wished = a_of(model, force, bounded);
+    let a = possible(model, wished);
     (Pressures { a, b: bounded }, a != wished)
+}
+
+/// Targets while the counter chamber still has too much: the drive chamber makes the
+/// force with what that one has. `None` if it does not lag.
+#[inline]
+fn made_up(
+    model: &AxisModel,
+    force: i32,
+    target: Pressures,
+    now: Pressures,
+    extends: bool,
+) -> Option<Pressures> {
+    if extends {
+        let a = possible(model, a_of(model, force, now.b)).max(target.a);
+        (now.b.saturating_sub(target.b) > LAG).then_some(Pressures { a, ..target })
+    } else {
+        let b = possible(model, b_of(model, force, now.a)).max(target.b);
+        (now.a.saturating_sub(target.a) > LAG).then_some(Pressures { b, ..target })
+    }
 }
