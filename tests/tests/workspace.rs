@@ -51,9 +51,12 @@ const ARROWS: [(&str, &[&str]); 18] = [
     (
         "wheeleg-fuzz-targets",
         &[
+            "wheeleg-board",
             "wheeleg-master",
             "wheeleg-node",
+            "wheeleg-pil-link",
             "wheeleg-protocol",
+            "wheeleg-remote",
             "wheeleg-sim",
             "wheeleg-units",
         ],
