@@ -40,6 +40,9 @@ pub(crate) const MUTANTS: [(&str, &str); 4] = [
 /// The mark that such an image carries (firmware/board/src/g431/mutant.rs).
 const MUTANT_MARK: &str = "THIS_IMAGE_IS_WRONG_ON_PURPOSE";
 
+/// Saves parameters, for power cuts in mid-save.
+const PROBE: &str = "probe_store";
+
 /// What a reachable panic leaves for the linker to complain about.
 const PANIC_SYMBOL: &str = "this_image_can_panic";
 
@@ -64,14 +67,13 @@ pub(crate) fn steps(report: &mut Report) {
 
 /// Builds all images and says how.
 pub(crate) fn build() -> StepResult<Vec<Image>> {
-    build_by(set_up(TARGET)?)
+    build_into(set_up(TARGET)?, &target_dir().join("firmware"))
 }
 
-/// Builds all images in one of the ways.
-pub(crate) fn build_by(way: Way) -> StepResult<Vec<Image>> {
+/// Builds all images in one of the ways and lays them down in `folder`.
+pub(crate) fn build_into(way: Way, folder: &Path) -> StepResult<Vec<Image>> {
     println!("    way: {}", way.describe());
-    let folder = target_dir().join("firmware");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut images = Vec::new();
     for (feature, names) in IMAGES {
         let mut command = cargo(way, "build", feature)?;
@@ -101,12 +103,21 @@ pub(crate) fn build_by(way: Way) -> StepResult<Vec<Image>> {
     Ok(images)
 }
 
-/// Builds the images that are wrong on purpose, each pair into a folder of its own
-/// below the one it gives: `<folder>/<feature>/joint.elf`. Never beside the images
-/// that are flashed.
-pub(crate) fn mutants() -> StepResult<PathBuf> {
-    let way = set_up(TARGET)?;
-    let folder = target_dir().join("firmware-mutants");
+/// Builds the programs that exercise one driver on an emulated board.
+pub(crate) fn probes(way: Way, folder: &Path) -> StepResult {
+    run(cargo(way, "build", "probe")?.args(["--bin", PROBE]))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    fs::copy(
+        products(way).join(PROBE),
+        folder.join(format!("{PROBE}.elf")),
+    )
+    .with_context(|| format!("cannot copy the image {PROBE}"))?;
+    Ok(())
+}
+
+/// Builds the images that are wrong on purpose, each pair into a folder of its own:
+/// `<folder>/<feature>/joint.elf`. Never beside the images that are flashed.
+pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
     for (feature, what) in MUTANTS {
         let mut command = cargo(way, "build", feature)?;
         for name in SHIPPED {
@@ -126,7 +137,7 @@ pub(crate) fn mutants() -> StepResult<PathBuf> {
         }
         println!("    {feature}: {what}");
     }
-    Ok(folder)
+    Ok(())
 }
 
 /// Links each image with a panic handler that does not exist. A third program,

@@ -103,20 +103,24 @@ pub(crate) fn set_up(target: &str) -> StepResult<Way> {
             }
         }
     }
-    if has_debian() {
+    second_way().map_err(|missing| {
+        if have("rustup") {
+            let install = format!("rustup target add {target}");
+            StepError::missing(format!("the Rust target {target}"), install)
+        } else {
+            missing
+        }
+    })
+}
+
+/// The second way, found or installed.
+pub(crate) fn second_way() -> StepResult<Way> {
+    if has_debian() || (may_apt() && apt_install(&DEBIAN_PACKAGES) && has_debian()) {
         return Ok(Way::DebianBuildStd);
     }
-    if may_apt() && apt_install(&DEBIAN_PACKAGES) && has_debian() {
-        return Ok(Way::DebianBuildStd);
-    }
-    let install = if have("rustup") {
-        format!("rustup target add {target}")
-    } else {
-        format!("apt-get install -y {}", DEBIAN_PACKAGES.join(" "))
-    };
     Err(StepError::missing(
-        format!("the Rust target {target}"),
-        install,
+        "Debian's Rust compiler with its library sources",
+        format!("apt-get install -y {}", DEBIAN_PACKAGES.join(" ")),
     ))
 }
 

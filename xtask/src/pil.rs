@@ -9,8 +9,11 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::firmware;
+use crate::no_std::{self, Way, set_up};
 use crate::process::{cargo, command, output, run, target_dir};
+use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
+use crate::sizes;
 use crate::tools::{apt_install, have, may_apt};
 
 const PACKAGE: &str = "wheeleg-pil-unicorn";
@@ -42,7 +45,10 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let Some(emulator) = report.step("emulated STM32G431", emulator) else {
         return;
     };
-    let Some(images) = report.step("images for the emulated boards", images) else {
+    let images = report.step("images for the emulated boards", || {
+        Images::build(set_up(firmware::TARGET)?, "firmware", !options.build)
+    });
+    let Some(images) = images else {
         return;
     };
     if options.build {
@@ -54,28 +60,12 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         run(cargo().args(["test", "--locked", "--package", PACKAGE]))?;
         Ok(())
     });
-    report.step("emulated boards against the host, and faults", || {
-        let test = ["test", "--locked", "--package", "wheeleg-tests"];
-        run(cargo()
-            .args(test)
-            .args(["--features", "pil", "--test", "pil"])
-            .env("WHEELEG_PIL", &emulator)
-            .env("WHEELEG_IMAGES", &images))?;
-        Ok(())
-    });
-    report.step("board support that is wrong on purpose is found", || {
-        let mutants = firmware::mutants()?;
-        let test = ["test", "--locked", "--package", "wheeleg-tests"];
-        run(cargo()
-            .args(test)
-            .args(["--features", "pil", "--test", "pil_mutants"])
-            .env("WHEELEG_PIL", &emulator)
-            .env("WHEELEG_IMAGES", &images)
-            .env("WHEELEG_MUTANTS", mutants))?;
-        Ok(())
-    });
+    report.step(
+        "emulated boards against the host, wrong board support, faults",
+        || tests(&emulator, &images),
+    );
     let figures = report.step("three steps on eight emulated boards", || {
-        figures(&emulator, &images)
+        figures(&emulator, &images.folder)
     });
     if options.json
         && let Some(figures) = figures
@@ -119,12 +109,72 @@ fn emulator() -> StepResult<PathBuf> {
     Ok(path)
 }
 
-/// Builds the images; gives the folder in which they lie.
-fn images() -> StepResult<PathBuf> {
-    let images = firmware::build()?;
-    let elf = images.first().map(|image| image.elf.clone());
-    let folder = elf.as_deref().and_then(Path::parent).map(Path::to_path_buf);
-    Ok(folder.context("no image was built")?)
+/// Images for the emulated boards.
+struct Images {
+    /// The ones that are flashed.
+    folder: PathBuf,
+    /// The ones that are wrong on purpose.
+    mutants: PathBuf,
+    /// The ones that exercise one driver.
+    probes: PathBuf,
+}
+
+impl Images {
+    /// Builds them in one of the ways, below the target folder; `all` says whether
+    /// those for the tests, too.
+    fn build(way: Way, name: &str, all: bool) -> StepResult<Self> {
+        let images = Self {
+            folder: target_dir().join(name),
+            mutants: target_dir().join(format!("{name}-mutants")),
+            probes: target_dir().join(format!("{name}-probes")),
+        };
+        firmware::build_into(way, &images.folder)?;
+        if all {
+            firmware::mutants(way, &images.mutants)?;
+            firmware::probes(way, &images.probes)?;
+        }
+        Ok(images)
+    }
+}
+
+/// The tests that need emulated boards.
+fn tests(emulator: &Path, images: &Images) -> StepResult {
+    let mut test = cargo();
+    // Optimised, as the program of the figures below is: one build serves both.
+    test.args(["test", "--locked", "--release", "--no-fail-fast"]);
+    test.args(["--package", "wheeleg-tests", "--features", "pil"]);
+    for name in ["pil", "pil_faults", "pil_mutants"] {
+        test.args(["--test", name]);
+    }
+    run(test
+        .env("WHEELEG_PIL", emulator)
+        .env("WHEELEG_IMAGES", &images.folder)
+        .env("WHEELEG_MUTANTS", &images.mutants)
+        .env("WHEELEG_PROBES", &images.probes))?;
+    Ok(())
+}
+
+/// The whole suite with images of the second way of building. It shares only
+/// the sources with the first: compiler, `core` and flags are others.
+pub(crate) fn second_way() -> StepResult<String> {
+    tools()?;
+    let emulator = emulator()?;
+    let images = Images::build(no_std::second_way()?, "firmware-debian", true)?;
+    tests(&emulator, &images)?;
+    let figures = figures(&emulator, &images.folder)?;
+    let pil = &figures["pil"];
+    let of = |image: &str| {
+        let (image, tick) = (&pil[image], "tick_instructions_worst");
+        let hash = image["blake3"].as_str().unwrap_or_default();
+        format!("blake3 {hash:.16}, tick {} at worst", image[tick])
+    };
+    Ok(format!(
+        "Debian's compiler: {} bits compared, {} differ; joint {}; wheel {}",
+        pil["compared_bits"],
+        pil["differing_bits"],
+        of("joint"),
+        of("wheel")
+    ))
 }
 
 fn ensure_file(path: &Path) -> anyhow::Result<()> {
@@ -132,25 +182,42 @@ fn ensure_file(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Runs the paper's test with all nodes of one kind; gives its summary.
+pub(crate) fn three_steps(
+    nodes: &str,
+    folder: &str,
+    environment: &[(&str, &Path)],
+    further: &[&str],
+) -> anyhow::Result<Value> {
+    run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))?;
+    let mut wheeleg = command(&target_dir().join("release").join("wheeleg"));
+    wheeleg
+        .args(["run", "three-step", "--nodes", nodes, "--json", "--out"])
+        .arg(target_dir().join(folder))
+        .args(further);
+    for (name, value) in environment {
+        wheeleg.env(name, value);
+    }
+    serde_json::from_str(&output(&mut wheeleg)?).context("the summary of the run")
+}
+
+/// Boards were compared with the host, and no bit differed.
+pub(crate) fn ensure_equal(pil: &Value) -> anyhow::Result<()> {
+    let (compared, differ) = (&pil["compared_bits"], &pil["differing_bits"]);
+    ensure!(
+        *differ == 0 && compared.as_u64() > Some(1_000_000),
+        "{compared} bits compared, {differ} differ: {}",
+        pil["first_difference"]
+    );
+    Ok(())
+}
+
 /// Runs the paper's test twice on eight emulated boards: no bit may differ from
 /// the host, nor between the runs.
 fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
-    run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))?;
-    let wheeleg = target_dir().join("release").join("wheeleg");
-    let folder = target_dir().join("pil-run");
-    let once = |name: &str, compare: &[&str]| -> anyhow::Result<Value> {
-        let json = output(
-            command(&wheeleg)
-                .args(["run", "three-step", "--nodes", "pil", "--json", "--out"])
-                .arg(folder.join(name))
-                .args(compare)
-                .env("WHEELEG_PIL", emulator)
-                .env("WHEELEG_IMAGES", images),
-        )?;
-        serde_json::from_str(&json).context("the summary of the run")
-    };
-    let first = once("first", &["--compare-sil"])?;
-    let second = once("second", &[])?;
+    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
+    let first = three_steps("pil", "pil-run/first", &environment, &["--compare-sil"])?;
+    let second = three_steps("pil", "pil-run/second", &environment, &[])?;
     let pil = &first["pil"];
     let most = |key: &str, image: &str| {
         let boards = pil["boards"].as_array().into_iter().flatten();
@@ -178,13 +245,13 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
             figures[image][key] = json!(most(key, image));
         }
     }
+    let within_budget = sizes::check_run(images, &mut figures);
+    figures["qemu"] = qemu::counts();
     println!("    {figures}");
-    let equal = pil["differing_bits"] == 0 && pil["compared_bits"].as_u64() > Some(1_000_000);
-    if !equal {
-        return Err(anyhow::anyhow!("{} bits differ", pil["differing_bits"]).into());
-    }
+    ensure_equal(pil)?;
     if first["hash"] != second["hash"] {
         return Err(anyhow::anyhow!("two runs differ").into());
     }
+    within_budget?;
     Ok(json!({ "pil": figures }))
 }

@@ -9,6 +9,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::no_std::{Way, cargo_for, set_up};
+use crate::pil;
 use crate::process::{ask, cargo, command, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::tools::{apt_install, have, may_apt};
@@ -46,6 +47,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     report.step("QEMU boards against the host, bit for bit", || {
         compare(&images)
     });
+    report.step("three steps on eight QEMU boards", || three_steps(&images));
     let counts = report.step("instructions per tick on QEMU", || count(&images));
     if options.json
         && let Some(counts) = counts
@@ -141,6 +143,20 @@ fn compare(images: &Path) -> StepResult {
     Ok(())
 }
 
+/// The paper's test with the whole robot on QEMU: no bit may differ from the host.
+fn three_steps(images: &Path) -> StepResult {
+    let environment = [("WHEELEG_IMAGES", images)];
+    let summary = pil::three_steps("qemu", "qemu-run", &environment, &["--compare-sil"])?;
+    let pil = &summary["pil"];
+    println!(
+        "    {} bits compared, {} differ, {:.1} times real time",
+        pil["compared_bits"],
+        pil["differing_bits"],
+        summary["realtime_factor"].as_f64().unwrap_or(0.0)
+    );
+    Ok(pil::ensure_equal(pil)?)
+}
+
 /// Runs the loops of the tests with the counting plugin. Gives, for each
 /// application and region, passes and the smallest, median and largest count.
 fn count(images: &Path) -> StepResult<Value> {
@@ -175,7 +191,19 @@ fn count(images: &Path) -> StepResult<Value> {
             });
         }
     }
+    fs::write(counts_file(), figures.to_string()).context("the file of counts")?;
     Ok(json!({ "qemu": { "machine": "mps2-an386", "instructions": figures } }))
+}
+
+fn counts_file() -> PathBuf {
+    target_dir().join("qemu-counts.json")
+}
+
+/// Instructions as counted by the last `cargo xtask qemu` in this target folder;
+/// null where there was none.
+pub(crate) fn counts() -> Value {
+    let text = fs::read_to_string(counts_file()).unwrap_or_default();
+    serde_json::from_str(&text).unwrap_or(Value::Null)
 }
 
 /// Counts of one emulator.

@@ -12,6 +12,7 @@ mod stack;
 mod thumb;
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::Context;
 use serde_json::{Value, json};
@@ -19,7 +20,7 @@ use serde_json::{Value, json};
 use crate::firmware::{self, Image, SHIPPED};
 use crate::process::target_dir;
 use crate::report::{Report, StepResult};
-use budget::{Budget, Figures};
+use budget::{Budget, Figures, Run};
 use elf::Elf;
 
 /// `cargo xtask sizes`.
@@ -53,6 +54,45 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     });
 }
 
+/// Holds what runs on emulated boards have measured (`tick_instructions_worst` and
+/// `stack_used_bytes` of each image in `figures`) against budget and static bound,
+/// and puts those beside it.
+pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
+    let mut breaches = Vec::new();
+    for name in SHIPPED {
+        let elf = Elf::read(&images.join(format!("{name}.elf")))?;
+        let row = measure_elf(name, elf.flash_hash(), &elf)?;
+        let measured = &figures[name];
+        let number = |key: &str| measured[key].as_u64().unwrap_or(0);
+        let run = Run {
+            tick_instructions: number("tick_instructions_worst"),
+            stack_used_bytes: number("stack_used_bytes"),
+        };
+        let found = row.budget.breaches_of_run(&run, &row.figures);
+        breaches.extend(found.into_iter().map(|text| format!("{name}: {text}")));
+        let bound = row.figures.stack_bound_bytes;
+        println!(
+            "    {name:<5} stack {} bytes painted over, {bound} at worst by the call graph, {} there; \
+             tick {} instructions at worst, {} allowed",
+            run.stack_used_bytes,
+            row.figures.stack_room_bytes,
+            run.tick_instructions,
+            row.budget.tick_instructions_max
+        );
+        if let Some(known) = &row.budget.tick_shortfall {
+            println!("      KNOWN SHORTFALL of the tick: {}", known.reason);
+        }
+        figures[name]["blake3"] = json!(row.hash);
+        figures[name]["stack_bound_bytes"] = json!(bound);
+        figures[name]["tick_instructions_max"] = json!(row.budget.tick_instructions_max);
+    }
+    if breaches.is_empty() {
+        Ok(())
+    } else {
+        Err(anyhow::anyhow!(breaches.join("; ")).into())
+    }
+}
+
 struct Row {
     name: &'static str,
     hash: String,
@@ -63,19 +103,21 @@ struct Row {
 }
 
 fn measure(image: &Image) -> anyhow::Result<Row> {
-    let elf = Elf::read(&image.elf)?;
-    let context = || format!("image {}", image.name);
-    let stack = stack::bound(&elf).with_context(context)?;
+    measure_elf(image.name, image.hash.clone(), &Elf::read(&image.elf)?)
+}
+
+fn measure_elf(name: &'static str, hash: String, elf: &Elf) -> anyhow::Result<Row> {
+    let stack = stack::bound(elf).with_context(|| format!("image {name}"))?;
     Ok(Row {
-        name: image.name,
-        hash: image.hash.clone(),
+        name,
+        hash,
         figures: Figures {
             flash_bytes: elf.flash_bytes(),
             static_ram_bytes: elf.static_ram_bytes(),
             stack_bound_bytes: stack.bytes,
             stack_room_bytes: elf.stack_room()?,
         },
-        budget: Budget::read(image.name)?,
+        budget: Budget::read(name)?,
         path: stack.path,
         indirect: stack.indirect,
     })

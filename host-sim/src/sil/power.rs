@@ -88,7 +88,12 @@ impl World {
     /// The application of a board from its reset on.
     pub(super) fn start_anew(&mut self, address: Address) -> Result<(), SimError> {
         let i = usize::from(address.raw()) - 1;
-        self.down[i] = Down::No;
+        let outside = self.outside.as_ref();
+        let outside = outside.is_some_and(|o| o.has(address.raw()));
+        // A board outside that has lost its power stays without until it is given back.
+        if !(outside && matches!(self.down[i], Down::Off { .. })) {
+            self.down[i] = Down::No;
+        }
         if i < 6 {
             self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
         } else {
@@ -101,7 +106,8 @@ impl World {
     /// master that has been reset.
     pub(super) fn bring_up(&mut self) -> Result<(), SimError> {
         for raw in 1..=8_u8 {
-            let until_ns = match self.down[usize::from(raw) - 1] {
+            let down = self.down[usize::from(raw) - 1];
+            let until_ns = match down {
                 Down::No => continue,
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
             };
@@ -110,7 +116,12 @@ impl World {
             };
             match &mut self.outside {
                 // Its own watchdog and its own start-up end the fault.
-                Some(outside) if outside.has(raw) => outside.set_power(raw, link::Power::Good),
+                Some(outside) if outside.has(raw) => {
+                    outside.set_power(raw, link::Power::Good);
+                    if matches!(down, Down::Off { .. }) {
+                        self.down[usize::from(raw) - 1] = Down::No;
+                    }
+                }
                 _ => self.start_anew(address)?,
             }
         }

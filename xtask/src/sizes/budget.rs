@@ -18,6 +18,8 @@ pub(super) struct Budget {
     pub(super) tick_instructions_max: u64,
     /// Flash that is known to be missing, if it is.
     pub(super) flash_shortfall: Option<Shortfall>,
+    /// Instructions of a tick that are known to be too many, if they are.
+    pub(super) tick_shortfall: Option<Shortfall>,
 }
 
 /// A limit that is known to be missed: named in every run, never let grow, and
@@ -25,8 +27,8 @@ pub(super) struct Budget {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Shortfall {
-    /// The most that is accepted for now, bytes.
-    pub(super) bytes_max: u64,
+    /// The most that is accepted for now.
+    pub(super) max: u64,
     /// Why, for the reader of the report.
     pub(super) reason: String,
 }
@@ -67,7 +69,7 @@ impl Budget {
         let flash_max = self
             .flash_shortfall
             .as_ref()
-            .map_or(self.flash_bytes_max, |known| known.bytes_max);
+            .map_or(self.flash_bytes_max, |known| known.max);
         limit("flash", figures.flash_bytes, flash_max);
         limit(
             "static RAM",
@@ -87,6 +89,42 @@ impl Budget {
         }
         breaches
     }
+
+    /// What runs on emulated boards have shown to be beyond the limits, or beyond
+    /// the bound of the stack that was said to hold for every input.
+    pub(super) fn breaches_of_run(&self, run: &Run, figures: &Figures) -> Vec<String> {
+        let mut breaches = Vec::new();
+        let (used, bound) = (run.stack_used_bytes, figures.stack_bound_bytes);
+        if used > bound {
+            breaches.push(format!(
+                "{used} bytes of stack used, the bound says {bound}"
+            ));
+        }
+        if run.tick_instructions == 0 || used == 0 {
+            breaches.push("nothing was measured".to_owned());
+        }
+        let (tick, max) = (run.tick_instructions, self.tick_instructions_max);
+        match &self.tick_shortfall {
+            Some(_) if tick <= max => {
+                breaches.push("tick is within its limit: take its known shortfall out".to_owned());
+            }
+            known => {
+                let max = known.as_ref().map_or(max, |known| known.max);
+                if tick > max {
+                    breaches.push(format!("tick {tick} instructions, allowed are {max}"));
+                }
+            }
+        }
+        breaches
+    }
+}
+
+/// Measured in runs on emulated boards.
+#[derive(Debug)]
+pub(super) struct Run {
+    pub(super) tick_instructions: u64,
+    /// Deepest stack by the paint that was left.
+    pub(super) stack_used_bytes: u64,
 }
 
 #[cfg(test)]
@@ -125,12 +163,37 @@ mod tests {
         let mut budget = Budget::read("joint").expect("budget");
         let (flash, ram) = (budget.flash_bytes_max, budget.static_ram_bytes_max);
         budget.flash_shortfall = Some(Shortfall {
-            bytes_max: flash + 100,
+            max: flash + 100,
             reason: String::new(),
         });
         assert!(budget.breaches(&figures(flash + 100, ram, 0)).is_empty());
         assert_eq!(budget.breaches(&figures(flash + 101, ram, 0)).len(), 1);
         assert_eq!(budget.breaches(&figures(flash, ram, 0)).len(), 1);
+    }
+
+    #[test]
+    fn a_run_beyond_the_tick_budget_or_the_stack_bound_is_a_breach() {
+        let mut budget = Budget::read("wheel").expect("budget");
+        budget.tick_shortfall = None;
+        let max = budget.tick_instructions_max;
+        let breaches = |budget: &Budget, tick: u64, stack: u64| {
+            let run = Run {
+                tick_instructions: tick,
+                stack_used_bytes: stack,
+            };
+            budget.breaches_of_run(&run, &figures(0, 0, 3_000)).len()
+        };
+        assert_eq!(breaches(&budget, max, 3_000), 0);
+        assert_eq!(breaches(&budget, max + 1, 3_000), 1);
+        assert_eq!(breaches(&budget, max, 3_001), 1);
+        assert_eq!(breaches(&budget, 0, 100), 1, "not counted");
+        budget.tick_shortfall = Some(Shortfall {
+            max: max + 50,
+            reason: String::new(),
+        });
+        assert_eq!(breaches(&budget, max + 50, 100), 0);
+        assert_eq!(breaches(&budget, max + 51, 100), 1);
+        assert_eq!(breaches(&budget, max, 100), 1, "no shortfall any more");
     }
 
     #[test]

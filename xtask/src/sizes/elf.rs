@@ -150,15 +150,16 @@ impl Elf {
             .sum()
     }
 
-    /// BLAKE3 over address, length and bytes of everything that goes into flash.
+    /// BLAKE3 of the flash up to the last byte that is written. An emulated board
+    /// names itself by the first half of it.
     pub(crate) fn flash_hash(&self) -> String {
-        let mut hasher = blake3::Hasher::new();
+        let mut flash = Vec::new();
         for (address, data) in &self.segments {
-            hasher.update(&address.to_le_bytes());
-            hasher.update(&(data.len() as u64).to_le_bytes());
-            hasher.update(data);
+            // What lies between two segments is erased.
+            flash.resize((address - FLASH.start) as usize, 0xFF);
+            flash.extend_from_slice(data);
         }
-        hasher.finalize().to_hex().to_string()
+        blake3::hash(&flash).to_hex().to_string()
     }
 
     /// Bytes of variables.

@@ -1,0 +1,441 @@
+//! Faults with the firmware images on emulated boards: the master dies, a program
+//! stops, the supply fails in mid-move and in mid-save, a bit of the state flips.
+//! Each ends in the safe state of ARCHITECTURE.md, seen on the commanded, the
+//! sensed and the physical side. `cargo xtask pil` runs this.
+
+mod bench;
+mod sil;
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use bench::{closed_loop, power_up};
+use sil::{at, energised, gait, range, robot, window};
+use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run, text};
+use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
+use wheeleg_sim::pil::unicorn::{Unicorn, image};
+use wheeleg_sim::pil::{Line as _, NodeChoice, NodeKind, Nodes, PilSummary};
+use wheeleg_sim::telemetry::{JointSample, Recorder, Recording, Row};
+
+/// Valves commanded shut and wheel ramps begun within this, s.
+const REACTION_S: f64 = 0.060;
+/// Wheels stand after this, s.
+const STAGE_S: f64 = 0.500;
+const STANDING_MM_S: f64 = 5.0;
+const TICK_S: f64 = 1e-3;
+/// The watchdog of the boards, s, and its tolerance: it was fed at the end of the last
+/// tick, and counts its own oscillator.
+const WATCHDOG_S: [f64; 2] = [0.0480, 0.0505];
+
+const HOLD: u8 = 4;
+const EXHAUST: u8 = 5;
+
+/// A run with some nodes as images.
+fn run(scenario: &Scenario, nodes: &Nodes) -> (Recording, PilSummary) {
+    let mut recorder = Recorder::in_memory();
+    let outcome =
+        wheeleg_sim::sil::run_with(scenario, &robot(), 1, nodes, &mut recorder, &mut |_| {
+            ControlFlow::Continue(())
+        })
+        .expect("the run gets to its end");
+    let recording = recorder.finish().expect("nothing is written to a file");
+    (recording, outcome.pil.expect("boards outside"))
+}
+
+fn one(choice: &str) -> Nodes {
+    let choice: NodeChoice = choice.parse().expect("a node");
+    Nodes::new(&NodeKind::Sil, &[choice])
+}
+
+/// The gait with one fault.
+fn gait_with(fault: &str, duration_s: f64) -> Scenario {
+    Scenario {
+        faults: vec![fault.parse().expect("a fault")],
+        ..gait(LegChoice::Left, duration_s, &[])
+    }
+}
+
+/// End of the last tick after `from_s` in which `open` holds, counted from `from_s`; 0
+/// without one.
+fn last(rows: &[Row<JointSample>], from_s: f64, open: impl Fn(&JointSample) -> bool) -> f64 {
+    let from = window(rows, from_s, f64::INFINITY);
+    let row = from.iter().rfind(|row| open(&row.v));
+    row.map_or(0.0, |row| row.t_s() + TICK_S - from_s)
+}
+
+/// From the end of a coil's current to the end of the flow, s.
+fn closing_s(joint: usize) -> f64 {
+    let valves = &robot().plant.cylinders[joint];
+    valves.fill_valve.t_off_s.max(valves.vent_valve.t_off_s) + valves.line_delay_s
+}
+
+/// An instant in mid-move at which valves of the joint are at work, so that there is
+/// something to shut.
+fn busy(rows: &[Row<JointSample>]) -> f64 {
+    let at_work = rows.windows(5).find(|ticks| {
+        let moves = ticks.iter().all(|row| row.v.velocity_mm_s.abs() > 50.0);
+        let open = ticks.iter().all(|row| row.v.valves_open != 0);
+        moves && open && ticks.iter().all(|row| energised(&row.v))
+    });
+    at_work.expect("a moving joint")[2].t_s()
+}
+
+#[test]
+fn the_master_dies_and_every_image_goes_to_its_safe_state() {
+    // The wheels push; the foot is in the air.
+    for t in [1.0, 2.1] {
+        let scenario = gait(LegChoice::Left, t + 1.0, &[(t, EventAction::KillMaster)]);
+        let (recording, pil) = run(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+        assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
+        let mut worst_ms = [0.0_f64; 2];
+        for (joint, rows) in recording.joints.iter().enumerate() {
+            let name = joint + 1;
+            let until = window(rows, f64::NEG_INFINITY, t + STAGE_S);
+            let commanded = last(until, t, energised);
+            let physical = last(until, t, |s| s.valves_open != 0);
+            assert!(
+                commanded <= REACTION_S,
+                "joint {name} at {t} s: {commanded}"
+            );
+            let limit = REACTION_S + closing_s(joint) + TICK_S;
+            assert!(physical <= limit, "joint {name} at {t} s: {physical}");
+            for (worst, s) in worst_ms.iter_mut().zip([commanded, physical]) {
+                *worst = worst.max(s * 1e3);
+            }
+            for row in window(rows, t + REACTION_S, f64::INFINITY) {
+                assert!([HOLD, EXHAUST].contains(&row.v.mode) && row.v.faults != 0);
+            }
+            assert!(at(rows, t).faults == 0 && at(rows, t).mode == 3);
+        }
+        for (wheel, rows) in recording.wheels.iter().enumerate() {
+            let stood = window(rows, t + STAGE_S, f64::INFINITY);
+            let (low, high) = range(stood, |s| s.velocity_mm_s);
+            assert!(
+                low > -STANDING_MM_S && high < STANDING_MM_S,
+                "wheel {}: {low} … {high} mm/s",
+                wheel + 7
+            );
+            assert!(
+                stood
+                    .iter()
+                    .all(|row| row.v.mode == HOLD && row.v.faults != 0)
+            );
+        }
+        println!(
+            "master dies at {t} s: shut by command after {:.0} ms, physically after {:.0} ms",
+            worst_ms[0], worst_ms[1]
+        );
+    }
+}
+
+/// Joint 2 is disarmed and shut from `from_s` on, every other axis is held, and all of
+/// that stays.
+fn assert_all_stopped(recording: &Recording, from_s: f64) {
+    for (joint, rows) in recording.joints.iter().enumerate() {
+        let rest = window(rows, from_s, f64::INFINITY);
+        assert!(rest.len() > 200);
+        for row in rest {
+            assert!(
+                !energised(&row.v),
+                "joint {} at {:.3} s",
+                joint + 1,
+                row.t_s()
+            );
+            assert_eq!(
+                row.v.valves_open,
+                0,
+                "joint {} at {:.3} s",
+                joint + 1,
+                row.t_s()
+            );
+            // Held, or started anew and not armed again.
+            let held = row.v.mode == HOLD || joint == 1 && row.v.mode <= 1;
+            assert!(held, "joint {} in mode {}", joint + 1, row.v.mode);
+        }
+        let (low, high) = range(rest, |s| s.position_mm);
+        assert!(
+            high - low < 20.0,
+            "joint {} moves {low} … {high} mm",
+            joint + 1
+        );
+        // What the board senses is what is there, to the noise.
+        for row in rest.iter().skip(100) {
+            let error = row.v.sensed_mm - row.v.position_mm;
+            assert!(error.abs() < 2.0, "joint {}: {error} mm", joint + 1);
+        }
+    }
+}
+
+#[test]
+fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
+    let (sound, _) = run(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
+    let t = busy(&sound.joints[1]);
+    let scenario = gait_with(&format!("node-hang:joint2@{t:.3}s"), t + 1.0);
+    let (recording, pil) = run(&scenario, &one("joint2=pil"));
+    let rows = &recording.joints[1];
+    // The hardware goes on with what it was told last.
+    let hung = window(rows, t + 2.0 * TICK_S, t + 0.040);
+    let told = |row: &Row<JointSample>| {
+        [
+            row.v.fill_a_us,
+            row.v.vent_a_us,
+            row.v.fill_b_us,
+            row.v.vent_b_us,
+        ]
+    };
+    let outputs: BTreeSet<[u16; 4]> = hung.iter().map(told).collect();
+    assert_eq!(outputs.len(), 1, "{outputs:?}");
+    let commanded = last(rows, t, energised);
+    assert!(
+        (WATCHDOG_S[0]..WATCHDOG_S[1] + TICK_S).contains(&commanded),
+        "off after {commanded} s"
+    );
+    let physical = last(rows, t, |s| s.valves_open != 0);
+    assert!(physical > commanded, "{physical} s");
+    assert!(
+        physical <= commanded + closing_s(1) + TICK_S,
+        "{physical} s"
+    );
+    assert_eq!(pil.boards[0].resets, 1);
+    assert_all_stopped(&recording, t + 0.2);
+    println!(
+        "program stops: outputs off after {:.1} ms, valves shut after {:.1} ms",
+        commanded * 1e3,
+        physical * 1e3
+    );
+}
+
+#[test]
+fn a_brown_out_in_mid_move_turns_the_outputs_off_and_the_board_comes_back_disarmed() {
+    let (sound, _) = run(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
+    let t = busy(&sound.joints[1]);
+    let scenario = gait_with(&format!("brown-out:joint2=30@{t:.3}s"), t + 1.0);
+    let (recording, pil) = run(&scenario, &one("joint2=pil"));
+    let rows = &recording.joints[1];
+    let commanded = last(rows, t, energised);
+    // The fault strikes within the tick of its instant; the next one has none.
+    assert!(commanded <= 2.0 * TICK_S, "off after {commanded} s");
+    let physical = last(rows, t, |s| s.valves_open != 0);
+    assert!(
+        physical <= commanded + closing_s(1) + TICK_S,
+        "{physical} s"
+    );
+    assert_eq!(pil.boards[0].resets, 1);
+    assert_all_stopped(&recording, t + 0.2);
+    println!(
+        "supply fails: outputs off after {:.1} ms, valves shut after {:.1} ms",
+        commanded * 1e3,
+        physical * 1e3
+    );
+}
+
+/// One emulated board by itself.
+struct Board(Unicorn);
+
+impl Board {
+    fn new(image: PathBuf) -> Self {
+        Self(Unicorn::start(&[image]).expect("the emulator"))
+    }
+
+    fn ask(&mut self, request: &Request) -> Reply {
+        self.0.queue(0, request).expect("queued");
+        self.0.flush().expect("sent");
+        self.0.receive().expect("a reply").1
+    }
+
+    fn ran(&mut self, request: &Request) -> Ran {
+        match self.ask(request) {
+            Reply::Ran(ran) => ran,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// Numbers that look random and are the same every time.
+fn hash(number: u64) -> u64 {
+    let mut x = number.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
+
+/// Instant of the flip: the cylinder moves to the second set-point, ms.
+const FLIP_MS: u64 = 330;
+/// End of a run with a flip, ms.
+const FLIPPED_MS: u64 = 480;
+
+/// What a flip came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Came {
+    /// The valves are shut from the second tick after it on.
+    Held,
+    /// The board did exactly what it does without.
+    Nothing,
+    /// The processor was reset, and its valves are shut from then on.
+    Reset,
+    /// Anything else.
+    Changed,
+}
+
+/// On-times of all four valves from edge to edge.
+fn on_times(bit: Option<(u32, u8)>) -> (Vec<[u16; 4]>, bool) {
+    let mut board = Board::new(image("joint").expect("an image"));
+    let mut on_us = Vec::new();
+    let mut reset = false;
+    closed_loop(FLIPPED_MS, |request| {
+        let edge = match request {
+            Request::Run(run) => run.edge.is_some(),
+            _ => false,
+        };
+        if let (true, Some((offset, bit))) = (edge && on_us.len() as u64 == FLIP_MS, bit) {
+            let hook = Hook::FlipBit {
+                symbol: text("NODE"),
+                address: offset,
+                bit,
+            };
+            assert_eq!(board.ask(&Request::Hook(hook)), Reply::Done);
+        }
+        let reply = board.ask(request);
+        if let Reply::Ran(ran) = &reply {
+            reset |= ran.trip.is_some();
+            if edge {
+                on_us.push(ran.outputs.valve_on_us);
+            }
+        }
+        reply
+    });
+    (on_us, reset)
+}
+
+fn judge(sound: &[[u16; 4]], flipped: &[[u16; 4]], reset: bool) -> Came {
+    let at = FLIP_MS as usize;
+    assert_eq!(sound[..at], flipped[..at], "equal up to the flip");
+    // The edge after the flip still shows what was prepared before it.
+    let shut = |from: usize| flipped[from..].iter().all(|on_us| *on_us == [0; 4]);
+    match () {
+        () if flipped == sound => Came::Nothing,
+        () if reset && shut(at + 60) => Came::Reset,
+        () if shut(at + 2) => Came::Held,
+        () => Came::Changed,
+    }
+}
+
+#[test]
+fn a_flipped_bit_of_the_state_is_found_or_does_nothing() {
+    let (sound, _) = on_times(None);
+    let moving = &sound[FLIP_MS as usize..];
+    assert!(
+        moving.iter().filter(|on_us| **on_us != [0; 4]).count() > 20,
+        "valves at work, or a flip could not show"
+    );
+    let size = object_size("NODE");
+    let mut counts = [0_u32; 4];
+    let mut changed = Vec::new();
+    const FLIPS: u64 = 160;
+    for number in 0..FLIPS {
+        let random = hash(number);
+        let place = ((random >> 8) as u32 % size, (random & 7) as u8);
+        let (flipped, reset) = on_times(Some(place));
+        let came = judge(&sound, &flipped, reset);
+        counts[came as usize] += 1;
+        if came == Came::Changed {
+            changed.push(place);
+        }
+    }
+    let [held, nothing, reset, other] = counts;
+    println!(
+        "{FLIPS} flips in {size} bytes: {held} held within 2 ticks, {nothing} without effect, \
+         {reset} reset, {other} other {changed:?}"
+    );
+    // The state is most of the application; what no seal covers is buffers and counters.
+    assert!(held > FLIPS as u32 / 4, "{held} held");
+    assert_eq!(other, 0, "neither found nor without effect: {changed:?}");
+}
+
+/// Size of a variable in the joint image, bytes.
+fn object_size(name: &str) -> u32 {
+    use object::{Object as _, ObjectSymbol as _};
+    let bytes = std::fs::read(image("joint").expect("an image")).expect("read");
+    let elf = object::File::parse(&*bytes).expect("ELF");
+    let found = elf
+        .symbols()
+        .find(|symbol| symbol.name().is_ok_and(|n| n.contains(name)) && symbol.size() > 500);
+    found.unwrap_or_else(|| panic!("no variable {name}")).size() as u32
+}
+
+/// A board that saves its parameters (firmware/board/src/bin/probe_store.rs).
+struct Saver {
+    board: Board,
+    now_ns: u64,
+}
+
+/// Which set the program found when it started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Set {
+    Old,
+    New,
+    Neither,
+}
+
+impl Saver {
+    fn new() -> Self {
+        let folder = std::env::var_os("WHEELEG_PROBES").expect("run `cargo xtask pil`");
+        let mut board = Board::new(PathBuf::from(folder).join("probe_store.elf"));
+        board.ran(&power_up(1));
+        Self { board, now_ns: 0 }
+    }
+
+    fn run(&mut self, ms: u64, power: Power) -> Ran {
+        self.now_ns += ms * 1_000_000;
+        let run = Run {
+            until_ns: self.now_ns,
+            power,
+            byte_ns: 10_000,
+            ..Run::default()
+        };
+        self.board.ran(&Request::Run(run))
+    }
+
+    /// Switches the supply off and on; gives the set that is found then.
+    fn restart(&mut self) -> Set {
+        self.run(5, Power::BrownOut);
+        // Long enough for the clock to start and the pages to be read, too short for
+        // the next save to begin.
+        let outputs = self.run(60, Power::Good).outputs;
+        match (outputs.bridge_backward, outputs.dump) {
+            (true, false) => Set::Old,
+            (false, true) => Set::New,
+            _ => Set::Neither,
+        }
+    }
+}
+
+#[test]
+fn a_power_cut_in_mid_save_leaves_the_old_parameters_or_the_new_ones_never_a_mixture() {
+    // An erased page, the head, 40 records, the word with the checksum.
+    const UNITS: u16 = 43;
+    let mut found = Vec::new();
+    for after in 0..=UNITS {
+        let mut saver = Saver::new();
+        saver.run(300, Power::Good);
+        assert_eq!(
+            saver.restart(),
+            Set::Old,
+            "the blank store took the old set"
+        );
+        let resets = saver.run(1, Power::Good).figures.resets;
+        let hook = Hook::BrownOutInSave { after };
+        assert_eq!(saver.board.ask(&Request::Hook(hook)), Reply::Done);
+        // The new set is saved, and the supply fails in it.
+        let cut = saver.run(300, Power::Good);
+        let was_cut = cut.figures.resets > resets;
+        assert_eq!(was_cut, after < UNITS, "after {after} units");
+        found.push(saver.restart());
+    }
+    println!("found after a cut in each of the {UNITS} units: {found:?}");
+    assert!(!found.contains(&Set::Neither), "{found:?}");
+    // The word with the checksum decides, and nothing before it.
+    let first_new = found.iter().position(|set| *set == Set::New);
+    assert_eq!(first_new, Some(usize::from(UNITS)), "{found:?}");
+}
