@@ -17,8 +17,8 @@ use super::trial::{Before, BusPath, Law, Start, Trial};
 use super::{mean_delay, run_all};
 use crate::SimError;
 
-/// Seeds of every row: wait for SYNC, phase of the command and noise.
-const SEEDS: u64 = 20;
+/// Most seeds of a row: wait for SYNC, phase of the command and noise.
+const SEEDS: u32 = 20;
 /// A valve so many times larger hardly holds the flow up.
 const WIDE_OPEN: f64 = 10.0;
 /// Least dead volume \[m³\]: without any, a chamber at its stop has none at all.
@@ -305,7 +305,7 @@ pub struct Ablation {
     pub variations: Vec<Variation>,
 }
 
-/// Measures all rows.
+/// Measures all rows, each with `seeds` seeds or 20, whichever is less.
 ///
 /// # Errors
 /// [`SimError::Simulation`] if the axis cannot be simulated or does not start in the base case.
@@ -313,9 +313,11 @@ pub fn measure(
     axis: &AxisParams,
     bus: BusPath,
     weight_n: f64,
+    seeds: u32,
     bar: &ProgressBar,
 ) -> Result<Ablation, SimError> {
-    let base: Vec<Trial> = (1..=SEEDS)
+    let seeds = u64::from(seeds.min(SEEDS));
+    let base: Vec<Trial> = (1..=seeds)
         .map(|seed| Trial {
             bus: Some(bus),
             ..Trial::new(axis, Law::Paper, Start::HomeHeld, seed)
@@ -386,7 +388,7 @@ pub fn measure(
         })
         .collect();
     Ok(Ablation {
-        seeds: SEEDS,
+        seeds,
         base_s,
         rows,
         residual_s: before_s,

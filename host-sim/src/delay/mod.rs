@@ -15,9 +15,12 @@
 
 pub mod ablation;
 mod charts;
+mod hands;
+pub mod kinds;
 pub mod notice;
 mod page;
 pub mod predictions;
+pub mod scaling;
 pub mod starts;
 mod tables;
 pub mod trial;
@@ -37,7 +40,7 @@ use crate::report::subfolder;
 use crate::{SimError, output};
 use trial::{BusPath, Outcome, Trial};
 
-/// The paper's delay, and the band that counts as explained (issue of the delay bar) \[s\].
+/// The paper's delay, and the band that counts as explained \[s\].
 pub const PAPER_DELAY_S: f64 = 0.25;
 /// Half of the band \[s\].
 pub const PAPER_BAND_S: f64 = 0.05;
@@ -187,11 +190,11 @@ pub fn study(robot: &RobotConfig, options: &Options) -> Result<Study, SimError> 
     part("distributions");
     let starts = starts::measure(&axis, options.seeds, &bar)?;
     part("ablation");
-    let ablation = ablation::measure(&axis, bus, weight_n, &bar)?;
+    let ablation = ablation::measure(&axis, bus, weight_n, options.seeds, &bar)?;
     part("announced moves");
     let notice = notice::measure(&axis, options.seeds.min(8), &bar)?;
     part("predictions");
-    let predictions = predictions::measure(&axis, &starts, &notice, &bar)?;
+    let predictions = predictions::measure(&axis, &starts, &notice, options.seeds, &bar)?;
     bar.finish_and_clear();
     Ok(Study {
         robot: robot.name.clone(),

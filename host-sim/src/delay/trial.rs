@@ -9,12 +9,13 @@ use std::collections::VecDeque;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
-use wheeleg_control::pwm::OnTimes;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_units::{Duty, PositionMm};
 
+use super::hands::Hands;
+pub use super::kinds::{Law, Start};
 use crate::bench::suite::BenchError;
-use crate::bench::{self, Action, Bench, Board, Design, Firmware, Motion, Row, Sample, design};
+use crate::bench::{Bench, Design, Firmware, Motion, Row, design};
 
 /// A start counts from here: the first motion of this much from where the piston turned \[m\].
 pub const STARTED_M: f64 = 1e-3;
@@ -32,113 +33,6 @@ const WAIT_S: f64 = 0.5;
 const WATCH_S: f64 = 1.5;
 /// All ticks of a valve on.
 const FULL: u16 = 1000;
-
-/// Which law drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Law {
-    /// P + fuzzy PD, as the paper describes it.
-    Paper,
-    /// The predictive law.
-    Default,
-}
-
-impl Law {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::Default];
-
-    /// Name in tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Default => "default",
-        }
-    }
-
-    const fn kind(self) -> bench::Kind {
-        match self {
-            Self::Paper => bench::Kind::FuzzyPd,
-            Self::Default => bench::Kind::Predictive,
-        }
-    }
-}
-
-/// From where a move starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Start {
-    /// Retracts from the extended stop, against which the law kept pushing.
-    HomeHeld,
-    /// Retracts from the extended stop, where the law had settled.
-    HomeRest,
-    /// Extends from the retracted stop, against which the law kept pushing.
-    StopHeld,
-    /// Extends from the retracted stop, where the law had settled.
-    StopRest,
-    /// Extends from a rest inside the stroke.
-    MidExtend,
-    /// Retracts from a rest inside the stroke.
-    MidRetract,
-    /// Turns round inside the stroke, while extending.
-    Reversal,
-}
-
-impl Start {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::HomeHeld,
-        Self::HomeRest,
-        Self::StopHeld,
-        Self::StopRest,
-        Self::MidExtend,
-        Self::MidRetract,
-        Self::Reversal,
-    ];
-
-    /// Name in tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::HomeHeld => "home, held",
-            Self::HomeRest => "home, at rest",
-            Self::StopHeld => "stop, held",
-            Self::StopRest => "stop, at rest",
-            Self::MidExtend => "mid-stroke, extends",
-            Self::MidRetract => "mid-stroke, retracts",
-            Self::Reversal => "mid-stroke, reverses",
-        }
-    }
-
-    /// One line for the reader.
-    #[must_use]
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::HomeHeld => {
-                "retracts from the extended stop, where the law pushes on: one chamber at supply"
-            }
-            Self::HomeRest => "retracts from the extended stop, where the law has shut the valves",
-            Self::StopHeld => "extends from the retracted stop, where the law pushes on",
-            Self::StopRest => "extends from the retracted stop, where the law has shut the valves",
-            Self::MidExtend => "extends from a settled rest at 30 to 70 % of the stroke",
-            Self::MidRetract => "retracts from a settled rest at 30 to 70 % of the stroke",
-            Self::Reversal => "reference reversed in the middle of an extending move",
-        }
-    }
-
-    const fn held(self) -> bool {
-        matches!(self, Self::HomeHeld | Self::StopHeld)
-    }
-
-    /// Direction of the move that starts: 1 extends.
-    #[must_use]
-    pub const fn sign(self) -> f64 {
-        match self {
-            Self::StopHeld | Self::StopRest | Self::MidExtend => 1.0,
-            _ => -1.0,
-        }
-    }
-}
 
 /// What happens between the history and the command, beside the law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -256,51 +150,6 @@ pub struct Outcome {
 /// Time before the command that an outcome's rows hold \[s\].
 pub const LEAD_S: f64 = 0.5;
 
-/// The board with hands on its valves, at the end of a bus.
-struct Hands {
-    firmware: Firmware,
-    forced: Option<OnTimes>,
-    /// Ticks until hands let go, or throw valves open.
-    then: Option<(u32, Option<OnTimes>)>,
-    /// Set-points on their way to the board.
-    under_way: VecDeque<Sample>,
-    late: usize,
-}
-
-impl Board for Hands {
-    fn tick(&mut self, sample: &Sample) -> Action {
-        self.under_way.push_back(*sample);
-        let mut seen = *sample;
-        if self.under_way.len() > self.late
-            && let Some(old) = self.under_way.pop_front()
-        {
-            seen = Sample {
-                code: sample.code,
-                ..old
-            };
-        } else if let Some(first) = self.under_way.front() {
-            seen = Sample {
-                code: sample.code,
-                ..*first
-            };
-        }
-        let mut action = self.firmware.tick(&seen);
-        if let Some((left, on)) = &mut self.then {
-            if *left == 0 {
-                self.forced = *on;
-            } else {
-                *left -= 1;
-            }
-        }
-        if let Some(on) = self.forced {
-            // The law follows the air by what was really sent.
-            self.firmware.controller.sent(on);
-            action.on_us = on;
-        }
-        action
-    }
-}
-
 /// Pressures of the chambers as they are \[Pa\].
 fn pressures(bench: &Bench<Hands>) -> [f64; 2] {
     let model = &bench.axis().assembly.cylinders[0];
@@ -407,7 +256,7 @@ impl Trial {
         let stroke_m = self.axis.cylinder.stroke_m;
         let inside = matches!(self.start, Start::MidExtend | Start::MidRetract);
         // A rest inside the stroke is come to from either side, by a move of its own.
-        let side = if self.seed % 2 == 0 { 0.1 } else { 0.9 };
+        let side = if self.seed.is_multiple_of(2) { 0.1 } else { 0.9 };
         let stations = inside.then_some((side * stroke_m, 1.5)).into_iter();
         for (to_m, seconds) in stations.chain([(from_m, HISTORY_S)]) {
             let step = Motion::Step {
