@@ -256,7 +256,11 @@ impl Trial {
         let stroke_m = self.axis.cylinder.stroke_m;
         let inside = matches!(self.start, Start::MidExtend | Start::MidRetract);
         // A rest inside the stroke is come to from either side, by a move of its own.
-        let side = if self.seed.is_multiple_of(2) { 0.1 } else { 0.9 };
+        let side = if self.seed.is_multiple_of(2) {
+            0.1
+        } else {
+            0.9
+        };
         let stations = inside.then_some((side * stroke_m, 1.5)).into_iter();
         for (to_m, seconds) in stations.chain([(from_m, HISTORY_S)]) {
             let step = Motion::Step {
