@@ -8,7 +8,8 @@
 mod exceptions;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, HookType, Mode, Prot, RegisterARM as R, TlbEntry, TlbType, Unicorn, uc_error,
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM as R, TlbEntry, TlbType, Unicorn,
+    uc_error,
 };
 
 use crate::image::{FLASH_BASE, FLASH_SIZE, Image, RAM_BASE, RAM_SIZE};
@@ -25,6 +26,9 @@ const TICK_LINES: [usize; 2] = [16 + 18, 16 + 28];
 
 /// Blocks kept for messages.
 const TRACE: usize = 16;
+
+/// EPSR outside of an IT block.
+const THUMB: u64 = 1 << 24;
 
 /// Address at which no block begins: run until stopped. The engine looks it up
 /// at every stop, so it is executable memory, of a page that the part lacks.
@@ -368,7 +372,13 @@ impl Machine {
         // Addresses are what they are. Of the default memory map this leaves out
         // that RAM can be executed: the engine would look for code at every store.
         uc.ctl_set_tlb_type(TlbType::VIRTUAL)?;
-        uc.add_tlb_hook(0, u64::from(u32::MAX), move |_, address, _| {
+        uc.add_tlb_hook(0, u64::from(u32::MAX), move |uc, address, kind| {
+            if kind != MemType::FETCH {
+                // Before it asks, the engine has put the IT state of the instruction
+                // back into the registers, where it is zero within a block; left
+                // there, the next block would be taken for conditional.
+                let _ = uc.reg_write(R::EPSR, THUMB);
+            }
             let ram = (u64::from(RAM_BASE)..ram_end).contains(&address);
             let perms = if ram {
                 Prot::READ | Prot::WRITE

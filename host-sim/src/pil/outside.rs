@@ -35,6 +35,8 @@ struct Board {
     ran: Ran,
     /// Bytes that ended up to here have been handed over, ns.
     heard_ns: u64,
+    /// The newest edge that it was run through, ns.
+    edge_ns: Option<u64>,
     /// Inputs of the newest edges that have not been compared.
     latched: VecDeque<(u64, Inputs)>,
     /// Sent here by the native application, there by the board.
@@ -175,6 +177,7 @@ impl Outside {
             hello,
             ran: Ran::default(),
             heard_ns: 0,
+            edge_ns: None,
             latched: VecDeque::new(),
             here: VecDeque::new(),
             there: VecDeque::new(),
@@ -236,6 +239,11 @@ impl Outside {
     pub(crate) fn ticks(&self, address: u8, now_ns: u64) -> Option<bool> {
         let from = self.boards[self.number(address)?].running_from_ns;
         Some(from.is_some_and(|from| from <= now_ns))
+    }
+
+    /// The newest edge of the board at `address`, ns; `None` for one that runs here.
+    pub(crate) fn edge_ns(&self, address: u8) -> Option<u64> {
+        self.boards[self.number(address)?].edge_ns
     }
 
     /// The reset of the board at `address` since the last call.
@@ -306,6 +314,7 @@ impl Outside {
         }
         run.edge = edge;
         if let Some(inputs) = edge {
+            board.edge_ns = Some(now_ns);
             board.latched.push_back((now_ns, inputs));
             if board.latched.len() > 4 {
                 board.latched.pop_front();

@@ -6,6 +6,7 @@ use wheeleg_protocol::Address;
 
 use super::world::World;
 use crate::SimError;
+use crate::pil::Outside;
 
 /// What the joint boards read at a tick edge.
 #[derive(Debug, Clone, Copy, Default)]
@@ -42,29 +43,34 @@ impl World {
         Ok(())
     }
 
-    /// The edge of a wheel board outside, and the comparison of its outputs.
-    pub(super) fn wheel_edge_outside(
-        &mut self,
-        wheel: usize,
-        edges: i64,
-        switch: bool,
-    ) -> Result<(), SimError> {
-        let address = wheel as u8 + 7;
-        if self.outside.is_none() {
-            return Ok(());
+    /// The edge of a wheel board outside, and the comparison of its outputs. Boards
+    /// whose edges fall on one instant work at the same time.
+    pub(super) fn wheel_edge_outside(&mut self, wheel: usize) -> Result<(), SimError> {
+        let now_ns = self.now_ns;
+        let mut edges = Vec::new();
+        for i in 0..2 {
+            let address = i as u8 + 7;
+            let fresh = |outside: &Outside| outside.edge_ns(address) != Some(now_ns);
+            if self.next_wheel_ns[i] == now_ns && self.outside.as_ref().is_some_and(fresh) {
+                let (count, switch) = self.wheel_inputs(i);
+                let inputs = link::Inputs {
+                    adc: 0,
+                    switches: link::Switches::from_supply(switch),
+                    // The counter wraps, as the board's does.
+                    encoder: count as i32,
+                };
+                edges.push((address, Some(inputs)));
+            }
         }
-        let inputs = link::Inputs {
-            adc: 0,
-            switches: link::Switches::from_supply(switch),
-            // The counter wraps, as the board's does.
-            encoder: edges as i32,
-        };
-        self.run_outside(&[(address, Some(inputs))])?;
+        if !edges.is_empty() {
+            self.run_outside(&edges)?;
+        }
+        let address = wheel as u8 + 7;
         if self.runs(address)
             && let Some(outside) = &mut self.outside
         {
             let here = self.wheels[wheel].active_outputs();
-            outside.compare_outputs(self.now_ns, address, &here);
+            outside.compare_outputs(now_ns, address, &here);
         }
         Ok(())
     }

@@ -282,15 +282,20 @@ impl World {
         Ok(())
     }
 
-    fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
-        self.advance_plant()?;
+    /// What a wheel board reads now: encoder edges and the supply switch.
+    pub(super) fn wheel_inputs(&mut self, wheel: usize) -> (i64, bool) {
         let core = &self.state.core;
         let mechanics = &self.plant.assembly.mechanics;
         let angle_rad = mechanics.wheel_angle_rad(&core.motion);
         let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
         let edges = self.faults.edges(wheel, edges);
-        let switch = core.supply.pressure_switch;
-        self.wheel_edge_outside(wheel, edges, switch)?;
+        (edges, core.supply.pressure_switch)
+    }
+
+    fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
+        self.advance_plant()?;
+        let (edges, switch) = self.wheel_inputs(wheel);
+        self.wheel_edge_outside(wheel)?;
         let address = wheel as u8 + 7;
         let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         // Only the bridge takes new inputs here: the valves keep their tick.

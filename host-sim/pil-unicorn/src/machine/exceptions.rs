@@ -2,7 +2,7 @@
 
 use unicorn_engine::RegisterARM as R;
 
-use super::Machine;
+use super::{Machine, THUMB};
 
 impl Machine {
     /// Takes the most urgent exception that nothing holds back.
@@ -51,6 +51,8 @@ impl Machine {
         let mut handler = [0; 4];
         self.memory(vector, &mut handler)?;
         self.set(R::IPSR, n as u32)?;
+        // An IT block may have been interrupted: the handler is not part of it.
+        self.set(R::EPSR, THUMB as u32)?;
         self.mode_changed(xpsr)?;
         self.set(R::PC, u32::from_le_bytes(handler) | 1)?;
         let state = self.uc.get_data_mut();

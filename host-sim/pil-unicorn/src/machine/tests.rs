@@ -120,3 +120,17 @@ fn an_instruction_of_a_later_processor_is_refused() {
     let error = machine.run(1_000, Until::Cycle, true).expect_err("no TT");
     assert!(error.contains("INSN_INVALID"), "{error}");
 }
+
+#[test]
+fn a_first_access_in_an_it_block_leaves_no_condition_behind() {
+    // r1 = RAM; movs r0, #1; itt ne; ldrne r2, [r1]; movne r0, #2; b .+2;
+    // movs r4, #0; bne .+4; movs r5, #1; b .
+    let code = [
+        0x4904, 0x2001, 0xBF1C, 0x680A, 0x2002, 0xE7FF, 0x2400, 0xD100, 0x2501, 0xE7FE, 0x4000,
+        0x2000,
+    ];
+    let mut machine = machine(&code, &[]);
+    run(&mut machine, 1_000, 1_000);
+    assert_eq!(machine.get(R::R0), Ok(2));
+    assert_eq!(machine.get(R::R5), Ok(1), "movs has set the flags");
+}
