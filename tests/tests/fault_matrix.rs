@@ -1,10 +1,14 @@
 //! The fault matrix: every row of host-sim/FAULTS.md is run, and comes out as it must or
 //! as the shortfalls of that file say; no fault trips where there is none.
 
+mod program;
 mod sil;
 
 use std::collections::BTreeSet;
 
+use assert_cmd::Command;
+use predicates::str::contains;
+use serde_json::Value;
 use sil::{robot, run, scenario, story};
 use wheeleg_sim::config::builtin;
 use wheeleg_sim::faults::matrix::{self, Expect, ROWS, Verdict};
@@ -94,6 +98,16 @@ fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
         assert_eq!(o.measured.wrong_frames, 0, "{id}");
     }
     assert!(wrong.is_empty(), "{wrong}");
+    // A minute of broken frames: most get through, some do not, none is another one.
+    let minute = outcomes.iter().find(|o| o.row.id == "bit-errors/60s");
+    let m = &minute.expect("the row").measured;
+    let lost = 1.0 - m.accepted_frames as f64 / m.sent_frames as f64;
+    assert!(m.sent_frames > 40_000, "{} frames sent", m.sent_frames);
+    // Of 102 bytes 8 % have a wrong bit, of 29 bytes 2 %; one SYNC comes to eight replies.
+    assert!(
+        (0.015..0.05).contains(&lost),
+        "{lost} of the frames are lost"
+    );
     for id in known {
         assert!(ROWS.iter().any(|row| row.id == id), "no row {id}");
     }
@@ -136,4 +150,55 @@ fn nothing_trips_without_a_fault() {
         assert!(holds.is_none(), "{name}\n{}", story(&recording));
     }
     assert!(quiet >= 7, "{quiet} scenarios without faults");
+}
+
+fn faults_run(arguments: &[&str]) -> (Command, tempfile::TempDir) {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let mut command = Command::new(program::path());
+    command.args(["faults", "run"]).args(arguments);
+    command.arg("--out").arg(folder.path().join("matrix"));
+    (command, folder)
+}
+
+/// Exit codes, JSON and page of `wheeleg faults run`.
+#[test]
+fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
+    let (mut command, folder) = faults_run(&["--row", "pot-open", "--seed", "3", "--json"]);
+    let output = command.assert().success();
+    let json: Value = serde_json::from_slice(&output.get_output().stdout).expect("JSON");
+    let row = &json["rows"][0];
+    assert_eq!(
+        (&row["row"], &row["pass"]),
+        (&"pot-open".into(), &true.into())
+    );
+    assert_eq!(
+        (&row["latched"], &json["failed"]),
+        (&true.into(), &0.into())
+    );
+    let detected = row["measured"]["detected_ms"].as_f64().expect("measured");
+    assert!((0.9..=3.1).contains(&detected), "{detected} ms");
+    assert_eq!(row["expected"]["axis"], 3);
+    let page = std::fs::read_to_string(folder.path().join("matrix/report.html"));
+    let page = page
+        .expect("a page")
+        .replace("http://www.w3.org/2000/svg", "");
+    for words in [
+        "pot-open",
+        "PASS",
+        "The position sensor reads outside its range",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    for outside in ["http:", "https:", "src=", "<script", "@import"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+
+    let (mut command, _folder) = faults_run(&["--row", "tube-burst"]);
+    command.assert().code(1).stdout(contains("FAIL"));
+    let (mut command, _folder) = faults_run(&["--row", "ui-replay"]);
+    command.assert().code(2).stderr(contains("not implemented"));
+    let (mut command, _folder) = faults_run(&["--row", "pot-opn"]);
+    command.assert().code(2).stderr(contains("pot-open"));
+    let (mut command, _folder) = faults_run(&[]);
+    command.assert().code(2);
 }

@@ -17,6 +17,7 @@ pub use delay::StartDelay;
 use delay::{start_delays, velocity_shift_s};
 pub use reference::{ReferenceModel, ReferencePoint};
 pub use rest::{RestResult, rest_switching};
+pub(crate) use safe_state::commanded_open;
 pub use target::Target;
 
 use crate::config::{EventAction, LegChoice, Motion, RobotConfig, Scenario, TargetSet};

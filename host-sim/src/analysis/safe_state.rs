@@ -131,7 +131,8 @@ fn worst(mut values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     values.try_fold(0.0_f64, |worst, v| Some(worst.max(v?)))
 }
 
-fn commanded_open(s: &JointSample) -> bool {
+/// Whether a valve of the joint is energised in the tick that begins here.
+pub(crate) fn commanded_open(s: &JointSample) -> bool {
     s.fill_a_us | s.vent_a_us | s.fill_b_us | s.vent_b_us != 0
 }
 

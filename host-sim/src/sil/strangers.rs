@@ -37,24 +37,12 @@ const FIRST_SEQUENCE: u16 = 0xF000;
 /// A parameter that no board has.
 const NO_PARAMETER: u16 = 0x7FFF;
 
-/// A board with the address of another one.
-enum Twin {
-    Joint(u8, JointBoard),
-    Wheel(u8, WheelBoard),
-}
-
-impl Twin {
-    fn address(&self) -> u8 {
-        match self {
-            Self::Joint(address, _) | Self::Wheel(address, _) => *address,
-        }
-    }
-}
-
 /// Everybody else on the line.
 #[derive(Default)]
 pub(super) struct Strangers {
-    twins: Vec<Twin>,
+    /// Boards with the address of another one.
+    joints: Vec<(u8, JointBoard)>,
+    wheels: Vec<(u8, WheelBoard)>,
     service: Option<Service>,
     notes: Vec<String>,
 }
@@ -70,17 +58,20 @@ impl Strangers {
         let Some(at) = Address::new(address) else {
             return Ok(());
         };
-        self.twins.push(if i < 6 {
-            Twin::Joint(address, JointBoard::twin(at, &stored.joints[i])?)
+        if i < 6 {
+            let board = JointBoard::twin(at, &stored.joints[i])?;
+            self.joints.push((address, board));
         } else {
-            Twin::Wheel(address, WheelBoard::twin(at, &stored.wheels[i - 6])?)
-        });
+            let board = WheelBoard::twin(at, &stored.wheels[i - 6])?;
+            self.wheels.push((address, board));
+        }
         Ok(())
     }
 
     /// It is unplugged.
     pub(super) fn unplug(&mut self, address: u8) {
-        self.twins.retain(|twin| twin.address() != address);
+        self.joints.retain(|(own, _)| *own != address);
+        self.wheels.retain(|(own, _)| *own != address);
     }
 
     /// The service tool begins to write parameters of the board at `address`.
@@ -90,33 +81,28 @@ impl Strangers {
 
     /// One tick of the joints among the second boards.
     pub(super) fn joint_tick(&mut self, now_ns: u64) {
-        for twin in &mut self.twins {
-            if let Twin::Joint(_, board) = twin {
-                board.tick(micros(now_ns), BENCH_CODE, [false; 4]);
-            }
+        for (_, board) in &mut self.joints {
+            board.tick(micros(now_ns), BENCH_CODE, [false; 4]);
         }
     }
 
     /// One sample of the wheels among the second boards that stand for `address`.
     pub(super) fn wheel_sample(&mut self, address: u8, now_ns: u64) {
-        for twin in &mut self.twins {
-            if let Twin::Wheel(own, board) = twin
-                && *own == address
-            {
-                board.tick(micros(now_ns), 0, true);
-            }
+        for (_, board) in self.wheels.iter_mut().filter(|(own, _)| *own == address) {
+            board.tick(micros(now_ns), 0, true);
         }
     }
 
     /// Hears a delivery.
     pub(super) fn hear(&mut self, bus: &Bus, delivery: &Delivery) {
-        for twin in &mut self.twins {
-            let Some((bytes, end_ns)) = bus.heard_by(TWIN | twin.address(), delivery) else {
-                continue;
-            };
-            match twin {
-                Twin::Joint(_, board) => board.on_bus_bytes(&bytes, micros(end_ns)),
-                Twin::Wheel(_, board) => board.on_bus_bytes(&bytes, micros(end_ns)),
+        for (address, board) in &mut self.joints {
+            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
+                board.on_bus_bytes(&bytes, micros(end_ns));
+            }
+        }
+        for (address, board) in &mut self.wheels {
+            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
+                board.on_bus_bytes(&bytes, micros(end_ns));
             }
         }
         if let Some(service) = &mut self.service
@@ -128,14 +114,14 @@ impl Strangers {
 
     /// What a second board wants to send.
     pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
-        self.twins.iter_mut().find_map(|twin| {
-            let from = TWIN | twin.address();
-            let transmission = match twin {
-                Twin::Joint(_, board) => board.take_transmission(),
-                Twin::Wheel(_, board) => board.take_transmission(),
-            };
-            Some((from, transmission?))
-        })
+        let joints = self.joints.iter_mut();
+        let mut joints = joints.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
+        if let Some(sent) = joints.next() {
+            return Some(sent);
+        }
+        let wheels = self.wheels.iter_mut();
+        let mut wheels = wheels.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
+        wheels.next()
     }
 
     /// The next request of the service tool, if it has one and `left_ns` until the

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::row::{Expect, Row, Since};
 use super::run::Ran;
+use crate::analysis::{commanded_open, window};
 use crate::faults::{FaultKind, FaultSpec, Victim};
 use crate::telemetry::{JointSample, Recording, Row as Sample};
 
@@ -50,7 +51,11 @@ pub struct Measured {
     pub stopped: bool,
     /// No axis drives again, though the cause may be gone and arming was asked for.
     pub latched: bool,
-    /// Frames that a receiver accepted and nobody had sent.
+    /// Frames that were put on the line, start-up included.
+    pub sent_frames: u64,
+    /// Frames that a receiver accepted.
+    pub accepted_frames: u64,
+    /// Frames among them that nobody had sent.
     pub wrong_frames: u64,
     /// Largest load of a bus cycle after the instant.
     pub bus_load: f64,
@@ -107,6 +112,8 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
     let mut m = Measured {
         at_s,
         since_s,
+        sent_frames: ran.line.sent,
+        accepted_frames: ran.line.accepted,
         wrong_frames: ran.line.wrong,
         dropped: r.dropped,
         detected_ms: detected_s(r, at_s, heard(&ran.faults)).map(ms),
@@ -227,9 +234,7 @@ fn until_s<S>(last: Option<usize>, rows: &[Sample<S>], from_s: f64) -> Option<f6
 /// When the outputs of an axis, 0 to 7, were commanded off for good.
 fn shut_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64> {
     match r.joints.get(axis) {
-        Some(rows) => open_until_s(rows, from_s, |s| {
-            s.fill_a_us | s.vent_a_us | s.fill_b_us | s.vent_b_us != 0
-        }),
+        Some(rows) => open_until_s(rows, from_s, commanded_open),
         None => safe_s(r, axis, from_s, blind),
     }
 }
@@ -271,7 +276,7 @@ fn stand_s(r: &Recording, from_s: f64) -> Option<f64> {
 
 fn held_mm(r: &Recording, from_s: f64) -> Option<f64> {
     let ranges = r.joints.iter().filter_map(|rows| {
-        let held = crate::analysis::window(rows, from_s, from_s + HELD_S);
+        let held = window(rows, from_s, from_s + HELD_S);
         let held: Vec<f64> = held
             .iter()
             .filter(|s| s.v.mode != EXHAUST)
