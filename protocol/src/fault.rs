@@ -197,7 +197,7 @@ fault_table!(
         "Check that the master runs and the bus cable is plugged, then clear the fault.";
     StaleMaster = 2, bit 1, "SYNC arrives but its cycle counter does not advance.",
         "Restart the master: its control loop is stuck while its transmitter repeats. Then clear the fault.";
-    SlotOverrun = 3, bit 2, "A reply could not be sent within its slot; the driver was cut off.",
+    SlotOverrun = 3, bit 2, "The board cannot keep to its slot: its clock runs wrong, or its driver was cut off.",
         "Check the baud rate and the clock of this board, then clear the fault.";
     SensorRange = 32, bit 4, "The position sensor reads outside its range.",
         "Check the potentiometer wiring for an open or short circuit, then clear the fault.";
@@ -219,8 +219,8 @@ fault_table!(
         "Move the axis back by hand with the air off, check its calibration, then clear the fault.";
     EncoderFault = 41, bit 13, "The encoder lost or reversed its counts.",
         "Check the encoder cable and its two channels, then clear the fault.";
-    WatchdogReset = 42, bit 14, "The board was reset by its hardware watchdog.",
-        "Report this with the firmware version, then clear the fault.";
+    UnexpectedReset = 42, bit 14, "The board was reset in operation; the reset cause says by what.",
+        "After a brown-out check the supply; otherwise report this with the firmware version. Then clear the fault.";
     DuplicateAddress = 43, bit 15, "Another board answers at this address.",
         "Set the address straps so that every board has its own address, then restart the boards.";
     NoMotion = 44, bit 3, "The valves gave the air for a motion of the axis, and it did not come.",

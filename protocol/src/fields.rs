@@ -68,6 +68,46 @@ wire_enum! {
 }
 
 wire_enum! {
+    /// Why a processor started.
+    ///
+    /// 3 to 6 are faults of a board in operation, as is 2; the others are how
+    /// boards start.
+    ResetCause {
+        Unknown = 0, "The board does not tell.";
+        PowerUp = 1, "The supply came up, or had fallen below the level at which the processor stops.";
+        Watchdog = 2, "The program did not feed the hardware watchdog.";
+        BrownOut = 3, "The supply sagged below its warning level and came back.";
+        ProcessorFault = 4, "A processor fault or an unexpected interrupt.";
+        Panic = 5, "The program found itself in an impossible state.";
+        ClockLoss = 6, "The crystal oscillator stopped.";
+        Software = 7, "Asked for by software or by a debugger.";
+        Pin = 8, "The reset pin.";
+        OptionBytes = 9, "The option bytes were loaded.";
+    }
+}
+
+impl ResetCause {
+    /// Whether something failed in operation, so that the board latches a fault.
+    #[must_use]
+    pub const fn is_fault(self) -> bool {
+        matches!(self.code(), 2..=6)
+    }
+}
+
+wire_enum! {
+    /// What a record of the log stream says; its text is put together by the
+    /// reader from this table and the two arguments.
+    LogEvent {
+        None = 0, "No record.";
+        Mode = 1, "The mode changed from {a} to {b}.";
+        Fault = 2, "Fault {a} was latched in mode {b}.";
+        Parameter = 3, "Parameter {b} was set.";
+        Saved = 4, "The parameters were stored; 1 if it went well: {a}.";
+        Cleared = 5, "Faults were cleared: bits {b}.";
+    }
+}
+
+wire_enum! {
     /// Why a request was refused.
     NackReason {
         UnknownMessage = 1, "This board does not know the message type.";
@@ -86,6 +126,7 @@ wire_enum! {
         WrongBoard = 14, "The request is for the other kind of board.";
         LinkDown = 15, "No live SYNC stream from the master.";
         NotReady = 16, "The board is still starting.";
+        StoreFailed = 17, "The parameters could not be stored; the set stored before is still there.";
     }
 }
 

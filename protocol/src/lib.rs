@@ -48,6 +48,7 @@ pub mod fault;
 pub mod fields;
 pub mod frame;
 pub mod link;
+pub mod log;
 pub mod message;
 pub mod param;
 pub mod schema;
@@ -60,13 +61,14 @@ pub use fault::{
     FAULTS, Fault, FaultBits, FaultClass, FaultCode, FaultSchema, LIMITS, Limit, LimitBits,
 };
 pub use fields::{
-    Acceleration8p8, BoardKind, Correction, Count24, DisarmReason, InputBits, NackReason, NodeMode,
-    OpenMode, OutOfRange, Speed7, WheelControlMode,
+    Acceleration8p8, BoardKind, Correction, Count24, DisarmReason, InputBits, LogEvent, NackReason,
+    NodeMode, OpenMode, OutOfRange, ResetCause, Speed7, WheelControlMode,
 };
 pub use frame::{
     CRC_LEN, DELIMITER, EncodeError, Frame, FrameError, HEADER_LEN, Header, MAX_DECODED,
     MAX_ENCODED, MAX_PAYLOAD, VERSION, checksum, encode, encoded_len,
 };
+pub use log::{LOG_ENTRIES, LogEntry};
 pub use message::*;
 pub use schema::{INTERFACE, Interface, SCHEMA_HASH};
 pub use sync::{

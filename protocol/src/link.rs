@@ -15,6 +15,6 @@ pub use supervisor::{
     ClearError, LinkLoss, LinkState, LinkSupervisor, NodeMonitor, WatchdogCycles,
 };
 pub use timing::{
-    BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, DUPLICATE_WINDOW_US, GAP_US, MAX_DEADLINE_CYCLES,
-    SlotTiming, TURNAROUND_US, deadline_is_live,
+    BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, DISCOVERY_SLOTS, DUPLICATE_WINDOW_US, GAP_US,
+    MAX_DEADLINE_CYCLES, SlotTiming, TURNAROUND_US, deadline_is_live,
 };

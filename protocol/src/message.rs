@@ -10,7 +10,7 @@ use crate::address::Address;
 use crate::fault::{FaultBits, FaultCode, LimitBits};
 use crate::fields::{
     Acceleration8p8, BoardKind, Correction, Count24, DisarmReason, InputBits, NackReason, NodeMode,
-    OpenMode, Speed7, WheelControlMode,
+    OpenMode, ResetCause, Speed7, WheelControlMode,
 };
 use crate::frame::{self, EncodeError, Frame, Header, MAX_PAYLOAD, VERSION};
 use crate::sync::{SyncFlags, SyncSlots};
@@ -190,6 +190,15 @@ messages! {
     EmergencyBrake = 0x15, Request {}
     /// Board command: transmit the actual position.
     TransmitPosition = 0x16, Request -> Position {}
+    /// Who else is at this address? Each board answers in a slot that its unique id and
+    /// the newest bus cycle choose, so that two boards at one address hear each other.
+    Discover = 0x17, Request -> Identity {}
+    /// Ask for the counters of the link.
+    LinkReport = 0x18, Request -> LinkRecord {}
+    /// Fetch the log stream, and keep it on for a while.
+    LogRead = 0x19, Request -> LogRecords {
+        #[serde(with = "le")] lease_ms: u16 = "time for which the board goes on recording, ms; 0 ends it";
+    }
     /// Board command: receive a position reference.
     PositionReference = 0x20, Request {
         #[serde(with = "le")] reference_raw: i32 = "stroke, I16F16 mm";
@@ -244,6 +253,8 @@ messages! {
         #[serde(with = "le")] id: u16 = "parameter number";
         #[serde(with = "le")] value: i32 = "raw value in the parameter's format";
     }
+    /// Store the parameters in force. Refused while armed; Busy until it is done.
+    ParamSave = 0x42, Request {}
     /// The request was carried out or accepted.
     Ack = 0x80, Answer {
         request: u8 = "message type of the request";
@@ -281,6 +292,28 @@ messages! {
         #[serde(with = "le")] first_time_us: u32 = "board time of the first fault, us, wraps; 0 if none";
         disarm_reason: DisarmReason = "why it was last disarmed or stopped";
         limits: LimitBits = "limits that shape the output now";
+        reset_cause: ResetCause = "why the processor last started";
+        #[serde(with = "le")] clock_offset_us: u32 = "master time less board time, us, wraps; 0 before the first SYNC";
+    }
+    /// Answer to LinkReport: what the board heard since it started. Counters stop at
+    /// their largest value.
+    LinkRecord = 0x86, Answer {
+        #[serde(with = "le")] frames: u32 = "sound frames";
+        #[serde(with = "le")] overflow: u16 = "frames with too many bytes";
+        #[serde(with = "le")] truncated: u16 = "frames that end inside a COBS block";
+        #[serde(with = "le")] short: u16 = "frames shorter than header and CRC";
+        #[serde(with = "le")] crc: u16 = "frames with a wrong CRC";
+        #[serde(with = "le")] version: u16 = "frames of another protocol version";
+        #[serde(with = "le")] length: u16 = "frames with a wrong length field";
+        #[serde(with = "le")] address: u16 = "frames with an address that does not exist";
+        #[serde(with = "le")] unsent: u16 = "own frames replaced before they were sent";
+        #[serde(with = "le")] drift_ppm: i16 = "board clock less master clock, ppm, over the last second";
+    }
+    /// Answer to LogRead: the oldest records, which are then forgotten.
+    LogRecords = 0x87, Answer {
+        #[serde(with = "le")] lost: u16 = "records lost to a full buffer since the last answer";
+        left: u8 = "records that wait still";
+        entries: [u8; 32] = "four records: board time u32 us, LogEvent, a u8, b u16; unused ones 0";
     }
 }
 

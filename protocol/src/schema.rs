@@ -9,8 +9,8 @@
 
 use crate::fault::{FAULTS, FaultSchema, LIMITS};
 use crate::fields::{
-    BoardKind, Correction, DisarmReason, InputBits, NackReason, NodeMode, OpenMode,
-    WheelControlMode,
+    BoardKind, Correction, DisarmReason, InputBits, LogEvent, NackReason, NodeMode, OpenMode,
+    ResetCause, WheelControlMode,
 };
 use crate::frame::VERSION;
 use crate::message::MESSAGES;
@@ -54,6 +54,8 @@ pub const INTERFACE: Interface<'static> = Interface {
         Correction::SCHEMA,
         WheelControlMode::SCHEMA,
         DisarmReason::SCHEMA,
+        ResetCause::SCHEMA,
+        LogEvent::SCHEMA,
         NackReason::SCHEMA,
         InputBits::SCHEMA,
     ],

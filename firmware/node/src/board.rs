@@ -2,16 +2,19 @@
 //! requests that every board answers, slot timing.
 
 use crate::FIRMWARE_VERSION;
+use crate::hardware::ParameterStore;
 use crate::mode::{Event, Mode, ModeRules};
 use crate::overrun::elapsed;
 use crate::port::{BusPort, Incoming};
 use crate::supervisor::{SupervisionTimes, Supervisor};
+use crate::time::TimeSync;
 use wheeleg_protocol::link::{
     DuplicateFilter, SlotTiming, TURNAROUND_US, Verdict, deadline_is_live,
 };
 use wheeleg_protocol::{
-    Ack, Address, BoardKind, Envelope, Fault, FaultRecord, Identity, LimitBits, Message, Nack,
-    NackReason, ParseError, SCHEMA_HASH, SlotReply, Sync, SyncFlags,
+    Ack, Address, BoardKind, Envelope, Fault, FaultRecord, Identity, LimitBits, LinkRecord,
+    LogEvent, Message, Nack, NackReason, ParseError, ResetCause, SCHEMA_HASH, SlotReply, Sync,
+    SyncFlags,
 };
 use wheeleg_units::Micros;
 
@@ -39,6 +42,20 @@ pub(crate) struct BoardCore {
     pub(crate) cycle_at: Micros,
     kind: BoardKind,
     duplicates: DuplicateFilter,
+    time: TimeSync,
+    reset_cause: ResetCause,
+    pub(crate) save: Save,
+}
+
+/// Where a save of the parameters is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Save {
+    /// Nobody asked.
+    Idle,
+    /// To be done between two ticks.
+    Asked,
+    /// Done; whether it went well is not told yet.
+    Done(bool),
 }
 
 /// What a joint or wheel adds to the core.
@@ -77,7 +94,80 @@ impl BoardCore {
             cycle_at: Micros::ZERO,
             kind,
             duplicates: DuplicateFilter::new(),
+            time: TimeSync::default(),
+            reset_cause: ResetCause::Unknown,
+            save: Save::Idle,
         }
+    }
+
+    /// The processor was started by `cause`.
+    pub(crate) fn started_by(&mut self, cause: ResetCause) {
+        self.reset_cause = cause;
+        if cause.is_fault() {
+            self.axis_fault(Fault::UnexpectedReset, Micros::ZERO);
+        }
+    }
+
+    /// A fault that holds the axis.
+    #[inline(never)]
+    pub(crate) fn axis_fault(&mut self, fault: Fault, at: Micros) {
+        self.supervisor.fault(fault, Event::AxisFault, at);
+    }
+
+    /// Whether parameters wait to be stored.
+    pub(crate) fn save_is_due(&self) -> bool {
+        self.save == Save::Asked
+    }
+
+    /// Stores parameters, unless the board has been armed since it was asked. The
+    /// processor may stand still meanwhile: the next tick is measured anew.
+    pub(crate) fn save(
+        &mut self,
+        records: impl Iterator<Item = (u16, i32)>,
+        store: &mut impl ParameterStore,
+        at: Micros,
+    ) {
+        let stored = self.mode().is_disarmed() && store.save(records).is_ok();
+        self.save = Save::Done(stored);
+        self.supervisor
+            .note(LogEvent::Saved, u8::from(stored), 0, at);
+        self.supervisor.restart_timing();
+    }
+
+    /// Answer to a request to save: Busy until it is done, then how it went, once.
+    fn ask_save(&mut self) -> Result<(), NackReason> {
+        if !self.mode().is_disarmed() {
+            return Err(NackReason::Armed);
+        }
+        match self.save {
+            Save::Idle | Save::Asked => {
+                self.save = Save::Asked;
+                Err(NackReason::Busy)
+            }
+            Save::Done(stored) => {
+                self.save = Save::Idle;
+                stored.then_some(()).ok_or(NackReason::StoreFailed)
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn link_record(&self) -> Message {
+        let quality = self.port.quality();
+        let count = |count: u32| u16::try_from(count).unwrap_or(u16::MAX);
+        LinkRecord {
+            frames: quality.frames,
+            overflow: count(quality.overflow),
+            truncated: count(quality.truncated),
+            short: count(quality.short),
+            crc: count(quality.crc),
+            version: count(quality.version),
+            length: count(quality.length),
+            address: count(quality.address),
+            unsent: count(self.port.unsent()),
+            drift_ppm: self.time.drift_ppm(),
+        }
+        .into()
     }
 
     pub(crate) const fn mode(&self) -> Mode {
@@ -115,6 +205,8 @@ impl BoardCore {
             first_time_us: first.map_or(0, |first| first.at.get()),
             disarm_reason: self.supervisor.disarm_reason(),
             limits,
+            reset_cause: self.reset_cause,
+            clock_offset_us: self.time.offset_us(),
         }
         .into()
     }
@@ -136,12 +228,7 @@ pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: 
             Incoming::Addressed(envelope, code, message) => {
                 take_request(application, envelope, code, &message, at);
             }
-            Incoming::Impostor => {
-                application
-                    .core()
-                    .supervisor
-                    .fault(Fault::DuplicateAddress, Event::AxisFault, at)
-            }
+            Incoming::Impostor => application.core().axis_fault(Fault::DuplicateAddress, at),
         }
     }
 }
@@ -154,6 +241,9 @@ fn take_sync<A: Application>(application: &mut A, sync: &Sync, at: Micros) {
     if core.supervisor.sync(sync.cycle, emergency, at) {
         core.cycle = sync.cycle;
         core.cycle_at = at;
+        if core.time.sync(sync.master_time_us, at) {
+            core.axis_fault(Fault::SlotOverrun, at);
+        }
         application.sync(sync, at);
     }
     let [echo, _] = sync.cycle.to_le_bytes();
@@ -205,11 +295,15 @@ fn take_request<A: Application>(
             }
         },
     };
-    let start_at = Micros(at.get().wrapping_add(TURNAROUND_US));
-    application
-        .core()
-        .port
-        .queue_answer(&answer, envelope, start_at);
+    let core = application.core();
+    let delay = match message {
+        Ok(Message::Discover(_)) => {
+            SlotTiming::DEFAULT.discovery_us(&core.identity.unique_id, core.cycle)
+        }
+        _ => TURNAROUND_US,
+    };
+    let start_at = Micros(at.get().wrapping_add(delay));
+    core.port.queue_answer(&answer, envelope, start_at);
 }
 
 /// Requests that every board answers in the same way; the rest goes on.
@@ -223,7 +317,12 @@ fn common_request<A: Application>(
     let limits = application.limits();
     let core = application.core();
     match request {
-        Message::Identify(_) => return Ok(core.identity_message()),
+        Message::Identify(_) | Message::Discover(_) => return Ok(core.identity_message()),
+        Message::LinkReport(_) => return Ok(core.link_record()),
+        Message::LogRead(read) => {
+            return Ok(core.supervisor.read_log(read.lease_ms, at).into());
+        }
+        Message::ParamSave(_) => core.ask_save()?,
         Message::FaultReport(_) => return Ok(core.fault_record(limits)),
         Message::Arm(arm) => {
             if arm.schema_hash != SCHEMA_HASH {
@@ -247,7 +346,16 @@ fn common_request<A: Application>(
         Message::EmergencyBrake(_) => {
             core.supervisor.apply(Event::EmergencyBrake, at)?;
         }
-        _ => return application.request(request, at),
+        _ => {
+            let answer = application.request(request, at)?;
+            if let Message::ParamSet(set) = request {
+                let core = application.core();
+                // What was stored is no longer what is in force.
+                core.save = Save::Idle;
+                core.supervisor.note(LogEvent::Parameter, 0, set.id, at);
+            }
+            return Ok(answer);
+        }
     }
     Ok(ack)
 }

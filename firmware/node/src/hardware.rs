@@ -193,3 +193,17 @@ impl DumpValve for NoDumpValve {
         Ok(())
     }
 }
+
+/// The parameters could not be stored; the set stored before is still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StoreError;
+
+/// Memory that keeps parameters without power: two copies, the older one
+/// replaced, so that a power cut at any instant leaves a whole set.
+pub trait ParameterStore {
+    /// Stores a set, given as numbers and raw values.
+    ///
+    /// # Errors
+    /// [`StoreError`]; then the set stored before is still there.
+    fn save(&mut self, records: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError>;
+}

@@ -32,6 +32,7 @@ pub mod debounce;
 pub mod faults;
 pub mod hardware;
 pub mod joint;
+pub mod log;
 pub mod mode;
 pub mod overrun;
 pub mod parameters;
@@ -40,6 +41,7 @@ pub mod seal;
 pub mod sensor;
 pub mod snapshot;
 pub mod supervisor;
+pub mod time;
 mod transmission;
 pub mod wheel;
 

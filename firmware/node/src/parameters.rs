@@ -79,6 +79,13 @@ macro_rules! parameters_of {
                 self.at(parameter.index())
             }
 
+            /// Every parameter that is not at its default: number and raw value.
+            pub fn changed_from_default(&self) -> impl Iterator<Item = (u16, i32)> + '_ {
+                let rows = $table.iter().zip(&self.values);
+                rows.filter(|(row, value)| row.default != **value)
+                    .map(|(row, value)| (row.id, *value))
+            }
+
             /// Raw value by wire number.
             ///
             /// # Errors

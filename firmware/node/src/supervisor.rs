@@ -10,10 +10,11 @@
 
 use crate::clock::Clock;
 use crate::faults::FaultLog;
+use crate::log::Log;
 use crate::mode::{Event, Mode, ModeRules, Refusal};
 use crate::overrun::{OverrunDetector, elapsed};
 use wheeleg_protocol::link::{LinkState, LinkSupervisor, WatchdogCycles};
-use wheeleg_protocol::{DisarmReason, Fault, NackReason};
+use wheeleg_protocol::{DisarmReason, Fault, LogEvent, LogRecords, NackReason};
 use wheeleg_units::Micros;
 
 /// Times of the supervision.
@@ -39,6 +40,7 @@ pub(crate) fn watchdog(cycles: i32) -> WatchdogCycles {
 
 /// What an open-outlet mode is for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
 pub enum ExhaustKind {
     /// End of a staged stop: outlets pulsed, so that a loaded leg sinks slowly.
     #[default]
@@ -53,8 +55,8 @@ pub enum ExhaustKind {
 #[derive(Clone, Debug)]
 pub struct Supervisor {
     mode: Mode,
-    /// Complement of the mode, to detect a flipped bit.
-    mode_check: u8,
+    /// Complement of what steers the outputs, to detect a flipped bit.
+    check: u16,
     entered_at: Micros,
     staged: bool,
     /// Whether the present Hold began while the outputs were driven.
@@ -67,6 +69,7 @@ pub struct Supervisor {
     link: LinkSupervisor,
     clock: Clock,
     overrun: OverrunDetector,
+    log: Log,
 }
 
 /// The reason with which a refused request is answered.
@@ -103,9 +106,9 @@ impl Default for Supervisor {
 impl Supervisor {
     /// In Boot, no link, no fault.
     pub fn new() -> Self {
-        Self {
+        let mut fresh = Self {
             mode: Mode::Boot,
-            mode_check: !(Mode::Boot as u8),
+            check: 0,
             entered_at: Micros::ZERO,
             staged: false,
             from_drive: false,
@@ -117,7 +120,52 @@ impl Supervisor {
             link: LinkSupervisor::default(),
             clock: Clock::default(),
             overrun: OverrunDetector::new(),
+            log: Log::default(),
+        };
+        fresh.check = !fresh.steering();
+        fresh
+    }
+
+    /// What decides, with the mode, which outputs are driven and when: all in one word.
+    #[inline(always)]
+    fn steering(&self) -> u16 {
+        let flag = |flag: bool, place: u32| u16::from(flag).wrapping_shl(place);
+        u16::from(self.mode as u8)
+            | u16::from(self.exhaust as u8).wrapping_shl(4)
+            | flag(self.staged, 8)
+            | flag(self.from_drive, 9)
+            | flag(self.exhaust_allowed, 10)
+            | flag(self.emergency, 11)
+    }
+
+    #[inline(always)]
+    fn is_intact(&self) -> bool {
+        self.check == !self.steering()
+    }
+
+    /// Changes what the check covers. What was damaged before keeps its broken
+    /// check, so that the next tick still sees the damage.
+    #[inline]
+    fn change(&mut self, change: impl FnOnce(&mut Self)) {
+        let intact = self.is_intact();
+        change(self);
+        if intact {
+            self.check = !self.steering();
         }
+    }
+
+    /// Records what happened, for whoever reads the log.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn note(&mut self, event: LogEvent, a: u8, b: u16, at: Micros) {
+        let now_us = self.clock.unwrap(at);
+        self.log.push(event, a, b, at, now_us);
+    }
+
+    /// The oldest records of the log, which goes on for `lease_ms`.
+    pub(crate) fn read_log(&mut self, lease_ms: u16, at: Micros) -> LogRecords {
+        let now_us = self.clock.unwrap(at);
+        self.log.read(lease_ms, now_us)
     }
 
     /// Present mode.
@@ -176,35 +224,53 @@ impl Supervisor {
     pub fn apply(&mut self, event: Event, at: Micros) -> Result<Mode, Refusal> {
         let before = self.mode;
         let next = before.after(event)?;
-        if next != before {
-            self.entered_at = at;
-            if before.may_drive() && !next.may_drive() {
-                self.disarm_reason = disarm_reason(event);
-            }
-            if next == Mode::Hold {
-                self.from_drive = before.may_drive();
-                self.staged =
-                    self.from_drive && matches!(event, Event::LinkLost | Event::EmergencyStop);
-            }
-            self.mode = next;
-            self.mode_check = !(next as u8);
+        if next != before || matches!(event, Event::OpenAllValves | Event::BlowThrough) {
+            self.enter(event, next, at);
         }
-        match event {
-            Event::OpenAllValves => self.exhaust = ExhaustKind::Commanded,
-            Event::StageExhaust => self.exhaust = ExhaustKind::Staged,
-            Event::BlowThrough => self.exhaust = ExhaustKind::BlowThrough,
-            // Inlets never stay open when something goes wrong.
-            Event::LinkLost | Event::AxisFault if self.exhaust == ExhaustKind::BlowThrough => {
-                self.exhaust = ExhaustKind::Commanded;
-            }
-            _ => {}
+        // Inlets never stay open when something goes wrong.
+        if matches!(event, Event::LinkLost | Event::AxisFault)
+            && self.exhaust == ExhaustKind::BlowThrough
+        {
+            self.change(|own| own.exhaust = ExhaustKind::Commanded);
         }
         Ok(next)
     }
 
+    #[inline(never)]
+    fn enter(&mut self, event: Event, next: Mode, at: Micros) {
+        let before = self.mode;
+        self.change(|own| {
+            match event {
+                Event::OpenAllValves => own.exhaust = ExhaustKind::Commanded,
+                Event::StageExhaust => own.exhaust = ExhaustKind::Staged,
+                Event::BlowThrough => own.exhaust = ExhaustKind::BlowThrough,
+                _ => {}
+            }
+            if next == before {
+                return;
+            }
+            own.entered_at = at;
+            if before.may_drive() && !next.may_drive() {
+                own.disarm_reason = disarm_reason(event);
+            }
+            if next == Mode::Hold {
+                own.from_drive = before.may_drive();
+                own.staged =
+                    own.from_drive && matches!(event, Event::LinkLost | Event::EmergencyStop);
+            }
+            own.mode = next;
+        });
+        if next != before {
+            self.note(LogEvent::Mode, before as u8, u16::from(next as u8), at);
+        }
+    }
+
     /// Latches a fault and applies the event it stands for.
     pub fn fault(&mut self, fault: Fault, event: Event, at: Micros) {
-        self.faults.latch(fault, at);
+        if self.faults.latch(fault, at) {
+            let mode = u16::from(self.mode as u8);
+            self.note(LogEvent::Fault, fault.code(), mode, at);
+        }
         // Every fault event has a next mode in every mode; the table test
         // holds that, so there is no refusal to lose here.
         let _ = self.apply(event, at);
@@ -215,13 +281,13 @@ impl Supervisor {
     pub fn sync(&mut self, counter: u16, emergency: bool, at: Micros) -> bool {
         if emergency {
             // Even with a frozen counter: stopping needs no proof of freshness.
-            self.emergency = true;
+            self.change(|own| own.emergency = true);
             self.fault(Fault::EmergencyStop, Event::EmergencyStop, at);
         }
         let at_us = self.clock.unwrap(at);
         let fresh = self.link.on_sync(counter, at_us);
-        if fresh {
-            self.emergency = emergency;
+        if fresh && emergency != self.emergency {
+            self.change(|own| own.emergency = emergency);
         }
         fresh
     }
@@ -229,7 +295,9 @@ impl Supervisor {
     /// Takes the link-loss action of a fresh SYNC slot: whether the gait phase
     /// allows the exhaust.
     pub fn allow_exhaust(&mut self, allowed: bool) {
-        self.exhaust_allowed = allowed;
+        if allowed != self.exhaust_allowed {
+            self.change(|own| own.exhaust_allowed = allowed);
+        }
     }
 
     /// Supervision at the start of a tick: deadlines, link, own state, staging.
@@ -237,12 +305,8 @@ impl Supervisor {
         if self.overrun.begin(now, times.tick) {
             self.fault(Fault::TickOverrun, Event::BoardFault, now);
         }
-        if self.mode_check != !(self.mode as u8) {
-            self.mode = Mode::Hold;
-            self.mode_check = !(Mode::Hold as u8);
-            self.staged = false;
-            self.from_drive = false;
-            self.faults.latch(Fault::StateCorrupt, now);
+        if !self.is_intact() {
+            self.repair(now);
         }
         self.link.set_watchdog(times.watchdog);
         let now_us = self.clock.unwrap(now);
@@ -259,6 +323,22 @@ impl Supervisor {
         {
             let _ = self.apply(Event::BlowThroughOver, now);
         }
+    }
+
+    /// A bit has flipped: Hold, and nothing of what it may have been.
+    #[cold]
+    #[inline(never)]
+    fn repair(&mut self, now: Micros) {
+        self.mode = Mode::Hold;
+        self.exhaust = ExhaustKind::Staged;
+        self.staged = false;
+        self.from_drive = false;
+        self.exhaust_allowed = false;
+        // An E-stop bit that flipped off comes with the next SYNC; the latched
+        // fault keeps the dump valve open meanwhile.
+        self.emergency = false;
+        self.check = !self.steering();
+        self.fault(Fault::StateCorrupt, Event::AxisFault, now);
     }
 
     /// The tick ended at `end`.
@@ -281,6 +361,7 @@ impl Supervisor {
         let now_us = self.clock.unwrap(at);
         self.link.clear(now_us).map_err(|_| Refusal::NoLink)?;
         let next = self.apply(Event::ClearFault, at)?;
+        self.note(LogEvent::Cleared, 0, self.faults.latched().raw(), at);
         self.faults.clear();
         Ok(next)
     }
@@ -294,5 +375,69 @@ impl Supervisor {
             return Err(Refusal::NoLink);
         }
         self.apply(Event::Arm, at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_protocol::link::WatchdogCycles;
+
+    const TIMES: SupervisionTimes = SupervisionTimes {
+        tick: Micros(1000),
+        watchdog: WatchdogCycles::DEFAULT,
+        hold: Micros::from_millis(500),
+        blow_through: Micros::from_millis(5000),
+    };
+
+    /// Armed, then in Hold after the loss of the link.
+    fn held() -> Supervisor {
+        let mut own = Supervisor::new();
+        own.begin_tick(Micros(0), &TIMES);
+        own.apply(Event::SelfTestPassed, Micros(0)).unwrap();
+        own.apply(Event::Arm, Micros(0)).unwrap();
+        own.allow_exhaust(true);
+        own.fault(Fault::LinkLost, Event::LinkLost, Micros(0));
+        own.begin_tick(Micros(1000), &TIMES);
+        assert_eq!((own.mode(), own.staged), (Mode::Hold, true));
+        own
+    }
+
+    #[test]
+    fn a_flipped_bit_of_what_steers_the_outputs_is_held() {
+        let flips: [fn(&mut Supervisor); 7] = [
+            |own| own.mode = Mode::Tracking,
+            |own| own.exhaust = ExhaustKind::BlowThrough,
+            |own| own.staged = false,
+            |own| own.from_drive = false,
+            |own| own.exhaust_allowed = false,
+            |own| own.emergency = true,
+            |own| own.check ^= 1 << 15,
+        ];
+        for (index, flip) in flips.into_iter().enumerate() {
+            // Damage is seen also when something changes before the next tick.
+            for changed in [false, true] {
+                let mut own = held();
+                flip(&mut own);
+                if changed {
+                    own.allow_exhaust(false);
+                }
+                own.begin_tick(Micros(2000), &TIMES);
+                assert!(
+                    own.faults().latched().contains(Fault::StateCorrupt),
+                    "{index}"
+                );
+                assert_eq!((own.mode(), own.staged), (Mode::Hold, false));
+                assert_eq!(own.exhaust(), ExhaustKind::Staged);
+                // Nothing is staged by a program whose state was wrong.
+                for tick in 3..2000 {
+                    own.begin_tick(Micros(tick * 1000), &TIMES);
+                    assert_eq!(own.mode(), Mode::Hold);
+                }
+            }
+        }
+        let mut sound = held();
+        sound.begin_tick(Micros(2000), &TIMES);
+        assert!(!sound.faults().latched().contains(Fault::StateCorrupt));
     }
 }

@@ -186,3 +186,29 @@ fn a_speed_changed_during_a_profile_is_that_of_the_next_one() {
     assert!(largest[0] > 2 * 20, "{largest:?}");
     assert!((1..=2 * 10).contains(&largest[1]), "{largest:?}");
 }
+
+/// Cycles until a piston that does not move is at fault, pushed all the time.
+fn cycles_to_no_motion() -> u32 {
+    let mut rig = JointRig::tracking(Hold);
+    for cycle in 1..=400 {
+        rig.run_cycles(1, Some(setpoint(140.0, Hold)));
+        if rig.node.mode() == Mode::Hold {
+            assert!(rig.node.faults().contains(Fault::NoMotion));
+            return cycle;
+        }
+    }
+    panic!("a piston that stands still under air is at fault");
+}
+
+#[test]
+fn rest_ends_the_wait_for_a_motion() {
+    let part = cycles_to_no_motion() * 7 / 10;
+    let mut rig = JointRig::tracking(Hold);
+    for _ in 0..3 {
+        rig.run_cycles(part, Some(setpoint(140.0, Hold)));
+        assert_eq!(rig.node.mode(), Mode::Tracking);
+        rig.run_cycles(30, Some(setpoint(100.0, Hold)));
+        assert!(rig.node.snapshot().settled);
+    }
+    assert!(rig.node.faults().is_empty());
+}

@@ -26,6 +26,9 @@ pub const MAX_DEADLINE_CYCLES: u16 = 200;
 /// A repeated request is known as such for this long, µs.
 pub const DUPLICATE_WINDOW_US: u64 = 500_000;
 
+/// Slots for the answers to [`MessageType::Discover`]; a power of two.
+pub const DISCOVERY_SLOTS: u32 = 8;
+
 /// Slots of one bus cycle at a line rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SlotTiming {
@@ -103,6 +106,25 @@ impl SlotTiming {
         self.cyclic_us().saturating_mul(1000).div_ceil(CYCLE_US)
     }
 
+    /// Start of a board's answer to [`MessageType::Discover`], µs after the end of
+    /// the request: one of [`DISCOVERY_SLOTS`] slots, chosen by the unique id and
+    /// the newest bus cycle. Two boards meet in one slot in one of eight cycles,
+    /// and in the next choose anew.
+    #[must_use]
+    pub fn discovery_us(self, unique_id: &[u8; 12], cycle: u16) -> u32 {
+        // FNV-1a, 32 bit, over the cycle's low byte and the id; its upper bits. (With a
+        // CRC, which is linear, two ids would meet in all cycles or in none.)
+        let [low, _] = cycle.to_le_bytes();
+        let hash = core::iter::once(&low)
+            .chain(unique_id)
+            .fold(0x811C_9DC5_u32, |hash, byte| {
+                (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
+            });
+        let slot = hash.wrapping_shr(16) & DISCOVERY_SLOTS.wrapping_sub(1);
+        let pitch = self.frame_us(MessageType::Identity).saturating_add(GAP_US);
+        TURNAROUND_US.saturating_add(pitch.saturating_mul(slot))
+    }
+
     /// Time that a request and its longest answer occupy the line, turnaround and
     /// gap included, µs; `None` if the type is no request.
     #[must_use]
@@ -113,6 +135,13 @@ impl SlotTiming {
         let answer = self.frame_us(answer);
         let nack = self.frame_us(MessageType::Nack);
         let longest = if answer > nack { answer } else { nack };
+        let longest = if matches!(request, MessageType::Discover) {
+            longest
+                .saturating_add(GAP_US)
+                .saturating_mul(DISCOVERY_SLOTS)
+        } else {
+            longest
+        };
         Some(
             self.frame_us(request)
                 .saturating_add(TURNAROUND_US)
@@ -219,6 +248,25 @@ mod tests {
         assert!(timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange));
         assert!(!timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange + 1));
         assert!(!timing.exchange_fits(MessageType::Sync, start));
+    }
+
+    #[test]
+    fn boards_at_one_address_part_within_a_few_cycles() {
+        let timing = SlotTiming::DEFAULT;
+        let ids: [[u8; 12]; 2] = [[3; 12], [0xFC; 12]];
+        let mut apart = 0;
+        for cycle in 0..256_u16 {
+            let [a, b] = ids.map(|id| timing.discovery_us(&id, cycle));
+            assert!(a >= TURNAROUND_US && b <= TURNAROUND_US + 7 * 420);
+            assert_eq!(a, timing.discovery_us(&ids[0], cycle + 256));
+            apart += u32::from(a.abs_diff(b) >= 420);
+        }
+        // Seven of eight cycles.
+        assert!((205..=243).contains(&apart), "{apart}");
+        assert_eq!(
+            timing.exchange_us(MessageType::Discover),
+            Some(150 + 100 + 8 * 420 + 20)
+        );
     }
 
     #[test]

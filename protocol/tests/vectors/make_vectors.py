@@ -59,11 +59,14 @@ ENUMS = {
                      6: "EmergencyBrake", 7: "OpenAllValves"},
     "NackReason": {1: "UnknownMessage", 2: "BadLength", 3: "OutOfRange", 4: "Busy", 5: "WrongMode", 6: "NotArmed",
                    7: "Armed", 8: "Duplicate", 9: "Expired", 10: "UnknownParameter", 11: "ReadOnly",
-                   12: "VersionMismatch", 13: "FaultLatched", 14: "WrongBoard", 15: "LinkDown", 16: "NotReady"},
+                   12: "VersionMismatch", 13: "FaultLatched", 14: "WrongBoard", 15: "LinkDown", 16: "NotReady",
+                   17: "StoreFailed"},
+    "ResetCause": {0: "Unknown", 1: "PowerUp", 2: "Watchdog", 3: "BrownOut", 4: "ProcessorFault", 5: "Panic",
+                   6: "ClockLoss", 7: "Software", 8: "Pin", 9: "OptionBytes"},
 }
 FAULTS = {1: "LinkLost", 2: "StaleMaster", 3: "SlotOverrun", 32: "SensorRange",
           33: "SensorRate", 34: "FollowingError", 35: "TickOverrun", 36: "ParameterCorrupt", 37: "StateCorrupt",
-          38: "SupplyLost", 39: "EmergencyStop", 40: "OverTravel", 41: "EncoderFault", 42: "WatchdogReset",
+          38: "SupplyLost", 39: "EmergencyStop", 40: "OverTravel", 41: "EncoderFault", 42: "UnexpectedReset",
           43: "DuplicateAddress", 44: "NoMotion"}
 INTS = {"u8": ("B", 0, 2**8 - 1), "u16": ("<H", 0, 2**16 - 1), "u32": ("<I", 0, 2**32 - 1),
         "u64": ("<Q", 0, 2**64 - 1), "i16": ("<h", -2**15, 2**15 - 1), "i32": ("<i", -2**31, 2**31 - 1)}
@@ -163,6 +166,9 @@ MESSAGES = {
     0x14: ("FaultReport", []),
     0x15: ("EmergencyBrake", []),
     0x16: ("TransmitPosition", []),
+    0x17: ("Discover", []),
+    0x18: ("LinkReport", []),
+    0x19: ("LogRead", [("lease_ms", "u16")]),
     0x20: ("PositionReference", [("reference_raw", "i32"), DEADLINE]),
     0x21: ("OpenAllValves", [("mode", "OpenMode")]),
     0x22: ("SelectCorrection", [("correction", "Correction")]),
@@ -175,6 +181,7 @@ MESSAGES = {
     0x36: ("WheelMode", [("mode", "WheelControlMode")]),
     0x40: ("ParamGet", [("id", "u16")]),
     0x41: ("ParamSet", [("id", "u16"), ("value", "i32")]),
+    0x42: ("ParamSave", []),
     0x80: ("Ack", [("request", "u8")]),
     0x81: ("Nack", [("request", "u8"), ("reason", "NackReason")]),
     0x82: ("Identity", [("board", "BoardKind"), ("address", "Address"), ("firmware", "bytes3"),
@@ -182,7 +189,12 @@ MESSAGES = {
     0x83: ("Position", [("position_raw", "i32"), ("velocity_raw", "i16"), ("cycle", "u16"), ("age_us", "u16")]),
     0x84: ("ParamValue", [("id", "u16"), ("value", "i32")]),
     0x85: ("FaultRecord", [("active", "FaultBits"), ("sticky", "FaultBits"), ("first_fault", "FaultCode"),
-                           ("first_time_us", "u32"), ("disarm_reason", "DisarmReason"), ("limits", "LimitBits")]),
+                           ("first_time_us", "u32"), ("disarm_reason", "DisarmReason"), ("limits", "LimitBits"),
+                           ("reset_cause", "ResetCause"), ("clock_offset_us", "u32")]),
+    0x86: ("LinkRecord", [("frames", "u32"), ("overflow", "u16"), ("truncated", "u16"), ("short", "u16"),
+                          ("crc", "u16"), ("version", "u16"), ("length", "u16"), ("address", "u16"),
+                          ("unsent", "u16"), ("drift_ppm", "i16")]),
+    0x87: ("LogRecords", [("lost", "u16"), ("left", "u8"), ("entries", "bytes32")]),
 }
 
 
@@ -197,6 +209,7 @@ EXAMPLES = {
     # 89.75 mm, -20 mm/s, duty 0.25, tracking, duty saturated, front and rear foot switch.
     0x02: [89 * MM + 3 * MM // 4, -320, 4096, 0, 3, 1, 5, 300 % 256],
     0x11: [0x0123456789ABCDEF],
+    0x19: [2_000],
     0x20: [90 * MM, 305],
     0x21: [0],
     0x22: [1],
@@ -214,7 +227,11 @@ EXAMPLES = {
     0x82: [1, 3, [0, 1, 0], 0x0123456789ABCDEF, list(range(0x30, 0x3C))],
     0x83: [89 * MM + 3 * MM // 4, -320, 300, 1_250],
     0x84: [0x0101, 335_544],
-    0x85: [1 | 1 << 4, 1 | 1 << 4, 32, 4_200_000, 4, 0],
+    0x85: [1 | 1 << 4, 1 | 1 << 4, 32, 4_200_000, 4, 0, 1, 4_294_000_000],
+    # Two lost bytes and a flipped bit among 12 000 frames; the clock is 35 ppm slow.
+    0x86: [12_000, 0, 2, 0, 1, 0, 0, 0, 0, -35],
+    # From Armed to Tracking, then a fault.
+    0x87: [0, 0, [64, 66, 15, 0, 1, 2, 3, 0, 128, 132, 30, 0, 2, 44, 3, 0] + [0] * 16],
 }
 
 

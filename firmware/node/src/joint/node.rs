@@ -7,7 +7,7 @@ use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
 use crate::debounce::Debounce;
-use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
+use crate::hardware::{ParameterStore, PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::JointParameters;
 use crate::seal::Seal;
@@ -17,7 +17,7 @@ use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
 use wheeleg_control::joint::JointController;
 use wheeleg_control::pwm::ValvePwm;
-use wheeleg_protocol::{BoardKind, Fault, FaultBits};
+use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
 
 /// State that only a tick changes, sealed between two ticks.
@@ -105,6 +105,32 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         Ok(node)
     }
 
+    /// A board with the parameters that its memory kept. Those that contradict each
+    /// other are not used: the board starts with its defaults and a latched
+    /// fault, so that it can be reached and told better ones.
+    ///
+    /// # Errors
+    /// [`ConfigError::Address`], as [`Self::new`].
+    pub fn from_store(
+        identity: NodeIdentity,
+        stored: JointParameters,
+        valves: V,
+        sensor: S,
+        switches: W,
+    ) -> Result<Self, ConfigError> {
+        let sound = JointSettings::new(&stored).is_some();
+        let parameters = if sound {
+            stored
+        } else {
+            JointParameters::default()
+        };
+        let mut node = Self::new(identity, parameters, valves, sensor, switches)?;
+        if !sound {
+            node.axis_fault(Fault::ParameterCorrupt, Micros::ZERO);
+        }
+        Ok(node)
+    }
+
     /// Takes bytes of the bus, in any chunking; the last of them ended at
     /// `t_end`. Never panics, for any bytes.
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
@@ -162,6 +188,29 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// latched fault.
     pub fn tick_done(&mut self, end: Micros) {
         self.core.supervisor.end_tick(end, &self.core.times);
+    }
+
+    /// Says why the processor started; call it before the first tick. After a
+    /// watchdog, a brown-out or a processor fault the board has a latched fault.
+    pub fn started_by(&mut self, cause: ResetCause) {
+        self.core.started_by(cause);
+    }
+
+    /// The board's transmitter was cut off by its time limit: a latched fault.
+    pub fn driver_cut_off(&mut self, at: Micros) {
+        self.core.axis_fault(Fault::SlotOverrun, at);
+    }
+
+    /// Whether the parameters are to be stored: call [`Self::save`] between two ticks.
+    pub fn save_is_due(&self) -> bool {
+        self.core.save_is_due()
+    }
+
+    /// Stores the parameters in force, which may take a while: the next tick is not
+    /// measured against this one.
+    pub fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+        let records = self.parameters.changed_from_default();
+        self.core.save(records, store, at);
     }
 
     /// Internals after the last tick.
@@ -243,7 +292,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {
-        self.core.supervisor.fault(fault, Event::AxisFault, now);
+        self.core.axis_fault(fault, now);
     }
 
     /// Self-test in Boot, faults of the sensor in every other mode.

@@ -7,7 +7,7 @@ use super::motion::Target;
 use super::settings::WheelSettings;
 use crate::board::{BoardCore, NodeIdentity, receive};
 use crate::debounce::Debounce;
-use crate::hardware::{DumpValve, Encoder, MotorDrive, SwitchBank};
+use crate::hardware::{DumpValve, Encoder, MotorDrive, ParameterStore, SwitchBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::WheelParameters;
 use crate::seal::Seal;
@@ -15,7 +15,7 @@ use crate::snapshot::{TickReport, WheelSnapshot};
 use crate::transmission::Transmission;
 use crate::{ConfigError, SWITCH_TICKS};
 use wheeleg_control::wheel::{WheelCommand, WheelController};
-use wheeleg_protocol::{BoardKind, Fault, FaultBits, LimitBits, WheelControlMode};
+use wheeleg_protocol::{BoardKind, Fault, FaultBits, LimitBits, ResetCause, WheelControlMode};
 use wheeleg_units::{Micros, Ticks, WheelCount};
 
 /// Samples in Boot: long enough for the switch to be debounced.
@@ -102,6 +102,40 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         };
         node.tune();
         node.reseal_all();
+        Ok(node)
+    }
+
+    /// A board with the parameters that its memory kept. Those that contradict each
+    /// other are not used: the board starts with its defaults and a latched
+    /// fault, so that it can be reached and told better ones.
+    ///
+    /// # Errors
+    /// [`ConfigError::Address`], as [`Self::new`].
+    pub fn from_store(
+        identity: NodeIdentity,
+        stored: WheelParameters,
+        motor: M,
+        encoder: E,
+        supply_switch: P,
+        dump_valve: D,
+    ) -> Result<Self, ConfigError> {
+        let sound = WheelSettings::new(&stored, WheelControlMode::Position).is_some();
+        let parameters = if sound {
+            stored
+        } else {
+            WheelParameters::default()
+        };
+        let mut node = Self::new(
+            identity,
+            parameters,
+            motor,
+            encoder,
+            supply_switch,
+            dump_valve,
+        )?;
+        if !sound {
+            node.axis_fault(Fault::ParameterCorrupt, Micros::ZERO);
+        }
         Ok(node)
     }
 
@@ -195,6 +229,29 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.core.supervisor.end_tick(end, &self.core.times);
     }
 
+    /// Says why the processor started; call it before the first tick. After a
+    /// watchdog, a brown-out or a processor fault the board has a latched fault.
+    pub fn started_by(&mut self, cause: ResetCause) {
+        self.core.started_by(cause);
+    }
+
+    /// The board's transmitter was cut off by its time limit: a latched fault.
+    pub fn driver_cut_off(&mut self, at: Micros) {
+        self.core.axis_fault(Fault::SlotOverrun, at);
+    }
+
+    /// Whether the parameters are to be stored: call [`Self::save`] between two ticks.
+    pub fn save_is_due(&self) -> bool {
+        self.core.save_is_due()
+    }
+
+    /// Stores the parameters in force, which may take a while: the next tick is not
+    /// measured against this one.
+    pub fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+        let records = self.parameters.changed_from_default();
+        self.core.save(records, store, at);
+    }
+
     /// Internals after the last tick.
     pub const fn snapshot(&self) -> &WheelSnapshot {
         &self.snapshot
@@ -286,6 +343,6 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     }
 
     pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {
-        self.core.supervisor.fault(fault, Event::AxisFault, now);
+        self.core.axis_fault(fault, now);
     }
 }

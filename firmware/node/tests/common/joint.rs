@@ -7,14 +7,17 @@ use wheeleg_node::joint::JointNode;
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_node::snapshot::TickReport;
-use wheeleg_node::{NodeIdentity, Transmission};
+use wheeleg_node::{ConfigError, NodeIdentity, Transmission};
 use wheeleg_protocol::{
     Address, ClearFault, JointSetpoint, LinkLossAction, Message, SlotReply, Sync, SyncFlags,
     SyncSlots,
 };
 use wheeleg_units::{AdcCode, Micros, PositionMm, WireVelocity};
 
-pub type Node = JointNode<FourValves<Pwm, Pwm, Pwm, Pwm>, Sensor, FootSwitches<Pin, Pin, Pin, Pin>>;
+type Valves = FourValves<Pwm, Pwm, Pwm, Pwm>;
+type Feet = FootSwitches<Pin, Pin, Pin, Pin>;
+pub type Node = JointNode<Valves, Sensor, Feet>;
+type Make = fn(NodeIdentity, JointParameters, Valves, Sensor, Feet) -> Result<Node, ConfigError>;
 
 /// Left-aligned code of a stroke with the default calibration: 200 mm full
 /// scale, zero at 3277.
@@ -51,17 +54,28 @@ impl JointRig {
     }
 
     pub fn with(parameters: JointParameters) -> Self {
+        Self::made(Node::new, parameters, [3; 12])
+    }
+
+    /// With parameters from the board's memory.
+    pub fn stored(parameters: JointParameters) -> Self {
+        Self::made(Node::from_store, parameters, [3; 12])
+    }
+
+    /// With another processor.
+    pub fn with_id(unique_id: [u8; 12]) -> Self {
+        Self::made(Node::new, JointParameters::default(), unique_id)
+    }
+
+    fn made(make: Make, parameters: JointParameters, unique_id: [u8; 12]) -> Self {
         let valves: [Pwm; 4] = Default::default();
         let feet: [Pin; 4] = Default::default();
         let sensor = Sensor::at(code_at(100.0).get());
         let address = Address::joint(3).unwrap();
         let [fill_a, vent_a, fill_b, vent_b] = valves.clone();
         let [a, b, c, d] = feet.clone();
-        let node = JointNode::new(
-            NodeIdentity {
-                address,
-                unique_id: [3; 12],
-            },
+        let node = make(
+            NodeIdentity { address, unique_id },
             parameters,
             FourValves {
                 fill_a,

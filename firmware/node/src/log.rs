@@ -1,0 +1,130 @@
+//! The log stream of a board: records in left-over bandwidth, while somebody reads.
+//!
+//! A reader holds a lease; without one nothing is recorded. A token bucket keeps a
+//! storm of events from pushing everything else out: sixteen records at once, one
+//! per millisecond on the average. What is beyond is counted.
+
+use heapless::Deque;
+use wheeleg_protocol::{LOG_ENTRIES, LogEntry, LogEvent, LogRecords};
+use wheeleg_units::Micros;
+
+/// Records that wait, and tokens of a full bucket.
+const DEPTH: usize = 16;
+
+/// Waiting records of one board.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    waiting: Deque<[u8; 8], DEPTH>,
+    lost: u16,
+    /// End of the lease, µs since reset; 0 when nobody reads.
+    lease_end_us: u64,
+    tokens: u8,
+    /// Millisecond of the last record.
+    filled_ms: u64,
+}
+
+impl Log {
+    /// Takes what happened at `at`, `now_us` on the clock that does not wrap.
+    #[cold]
+    pub fn push(&mut self, event: LogEvent, a: u8, b: u16, at: Micros, now_us: u64) {
+        if now_us >= self.lease_end_us {
+            return;
+        }
+        let now_ms = now_us.wrapping_shr(10);
+        let earned = now_ms.saturating_sub(self.filled_ms).min(DEPTH as u64);
+        self.filled_ms = now_ms;
+        self.tokens = self.tokens.saturating_add(earned as u8).min(DEPTH as u8);
+        let entry = LogEntry {
+            time_us: at.get(),
+            event,
+            a,
+            b,
+        };
+        if self.tokens > 0 && self.waiting.push_back(entry.to_bytes()).is_ok() {
+            self.tokens = self.tokens.saturating_sub(1);
+        } else {
+            self.lost = self.lost.saturating_add(1);
+        }
+    }
+
+    /// Gives the oldest records away and the lease a new end.
+    #[cold]
+    pub fn read(&mut self, lease_ms: u16, now_us: u64) -> LogRecords {
+        if now_us >= self.lease_end_us {
+            // A lease that ended takes what was not fetched with it.
+            *self = Self {
+                tokens: DEPTH as u8,
+                filled_ms: now_us.wrapping_shr(10),
+                ..Self::default()
+            };
+        }
+        self.lease_end_us = now_us.saturating_add(u64::from(lease_ms).saturating_mul(1000));
+        let mut entries = [0; 8 * LOG_ENTRIES];
+        let (places, _) = entries.as_chunks_mut::<8>();
+        for place in places {
+            *place = self.waiting.pop_front().unwrap_or_default();
+        }
+        LogRecords {
+            lost: core::mem::take(&mut self.lost),
+            left: self.waiting.len() as u8,
+            entries,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn push(log: &mut Log, number: u16, now_us: u64) {
+        log.push(
+            LogEvent::Parameter,
+            0,
+            number,
+            Micros(now_us as u32),
+            now_us,
+        );
+    }
+
+    fn numbers(records: &LogRecords) -> Vec<u16> {
+        records.iter().map(|entry| entry.b).collect()
+    }
+
+    #[test]
+    fn nothing_is_recorded_without_a_lease_or_after_its_end() {
+        let mut log = Log::default();
+        push(&mut log, 1, 100);
+        assert!(numbers(&log.read(20, 1000)).is_empty());
+        push(&mut log, 2, 20_999);
+        push(&mut log, 3, 21_000);
+        assert_eq!(numbers(&log.read(0, 20_999)), [2]);
+        push(&mut log, 4, 21_001);
+        assert!(numbers(&log.read(20, 22_000)).is_empty());
+        // What a reader that died left behind is not told to the next one.
+        push(&mut log, 5, 23_000);
+        let late = log.read(20, 90_000);
+        assert_eq!((numbers(&late), late.lost), (vec![], 0));
+    }
+
+    #[test]
+    fn records_come_in_order_and_losses_are_counted() {
+        let mut log = Log::default();
+        log.read(60_000, 0);
+        for number in 0..20 {
+            push(&mut log, number, 10);
+        }
+        let first = log.read(60_000, 11);
+        assert_eq!(numbers(&first), [0, 1, 2, 3]);
+        assert_eq!((first.lost, first.left), (4, 12));
+        assert_eq!(numbers(&log.read(60_000, 12)), [4, 5, 6, 7]);
+        // The bucket is empty although there is room again.
+        push(&mut log, 99, 13);
+        assert_eq!(log.read(60_000, 14).lost, 1);
+        // A millisecond earns at least one record, a pause no more than sixteen.
+        push(&mut log, 100, 2000);
+        let records: Vec<u16> = (0..3)
+            .flat_map(|_| numbers(&log.read(60_000, 2001)))
+            .collect();
+        assert_eq!(records, [12, 13, 14, 15, 100]);
+    }
+}

@@ -1,0 +1,134 @@
+//! The board's clock against the master's.
+//!
+//! SYNC carries the master's time at its start. What is kept is the difference at
+//! the latch of the newest SYNC, and the drift over the last second: how far the
+//! difference has moved. A jump of more than 100 ms is another master, not a drift.
+
+use crate::overrun::elapsed;
+use wheeleg_protocol::MessageType;
+use wheeleg_protocol::link::SlotTiming;
+use wheeleg_units::Micros;
+
+/// Time from the master's stamp to the latch: SYNC on the line, µs.
+const SYNC_US: u32 = SlotTiming::DEFAULT.frame_us(MessageType::Sync);
+
+/// Time over which a drift is measured: then one µs is one ppm.
+const WINDOW: Micros = Micros::from_millis(1000);
+
+/// Largest step of the difference that is a drift, µs.
+const JUMP_US: i32 = 100_000;
+
+/// Drift beyond which a board does not keep to its slot, ppm: over the 3.6 ms of
+/// the slots it is 7 µs, of a gap of 20 µs between two of them, and the neighbour
+/// may run as wrong the other way.
+pub const DRIFT_LIMIT_PPM: i16 = 2000;
+
+/// Offset and drift.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TimeSync {
+    offset_us: u32,
+    /// Latch and offset at the start of the window.
+    start: Option<(Micros, u32)>,
+    drift_ppm: i16,
+}
+
+impl TimeSync {
+    /// Takes the stamp of a SYNC latched at `at`; true when the drift was beyond its
+    /// limit in two windows in a row, in the same direction: late frames are
+    /// not a clock that runs wrong.
+    pub fn sync(&mut self, master_time_us: u32, at: Micros) -> bool {
+        self.offset_us = master_time_us.wrapping_add(SYNC_US).wrapping_sub(at.get());
+        let Some((from, offset_us)) = self.start else {
+            self.start = Some((at, self.offset_us));
+            return false;
+        };
+        let moved = offset_us.wrapping_sub(self.offset_us) as i32;
+        if !(-JUMP_US..=JUMP_US).contains(&moved) {
+            self.start = None;
+            return false;
+        }
+        let took = elapsed(from, at).get();
+        if took < WINDOW.get() {
+            return false;
+        }
+        self.start = Some((at, self.offset_us));
+        let ppm = i64::from(moved)
+            .saturating_mul(i64::from(WINDOW.get()))
+            .checked_div(i64::from(took))
+            .unwrap_or(0);
+        let limit = |ppm: i16| i32::from(ppm / DRIFT_LIMIT_PPM).signum();
+        let before = limit(self.drift_ppm);
+        self.drift_ppm = i16::try_from(ppm).unwrap_or(if ppm < 0 { i16::MIN } else { i16::MAX });
+        before != 0 && before == limit(self.drift_ppm)
+    }
+
+    /// Master time less board time, µs, modulo 2^32; 0 before the first SYNC.
+    #[must_use]
+    pub const fn offset_us(&self) -> u32 {
+        self.offset_us
+    }
+
+    /// How much faster than the master's the board's clock runs, ppm.
+    #[must_use]
+    pub const fn drift_ppm(&self) -> i16 {
+        self.drift_ppm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seconds after which a clock that is wrong by `ppm` is a fault, of ten.
+    fn fault_after(ppm: i64, late_us: impl Fn(i64) -> i64) -> (Option<i64>, TimeSync) {
+        let mut clock = TimeSync::default();
+        let mut fault = None;
+        for cycle in 0..1000_i64 {
+            let master = cycle * 10_000 + 4_294_000_000;
+            let latched = master + 1020 + late_us(cycle);
+            let board = latched + latched * ppm / 1_000_000 + 77_000;
+            if clock.sync(master as u32, Micros(board as u32)) {
+                fault = fault.or(Some(cycle / 100));
+            }
+        }
+        (fault, clock)
+    }
+
+    #[test]
+    fn drift_is_measured_within_a_ppm_and_only_a_wrong_clock_is_a_fault() {
+        for ppm in [0, 35, -35, 200, -200, 1990] {
+            let (fault, clock) = fault_after(ppm, |_| 0);
+            assert_eq!(fault, None, "{ppm}");
+            assert!(
+                (i64::from(clock.drift_ppm()) - ppm).abs() <= 4,
+                "{ppm} {clock:?}"
+            );
+        }
+        for ppm in [2100, -2100, 40_000, -50_000] {
+            let (fault, _) = fault_after(ppm, |_| 0);
+            assert!(matches!(fault, Some(1 | 2)), "{ppm} {fault:?}");
+        }
+    }
+
+    #[test]
+    fn the_offset_turns_board_time_into_master_time() {
+        let (_, clock) = fault_after(0, |_| 0);
+        let board: u32 = 12_345;
+        let master = board.wrapping_add(clock.offset_us());
+        assert_eq!(board, master.wrapping_add(77_000));
+    }
+
+    #[test]
+    fn late_frames_and_a_new_master_are_no_drift() {
+        // Late by up to 5 ms, in an order without sense.
+        let (fault, _) = fault_after(0, |cycle| cycle * 7919 % 5000);
+        assert_eq!(fault, None);
+        let mut clock = TimeSync::default();
+        for cycle in 0..300_u32 {
+            let restarted = if cycle < 150 { 0 } else { 3_000_000_000 };
+            let master = restarted + cycle * 10_000;
+            assert!(!clock.sync(master, Micros(cycle * 10_000 + 1020)));
+        }
+        assert_eq!(clock.drift_ppm(), 0);
+    }
+}
