@@ -305,7 +305,7 @@ def rejected():
         for way in ways:
             yield bad(f"Route {{ message_type: {MESSAGES[kind][0]} }}", frame(kind, message(kind, "any")[0], *way, 1),
                       "a way this message may not go")
-    for kind in (0x00, 0x03, 0x17, 0x7F, 0x86, 0xFF):
+    for kind in (0x00, 0x03, 0x1A, 0x7F, 0x88, 0xFF):
         yield bad(f"UnknownType {{ code: {kind} }}", frame(kind, b"\1\2", 0, 1, 1), "unassigned message type")
     yield bad("Short", b"\0" + cobs(b"123") + b"\0", "three bytes")
     yield bad("Short", b"\0" + cobs(bytes(range(11))) + b"\0", "eleven bytes")
@@ -342,12 +342,13 @@ def rejected():
     yield value(0x33, b"\x00\x80", "acceleration 128")
     yield value(0x36, b"\5", "wheel mode 5")
     yield value(0x81, b"\x10\x00", "nack reason 0")
-    yield value(0x81, b"\x10\x11", "nack reason 17")
+    yield value(0x81, b"\x10\x12", "nack reason 18")
     yield value(0x82, bytes([3, 1]) + bytes(23), "board kind 3")
     yield value(0x82, bytes([1, 9]) + bytes(23), "address 9")
-    yield value(0x85, struct.pack("<HHBIBB", 0, 0, 5, 0, 0, 0), "fault number 5")
-    yield value(0x85, struct.pack("<HHBIBB", 0, 0, 96, 0, 0, 0), "a limit as first fault")
-    yield value(0x85, struct.pack("<HHBIBB", 0, 0, 0, 0, 8, 0), "disarm reason 8")
+    yield value(0x85, struct.pack("<HHBIBBBI", 0, 0, 5, 0, 0, 0, 0, 0), "fault number 5")
+    yield value(0x85, struct.pack("<HHBIBBBI", 0, 0, 96, 0, 0, 0, 0, 0), "a limit as first fault")
+    yield value(0x85, struct.pack("<HHBIBBBI", 0, 0, 0, 0, 8, 0, 0, 0), "disarm reason 8")
+    yield value(0x85, struct.pack("<HHBIBBBI", 0, 0, 0, 0, 0, 0, 10, 0), "reset cause 10")
 
 
 print(json.dumps({"source": "make_vectors.py", "accepted": list(accepted()), "rejected": list(rejected())}, indent=1))
