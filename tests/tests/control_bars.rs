@@ -1,16 +1,27 @@
 //! The bars of position control with four on/off valves and one potentiometer,
 //! on the bench axis (bore 20 x 180 mm, VQ110U-class valves, 1.5 kg, 6 bar gauge)
-//! and on axes that nobody tuned for. All on the firmware's own control path.
+//! and on axes that nobody tuned for. All on the joint board's whole application,
+//! supervision included: a fault in any of these cases is a false alarm and fails it.
 
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::testing::wheeleg_2003_axis;
-use wheeleg_sim::bench::suite::{self, Factors, StartUp};
-use wheeleg_sim::bench::{Bench, Firmware, Kind, Metrics, Motion, design, optimal, plant_check};
+use wheeleg_sim::bench::suite::{self, Factors, Rig, StartUp};
+use wheeleg_sim::bench::{Kind, Metrics, Motion, Trace, design, optimal, plant_check};
+use wheeleg_sim::compare::{Figures, Move, RECOVERY_S, Scene, Sizes, Variation};
 use wheeleg_sim::config::AxisConfig;
 use wheeleg_units::{Duty, PositionMm};
 
 fn bench_axis() -> AxisParams {
     AxisConfig::load("bench-vq110u").expect("built in").axis
+}
+
+/// No case here has a fault in it.
+fn without_alarm(trace: &Trace, context: &str) {
+    assert!(
+        trace.faults.is_empty() && trace.drove,
+        "{context}: {:?}",
+        trace.faults
+    );
 }
 
 /// Metrics of steps after one another; the first is the learning move.
@@ -21,11 +32,30 @@ fn moves(
     seed: u64,
     targets: &[f64],
 ) -> Vec<Metrics> {
-    suite::steps(&bench_axis(), factors, kind, start, seed, targets, 2.5)
-        .expect("the axis runs")
-        .iter()
-        .map(Metrics::of)
-        .collect()
+    let traces = suite::steps(&bench_axis(), factors, kind, start, seed, targets, 2.5)
+        .expect("the axis runs");
+    for trace in &traces {
+        without_alarm(trace, &format!("{}, {factors:?}, seed {seed}", kind.name()));
+    }
+    traces.iter().map(Metrics::of).collect()
+}
+
+/// Figures of a case of `wheeleg compare`, as on the sheet.
+fn nominal(axis: &str, kind: Kind, motion: Move, seed: u64) -> Figures {
+    let sheet = AxisConfig::load(axis).expect("built in").axis;
+    let scene = Scene::new(axis, &sheet, Variation::Nominal, seed).expect("runs");
+    let played = scene
+        .play(kind, motion)
+        .expect("runs")
+        .expect("no load is feasible");
+    let figures = Figures::of(motion, &played, None);
+    let name = scene.id(kind, motion);
+    assert_eq!(
+        (figures.faults.as_str(), figures.stopped),
+        ("", Some(false)),
+        "{name}"
+    );
+    figures
 }
 
 /// 100 mm out, back, out; 20 mm back and out.
@@ -72,10 +102,22 @@ fn the_fuzzy_laws_keep_their_bars() {
 #[test]
 fn an_s_curve_is_followed() {
     for seed in 0..10 {
-        for m in
-            suite::s_curves(&bench_axis(), Kind::Predictive, seed, 0.06, 0.124, 1.0).expect("runs")
-        {
-            assert!(m.worst_mm <= 1.5 && m.worst_mm > 0.1, "seed {seed}: {m:?}");
+        let f = nominal("bench-vq110u", Kind::Predictive, Move::SCurve, seed);
+        let worst_mm = f.worst_mm.expect("tracked");
+        assert!((0.1..=1.5).contains(&worst_mm), "seed {seed}: {f:?}");
+    }
+}
+
+#[test]
+fn no_supervision_trips_whatever_the_controller() {
+    for kind in Kind::ALL {
+        for motion in Move::ALL {
+            nominal("bench-vq110u", kind, motion, 1);
+        }
+    }
+    for axis in ["small-12x50", "long-16x400", "heavy-40x250"] {
+        for motion in Move::ALL {
+            nominal(axis, Kind::Predictive, motion, 1);
         }
     }
 }
@@ -132,10 +174,9 @@ fn two_hundred_combinations() {
     let sheet = bench_axis();
     let mut tried = 0;
     for seed in 0..200 {
-        let factors = Factors::random(seed);
-        if factors.static_margin(&sheet) < 1.25 {
-            continue;
-        }
+        let factors = Factors::random(&sheet, seed);
+        // Drawn within 80 % of the force left; less rounding.
+        assert!(factors.static_margin(&sheet) >= 1.25 - 1e-9);
         tried += 1;
         let all = moves(
             Kind::Predictive,
@@ -151,42 +192,41 @@ fn two_hundred_combinations() {
             assert!(!m.limit_cycle(), "{context}");
         }
     }
-    assert!(tried >= 190, "{tried}");
+    assert_eq!(tried, 200);
 }
 
 #[test]
 fn nothing_switches_at_rest() {
-    let sheet = bench_axis();
-    for seed in 0..5 {
-        let board = Firmware::new(&design(&sheet, Kind::Predictive)).expect("valid");
-        let mut bench = Bench::new(&sheet, seed, board).expect("valid");
-        let step = Motion::Step {
-            at_s: 0.05,
-            from_m: 0.04,
-            to_m: 0.11,
-        };
-        let moved = bench.run(&step, &[], 3.0).expect("runs");
-        assert!(
-            moved
-                .rows
-                .last()
-                .is_some_and(|r| r.settled && r.switches > 0)
-        );
-        let rest = bench.run(&Motion::hold(0.11), &[], 10.0).expect("runs");
-        let last = rest.rows.last().expect("rows");
-        assert_eq!(last.switches, 0, "seed {seed}");
-        assert!((last.stroke_m - 0.11).abs() < 5e-4);
+    // At the stated leakage of both sets, the bench axis and the robot's cylinder.
+    let kind = Kind::Predictive;
+    for (set, sheet) in [("A", bench_axis()), ("B", wheeleg_2003_axis())] {
+        for seed in 0..5 {
+            let context = format!("set {set}, seed {seed}");
+            let mut rig = Rig::new(&sheet, &design(&sheet, kind), seed).expect("valid");
+            let moved = rig.step(0.11, 3.0).expect("runs");
+            let moved_to = moved.rows.last().expect("rows");
+            assert!(moved_to.settled && moved_to.switches > 0, "{context}");
+            let rest = rig.run(&Motion::hold(0.11), &[], 10.0).expect("runs");
+            let last = rest.rows.last().expect("rows");
+            assert_eq!(last.switches, 0, "{context}");
+            let drift_m = (last.stroke_m - moved_to.stroke_m).abs();
+            assert!(drift_m < 1e-3, "{context}: {drift_m}");
+            without_alarm(&rest, &context);
+        }
     }
 }
 
 #[test]
 fn contact_lost_and_found() {
-    for load_n in [-60.0, 60.0] {
+    assert_eq!(Sizes::of(&bench_axis()).contact_n, 60.0);
+    assert_eq!(RECOVERY_S, 0.5);
+    for motion in [Move::Contact, Move::ContactHelped] {
         for seed in 0..5 {
-            let (trace, worst_mm) =
-                suite::contact_loss(&bench_axis(), Kind::Predictive, seed, load_n).expect("runs");
-            assert!(worst_mm <= 2.0, "{load_n} N, seed {seed}: {worst_mm}");
-            assert!(!Metrics::of(&trace).limit_cycle());
+            let f = nominal("bench-vq110u", Kind::Predictive, motion, seed);
+            let context = format!("{}, seed {seed}: {f:?}", motion.name());
+            assert!(f.contact_error_mm.is_some_and(|mm| mm <= 2.0), "{context}");
+            assert!(f.recovery_s.is_some_and(|s| s <= 0.5), "{context}");
+            assert_eq!(f.limit_cycle, Some(false), "{context}");
         }
     }
 }
@@ -223,37 +263,21 @@ fn the_start_from_home_and_what_notice_does() {
         assert!(m.early_mm <= 1.0, "{m:?}");
     }
     let (without, _) = home(&pushing, 0.0);
-    assert!(without.start_delay_s.expect("moves") > 0.15, "{without:?}");
+    // It is the notice that does it: the air of a full chamber needs its time.
+    assert!(without.start_delay_s.expect("moves") > 0.09, "{without:?}");
 }
 
 #[test]
 fn the_time_optimal_bound_and_the_ratio_to_it() {
     let sheet = bench_axis();
-    let board = Firmware::new(&design(&sheet, Kind::Predictive)).expect("valid");
-    let mut bench = Bench::new(&sheet, 1, board).expect("valid");
-    let mut at_m = 0.04;
+    let mut rig = Rig::new(&sheet, &design(&sheet, Kind::Predictive), 1).expect("valid");
     for to_m in [0.14, 0.04] {
-        bench
-            .run(
-                &Motion::Step {
-                    at_s: 0.05,
-                    from_m: at_m,
-                    to_m,
-                },
-                &[],
-                2.0,
-            )
-            .expect("runs");
-        at_m = to_m;
+        rig.step(to_m, 2.0).expect("runs");
     }
+    let bench = rig.bench();
     let bound = optimal::fastest(bench.axis(), &bench.state, 0.14, 1, 1500).expect("runs");
     assert!((0.19..=0.26).contains(&bound.settle_s), "{bound:?}");
-    let step = Motion::Step {
-        at_s: 0.0,
-        from_m: 0.04,
-        to_m: 0.14,
-    };
-    let ours = Metrics::of(&bench.run(&step, &[], 1.5).expect("runs"))
+    let ours = Metrics::of(&rig.step(0.14, 1.5).expect("runs"))
         .settle_s
         .expect("settles");
     let ratio = ours / bound.settle_s;
@@ -279,8 +303,10 @@ fn axes_that_nobody_tuned_for() {
                 3.0,
             )
             .expect("runs");
-            for m in traces[1..].iter().map(Metrics::of) {
+            for trace in &traces[1..] {
+                let m = Metrics::of(trace);
                 let context = format!("{name}, seed {seed}: {m:?}");
+                without_alarm(trace, &context);
                 assert!(m.steady_error_mm.abs() <= 0.5, "{context}");
                 assert!(m.overshoot_mm <= 3.0, "{context}");
                 assert!(m.settle_s.is_some_and(|t| t <= 1.0), "{context}");

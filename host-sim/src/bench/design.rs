@@ -216,13 +216,14 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
         },
         Kind::PwmPid => JointGains {
             law: Law::Pid,
+            proportional: gain(proportional * 0.5),
             derivative: gain(proportional * 4.0 * lag_s),
-            integral: gain(proportional / (20.0 * lag_s)),
+            integral: gain(proportional / (130.0 * lag_s)),
             ..base
         },
         Kind::FuzzyPd => base,
         Kind::FuzzyId => JointGains {
-            correction_id: gain(1.0),
+            correction_id: gain(0.5),
             settle_band: mm(0.4),
             release_band: mm(1.2),
             ..base
@@ -232,7 +233,7 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
             sliding_time: Micros((6.0 * facts.dead_time_s * 1e6).round() as u32),
             settle_band: mm(facts.speed_mm_s * facts.dead_time_s),
             release_band: mm(3.0 * facts.speed_mm_s * facts.dead_time_s),
-            error_scale: mm((10.0 * facts.speed_mm_s * facts.dead_time_s).max(0.25)),
+            error_scale: mm((20.0 * facts.speed_mm_s * facts.dead_time_s).clamp(0.25, 1000.0)),
             ..base
         },
         Kind::Predictive => JointGains {

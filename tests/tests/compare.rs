@@ -1,0 +1,377 @@
+//! `wheeleg compare` and `wheeleg tune`: what they print, write and refuse, and that
+//! a row is what the same moves give without them.
+
+mod program;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+use serde_json::Value;
+use wheeleg_sim::bench::suite::{self, Factors, StartUp};
+use wheeleg_sim::bench::{Kind, Metrics};
+use wheeleg_sim::compare::{Comparison, Move, Options, Scene, Variation};
+use wheeleg_sim::config::{AxisConfig, RobotConfig};
+
+const AXIS: &str = "bench-vq110u";
+/// Longest time that any one call may take before it counts as hung.
+const HUNG: Duration = Duration::from_secs(300);
+
+fn wheeleg(args: &[&str]) -> Command {
+    let mut command = Command::new(program::path());
+    command.timeout(HUNG).env("NO_COLOR", "1").args(args);
+    command
+}
+
+fn source(path: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim");
+    fs::read_to_string(root.join(path)).expect(path)
+}
+
+/// An axis file with one text replaced.
+fn axis_file(folder: &Path, old: &str, new: &str) -> String {
+    let text = source("axes/bench-vq110u.toml");
+    assert!(text.contains(old), "{old}");
+    let path = folder.join("mine.toml");
+    fs::write(&path, text.replacen(old, new, 1)).expect("written");
+    path.to_string_lossy().into_owned()
+}
+
+fn small(threads: usize) -> Options {
+    Options {
+        axes: vec![AXIS.into()],
+        kinds: vec![Kind::PwmPid, Kind::Predictive],
+        moves: Some(vec![Move::Step20, Move::Hold]),
+        seeds: 2,
+        seed: 5,
+        combinations: 2,
+        quick: true,
+        threads,
+    }
+}
+
+/// Every file below a folder.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).expect("folder") {
+        let path = entry.expect("entry").path();
+        let name = path
+            .file_name()
+            .expect("name")
+            .to_string_lossy()
+            .into_owned();
+        if path.is_dir() {
+            let below = files(&path);
+            found.extend(below.into_iter().map(|(k, v)| (format!("{name}/{k}"), v)));
+        } else {
+            found.insert(name, fs::read(&path).expect("file"));
+        }
+    }
+    found
+}
+
+#[test]
+fn any_number_of_threads_writes_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let written: Vec<_> = [1, 3]
+        .into_iter()
+        .map(|threads| {
+            let out = folder.path().join(threads.to_string());
+            let comparison = Comparison::run(&small(threads)).expect("runs");
+            comparison.write(&out).expect("written");
+            files(&out)
+        })
+        .collect();
+    let names: Vec<&String> = written[0].keys().collect();
+    for expected in ["report.html", "summary.json", "csv/cases.csv"] {
+        assert!(names.iter().any(|n| *n == expected), "{names:?}");
+    }
+    assert!(
+        names.iter().filter(|n| n.ends_with(".png")).count() >= 2,
+        "{names:?}"
+    );
+    assert_eq!(names, written[1].keys().collect::<Vec<_>>());
+    for (name, bytes) in &written[0] {
+        assert!(bytes == &written[1][name], "{name} differs");
+    }
+
+    // The tables say the same, one row per case.
+    let json: Value = serde_json::from_slice(&written[0]["summary.json"]).expect("JSON");
+    let rows = json.as_array().expect("a list");
+    // (2 seeds + 12 factors + 2 combinations) × 2 controllers × 2 moves.
+    assert_eq!(rows.len(), 64);
+    let csv = String::from_utf8(written[0]["csv/cases.csv"].clone()).expect("UTF-8");
+    let head: Vec<&str> = csv.lines().next().expect("head").split(',').collect();
+    assert_eq!(csv.lines().count(), 65);
+    for row in rows {
+        let row = row.as_object().expect("an object");
+        let mut keys: Vec<&str> = row.keys().map(String::as_str).collect();
+        let mut columns = head.clone();
+        keys.sort_unstable();
+        columns.sort_unstable();
+        assert_eq!(keys, columns);
+        for text in [
+            "id",
+            "axis",
+            "controller",
+            "move",
+            "variation",
+            "delays",
+            "faults",
+        ] {
+            assert!(row[text].is_string(), "{text}: {row:?}");
+        }
+        for number in [
+            "seed",
+            "load_n",
+            "mass_kg",
+            "supply_bar_g",
+            "static_margin",
+            "worst_mm",
+            "air_nl",
+        ] {
+            assert!(row[number].is_number(), "{number}: {row:?}");
+        }
+        assert_eq!(row["feasible"], true);
+        assert_eq!(row["rest_switches"].is_number(), row["move"] == "hold");
+        assert_eq!(row["rise_s"].is_number(), row["move"] == "step-20");
+    }
+    let page = String::from_utf8(written[0]["report.html"].clone()).expect("UTF-8");
+    let links = page.replace("http://www.w3.org/2000/svg", "");
+    for forbidden in ["http:", "https:", "src=", "<script", "@import", "url("] {
+        assert!(!links.contains(forbidden), "{forbidden}");
+    }
+    assert!(page.contains("pwm-pid") && page.contains("supply 4 bar"));
+}
+
+#[test]
+fn a_row_is_what_the_moves_give_without_the_comparison() {
+    let sheet = AxisConfig::load(AXIS).expect("built in").axis;
+    for (variation, factors, start) in [
+        (Variation::Nominal, Factors::NONE, StartUp::Sheet),
+        (
+            Variation::Combination(3),
+            Factors::random(&sheet, 3),
+            StartUp::Identified,
+        ),
+    ] {
+        let scene = Scene::new(AXIS, &sheet, variation, 4).expect("runs");
+        for kind in [Kind::Predictive, Kind::FuzzyPd] {
+            let played = scene.play(kind, Move::Step100).expect("runs");
+            let row = scene.row(kind, Move::Step100, played.as_ref(), Some([0.25, 0.2]));
+            // Ends of the 100 mm step about the middle of 180 mm.
+            let targets = [0.14, 0.04, 0.14];
+            let traces =
+                suite::steps(&sheet, &factors, kind, start, 4, &targets, 2.5).expect("runs");
+            let [first, back, out] = [0, 1, 2].map(|i| Metrics::of(&traces[i]));
+            let f = &row.figures;
+            let near = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() < 1e-9);
+            let steady = f.steady_error_mm.expect("a step").abs();
+            assert!(near(
+                Some(steady),
+                back.steady_error_mm.abs().max(out.steady_error_mm.abs())
+            ));
+            assert!(near(
+                f.overshoot_mm,
+                back.overshoot_mm.max(out.overshoot_mm)
+            ));
+            assert!(near(f.first_overshoot_mm, first.overshoot_mm));
+            assert!(near(f.air_nl, back.air_dm3.max(out.air_dm3)));
+            if let (Some(b), Some(o)) = (back.settle_s, out.settle_s) {
+                assert!(near(f.settle_s, b.max(o)));
+                assert!(near(f.ratio_to_bound, (b / 0.25).max(o / 0.2)));
+            } else {
+                assert_eq!((f.settle_s, f.ratio_to_bound), (None, None));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_case_can_be_played_alone_and_gives_its_row_again() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let comparison = Comparison::run(&small(2)).expect("runs");
+    let row = &comparison.rows[comparison.rows.len() - 1];
+    assert!(
+        row.case.variation.starts_with("combination="),
+        "{}",
+        row.case.id
+    );
+    let out = folder.path().join("case");
+    let assert = wheeleg(&["compare", "--json", "--case", &row.case.id, "--out"])
+        .arg(&out)
+        .assert()
+        .success();
+    let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
+    let alone: Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_eq!(alone, serde_json::to_value(row).expect("serialises"));
+    let names: Vec<String> = files(&out).into_keys().collect();
+    for expected in [
+        "summary.json",
+        "csv/first.csv",
+        "csv/measured-1.csv",
+        "figures/measured-1.png",
+    ] {
+        assert!(names.iter().any(|n| n == expected), "{names:?}");
+    }
+}
+
+#[test]
+fn wrong_input_is_refused_by_name() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out").to_string_lossy().into_owned();
+    let refused = |args: &[&str], words: &[&str]| {
+        let mut all = vec!["compare", "--out", &out];
+        all.extend(args);
+        let mut assert = wheeleg(&all).assert().failure().code(2);
+        for word in words {
+            assert = assert.stderr(contains(*word));
+        }
+    };
+    refused(
+        &["--controller", "best"],
+        &["best", "on-off", "fuzzy-pd", "predictive"],
+    );
+    refused(&["--move", "jump"], &["jump", "step-100", "contact-helped"]);
+    refused(&["--move"], &["--move"]);
+    refused(&["--seeds", "0"], &["0", "1..=1000"]);
+    refused(&["--threads", "0"], &["1..=1024"]);
+    refused(&["--axis", "bench"], &["bench", "bench-vq110u"]);
+    refused(&["--axis", "nowhere/a.toml"], &["nowhere/a.toml"]);
+    refused(
+        &["--case", "predictive"],
+        &["AXIS/CONTROLLER/MOVE/VARIATION/SEED"],
+    );
+    refused(
+        &["--case", "a/predictive/hold/windy/1"],
+        &["windy", "friction=FACTOR"],
+    );
+    refused(
+        &["--case", "moon/predictive/hold/nominal/1"],
+        &["moon", "bench-vq110u", "--axis"],
+    );
+    refused(
+        &["--case", "a/pwm-p/hold/nominal/1", "--quick"],
+        &["--quick"],
+    );
+
+    let bad = axis_file(
+        folder.path(),
+        "bore          = { value = 20.0",
+        "bore          = { value = -3.0",
+    );
+    refused(&["--axis", &bad], &["mine.toml", "cylinder.bore", "-3"]);
+    // A range of the board, not of the file.
+    let bad = axis_file(
+        folder.path(),
+        "stroke        = { value = 180.0",
+        "stroke        = { value = 900.0",
+    );
+    refused(&["--axis", &bad], &["mine.toml", "stroke"]);
+    let twin = axis_file(folder.path(), "# Bench axis", "# Same");
+    refused(
+        &["--axis", AXIS, "--axis", &twin],
+        &["bench-vq110u", "twice"],
+    );
+    assert!(
+        !Path::new(&out).exists(),
+        "nothing is written before the input is sound"
+    );
+}
+
+#[test]
+fn tuning_gives_a_section_that_a_run_accepts() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("tune");
+    let assert = wheeleg(&["tune", AXIS, "--json", "--out"])
+        .arg(&out)
+        .assert()
+        .success();
+    let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
+    let summary: Value = serde_json::from_str(&stdout).expect("JSON");
+    let tests = summary["tests"].as_array().expect("a list");
+    let large = tests
+        .iter()
+        .find(|t| t["move"] == "step-100")
+        .expect("played");
+    let settled = |side: &str| large[side]["settle_s"].as_f64();
+    let after = settled("after").expect("settles");
+    // Measured 0.33; the board's own gains need half as long again, or do not settle.
+    assert!((0.2..0.5).contains(&after), "{after}");
+    assert!(settled("before").is_none_or(|before| before > 1.2 * after));
+    let found = summary["found_t_on_ms"].as_f64().expect("found");
+    assert!((found - 3.5).abs() < 0.3, "{found}");
+
+    // The section in the place of the robot's own.
+    let section = fs::read_to_string(out.join("node-parameters.toml")).expect("written");
+    let robot = source("robots/wheeleg-2003.toml");
+    let begin = robot.find("[node.joint]").expect("section");
+    let end = begin + robot[begin..].find("\n[node.vertical]").expect("next");
+    let text = format!("{}{section}{}", &robot[..begin], &robot[end..]);
+    let config = RobotConfig::parse("tuned.toml", &text).expect("accepted");
+    let mut set: BTreeMap<u16, i32> = config.node.joints[0].iter().copied().collect();
+    for parameter in summary["parameters"].as_array().expect("a list") {
+        let name = parameter["name"].as_str().expect("name");
+        let row = wheeleg_protocol::param::JOINT_PARAMS
+            .iter()
+            .find(|row| row.name == name)
+            .expect("in the table");
+        let raw = parameter["raw"].as_i64();
+        assert_eq!(set.remove(&row.id).map(i64::from), raw, "{name}");
+    }
+    assert!(set.is_empty(), "{set:?}");
+    let path = folder.path().join("tuned.toml");
+    fs::write(&path, text).expect("written");
+    wheeleg(&["run", "stand", "--robot"])
+        .arg(&path)
+        .arg("--out")
+        .arg(folder.path().join("run"))
+        .assert()
+        .success();
+}
+
+#[test]
+fn an_axis_that_cannot_hold_its_load_is_refused() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let heavy = axis_file(
+        folder.path(),
+        "load = { value = 0.0",
+        "load = { value = 130.0",
+    );
+    let out = folder.path().join("out");
+    wheeleg(&["tune", &heavy, "--out"])
+        .arg(&out)
+        .assert()
+        .failure()
+        .code(2)
+        .stderr(
+            contains("mine.toml")
+                .and(contains("`moving.load`"))
+                .and(contains("130.0 N"))
+                .and(contains("114.7 N"))
+                .and(contains("1.25")),
+        );
+    assert!(!out.exists());
+    // The comparison lists it, and plays nothing.
+    let options = Options {
+        axes: vec![heavy],
+        combinations: 0,
+        ..small(2)
+    };
+    let comparison = Comparison::run(&options);
+    let comparison = comparison.expect("runs");
+    assert!(comparison.rows.iter().any(|r| !r.case.feasible));
+    let listed = comparison.infeasible();
+    let nominal = listed
+        .iter()
+        .find(|(_, v, _)| *v == "nominal")
+        .expect("listed");
+    assert!((nominal.2 - 143.3 / 130.0).abs() < 0.01, "{nominal:?}");
+    for row in comparison.rows.iter().filter(|r| !r.case.feasible) {
+        assert_eq!(row.figures.steady_error_mm, None);
+    }
+}
