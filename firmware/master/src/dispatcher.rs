@@ -107,6 +107,12 @@ pub enum Refusal {
         /// Bus address.
         node: u8,
     },
+    /// Two boards answer at one address: set the address straps so that every board
+    /// has its own, then restart the boards.
+    DuplicateAddress {
+        /// Bus address.
+        node: u8,
+    },
     /// A node has an active fault.
     NodeFault {
         /// Bus address.

@@ -63,6 +63,13 @@ pub enum Event {
         /// Bus address.
         u8,
     ),
+    /// Two boards answer at one address: the robot will not arm.
+    DuplicateAddress {
+        /// Bus address.
+        node: u8,
+        /// Their unique ids.
+        unique_ids: [[u8; 12]; 2],
+    },
     /// A node missed three cycles in a row.
     NodeLost(
         /// Bus address.

@@ -5,7 +5,7 @@ use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_master::contact::Side;
 use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::layer1::foot::FootShape;
-use wheeleg_protocol::{Address, FaultBits};
+use wheeleg_protocol::{Address, Fault, FaultBits};
 use wheeleg_units::PositionMm;
 
 use super::START_UP;
@@ -281,9 +281,10 @@ impl<'a> Operator<'a> {
         while let Some((_, event)) = world.master().take_event() {
             let kind = match event {
                 Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
-                Event::Hold(_) | Event::HomingFailed { .. } | Event::SchemaMismatch { .. } => {
-                    EventKind::Fault
-                }
+                Event::Hold(_)
+                | Event::HomingFailed { .. }
+                | Event::SchemaMismatch { .. }
+                | Event::DuplicateAddress { .. } => EventKind::Fault,
                 Event::Done(_) | Event::Refused { .. } | Event::Position { .. } => {
                     EventKind::Command
                 }
@@ -316,6 +317,15 @@ fn describe(event: &Event) -> String {
             "{} has interface {theirs:016x}, the master has {master:016x}: will not arm",
             board(node)
         ),
+        Event::DuplicateAddress { node, unique_ids } => {
+            let hex = |id: [u8; 12]| id.iter().map(|b| format!("{b:02x}")).collect::<String>();
+            let [one, other] = unique_ids.map(hex);
+            let remedy = Fault::DuplicateAddress.remedy();
+            format!(
+                "two boards at the address of {}, unique ids {one} and {other}: will not arm. {remedy}",
+                board(node)
+            )
+        }
         Event::WrongRole(node) => format!("{} answers as another kind of board", board(node)),
         Event::NodeLost(node) => format!("{} is lost", board(node)),
         Event::NodeBack(node) => format!("{} answers", board(node)),

@@ -17,6 +17,8 @@ pub enum Enumerated {
     Schema(Identity),
     /// Not the kind of board its address stands for, or the straps say otherwise.
     Role(Identity),
+    /// Two boards answer at this address: their unique ids.
+    Twins([[u8; 12]; 2]),
 }
 
 /// One node.
@@ -24,10 +26,31 @@ pub enum Enumerated {
 pub struct Node {
     /// Who it is.
     pub enumerated: Enumerated,
+    /// It did not answer the last question who it is.
+    pub in_vain: bool,
     /// Its reply in the last cycle, if it answered.
     pub reply: Option<SlotReply>,
     /// Its last reply ever.
     pub last: Option<SlotReply>,
+}
+
+impl Node {
+    /// Unique id of the board, once it has said who it is.
+    #[must_use]
+    pub const fn unique_id(&self) -> Option<[u8; 12]> {
+        match self.enumerated {
+            Enumerated::Unknown | Enumerated::Twins(_) => None,
+            Enumerated::Ready(identity)
+            | Enumerated::Schema(identity)
+            | Enumerated::Role(identity) => Some(identity.unique_id),
+        }
+    }
+
+    /// Whether two boards were heard at this address.
+    #[must_use]
+    pub const fn has_twin(&self) -> bool {
+        matches!(self.enumerated, Enumerated::Twins(_))
+    }
 }
 
 /// All nodes, index 0..8 for addresses 1..=8.
@@ -70,7 +93,15 @@ impl Nodes {
         } else {
             BoardKind::Wheel
         };
-        let result = if identity.schema_hash != schema_hash {
+        let node = from.slot().and_then(|index| self.get(index));
+        if let Some(twins) = node.filter(|node| node.has_twin()) {
+            return twins.enumerated;
+        }
+        let known = node.and_then(Node::unique_id);
+        let result = if let Some(known) = known.filter(|known| *known != identity.unique_id) {
+            // Known and not lost since: this is another board.
+            Enumerated::Twins([known, identity.unique_id])
+        } else if identity.schema_hash != schema_hash {
             Enumerated::Schema(identity)
         } else if identity.board != kind || identity.address != from {
             Enumerated::Role(identity)
@@ -81,6 +112,14 @@ impl Nodes {
             node.enumerated = result;
         }
         result
+    }
+
+    /// A node did not answer the question who it is: it is missing, or it and a twin
+    /// spoil each other's answers. It is asked by turns so that twins part.
+    pub fn in_vain(&mut self, from: Address) {
+        if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
+            node.in_vain = !node.in_vain;
+        }
     }
 
     /// Forgets who a node is (it was lost and may have been replaced or reset).
@@ -115,6 +154,7 @@ impl Nodes {
                         theirs: identity.schema_hash,
                     }),
                     Enumerated::Role(_) => Some(Refusal::WrongRole { node: address }),
+                    Enumerated::Twins(_) => Some(Refusal::DuplicateAddress { node: address }),
                     Enumerated::Unknown => Some(Refusal::NodeMissing { node: address }),
                     Enumerated::Ready(_) if !alive(index) => {
                         Some(Refusal::NodeMissing { node: address })
@@ -149,5 +189,66 @@ impl Nodes {
             node.last
                 .is_some_and(|reply| matches!(reply.mode, NodeMode::Armed | NodeMode::Tracking))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn identity(id: u8) -> Identity {
+        Identity {
+            board: BoardKind::Joint,
+            address: Address::of_slot(2).unwrap(),
+            firmware: [0, 1, 0],
+            schema_hash: 7,
+            unique_id: [id; 12],
+        }
+    }
+
+    #[test]
+    fn two_unique_ids_at_one_address_bar_arming_until_one_is_gone() {
+        let mut nodes = Nodes::default();
+        let address = Address::of_slot(2).unwrap();
+        for again in 0..2 {
+            let told = nodes.identify(address, identity(1), 7);
+            assert_eq!(
+                told,
+                Enumerated::Ready(identity(1)),
+                "{again}: the same board"
+            );
+        }
+        let twins = Enumerated::Twins([[1; 12], [2; 12]]);
+        assert_eq!(nodes.identify(address, identity(2), 7), twins);
+        let node = nodes.get(2).unwrap();
+        assert!(node.has_twin() && node.unique_id().is_none());
+        assert_eq!(
+            nodes.identify(address, identity(1), 7),
+            twins,
+            "until it is lost"
+        );
+        for index in [0, 1, 3, 4, 5, 6, 7] {
+            let from = Address::of_slot(index).unwrap();
+            let board = if index < 6 {
+                BoardKind::Joint
+            } else {
+                BoardKind::Wheel
+            };
+            let other = Identity {
+                board,
+                address: from,
+                ..identity(9)
+            };
+            nodes.identify(from, other, 7);
+        }
+        let bar = nodes.bar_to_arming(|_| true, 7);
+        assert_eq!(bar, Some(Refusal::DuplicateAddress { node: 3 }));
+        // A board that was lost may be replaced.
+        nodes.forget(2);
+        assert_eq!(
+            nodes.identify(address, identity(2), 7),
+            Enumerated::Ready(identity(2))
+        );
+        assert_eq!(nodes.bar_to_arming(|_| true, 7), None);
     }
 }

@@ -1,7 +1,7 @@
 //! Acyclic part of the cycle: sends requests, judges answers, enumerates.
 
 use wheeleg_protocol::link::{CYCLE_US, GiveUp, Outcome, SlotTiming, Step};
-use wheeleg_protocol::{Address, Disarm, Envelope, Identify, Message};
+use wheeleg_protocol::{Address, Disarm, Discover, Envelope, Identify, Message};
 
 use super::acyclic::{Job, Purpose};
 use super::cycle::frame_of;
@@ -49,9 +49,14 @@ impl Layer0 {
         }
         let to = self.nodes.next_unknown(self.ask_from)?;
         self.ask_from = usize::from(to.raw());
+        let node = to.slot().and_then(|index| self.nodes.get(index));
         Some(Job {
             to,
-            message: Identify {}.into(),
+            message: if node.is_some_and(|node| node.in_vain) {
+                Discover {}.into()
+            } else {
+                Identify {}.into()
+            },
             purpose: Purpose::Identify,
         })
     }
@@ -77,6 +82,10 @@ impl Layer0 {
         events: &mut Events,
     ) {
         let Some(outcome) = self.requester.on_message(envelope, message) else {
+            if let Message::Identity(_) = message {
+                // Nobody asked any more: a second board answers a question to one.
+                self.identified(envelope.source, Ok(*message), now_us, events);
+            }
             self.counters.unexpected = self.counters.unexpected.wrapping_add(1);
             return;
         };
@@ -120,6 +129,7 @@ impl Layer0 {
         events: &mut Events,
     ) {
         let Ok(Message::Identity(identity)) = result else {
+            self.nodes.in_vain(from);
             return;
         };
         let node = from.raw();
@@ -134,6 +144,9 @@ impl Layer0 {
                 },
             ),
             Enumerated::Role(_) => events.push(now_us, Event::WrongRole(node)),
+            Enumerated::Twins(unique_ids) => {
+                events.push(now_us, Event::DuplicateAddress { node, unique_ids });
+            }
             Enumerated::Unknown => {}
         }
     }

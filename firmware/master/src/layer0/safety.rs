@@ -4,6 +4,7 @@ use wheeleg_protocol::{Address, EmergencyBrake, InputBits};
 
 use super::acyclic::Purpose;
 use super::liveness::Change;
+use super::nodes::Node;
 use super::{GroupKind, Layer0, Power, STALL_CYCLES};
 use crate::dispatcher::Refusal;
 use crate::event::{Event, Events, HoldReason};
@@ -124,7 +125,13 @@ impl Layer0 {
                         _ => {}
                     }
                 }
-                Some(Change::Back) => events.push(now_us, Event::NodeBack(address)),
+                Some(Change::Back) => {
+                    if self.nodes.get(index).is_some_and(Node::has_twin) {
+                        // It is heard again: its twin is gone. Who is left?
+                        self.nodes.forget(index);
+                    }
+                    events.push(now_us, Event::NodeBack(address));
+                }
                 None => {}
             }
         }
