@@ -13,7 +13,8 @@ use wheeleg_node::parameters::JointParameters;
 use wheeleg_protocol::LinkLossAction::Hold;
 use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{
-    Fault, JointSetpoint, Limit, Message, ParamSet, WheelControlMode, WheelMode,
+    ClearFault, EmergencyBrake, Fault, JointSetpoint, Limit, Message, ParamSet, WheelControlMode,
+    WheelMode,
 };
 use wheeleg_units::{AdcCode, PositionMm, WheelCount};
 
@@ -211,4 +212,22 @@ fn rest_ends_the_wait_for_a_motion() {
         assert!(rig.node.snapshot().settled);
     }
     assert!(rig.node.faults().is_empty());
+}
+
+/// Found by the random sequences of `fuzz.rs`: a wheel that was armed and braked
+/// again between two samples began the ramp of its last stop anew.
+#[test]
+fn a_stop_right_after_arming_has_nothing_to_ramp_down() {
+    let mut rig = WheelRig::turning();
+    let brake = Message::EmergencyBrake(EmergencyBrake {});
+    rig.request(&brake);
+    rig.run_ms(100, None);
+    let left = rig.drive();
+    assert!(left > 0, "half way down the ramp");
+    for request in [Message::ClearFault(ClearFault {}), ARM, brake] {
+        assert!(matches!(rig.request(&request), Message::Ack(_)));
+    }
+    assert_eq!(rig.node.mode(), Mode::Hold);
+    rig.tick();
+    assert_eq!(rig.drive(), 0);
 }

@@ -113,6 +113,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
 
     /// The wheel has armed: closed loop at standstill where it is.
     pub(super) fn engage(&mut self) {
+        // Nothing is driven yet: a stop before the next sample has nothing to ramp.
+        self.state.drive_mean = 0;
+        self.state.ramp_from = 0;
         self.target = Target::at(self.state.actual);
         engage(&mut self.controller, self.control_mode, self.state.actual);
     }
