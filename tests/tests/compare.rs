@@ -45,7 +45,7 @@ fn small(threads: usize) -> Options {
     Options {
         axes: vec![AXIS.into()],
         kinds: vec![Kind::PwmPid, Kind::Predictive],
-        moves: Some(vec![Move::Step20, Move::Hold]),
+        moves: Some(vec![Move::Step100, Move::Hold]),
         seeds: 2,
         seed: 5,
         combinations: 2,
@@ -138,7 +138,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         }
         assert_eq!(row["feasible"], true);
         assert_eq!(row["rest_switches"].is_number(), row["move"] == "hold");
-        assert_eq!(row["rise_s"].is_number(), row["move"] == "step-20");
+        assert_eq!(row["rise_s"].is_number(), row["move"] == "step-100");
     }
     let page = String::from_utf8(written[0]["report.html"].clone()).expect("UTF-8");
     let links = page.replace("http://www.w3.org/2000/svg", "");

@@ -226,7 +226,7 @@ fn overview(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
 
 fn steps(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     let name = axis.config.name.as_str();
-    let mut panels = step_panels(comparison, name)?;
+    let mut panels = step_panels(comparison, name).unwrap_or_default();
     let small = comparison.overlay(name, Move::Step20, |r, x| x - r);
     if !small.is_empty() {
         panels.push(panel(
@@ -237,6 +237,9 @@ fn steps(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
             Some((-4.0, 4.0)),
             &[-1.0, 1.0],
         ));
+    }
+    if panels.is_empty() {
+        return None;
     }
     Some(Figure {
         id: format!("steps-{name}"),
