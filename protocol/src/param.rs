@@ -149,6 +149,52 @@ impl ParamInfo {
     }
 }
 
+/// What a board needs of a row to keep its values: the table without its texts,
+/// a third of the flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParamLimits {
+    /// Permanent number on the wire.
+    pub id: u16,
+    /// Whether it can be set only while disarmed.
+    pub disarmed_only: bool,
+    /// Smallest permitted raw value.
+    pub min: i32,
+    /// Largest permitted raw value.
+    pub max: i32,
+    /// Raw value of a new board.
+    pub default: i32,
+}
+
+impl ParamLimits {
+    const fn of(row: &ParamInfo) -> Self {
+        Self {
+            id: row.id,
+            disarmed_only: row.disarmed_only,
+            min: row.min,
+            max: row.max,
+            default: row.default,
+        }
+    }
+
+    /// Whether a raw value is permitted.
+    #[must_use]
+    pub const fn permits(&self, raw: i32) -> bool {
+        self.min <= raw && raw <= self.max
+    }
+}
+
+/// The limits of all rows. Evaluated at compile time alone.
+#[allow(clippy::indexing_slicing)]
+const fn limits<const N: usize>(table: &'static [ParamInfo]) -> [ParamLimits; N] {
+    let mut limits = [ParamLimits::of(&table[0]); N];
+    let mut index = 0;
+    while index < N {
+        limits[index] = ParamLimits::of(&table[index]);
+        index = index.saturating_add(1);
+    }
+    limits
+}
+
 #[allow(clippy::panic)] // Stops the build, never the program.
 const fn raw(format: Format, text: &str) -> i32 {
     match format.parse(text) {
@@ -220,6 +266,10 @@ macro_rules! parameters {
             pub const fn info(self) -> &'static ParamInfo {
                 match self { $( Self::$variant => const { find($table, $id).1 } ),* }
             }
+
+            /// The table without its texts, in the same order.
+            pub const LIMITS: &'static [ParamLimits] =
+                const { &limits::<{ Self::COUNT }>($table) };
 
             /// Index in the table, `0..COUNT`: for arrays of values.
             #[must_use]

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use heapless::Vec as Short;
 use wheeleg_pil_link::{Figures, Inputs, Nonvolatile, Power, Ran, Reply, Request, Run, Switches};
+use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
     Address, Arm, ClearFault, Envelope, JointSetpoint, LinkLossAction, MAX_ENCODED, Message,
     SCHEMA_HASH, Sync, SyncFlags, SyncSlots, WheelSetpoint,
@@ -21,7 +22,9 @@ use wheeleg_sim::pil::Partner;
 use wheeleg_sim::pil::qemu::{Qemu, QemuOptions};
 use wheeleg_units::{PositionMm, WheelCount, WireVelocity};
 
-use bench::{NoTime, assert_follows, assert_same, closed_loop, closed_loop_natively, power_up};
+use bench::{
+    NoTime, assert_follows, assert_same, closed_loop, closed_loop_natively, power_up, script,
+};
 
 /// Environment variable with the folder of the images.
 const IMAGES: &str = "WHEELEG_IMAGES";
@@ -84,6 +87,52 @@ fn two_runs_are_equal_down_to_the_stack() {
         figures.stack_used * 4 <= figures.stack_size * 3,
         "{figures:?}"
     );
+}
+
+/// The request that stores one parameter of a joint board.
+fn stored(parameter: JointParam, raw: i32) -> Request {
+    let mut bytes = vec![0x57, 0x57, 1, 0, 0, 0, 0, 0];
+    bytes.extend_from_slice(&parameter.id().to_le_bytes());
+    bytes.extend_from_slice(&[0, 0]);
+    bytes.extend_from_slice(&raw.to_le_bytes());
+    Request::Store(Nonvolatile {
+        offset: 0,
+        bytes: Short::from_slice(&bytes).expect("fits"),
+    })
+}
+
+/// The parameter that chooses the predictive law.
+fn predictive() -> Request {
+    stored(JointParam::Law, 5)
+}
+
+/// The best law, on moves that are long enough for the mass to be learnt, and in
+/// a life in which its estimates are upset.
+#[test]
+fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
+    const SCRIPT: [(u64, f64); 4] = [(0, 90.0), (200, 170.0), (1_000, 10.0), (2_000, 100.0)];
+    let run = |ask: &mut dyn FnMut(&Request) -> Reply| {
+        assert_eq!(ask(&predictive()), Reply::Done);
+        script(&SCRIPT, 3_000, ask)
+    };
+    let mut partner = board("qemu-joint");
+    let there = run(&mut |request| partner.ask(request).expect("the image answers"));
+    let pins = JointPins::default();
+    let mut session = Session::<RemoteJoint<'_>>::new(&pins, "this process", 0);
+    let here = run(&mut |request| session.answer(request, &mut NoTime));
+    assert_same(&there, &here);
+    for (at, target_mm) in [(999, 170.0), (1_999, 10.0), (2_999, 100.0)] {
+        let error_mm = here.stroke_mm[at] - target_mm;
+        assert!(error_mm.abs() < 1.0, "at {at} ms: {error_mm:.2} mm");
+    }
+
+    let mut life = eventful_life(3, 4_000, 99);
+    life.insert(0, predictive());
+    let mut partner = board("qemu-joint");
+    for (i, (request, here)) in life.iter().zip(answers_here(3, &life)).enumerate() {
+        let there = without_figures(partner.ask(request).expect("the image answers"));
+        assert!(there == here, "request {i}: here  {here:?}\nthere {there:?}");
+    }
 }
 
 /// Numbers that follow from a seed (SplitMix64, public domain).

@@ -25,6 +25,7 @@
 //! twice per period, and a valve with nothing to do not at all.
 
 use crate::valve::{VALVE_COUNT, ValveOpenings};
+use core::hash::{Hash, Hasher};
 use wheeleg_units::Micros;
 
 /// On-time of each valve in the next tick, µs from the tick edge:
@@ -115,14 +116,14 @@ impl PwmTiming {
         if opening.get() >= self.period {
             return Micros(self.period);
         }
-        // Below 10^6 + 10^6 and saturating at zero.
+        // Below 10^6 + 10^6 and saturating at zero; a gap is at most half the period.
         let wanted = opening
             .get()
-            .saturating_add(self.on_delay)
+            .wrapping_add(self.on_delay)
             .saturating_sub(self.off_delay);
         if opening.get() == 0 || wanted < self.shortest_pulse {
             Micros::ZERO
-        } else if wanted > self.period.saturating_sub(self.shortest_gap) {
+        } else if wanted > self.period.wrapping_sub(self.shortest_gap) {
             Micros(self.period)
         } else {
             Micros(wanted)
@@ -131,7 +132,7 @@ impl PwmTiming {
 }
 
 /// One valve: where it is in its period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Channel {
     /// In a period: from the start of a pulse until a new one may begin.
     running: bool,
@@ -156,21 +157,22 @@ impl Channel {
 
     #[inline]
     fn tick(&mut self, timing: &PwmTiming, opening: Micros) -> u16 {
+        if self.running && !self.energised {
+            if self.elapsed >= timing.period {
+                // A new pulse may begin once the valve has had the time to shut.
+                let off = self.elapsed.wrapping_sub(self.ended_at);
+                self.running = off < timing.shortest_gap;
+            }
+            if self.running {
+                self.elapsed = self.elapsed.wrapping_add(timing.tick);
+                return 0;
+            }
+        }
         if !self.running && opening == Micros::ZERO {
-            // A valve with nothing to do: what follows would give the same.
+            // A valve with nothing to do.
             return 0;
         }
         let target = timing.pulse(opening).get();
-        if self.running && self.elapsed >= timing.period {
-            if self.energised && target > 0 {
-                // A full pulse goes on: the next period follows without a gap.
-                self.elapsed = 0;
-            } else if !self.energised {
-                // A new pulse may begin once the valve has had the time to shut.
-                let off = self.elapsed.saturating_sub(self.ended_at);
-                self.running = off < timing.shortest_gap;
-            }
-        }
         if !self.running {
             if target == 0 {
                 return 0;
@@ -182,27 +184,48 @@ impl Channel {
                 ended_at: 0,
                 pulses: self.pulses.wrapping_add(1),
             };
+        } else if self.elapsed >= timing.period && target > 0 {
+            // A full pulse goes on: the next period follows without a gap.
+            self.elapsed = 0;
         }
-        let mut on = 0;
-        if self.energised {
-            let length = match target {
-                0 => 0,
-                target => target.max(timing.shortest_pulse),
-            };
-            on = length.saturating_sub(self.elapsed).min(timing.tick);
-            if on < timing.tick {
-                self.energised = false;
-                self.ended_at = self.elapsed.saturating_add(on);
-            }
+        let length = if target == 0 {
+            0
+        } else {
+            target.max(timing.shortest_pulse)
+        };
+        // Below twice the period of at most a second.
+        let on = length.saturating_sub(self.elapsed).min(timing.tick);
+        if on < timing.tick {
+            self.energised = false;
+            self.ended_at = self.elapsed.wrapping_add(on);
         }
-        self.elapsed = self.elapsed.saturating_add(timing.tick);
+        self.elapsed = self.elapsed.wrapping_add(timing.tick);
         // At most the tick, 2000.
         on as u16
     }
 }
 
+impl Hash for Channel {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. Both flags go
+        // into the word of the count: a flipped bit of either flips one of it.
+        let Self {
+            running,
+            energised,
+            elapsed,
+            ended_at,
+            pulses,
+        } = self;
+        let flags = u32::from(*running) | u32::from(*energised).wrapping_shl(8);
+        state.write_u32(pulses.rotate_left(16) ^ flags);
+        state.write_u32(*elapsed);
+        state.write_u32(*ended_at);
+    }
+}
+
 /// The sliced PWM of the four valves of a cylinder.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],
@@ -227,8 +250,9 @@ impl ValvePwm {
     /// What a tick changes: all but the timing, to be sealed apart from it.
     #[inline]
     #[must_use]
-    pub fn state(&self) -> impl core::hash::Hash + '_ {
-        &self.channels
+    pub fn state(&self) -> impl Hash + '_ {
+        let [a, b, c, d] = &self.channels;
+        (a, b, c, d)
     }
 
     /// Changes the timing; running periods end by the new one.
@@ -259,28 +283,25 @@ impl ValvePwm {
     #[must_use]
     pub fn direct(&mut self, on: OnTimes) -> OnTimes {
         let tick = self.timing.tick;
-        on.map({
-            let mut channels = self.channels.iter_mut();
-            move |on| {
-                let on = u32::from(on).min(tick);
-                if let Some(channel) = channels.next() {
-                    let begins = on > 0 && !channel.energised;
-                    *channel = Channel {
-                        running: on > 0,
-                        energised: on == tick,
-                        elapsed: if begins {
-                            on
-                        } else {
-                            channel.elapsed.saturating_add(on)
-                        },
-                        ended_at: 0,
-                        pulses: channel.pulses.wrapping_add(u32::from(begins)),
-                    };
-                }
-                // At most the tick, 2000.
-                on as u16
+        let mut sent = on;
+        for (on, channel) in sent.iter_mut().zip(&mut self.channels) {
+            if *on == 0 && !channel.running {
+                // A valve with nothing to do.
+                continue;
             }
-        })
+            let time = u32::from(*on).min(tick);
+            // At most the tick, 2000.
+            *on = time as u16;
+            if time > 0 && !channel.energised {
+                channel.pulses = channel.pulses.wrapping_add(1);
+                channel.elapsed = 0;
+            }
+            channel.elapsed = channel.elapsed.wrapping_add(time);
+            channel.running = time > 0;
+            channel.energised = time == tick;
+            channel.ended_at = 0;
+        }
+        sent
     }
 
     /// Pulses begun per valve since power-on, wrapping: the switching count.

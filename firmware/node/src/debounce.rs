@@ -4,43 +4,54 @@
 //! The delay is exactly `ticks` samples in both directions, so that lift and
 //! touchdown are delayed alike and step lengths are not biased.
 
+/// Largest number of samples.
+const MOST: u8 = 7;
+
+/// All ones if `ticks` has the bit, else zero.
+const fn plane(ticks: u8, bit: u8) -> u8 {
+    if ticks & bit == 0 { 0 } else { u8::MAX }
+}
+
 /// Debounced state of up to eight switches, one bit each.
+///
+/// The eight counters stand upright: bit n of the three planes is the counter of
+/// switch n, so that all of them count in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Debounce {
-    ticks: u8,
+    /// All ones where the number of samples has a one.
+    target: [u8; 3],
     state: u8,
-    counts: [u8; 8],
+    planes: [u8; 3],
 }
 
 impl Debounce {
-    /// Switches that must be stable for `ticks` samples (0 acts as 1); all off.
+    /// Switches that must be stable for `ticks` samples (1…7; 0 acts as 1, more as
+    /// 7); all off.
     pub const fn new(ticks: u8) -> Self {
+        let ticks = match ticks {
+            0 => 1,
+            ticks if ticks > MOST => MOST,
+            ticks => ticks,
+        };
         Self {
-            ticks: if ticks == 0 { 1 } else { ticks },
+            target: [plane(ticks, 1), plane(ticks, 2), plane(ticks, 4)],
             state: 0,
-            counts: [0; 8],
+            planes: [0; 3],
         }
     }
 
     /// Takes one sample of the raw levels and returns the debounced ones.
     pub fn sample(&mut self, raw: u8) -> u8 {
         let changed = raw ^ self.state;
-        if changed == 0 {
-            self.counts = [0; 8];
-            return self.state;
-        }
-        for (bit, count) in self.counts.iter_mut().enumerate() {
-            let mask = 1_u8.wrapping_shl(u32::try_from(bit).unwrap_or(0));
-            if changed & mask == 0 {
-                *count = 0;
-                continue;
-            }
-            *count = count.saturating_add(1);
-            if *count >= self.ticks {
-                self.state ^= mask;
-                *count = 0;
-            }
-        }
+        let [ones, twos, fours] = self.planes;
+        // Where the level differs, the counter goes up by one; elsewhere it is zero.
+        let ones_up = !ones & changed;
+        let twos_up = (twos ^ ones) & changed;
+        let fours_up = (fours ^ (ones & twos)) & changed;
+        let [one, two, four] = self.target;
+        let reached = !((ones_up ^ one) | (twos_up ^ two) | (fours_up ^ four)) & changed;
+        self.state ^= reached;
+        self.planes = [ones_up & !reached, twos_up & !reached, fours_up & !reached];
         self.state
     }
 
@@ -61,6 +72,19 @@ mod tests {
             [0b0001, 0b0001, 0b0001, 0b0000, 0b0000, 0b0000].map(|raw| switches.sample(raw)),
             [0, 0, 1, 1, 1, 0]
         );
+    }
+
+    #[test]
+    fn every_number_of_samples_is_counted_to_the_last() {
+        for ticks in 1..=MOST {
+            let mut switches = Debounce::new(ticks);
+            for level in [0xFF, 0x00] {
+                for sample in 1..=ticks {
+                    let expected = if sample == ticks { level } else { !level };
+                    assert_eq!(switches.sample(level), expected, "{sample} of {ticks}");
+                }
+            }
+        }
     }
 
     #[test]

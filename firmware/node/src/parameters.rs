@@ -6,7 +6,7 @@
 //! replaces the old values. So a refused value changes nothing.
 
 use wheeleg_protocol::NackReason;
-use wheeleg_protocol::param::{JOINT_PARAMS, JointParam, ParamInfo, WHEEL_PARAMS, WheelParam};
+use wheeleg_protocol::param::{JointParam, ParamLimits, WheelParam};
 
 /// Raw values of all rows of a table, in its order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -21,7 +21,7 @@ pub type JointParameters = Parameters<{ JointParam::COUNT }>;
 pub type WheelParameters = Parameters<{ WheelParam::COUNT }>;
 
 impl<const N: usize> Parameters<N> {
-    fn defaults(table: &'static [ParamInfo]) -> Self {
+    fn defaults(table: &'static [ParamLimits]) -> Self {
         let mut values = [0; N];
         for (value, row) in values.iter_mut().zip(table) {
             *value = row.default;
@@ -29,7 +29,7 @@ impl<const N: usize> Parameters<N> {
         Self { values }
     }
 
-    fn value(&self, table: &[ParamInfo], id: u16) -> Result<i32, NackReason> {
+    fn value(&self, table: &[ParamLimits], id: u16) -> Result<i32, NackReason> {
         table
             .iter()
             .zip(&self.values)
@@ -39,7 +39,7 @@ impl<const N: usize> Parameters<N> {
 
     fn changed(
         &self,
-        table: &[ParamInfo],
+        table: &[ParamLimits],
         id: u16,
         raw: i32,
         disarmed: bool,
@@ -60,16 +60,22 @@ impl<const N: usize> Parameters<N> {
         Ok(trial)
     }
 
+    /// The first or the second half of the values, for sealing them in two parts.
+    pub(crate) fn half(&self, half: usize) -> &[i32] {
+        let (first, second) = self.values.split_at(N / 2);
+        if half == 0 { first } else { second }
+    }
+
     fn at(&self, index: usize) -> i32 {
         self.values.get(index).copied().unwrap_or(0)
     }
 }
 
 macro_rules! parameters_of {
-    ($parameters:ident, $param:ident, $table:ident) => {
+    ($parameters:ident, $param:ident) => {
         impl Default for $parameters {
             fn default() -> Self {
-                Self::defaults($table)
+                Self::defaults($param::LIMITS)
             }
         }
 
@@ -81,7 +87,7 @@ macro_rules! parameters_of {
 
             /// Every parameter that is not at its default: number and raw value.
             pub fn changed_from_default(&self) -> impl Iterator<Item = (u16, i32)> + '_ {
-                let rows = $table.iter().zip(&self.values);
+                let rows = $param::LIMITS.iter().zip(&self.values);
                 rows.filter(|(row, value)| row.default != **value)
                     .map(|(row, value)| (row.id, *value))
             }
@@ -91,7 +97,7 @@ macro_rules! parameters_of {
             /// # Errors
             /// [`NackReason::UnknownParameter`].
             pub fn by_id(&self, id: u16) -> Result<i32, NackReason> {
-                self.value($table, id)
+                self.value($param::LIMITS, id)
             }
 
             /// A copy with one value changed, checked against its row.
@@ -101,18 +107,19 @@ macro_rules! parameters_of {
             /// [`NackReason::Armed`] for a row that can be set only while
             /// `disarmed`.
             pub fn with(&self, id: u16, raw: i32, disarmed: bool) -> Result<Self, NackReason> {
-                self.changed($table, id, raw, disarmed)
+                self.changed($param::LIMITS, id, raw, disarmed)
             }
         }
     };
 }
 
-parameters_of!(JointParameters, JointParam, JOINT_PARAMS);
-parameters_of!(WheelParameters, WheelParam, WHEEL_PARAMS);
+parameters_of!(JointParameters, JointParam);
+parameters_of!(WheelParameters, WheelParam);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_protocol::param::WHEEL_PARAMS;
 
     #[test]
     fn every_row_keeps_its_own_value() {

@@ -12,7 +12,7 @@ use core::hash::{Hash, Hasher};
 /// Word-wise sum used as a [`Hasher`], so that a derived `Hash` says what is
 /// covered. One instruction of mixing per word: multiply and accumulate.
 #[derive(Clone, Copy, Debug)]
-struct WordSum(u32);
+pub(crate) struct WordSum(u32);
 
 impl WordSum {
     #[inline(always)]
@@ -86,8 +86,14 @@ impl Seal {
     /// Seal of `state`.
     #[inline(always)]
     pub fn of(state: &impl Hash) -> Self {
+        Self::made(|sum| state.hash(sum))
+    }
+
+    /// Seal of what `write` puts into the sum.
+    #[inline(always)]
+    pub(crate) fn made(write: impl FnOnce(&mut WordSum)) -> Self {
         let mut sum = WordSum(0);
-        state.hash(&mut sum);
+        write(&mut sum);
         Self { sum: sum.0 }
     }
 

@@ -10,6 +10,7 @@
 //! sees it.
 
 use crate::hardware::SensorError;
+use core::hash::{Hash, Hasher};
 use wheeleg_units::{AdcCode, PositionMm};
 
 /// Added to the leaky count by a rejected reading; a good one takes 1 off.
@@ -65,11 +66,29 @@ pub struct Reading {
 }
 
 /// Checks and converts the readings of one position sensor.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorMonitor {
     last: Option<PositionMm>,
     rejected: u8,
     good_in_row: u8,
+}
+
+impl Hash for SensorMonitor {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here; small ones in
+        // one word.
+        let Self {
+            last,
+            rejected,
+            good_in_row,
+        } = self;
+        let small = u32::from(*rejected)
+            | u32::from(*good_in_row).wrapping_shl(8)
+            | u32::from(last.is_some()).wrapping_shl(16);
+        state.write_u32(small);
+        state.write_i32(last.unwrap_or(PositionMm::ZERO).raw());
+    }
 }
 
 impl SensorMonitor {

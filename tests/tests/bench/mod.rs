@@ -65,11 +65,11 @@ fn frame(destination: Address, message: &Message) -> Vec<u8> {
     message.emit(envelope, &mut buffer).expect("fits").to_vec()
 }
 
-fn sync(cycle: u64) -> Vec<u8> {
+fn sync(cycle: u64, script: &[(u64, f64)]) -> Vec<u8> {
     let address = Address::joint(ADDRESS).expect("a joint");
     let now_ms = 10 * cycle;
-    let (_, stroke_mm) = SCRIPT
-        .into_iter()
+    let (_, stroke_mm) = script
+        .iter()
         .rev()
         .find(|(from_ms, _)| *from_ms <= now_ms)
         .expect("begins at 0");
@@ -77,7 +77,7 @@ fn sync(cycle: u64) -> Vec<u8> {
     let set = slots.set_joint(
         address,
         JointSetpoint {
-            reference: PositionMm::from_f64(stroke_mm),
+            reference: PositionMm::from_f64(*stroke_mm),
             velocity: WireVelocity::ZERO,
             next: None,
             on_link_loss: LinkLossAction::Hold,
@@ -125,9 +125,18 @@ fn ran(reply: Reply) -> Ran {
     }
 }
 
-/// Runs the script for `duration_ms` with the board that `ask` reaches: power-up
-/// at mid-stroke, arming at 100 ms, then the set-points.
-pub(crate) fn closed_loop(duration_ms: u64, mut ask: impl FnMut(&Request) -> Reply) -> Trace {
+/// Runs the script for `duration_ms` with the board that `ask` reaches.
+pub(crate) fn closed_loop(duration_ms: u64, ask: impl FnMut(&Request) -> Reply) -> Trace {
+    script(&SCRIPT, duration_ms, ask)
+}
+
+/// Runs set-points, as in [`SCRIPT`], for `duration_ms` with the board that `ask`
+/// reaches: power-up at mid-stroke, arming at 100 ms, then the set-points.
+pub(crate) fn script(
+    script: &[(u64, f64)],
+    duration_ms: u64,
+    mut ask: impl FnMut(&Request) -> Reply,
+) -> Trace {
     let mut params = wheeleg_2003_axis();
     params.initial_stroke_m = 0.09;
     let axis = Axis::new(&params).expect("the bench");
@@ -152,7 +161,7 @@ pub(crate) fn closed_loop(duration_ms: u64, mut ask: impl FnMut(&Request) -> Rep
         trace.replies.push(reply);
         if ms % 10 == 1 {
             // Begun at the last edge; 102 bytes end just behind this one.
-            let bytes = sync(ms / 10);
+            let bytes = sync(ms / 10, script);
             let end_ns = (ms - 1) * MS + bytes.len() as u64 * BYTE_NS;
             assert!((ms * MS..(ms + 1) * MS).contains(&end_ns), "{end_ns}");
             trace.replies.push(ran(ask(&delivery(&bytes, end_ns))));

@@ -110,24 +110,36 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
     #[inline(never)]
     fn infer_all(&self, first: i16, second: i16) -> i16 {
         let mut second_levels = [0_u16; SECOND];
-        // Ranges instead of `enumerate`, whose counter is an overflow check that
-        // keeps a panic in the image.
-        for (j, level) in (0..SECOND).zip(&mut second_levels) {
-            *level = self.second.membership(j, second);
-        }
+        self.second.memberships(second, &mut second_levels);
         let mut numerator = 0_i64;
         let mut denominator = 0_i64;
-        for (i, row) in (0..FIRST).zip(&self.consequents) {
-            let level = self.first.membership(i, first);
+        let mut first_levels = [0_u16; FIRST];
+        self.first.memberships(first, &mut first_levels);
+        for (&level, row) in first_levels.iter().zip(&self.consequents) {
             if level == 0 {
                 continue;
             }
-            for (&other, &y) in second_levels.iter().zip(row) {
-                let weight = i64::from(level.min(other));
-                numerator = numerator.wrapping_add(weight.wrapping_mul(i64::from(y)));
-                denominator = denominator.wrapping_add(weight);
-            }
+            let (sum, weight) = weigh(level, &second_levels, row);
+            numerator = numerator.wrapping_add(sum);
+            denominator = denominator.wrapping_add(weight);
         }
         mean_i64(numerator, denominator)
     }
+}
+
+/// Weighted sum and weight of one row. Of any length and in one copy: unrolled, it
+/// would be a kilobyte of an image that may never use it.
+#[inline(never)]
+fn weigh(level: u16, others: &[u16], row: &[i16]) -> (i64, i64) {
+    others
+        .iter()
+        .zip(row)
+        .fold((0, 0), |(sum, total), (&other, &y)| {
+            // Weights are below 2^16 and consequents 2^15.
+            let weight = i64::from(level.min(other));
+            (
+                weight.wrapping_mul(i64::from(y)).wrapping_add(sum),
+                weight.wrapping_add(total),
+            )
+        })
 }

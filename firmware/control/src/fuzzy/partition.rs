@@ -318,6 +318,17 @@ impl<const N: usize> Partition<N> {
         side.level(offset.unsigned_abs(), u32::from(self.levels)) as u16
     }
 
+    /// Memberships of `input` in the sets, one after another. In one copy, not
+    /// unrolled: for rule bases whose cost does not matter.
+    #[inline(never)]
+    pub(super) fn memberships(&self, input: i16, levels: &mut [u16]) {
+        // A range instead of `enumerate`, whose counter is an overflow check that
+        // keeps a panic in the image.
+        for (index, level) in (0..N).zip(levels) {
+            *level = self.membership(index, input);
+        }
+    }
+
     /// The two sets around `input` in a fan of all `N` sets.
     #[inline]
     pub(super) fn pair(&self, input: i16) -> Pair {

@@ -5,6 +5,7 @@ use crate::axis::{AxisData, AxisField, AxisModel};
 use crate::fuzzy::GridRules;
 use crate::rules;
 use crate::velocity::VelocityWindow;
+use core::hash::{Hash as _, Hasher};
 use fixed::FixedI32;
 use fixed::types::extra::U24;
 use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS};
@@ -297,8 +298,20 @@ impl JointConfig {
     }
 }
 
-impl core::hash::Hash for JointConfig {
-    fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
+impl JointConfig {
+    /// Number of parts in which a board seals a configuration, one after another.
+    pub const PARTS: usize = 3;
+
+    /// Coefficients of the predictive law, when it is chosen.
+    #[must_use]
+    pub const fn axis(&self) -> Option<&AxisModel> {
+        self.axis.as_ref()
+    }
+
+    /// Part `0..PARTS` for sealing memory: of about equal size, together the whole
+    /// configuration. Rule bases, which are constants, count by their address.
+    #[inline]
+    pub fn hash_part<H: Hasher>(&self, part: usize, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             gains,
@@ -315,12 +328,68 @@ impl core::hash::Hash for JointConfig {
             bumpless_ticks,
             axis,
         } = self;
-        (gains, tick, window).hash(state);
-        core::ptr::hash(*rules_pd, state);
-        core::ptr::hash(*rules_id, state);
-        (error_to_input, velocity_to_input).hash(state);
-        (integral_to_input, integral_limit).hash(state);
-        (settle_ticks, release_ticks, bumpless_ticks, axis).hash(state);
+        match part {
+            0 => gains.hash_without_axis(state),
+            1 => {
+                (&gains.axis, tick, window).hash(state);
+                core::ptr::hash(*rules_pd, state);
+                core::ptr::hash(*rules_id, state);
+                (error_to_input, velocity_to_input).hash(state);
+                (integral_to_input, integral_limit).hash(state);
+                (settle_ticks, release_ticks, bumpless_ticks).hash(state);
+            }
+            _ => axis.hash(state),
+        }
+    }
+}
+
+impl core::hash::Hash for JointConfig {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        for part in 0..Self::PARTS {
+            self.hash_part(part, state);
+        }
+    }
+}
+
+impl JointGains {
+    /// All but the axis data.
+    #[inline]
+    fn hash_without_axis<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            proportional,
+            correction_pd,
+            correction_id,
+            feed_forward,
+            error_scale,
+            velocity_scale,
+            integral_scale,
+            integral_zone,
+            duty_limit,
+            dead_zone_duty,
+            minimum_duty,
+            settle_band,
+            settle_velocity,
+            settle_dwell,
+            release_band,
+            release_dwell,
+            bumpless_time,
+            velocity_window,
+            stroke_min,
+            stroke_max,
+            law,
+            integral,
+            derivative,
+            sliding_time,
+            axis: _,
+            pwm_period,
+        } = self;
+        (proportional, correction_pd, correction_id, feed_forward).hash(state);
+        (error_scale, velocity_scale, integral_scale, integral_zone).hash(state);
+        (duty_limit, dead_zone_duty, minimum_duty, settle_band).hash(state);
+        (settle_velocity, settle_dwell, release_band, release_dwell).hash(state);
+        (bumpless_time, velocity_window, stroke_min, stroke_max).hash(state);
+        (law, integral, derivative, sliding_time, pwm_period).hash(state);
     }
 }
 

@@ -8,6 +8,7 @@ use crate::axis::predictive::Predictive;
 use crate::pwm::OnTimes;
 use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
+use core::hash::{Hash, Hasher};
 use wheeleg_units::{Duty, PositionMm, VelocityMmS, saturate_i16, shift_right_round};
 
 /// From gain (24) × position or velocity (16) fractional bits to duty (30).
@@ -22,7 +23,7 @@ const FADE_LIMIT: i64 = 4 << 30;
 /// Call [`JointController::step`] once per control tick while the joint tracks,
 /// and [`JointController::observe`] once per tick while it does not. Its `Hash`
 /// covers configuration and state, so that a board can seal both.
-#[derive(Clone, Debug, Hash)]
+#[derive(Clone, Debug)]
 pub struct JointController {
     config: JointConfig,
     correction: Correction,
@@ -57,7 +58,7 @@ impl JointController {
             fade: 0,
             fade_step: 0,
             sent: [0; VALVE_COUNT],
-            predictive: config.axis.map(Predictive::new),
+            predictive: config.axis().copied().map(Predictive::new),
             config,
         }
     }
@@ -68,28 +69,12 @@ impl JointController {
         &self.config
     }
 
-    /// What a tick changes: all but the configuration, to be sealed apart from it.
+    /// What a tick changes and the next one reads, to be sealed apart from the
+    /// configuration.
     #[inline]
     #[must_use]
-    pub fn state(&self) -> impl core::hash::Hash + '_ {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            config: _,
-            correction,
-            velocity,
-            settle,
-            integral,
-            last_law,
-            changed,
-            fade,
-            fade_step,
-            sent,
-            predictive,
-        } = self;
-        (
-            (correction, velocity, settle, integral, last_law),
-            (changed, fade, fade_step, sent, predictive),
-        )
+    pub const fn state(&self) -> State<'_> {
+        State(self)
     }
 
     /// The correction in use.
@@ -138,7 +123,12 @@ impl JointController {
         }
         self.integral = within(self.integral, config.integral_limit);
         if config.axis != self.config.axis {
-            self.predictive = config.axis.map(Predictive::new);
+            // The state of the law that is left was not watched while another was in
+            // use.
+            let sent = self.sent;
+            self.config = config;
+            self.reset();
+            self.sent = sent;
         }
         self.config = config;
         self.changed = true;
@@ -172,8 +162,11 @@ impl JointController {
     /// One control tick. Never panics.
     pub fn step(&mut self, input: &JointInput) -> JointOutput {
         let mut limits = JointLimits::default();
-        let gains = *self.config.gains();
-        let reference = input.reference.limit(gains.stroke_min, gains.stroke_max);
+        let (low, high) = {
+            let gains = self.config.gains();
+            (gains.stroke_min, gains.stroke_max)
+        };
+        let reference = input.reference.limit(low, high);
         limits.reference = reference != input.reference;
         let error = reference.saturating_sub(input.measured);
         if let Some(law) = &mut self.predictive {
@@ -209,7 +202,7 @@ impl JointController {
         } else {
             self.shaped(law, error, input.reference_velocity, &mut limits)
         };
-        let integrates = match gains.law {
+        let integrates = match self.config.gains().law {
             Law::Fuzzy => self.correction == Correction::Id,
             Law::Pid => true,
             _ => false,
@@ -217,10 +210,11 @@ impl JointController {
         if integrates && !quiet {
             self.integrate(error, duty, &mut limits);
         }
+        let gains = self.config.gains();
         JointOutput {
             duty,
             openings: match gains.law {
-                Law::Sliding if !quiet => modes::sliding(&gains, error, error_rate, velocity),
+                Law::Sliding if !quiet => modes::sliding(gains, error, error_rate, velocity),
                 _ if duty == Duty::ZERO => ValveOpenings::SHUT,
                 _ => allocate(duty, gains.pwm_period),
             },
@@ -345,6 +339,48 @@ impl JointController {
             self.integral = within(sum, self.config.integral_limit);
         }
         limits.integral_clamped = self.integral.wrapping_abs() == self.config.integral_limit;
+    }
+}
+
+/// See [`JointController::state`].
+#[derive(Clone, Copy, Debug)]
+pub struct State<'a>(&'a JointController);
+
+impl Hash for State<'_> {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let JointController {
+            config: _,
+            correction,
+            velocity,
+            settle,
+            integral,
+            last_law,
+            changed,
+            fade,
+            fade_step,
+            sent,
+            predictive,
+        } = self.0;
+        let [a, b, c, d] = *sent;
+        state.write_u32(u32::from(a) | u32::from(b).wrapping_shl(16));
+        state.write_u32(u32::from(c) | u32::from(d).wrapping_shl(16));
+        let flags = u32::from(*changed)
+            | (*correction as u32).wrapping_shl(8)
+            | u32::from(last_law.is_some()).wrapping_shl(16)
+            | u32::from(predictive.is_some()).wrapping_shl(24);
+        state.write_u32(flags);
+        if let Some(law) = predictive {
+            // The other laws begin afresh after it.
+            return law.hash(state);
+        }
+        velocity.hash(state);
+        settle.hash(state);
+        state.write_i64(*integral);
+        state.write_i64(last_law.unwrap_or_default());
+        state.write_i64(*fade);
+        state.write_i64(*fade_step);
     }
 }
 

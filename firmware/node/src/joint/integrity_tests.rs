@@ -1,6 +1,7 @@
-//! A flipped bit in what a joint board keeps between two ticks means Hold.
+//! A flipped bit in what a joint board keeps between two ticks means Hold: at the
+//! next tick for what a tick changes, within [`PARTS`] ticks for the rest.
 
-use super::node::JointNode;
+use super::node::{JointNode, PARTS};
 use super::reference::Target;
 use crate::NodeIdentity;
 use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, ValveBank};
@@ -37,11 +38,14 @@ impl PositionSensor for Sensor {
 type Node = JointNode<Valves, Sensor, NoSwitches>;
 
 fn armed() -> Node {
+    armed_with(JointParameters::default())
+}
+
+fn armed_with(parameters: JointParameters) -> Node {
     let identity = NodeIdentity {
         address: Address::joint(1).unwrap(),
         unique_id: [0; 12],
     };
-    let parameters = JointParameters::default();
     let mut node =
         JointNode::new(identity, parameters, Valves([0; 4]), Sensor, NoSwitches).unwrap();
     for tick in 0..20 {
@@ -58,11 +62,18 @@ fn armed() -> Node {
 }
 
 fn holds_after(damage: impl FnOnce(&mut Node)) -> bool {
-    let mut node = armed();
+    ticks_to_hold(armed(), 1, damage).is_some()
+}
+
+/// The tick after damage, of `most`, in which the node goes to Hold with its valves
+/// shut.
+fn ticks_to_hold(mut node: Node, most: u32, damage: impl FnOnce(&mut Node)) -> Option<u32> {
     damage(&mut node);
-    node.tick(Micros(21_000));
-    let held = node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt);
-    held && node.snapshot().pulses == [Micros::ZERO; 4]
+    (1..=most).find(|tick| {
+        node.tick(Micros(20_000 + tick * 1000));
+        let held = node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt);
+        held && node.snapshot().pulses == [Micros::ZERO; 4]
+    })
 }
 
 #[test]
@@ -95,9 +106,6 @@ fn damaged_controller_valve_and_target_state_is_seen() {
     assert!(holds_after(|node| {
         node.target = Target::at(PositionMm::from_raw(1));
     }));
-    assert!(holds_after(|node| {
-        node.settings.staged_exhaust = ValveMode::BlowThrough.openings(Micros(10_000));
-    }));
 }
 
 #[test]
@@ -111,29 +119,78 @@ fn a_request_does_not_hide_earlier_damage() {
     }));
 }
 
+/// A flipped bit of the configuration is found in its turn, from whichever part the
+/// node looks at next.
+fn found_in_turn(damage: impl Fn(&mut Node)) {
+    let mut latest = 0;
+    for earlier in 0..PARTS as u32 {
+        let mut node = armed();
+        for tick in 0..earlier {
+            node.tick(Micros(20_000 + (tick + 1) * 1000));
+        }
+        damage(&mut node);
+        let found = (1..=PARTS as u32).find(|tick| {
+            node.tick(Micros(20_000 + (earlier + tick) * 1000));
+            node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt)
+        });
+        latest = latest.max(found.expect("found within one round"));
+        assert_eq!(node.snapshot().pulses, [Micros::ZERO; 4]);
+    }
+    assert_eq!(latest, PARTS as u32, "each part is looked at once a round");
+}
+
 #[test]
-fn damaged_parameters_settings_and_gains_are_seen() {
-    let slow = JointParam::FollowingTime.id();
-    assert!(holds_after(|node| {
-        node.parameters = node.parameters.with(slow, 1501, true).unwrap();
-    }));
-    assert!(holds_after(|node| {
-        node.settings.sensor.step_max = PositionMm::ZERO;
-    }));
-    assert!(holds_after(|node| {
-        node.core.times.hold = Micros(node.core.times.hold.get() ^ 1);
-    }));
-    assert!(holds_after(|node| {
+fn damaged_parameters_settings_and_gains_are_seen_within_a_round() {
+    assert!(PARTS <= 8);
+    let (first, last) = (
+        JointParam::ALL[0].id(),
+        JointParam::ALL.last().unwrap().id(),
+    );
+    for id in [first, JointParam::FollowingTime.id(), last] {
+        found_in_turn(|node| {
+            let raw = node.parameters.by_id(id).unwrap();
+            node.parameters = node.parameters.with(id, raw + 1, true).unwrap();
+        });
+    }
+    found_in_turn(|node| node.settings.sensor.step_max = PositionMm::ZERO);
+    found_in_turn(|node| {
+        node.settings.staged_exhaust = ValveMode::BlowThrough.openings(Micros(10_000))
+    });
+    found_in_turn(|node| node.core.times.hold = Micros(node.core.times.hold.get() ^ 1));
+    found_in_turn(|node| {
         let gains = JointGains {
             feed_forward: fixed::FixedI32::from_bits(1),
             ..*node.controller.config().gains()
         };
         let config = JointConfig::new(&gains, Micros(1000)).unwrap();
         node.controller.retune(config);
-    }));
-    assert!(holds_after(|node| {
+        // What the change of the law leaves behind in the state is not the point.
+        node.reseal();
+    });
+    found_in_turn(|node| {
         let tick = Micros(1000);
         let timing = PwmTiming::new(Micros(20_000), tick, tick, tick, tick).unwrap();
         node.pwm.set_timing(timing);
-    }));
+    });
+}
+
+#[test]
+fn the_predictive_law_is_watched_as_well() {
+    let law = JointParam::Law.id();
+    let node = || armed_with(JointParameters::default().with(law, 5, true).unwrap());
+    assert_eq!(ticks_to_hold(node(), 20, |_| {}), None);
+    // Pressures, motion and valves followed through a tick that never was.
+    let found = ticks_to_hold(node(), 1, |node| {
+        node.controller.sent([1000, 0, 0, 0]);
+        node.controller.observe(PositionMm::from_int(50));
+    });
+    assert_eq!(found, Some(1));
+    let found = ticks_to_hold(node(), PARTS as u32, |node| {
+        let mut gains = *node.controller.config().gains();
+        gains.axis.mass = PositionMm::from_raw(gains.axis.mass.raw() + 1);
+        node.controller
+            .retune(JointConfig::new(&gains, Micros(1000)).unwrap());
+        node.reseal();
+    });
+    assert!(found.is_some());
 }

@@ -15,10 +15,18 @@ use crate::sensor::{Reading, Rejection, SensorMonitor};
 use crate::snapshot::{JointSnapshot, TickReport};
 use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
-use wheeleg_control::joint::JointController;
+use wheeleg_control::joint::{JointConfig, JointController};
 use wheeleg_control::pwm::ValvePwm;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
+
+/// Parts of the configuration that the node keeps itself: parameters in two
+/// halves, settings.
+const OWN_PARTS: usize = 3;
+/// Parts in which the configuration is sealed. A tick looks at one of them, so a
+/// flipped bit of it is found within so many ticks.
+pub(super) const PARTS: usize = OWN_PARTS + JointConfig::PARTS;
+const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -45,8 +53,10 @@ pub struct JointNode<V, S, W> {
     pub(super) monitor: SensorMonitor,
     pub(super) target: Target,
     pub(super) state: TickState,
-    /// Seal of what only a request changes.
-    fixed_seal: Seal,
+    /// Seals of what only a request changes, part by part.
+    fixed_seals: [Seal; PARTS],
+    /// The part that the next tick looks at.
+    part: u8,
     /// Seal of what a tick changes.
     seal: Seal,
     pub(super) snapshot: JointSnapshot,
@@ -91,7 +101,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 motion: MotionWatch::default(),
                 boot_ticks: Ticks::ZERO,
             },
-            fixed_seal: Seal::default(),
+            fixed_seals: [Seal::default(); PARTS],
+            part: 0,
             seal: Seal::default(),
             snapshot: JointSnapshot::at_boot(),
             switches: Debounce::new(SWITCH_TICKS),
@@ -150,7 +161,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.is_intact() {
+        if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -238,16 +249,18 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    /// What shapes the outputs of the next tick and is changed by requests alone.
-    #[inline(always)]
-    fn fixed(&self) -> impl Hash + '_ {
-        (
-            &self.parameters,
-            &self.settings,
-            &self.core.times,
-            self.controller.config(),
-            self.pwm.timing(),
-        )
+    /// Seal of one part of what shapes the outputs and is changed by requests alone.
+    #[inline(never)]
+    fn fixed(&self, part: usize) -> Seal {
+        match part {
+            0 => Seal::of(&self.parameters.half(0)),
+            1 => Seal::of(&self.parameters.half(1)),
+            2 => Seal::of(&(&self.settings, &self.core.times, self.pwm.timing())),
+            _ => {
+                let config = self.controller.config();
+                Seal::made(|sum| config.hash_part(part.wrapping_sub(OWN_PARTS), sum))
+            }
+        }
     }
 
     /// What shapes the outputs of the next tick and is changed by every tick.
@@ -262,21 +275,40 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         )
     }
 
-    /// Whether the state is as the last tick or request left it.
-    #[inline]
+    /// Whether everything is as the last tick or request left it.
+    #[inline(never)]
     fn is_intact(&self) -> bool {
-        self.fixed_seal.holds(&self.fixed()) && self.seal.holds(&self.moving())
+        let fixed = self.fixed_seals.iter().zip(0..);
+        self.seal.holds(&self.moving())
+            && fixed
+                .into_iter()
+                .all(|(seal, part)| *seal == self.fixed(part))
+    }
+
+    /// As [`JointNode::is_intact`], for a tick: all of the state, and one part of
+    /// what is fixed, another one each tick.
+    #[inline]
+    fn looks_intact(&mut self) -> bool {
+        let part = usize::from(self.part);
+        self.part = if part.wrapping_add(1) < PARTS {
+            self.part.wrapping_add(1)
+        } else {
+            0
+        };
+        // A part that does not exist is damage too.
+        self.fixed_seals.get(part) == Some(&self.fixed(part)) && self.seal.holds(&self.moving())
     }
 
     #[inline]
-    fn reseal(&mut self) {
+    pub(super) fn reseal(&mut self) {
         let seal = Seal::of(&self.moving());
         self.seal = seal;
     }
 
+    #[inline(never)]
     fn reseal_all(&mut self) {
-        let seal = Seal::of(&self.fixed());
-        self.fixed_seal = seal;
+        let seals = core::array::from_fn(|part| self.fixed(part));
+        self.fixed_seals = seals;
         self.reseal();
     }
 

@@ -126,29 +126,28 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Scales on-times in µs to the counts of the PWM channels and writes them.
     pub(super) fn write(&mut self, on_times: OnTimes) -> Result<(), PinError> {
         let max = u32::from(self.valves.max_duty());
-        let duty = on_times.map(|on| {
-            let scaled = u32::from(on)
-                .saturating_mul(max)
-                .checked_div(JOINT_TICK.get());
-            // At most `max`, because an on-time is at most one tick.
-            u16::try_from(scaled.unwrap_or(0).min(max)).unwrap_or(0)
-        });
+        let mut duty = on_times;
+        if max != JOINT_TICK.get() {
+            for on in &mut duty {
+                // 16 bits each: below 2^32. At most `max`, because an on-time is at
+                // most one tick.
+                let scaled = u32::from(*on).wrapping_mul(max) / const { JOINT_TICK.get() };
+                *on = scaled.min(max) as u16;
+            }
+        }
         self.valves.write(duty)
     }
 }
 
 fn limit_bits(limits: &JointLimits, settled: bool) -> LimitBits {
-    [
-        (limits.duty, Limit::DutySaturated),
-        (limits.reference, Limit::TravelLimited),
-        (
-            limits.integral_frozen || limits.integral_clamped,
-            Limit::IntegralLimited,
-        ),
-        (limits.below_minimum, Limit::PulseTooShort),
-        (settled, Limit::SettledShut),
-    ]
-    .into_iter()
-    .filter(|(active, _)| *active)
-    .fold(LimitBits::NONE, |bits, (_, limit)| bits.with(limit))
+    let bit = |active: bool, bits: LimitBits| if active { bits } else { LimitBits::NONE };
+    let integral = limits.integral_frozen || limits.integral_clamped;
+    bit(limits.duty, const { Limit::DutySaturated.mask() })
+        .union(bit(limits.reference, const { Limit::TravelLimited.mask() }))
+        .union(bit(integral, const { Limit::IntegralLimited.mask() }))
+        .union(bit(
+            limits.below_minimum,
+            const { Limit::PulseTooShort.mask() },
+        ))
+        .union(bit(settled, const { Limit::SettledShut.mask() }))
 }

@@ -16,6 +16,7 @@
 
 use super::settings::TickSettings;
 use crate::JOINT_TICK;
+use core::hash::{Hash, Hasher};
 use wheeleg_control::joint::Announced;
 use wheeleg_protocol::JointSetpoint;
 use wheeleg_protocol::link::CYCLE_US;
@@ -29,12 +30,35 @@ const TICKS_PER_SECOND: i32 = 1_000_000 / JOINT_TICK.get() as i32;
 const _: () = assert!(1_000_000 % JOINT_TICK.get() == 0);
 
 /// What the bus wants.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Target {
     reference: PositionMm,
     velocity: VelocityMmS,
     next: Option<Announced>,
     age: u32,
+}
+
+impl Hash for Target {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. Without jumps;
+        // that there is a next reference is a bit of the age.
+        let Self {
+            reference,
+            velocity,
+            next,
+            age,
+        } = self;
+        let (present, next, after) = match next {
+            Some(next) => (1_u32, next.reference.raw(), next.after.get()),
+            None => (0, 0, 0),
+        };
+        state.write_i32(reference.raw());
+        state.write_i32(velocity.raw());
+        state.write_i32(next);
+        state.write_u32(after);
+        state.write_u32(age ^ present.rotate_right(1));
+    }
 }
 
 impl Target {
