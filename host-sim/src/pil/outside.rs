@@ -16,6 +16,7 @@ use super::choice::{NODE_NAMES, NodeKind, Nodes};
 use super::compare::Comparison;
 use super::figures::{BoardFigures, PilSummary};
 use super::line::Line;
+use super::partner::unexpected;
 use super::qemu::{Qemu, QemuOptions};
 use super::{store, unicorn};
 use crate::SimError;
@@ -474,25 +475,4 @@ impl Outside {
             boards,
         }
     }
-}
-
-/// An answer that does not belong to the request.
-fn unexpected(name: &str, reply: &Reply) -> SimError {
-    let (what, help) = match reply {
-        Reply::Refused(why) => (format!("refuses: {why}"), "what was logged is complete"),
-        Reply::Halted(halt) => (
-            format!(
-                "has stopped at {:.6} s, program counter 0x{:08X}: {}",
-                halt.at_ns as f64 * 1e-9,
-                halt.pc,
-                halt.reason
-            ),
-            "what was logged up to here is complete",
-        ),
-        other => (
-            format!("answers out of turn: {other:?}"),
-            "build image and program from the same sources: cargo xtask pil --build",
-        ),
-    };
-    SimError::simulation(format!("{name} {what}"), help)
 }

@@ -150,23 +150,7 @@ impl<S: Stream> Partner<S> {
 
     /// An answer that does not belong to the request.
     pub fn unexpected(&self, reply: &Reply) -> SimError {
-        let (what, help) = match reply {
-            Reply::Refused(why) => (format!("refuses: {why}"), "see the help of --nodes"),
-            Reply::Halted(halt) => (
-                format!(
-                    "has stopped at {:.6} s, program counter 0x{:08X}: {}",
-                    halt.at_ns as f64 * 1e-9,
-                    halt.pc,
-                    halt.reason
-                ),
-                "what was logged up to here is complete",
-            ),
-            other => (
-                format!("answers out of turn: {other:?}"),
-                "build image and program from the same sources",
-            ),
-        };
-        SimError::simulation(format!("{} {what}", self.name()), help)
+        unexpected(&self.name(), reply)
     }
 
     fn damaged(&self, error: FrameError) -> SimError {
@@ -178,4 +162,25 @@ impl<S: Stream> Partner<S> {
             "build image and program from the same sources; on a serial port, check baud rate and cable",
         )
     }
+}
+
+/// An answer of the board `name` that does not belong to the request.
+pub(super) fn unexpected(name: &str, reply: &Reply) -> SimError {
+    let (what, help) = match reply {
+        Reply::Refused(why) => (format!("refuses: {why}"), "see the help of --nodes"),
+        Reply::Halted(halt) => (
+            format!(
+                "has stopped at {:.6} s, program counter 0x{:08X}: {}",
+                halt.at_ns as f64 * 1e-9,
+                halt.pc,
+                halt.reason
+            ),
+            "what was logged up to here is complete",
+        ),
+        other => (
+            format!("answers out of turn: {other:?}"),
+            "build image and program from the same sources: cargo xtask pil --build",
+        ),
+    };
+    SimError::simulation(format!("{name} {what}"), help)
 }
