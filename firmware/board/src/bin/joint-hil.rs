@@ -2,7 +2,7 @@
 //! links only if nothing in it can panic.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)]
+#![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
 
 use cortex_m_rt::entry;
 use wheeleg_board::g431::hil;

@@ -3,7 +3,7 @@
 //! leaves the linker with an undefined symbol of a telling name.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)]
+#![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
 
 #[path = "../image/wheel.rs"]
 mod image;

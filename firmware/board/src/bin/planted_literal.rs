@@ -2,7 +2,7 @@
 //! search for the parser in the other images can find it.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)]
+#![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
 
 use core::sync::atomic::{AtomicI32, Ordering};
 use fixed::types::I16F16;

@@ -2,7 +2,7 @@
 //! link check of the other images can fail.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)]
+#![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use wheeleg_board as _;

@@ -5,7 +5,7 @@
 //! after a while, in which the power cut can be prepared.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)]
+#![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
 
 use wheeleg_board::g431::flash::ParameterPages;
 use wheeleg_board::g431::{clock, fatal, pins, power, watchdog};

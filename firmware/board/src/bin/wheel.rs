@@ -1,7 +1,7 @@
 //! The image of a wheel board.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)]
+#![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
 
 #[path = "../image/wheel.rs"]
 mod image;
