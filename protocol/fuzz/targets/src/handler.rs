@@ -5,7 +5,7 @@
 use arbitrary::Unstructured;
 use wheeleg_node::Transmission;
 use wheeleg_node::mode::Mode;
-use wheeleg_protocol::link::{SlotTiming, TURNAROUND_US};
+use wheeleg_protocol::link::{GAP_US, SlotTiming, TURNAROUND_US};
 use wheeleg_protocol::{
     Address, Fault, FaultBits, Message, MessageType, Nack, NackReason, SCHEMA_HASH, SyncFlags,
 };
@@ -358,8 +358,16 @@ impl<B: Board> Play<'_, B> {
                         assert_eq!(reply.active_faults, self.board.faults());
                         assert_eq!(reply.mode, self.board.mode());
                     }
-                    (Heard::Request(sound, _), answer) => {
-                        assert_eq!(start, TURNAROUND_US);
+                    (Heard::Request(sound, request), answer) => {
+                        if matches!(request, Some(Message::Discover(_))) {
+                            // Twins part here: one of eight slots, by unique id and cycle.
+                            let slots = SlotTiming::DEFAULT;
+                            let pitch = slots.frame_us(MessageType::Identity) + GAP_US;
+                            let late = start - TURNAROUND_US;
+                            assert!(late.is_multiple_of(pitch) && late < 8 * pitch, "{start}");
+                        } else {
+                            assert_eq!(start, TURNAROUND_US);
+                        }
                         assert_eq!(envelope.sequence, sound.sequence);
                         assert!(!matches!(answer, Message::SlotReply(_)));
                     }
