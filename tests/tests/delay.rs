@@ -180,13 +180,22 @@ fn the_predictions_of_a_pressure_swap_hold_and_its_rivals_fail() {
     for id in [
         "vented before",
         "balanced before",
-        "V/C",
+        "1/C",
         "offset",
+        "volume",
         "bore, scaled",
     ] {
         let p = predictions.of(id).expect("tested");
         assert!(p.holds, "{p:?}");
     }
+    // With tubes of one size the smaller bore starts later, as their air demands.
+    let delays: Vec<f64> = predictions
+        .bores
+        .iter()
+        .filter(|b| !b.scaled)
+        .map(|b| b.delay_s)
+        .collect();
+    assert!(delays[0] > delays[1] && delays[1] > delays[2], "{delays:?}");
     for id in ["rival: filter", "rival: transport"] {
         let p = predictions.of(id).expect("tested");
         assert!(!p.holds, "{p:?}");
