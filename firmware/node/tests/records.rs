@@ -253,3 +253,22 @@ fn a_stop_right_after_arming_has_nothing_to_ramp_down() {
     rig.tick();
     assert_eq!(rig.drive(), 0);
 }
+
+/// Found by the fuzz target `joint`: the pulses of the tick in which the fault
+/// was found still went out.
+#[test]
+fn the_tick_that_misses_a_motion_opens_no_valve() {
+    let mut rig = JointRig::tracking(Hold);
+    for _ in 0..400 {
+        rig.sync(Some(setpoint(140.0, Hold)), false);
+        for _ in 0..10 {
+            rig.tick();
+            if rig.node.mode() == Mode::Hold {
+                assert!(rig.node.faults().contains(Fault::NoMotion));
+                assert_eq!(rig.duty(), [0; 4]);
+                return;
+            }
+        }
+    }
+    panic!("a piston that stands still under air is at fault");
+}

@@ -49,8 +49,14 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else {
             self.pwm.tick(&output.openings)
         };
-        self.controller.sent(on_times);
         self.expect_motion(&on_times, output.settled, now);
+        // A motion that did not come is a fault of this tick, too.
+        let on_times = if self.core.mode().may_drive() {
+            on_times
+        } else {
+            self.pwm.shut()
+        };
+        self.controller.sent(on_times);
         let mut limits = limit_bits(&output.limits, output.settled);
         if slew_limited {
             limits.insert(Limit::SlewLimited);
