@@ -190,7 +190,7 @@ pub(crate) fn three_steps(
     further: &[&str],
 ) -> anyhow::Result<Value> {
     run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))?;
-    let mut wheeleg = command(&target_dir().join("release").join("wheeleg"));
+    let mut wheeleg = command(target_dir().join("release").join("wheeleg"));
     wheeleg
         .args(["run", "three-step", "--nodes", nodes, "--json", "--out"])
         .arg(target_dir().join(folder))

@@ -174,10 +174,16 @@ mod tests {
 
     #[test]
     fn leads_of_both_directions_cancel() {
-        let balanced = |tick: u32| if tick / 390 % 2 == 0 { PUSH } else { PULL };
+        let balanced = |tick: u32| {
+            if (tick / 390).is_multiple_of(2) {
+                PUSH
+            } else {
+                PULL
+            }
+        };
         assert_eq!(fault_at(60_000, balanced, still(90)), None);
         // A pull within the grace starts it anew.
-        let broken = |tick: u32| if tick % 190 == 0 { PULL } else { PUSH };
+        let broken = |tick: u32| if tick.is_multiple_of(190) { PULL } else { PUSH };
         assert_eq!(fault_at(60_000, broken, still(90)), None);
     }
 

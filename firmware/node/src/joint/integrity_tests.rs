@@ -141,7 +141,7 @@ fn found_in_turn(damage: impl Fn(&mut Node)) {
 
 #[test]
 fn damaged_parameters_settings_and_gains_are_seen_within_a_round() {
-    assert!(PARTS <= 8);
+    const { assert!(PARTS <= 8) };
     let (first, last) = (
         JointParam::ALL[0].id(),
         JointParam::ALL.last().unwrap().id(),

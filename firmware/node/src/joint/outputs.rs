@@ -137,7 +137,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             for on in &mut duty {
                 // 16 bits each: below 2^32. At most `max`, because an on-time is at
                 // most one tick.
-                let scaled = u32::from(*on).wrapping_mul(max).checked_div(JOINT_TICK.get());
+                let scaled = u32::from(*on)
+                    .wrapping_mul(max)
+                    .checked_div(JOINT_TICK.get());
                 *on = scaled.unwrap_or(0).min(max) as u16;
             }
         }
