@@ -209,7 +209,8 @@ fn no_field_type_is_missing_from_the_definition() {
         "Acceleration8p8",
         "SyncSlots",
         "[u8; 3]",
-        "[u8; 12]", "[u8; 32]",
+        "[u8; 12]",
+        "[u8; 32]",
     ];
     for message in MESSAGES {
         for field in message.fields {

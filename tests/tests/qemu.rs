@@ -131,7 +131,10 @@ fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
     let mut partner = board("qemu-joint");
     for (i, (request, here)) in life.iter().zip(answers_here(3, &life)).enumerate() {
         let there = without_figures(partner.ask(request).expect("the image answers"));
-        assert!(there == here, "request {i}: here  {here:?}\nthere {there:?}");
+        assert!(
+            there == here,
+            "request {i}: here  {here:?}\nthere {there:?}"
+        );
     }
 }
 

@@ -165,14 +165,23 @@ mod tests {
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (equal, other) = (page(0), page(5));
-        for word in ["joint3", "40842fedd013525c", "converter code", "1\u{2009}444", "natively"] {
+        for word in [
+            "joint3",
+            "40842fedd013525c",
+            "converter code",
+            "1\u{2009}444",
+            "natively",
+        ] {
             assert!(equal.contains(word), "{word}");
         }
         assert!(equal.contains("0 bits differ<") && !equal.contains("first difference"));
         assert!(other.contains("5 bits differ") && other.contains("7 here, 8 there"));
         let native = report("master-lost");
         let native = std::fs::read_to_string(native.0.path().join("report.html")).expect("written");
-        assert!(!native.contains("id=\"boards\""), "no boards outside, no section");
+        assert!(
+            !native.contains("id=\"boards\""),
+            "no boards outside, no section"
+        );
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! The STM32G431CB. Register names as in RM0440; what is used and why stands in
 //! `BOARD.md`.
-#![allow(unsafe_code, reason = "registers, interrupt handlers, memory that DMA shares")]
+#![allow(
+    unsafe_code,
+    reason = "registers, interrupt handlers, memory that DMA shares"
+)]
 
 #[cfg(feature = "outputs")]
 pub mod adc;
