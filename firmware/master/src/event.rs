@@ -21,6 +21,12 @@ pub enum HoldReason {
         /// Active fault bits, protocol's table of faults.
         faults: u16,
     },
+    /// A node that had been armed is so no longer, although nobody asked for it:
+    /// it has restarted.
+    NodeDisarmed(
+        /// Bus address.
+        u8,
+    ),
     /// The supply-pressure switch opened.
     SupplyLost,
     /// Layer 1 produced nothing for 100 ms.

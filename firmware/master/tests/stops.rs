@@ -167,6 +167,32 @@ fn a_stalled_layer_one_is_held_for_a_tenth_of_a_second() {
 }
 
 #[test]
+fn a_node_that_restarts_faster_than_it_is_missed_stops_the_others() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.stand();
+    rig.submit(Command::StartGait);
+    rig.run(60);
+    // Its next reply comes in its slot, from a board that remembers nothing.
+    rig.node(4).mode = NodeMode::Idle;
+    rig.run(2);
+    assert!(!rig.saw(|event| matches!(event, Event::NodeLost(_))));
+    assert_eq!(
+        rig.master.layer0().hold(),
+        Some(HoldReason::NodeDisarmed(4))
+    );
+    rig.run(20);
+    assert!(!rig.master.is_armed(), "latched");
+    let others = [1, 2, 3, 5, 6].map(|joint| rig.node(joint).mode);
+    assert_eq!(others, [NodeMode::Hold; 5]);
+    // Disarming on request is no such event.
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    rig.submit(Command::Disarm);
+    rig.run(20);
+    assert!(!rig.saw(|event| matches!(event, Event::Hold(_))));
+}
+
+#[test]
 fn emergency_brake_of_one_joint_stops_motion_and_keeps_the_others() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.stand();

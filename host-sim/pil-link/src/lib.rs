@@ -47,7 +47,7 @@ mod reply;
 mod request;
 
 pub use frame::{Deframer, FrameError, encode};
-pub use reply::{Figures, Halt, Hello, Image, Outputs, Ran, Reply, Sent, Trip};
+pub use reply::{Figures, Halt, Hello, Image, Outputs, Ran, Reply, Sent, Trip, WATCHDOG_RESET};
 pub use request::{Hook, Inputs, Nonvolatile, Power, Request, Run, Straps, Switches};
 
 /// Version of this interface; both sides must have the same.

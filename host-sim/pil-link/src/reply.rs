@@ -123,6 +123,9 @@ pub struct Figures {
     pub late_bytes: u32,
 }
 
+/// Reset flag of the independent watchdog in [`Trip::cause`] (RM0440, RCC_CSR).
+pub const WATCHDOG_RESET: u32 = 1 << 29;
+
 /// A reset of the processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Trip {

@@ -13,7 +13,7 @@ use wheeleg_node::mode::ModeRules as _;
 use wheeleg_protocol::link::CYCLE_US;
 use wheeleg_protocol::{
     Address, Arm, Envelope, JointSetpoint, LinkLossAction, MAX_ENCODED, Message, NextReference,
-    SCHEMA_HASH, Sync, SyncFlags, SyncSlots,
+    ResetCause, SCHEMA_HASH, Sync, SyncFlags, SyncSlots,
 };
 use wheeleg_units::Micros;
 
@@ -58,8 +58,8 @@ impl Node {
             .into_iter()
             .map(|(parameter, raw)| (parameter.id(), raw))
             .collect();
-        let board =
-            JointBoard::new(address, &stored).map_err(|e| BenchError::Board(e.to_string()))?;
+        let board = JointBoard::new(address, &stored, ResetCause::PowerUp)
+            .map_err(|e| BenchError::Board(e.to_string()))?;
         Ok(Self {
             board,
             address,

@@ -13,7 +13,7 @@ use wheeleg_node::parameters::{JointParameters, WheelParameters};
 use wheeleg_node::snapshot::TickReport;
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{NodeIdentity, Transmission};
-use wheeleg_protocol::{Address, NackReason};
+use wheeleg_protocol::{Address, NackReason, ResetCause};
 use wheeleg_units::Micros;
 
 use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
@@ -95,12 +95,17 @@ fn stored_parameters<P>(
 
 impl JointBoard {
     /// A board at `address`, in boot, all valves off. `stored` are the parameters
-    /// (number, raw value) that commissioning left in its memory.
+    /// (number, raw value) that commissioning left in its memory, `cause` why its
+    /// processor starts.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
-    pub(crate) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        Self::build(identity(address), stored)
+    pub(crate) fn new(
+        address: Address,
+        stored: &[(u16, i32)],
+        cause: ResetCause,
+    ) -> Result<Self, SimError> {
+        Self::build(identity(address), stored, cause)
     }
 
     /// Another board with the same straps, as [`Self::new`].
@@ -108,10 +113,14 @@ impl JointBoard {
     /// # Errors
     /// As [`Self::new`].
     pub(super) fn twin(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        Self::build(twin_identity(address), stored)
+        Self::build(twin_identity(address), stored, ResetCause::PowerUp)
     }
 
-    fn build(who: NodeIdentity, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+    fn build(
+        who: NodeIdentity,
+        stored: &[(u16, i32)],
+        cause: ResetCause,
+    ) -> Result<Self, SimError> {
         let address = who.address;
         let parameters =
             stored_parameters(address, stored, JointParameters::default(), |p, id, raw| {
@@ -136,8 +145,10 @@ impl JointBoard {
             JointNode::new(who, parameters, bank, sensor.clone(), NoSwitches)
                 .map(JointApplication::Plain)
         };
+        let mut application = application.map_err(|e| rejected(address, e))?;
+        each!(&mut application, node => node.started_by(cause));
         Ok(Self {
-            application: application.map_err(|e| rejected(address, e))?,
+            application,
             sensor,
             foot,
             valves,
@@ -217,12 +228,16 @@ pub(super) struct WheelBoard {
 }
 
 impl WheelBoard {
-    /// A board at `address`, in boot, bridge off. `stored` as for joints.
+    /// A board at `address`, in boot, bridge off. `stored` and `cause` as for joints.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
-    pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        Self::build(identity(address), stored)
+    pub(super) fn new(
+        address: Address,
+        stored: &[(u16, i32)],
+        cause: ResetCause,
+    ) -> Result<Self, SimError> {
+        Self::build(identity(address), stored, cause)
     }
 
     /// Another board with the same straps, as [`Self::new`].
@@ -230,10 +245,14 @@ impl WheelBoard {
     /// # Errors
     /// As [`Self::new`].
     pub(super) fn twin(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        Self::build(twin_identity(address), stored)
+        Self::build(twin_identity(address), stored, ResetCause::PowerUp)
     }
 
-    fn build(who: NodeIdentity, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+    fn build(
+        who: NodeIdentity,
+        stored: &[(u16, i32)],
+        cause: ResetCause,
+    ) -> Result<Self, SimError> {
         let address = who.address;
         let parameters =
             stored_parameters(address, stored, WheelParameters::default(), |p, id, raw| {
@@ -262,8 +281,10 @@ impl WheelBoard {
             )
             .map(WheelApplication::Plain)
         };
+        let mut application = application.map_err(|e| rejected(address, e))?;
+        each_wheel!(&mut application, node => node.started_by(cause));
         Ok(Self {
-            application: application.map_err(|e| rejected(address, e))?,
+            application,
             encoder,
             pulse,
             sign,

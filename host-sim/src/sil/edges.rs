@@ -2,7 +2,7 @@
 //! of their outputs with those of the native application beside them.
 
 use wheeleg_pil_link as link;
-use wheeleg_protocol::Address;
+use wheeleg_protocol::{Address, ResetCause};
 
 use super::world::World;
 use crate::SimError;
@@ -98,10 +98,15 @@ impl World {
     fn restart_tripped(&mut self) -> Result<(), SimError> {
         for raw in 1..=8_u8 {
             let trip = self.outside.as_mut().and_then(|o| o.take_trip(raw));
-            let Some(address) = trip.and_then(|_| Address::new(raw)) else {
+            let Some((trip, address)) = trip.zip(Address::new(raw)) else {
                 continue;
             };
-            self.start_anew(address)?;
+            let cause = if trip.cause & link::WATCHDOG_RESET == 0 {
+                ResetCause::PowerUp
+            } else {
+                ResetCause::Watchdog
+            };
+            self.start_anew(address, cause)?;
         }
         Ok(())
     }

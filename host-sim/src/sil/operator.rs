@@ -368,6 +368,9 @@ fn hold_reason(reason: &HoldReason) -> String {
                 .collect();
             format!("{} reports: {}", board(node), words.join(" "))
         }
+        HoldReason::NodeDisarmed(node) => {
+            format!("{} is no longer armed: it has restarted", board(node))
+        }
         HoldReason::SupplyLost => "supply pressure lost".to_owned(),
         HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
         HoldReason::EmergencyStop => "E-stop".to_owned(),

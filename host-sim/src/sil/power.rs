@@ -6,7 +6,7 @@ use wheeleg_master::dispatcher::{Reject, Request, Ticket};
 use wheeleg_master::master::LOCAL_DEADLINE_US;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_pil_link as link;
-use wheeleg_protocol::Address;
+use wheeleg_protocol::{Address, ResetCause};
 
 use super::boards::{JointBoard, WheelBoard};
 use super::world::{JOINT_TICK_NS, World};
@@ -35,6 +35,16 @@ pub(super) enum Down {
         /// When the watchdog bites, ns.
         until_ns: u64,
     },
+}
+
+impl Down {
+    /// What the processor finds as the cause of its reset when this is over.
+    fn ended_by(self) -> ResetCause {
+        match self {
+            Self::Hung { .. } => ResetCause::Watchdog,
+            Self::No | Self::Off { .. } => ResetCause::PowerUp,
+        }
+    }
 }
 
 /// The program through which the user gives commands: a client of the master.
@@ -85,8 +95,12 @@ impl World {
                 .unwrap_or(true)
     }
 
-    /// The application of a board from its reset on.
-    pub(super) fn start_anew(&mut self, address: Address) -> Result<(), SimError> {
+    /// The application of a board from its reset by `cause` on.
+    pub(super) fn start_anew(
+        &mut self,
+        address: Address,
+        cause: ResetCause,
+    ) -> Result<(), SimError> {
         let i = usize::from(address.raw()) - 1;
         let outside = self.outside.as_ref();
         let outside = outside.is_some_and(|o| o.has(address.raw()));
@@ -95,9 +109,9 @@ impl World {
             self.down[i] = Down::No;
         }
         if i < 6 {
-            self.joints[i] = JointBoard::new(address, &self.stored.joints[i])?;
+            self.joints[i] = JointBoard::new(address, &self.stored.joints[i], cause)?;
         } else {
-            self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6])?;
+            self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6], cause)?;
         }
         Ok(())
     }
@@ -122,7 +136,7 @@ impl World {
                         self.down[usize::from(raw) - 1] = Down::No;
                     }
                 }
-                _ => self.start_anew(address)?,
+                _ => self.start_anew(address, down.ended_by())?,
             }
         }
         if self.master_back_ns.is_some_and(|at| at <= self.now_ns) {

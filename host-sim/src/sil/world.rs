@@ -11,7 +11,7 @@ use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_pil_link as link;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
-use wheeleg_protocol::Address;
+use wheeleg_protocol::{Address, ResetCause};
 
 use super::audit::{Audit, LineAudit};
 use super::boards::{JointBoard, WheelBoard};
@@ -134,8 +134,20 @@ impl World {
         let address = |n: u8| {
             Address::new(n).ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
         };
-        let joint = |n: u8| JointBoard::new(address(n)?, &stored.joints[usize::from(n) - 1]);
-        let wheel = |n: u8| WheelBoard::new(address(n)?, &stored.wheels[usize::from(n) - 7]);
+        let joint = |n: u8| {
+            JointBoard::new(
+                address(n)?,
+                &stored.joints[usize::from(n) - 1],
+                ResetCause::PowerUp,
+            )
+        };
+        let wheel = |n: u8| {
+            WheelBoard::new(
+                address(n)?,
+                &stored.wheels[usize::from(n) - 7],
+                ResetCause::PowerUp,
+            )
+        };
         let outputs = plant.outputs(&state);
         let mut bus = Bus::new(robot.bus.baud_bit_s as u32);
         if outside.is_some() {

@@ -1,8 +1,9 @@
 //! The ways down: outputs off, a note for the next start, reset.
 
 use super::{flash, pac, pins};
-use crate::reset::{Note, ResetCause};
+use crate::reset::{self, Note};
 use core::sync::atomic::{AtomicU32, Ordering};
+use wheeleg_protocol::ResetCause;
 
 /// Survives a reset: not initialised by the start-up code.
 #[unsafe(link_section = ".uninit.NOTE")]
@@ -22,7 +23,7 @@ pub fn take_cause() -> ResetCause {
     csr.modify(|r| r.set_rmvf(true));
     let note = NOTE.load(Ordering::Relaxed);
     NOTE.store(0, Ordering::Relaxed);
-    ResetCause::decode(flags, note)
+    reset::decode(flags, note)
 }
 
 /// The non-maskable interrupt: a flash word with a double error is noted for its

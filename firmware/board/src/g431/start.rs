@@ -2,9 +2,9 @@
 
 use super::{clock, fatal, identity, pins, power, watchdog};
 use crate::led::Status;
-use crate::reset::ResetCause;
 use crate::straps;
 use wheeleg_node::NodeIdentity;
+use wheeleg_protocol::ResetCause;
 use wheeleg_units::Micros;
 
 /// What a board is, before it has an application.

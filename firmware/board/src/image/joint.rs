@@ -26,6 +26,7 @@ fn main() -> ! {
     let Some(node) = make(identity, valves, potentiometer, feet) else {
         start.halt();
     };
+    node.started_by(start.cause);
     let mut board = start.joint_board();
     executive::run(node, &mut board)
 }

@@ -29,6 +29,7 @@ fn main() -> ! {
     let Some(node) = make(identity, motor, encoder, supply, dump) else {
         start.halt();
     };
+    node.started_by(start.cause);
     let mut board = start.wheel_board(Micros(node.tick_period_us()));
     executive::run(node, &mut board)
 }

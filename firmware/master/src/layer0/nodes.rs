@@ -182,6 +182,17 @@ impl Nodes {
         })
     }
 
+    /// The first node whose newest reply shows that its outputs are off without a
+    /// fault: `Boot` or `Idle`.
+    #[must_use]
+    pub fn first_disarmed(&self) -> Option<u8> {
+        self.iter().find_map(|(address, node)| {
+            node.reply
+                .filter(|reply| matches!(reply.mode, NodeMode::Boot | NodeMode::Idle))
+                .map(|_| address.raw())
+        })
+    }
+
     /// Whether every node's last reply shows a closed loop.
     #[must_use]
     pub fn all_armed(&self) -> bool {

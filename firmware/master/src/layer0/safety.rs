@@ -145,6 +145,12 @@ impl Layer0 {
         if let Some((node, faults)) = self.nodes.first_fault() {
             self.hold_all(HoldReason::NodeFault { node, faults }, now_us, events);
         }
+        // A node that is back before it is missed has lost its position loop all the same.
+        if self.power == Power::Armed
+            && let Some(node) = self.nodes.first_disarmed()
+        {
+            self.hold_all(HoldReason::NodeDisarmed(node), now_us, events);
+        }
         let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);
         if supply.is_some_and(|reply| !reply.inputs.contains(InputBits::SUPPLY_PRESSURE)) {
             self.hold_all(HoldReason::SupplyLost, now_us, events);
