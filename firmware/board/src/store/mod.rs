@@ -186,7 +186,7 @@ impl<F: Flash> Store<F> {
     }
 
     /// Hands the records of a page to `take`; gives the set if it was whole.
-    fn read(&self, page: usize, take: &mut dyn FnMut(Record)) -> Option<Whole> {
+    fn read(&self, page: usize, take: &mut impl FnMut(Record)) -> Option<Whole> {
         let header = self.flash.read(page, 0)?;
         let count = usize::from((header >> 16) as u16);
         if header as u16 != MAGIC || count > RECORDS_MAX {
