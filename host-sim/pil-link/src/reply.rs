@@ -103,8 +103,8 @@ pub struct Sent {
 /// Measurements of the processor; zero where a board cannot take them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Figures {
-    /// Instructions of the last tick that was worked off: from its edge until
-    /// the processor slept again, interrupt entry and main loop included.
+    /// Instructions of the last tick that nothing interrupted: from waking at its edge
+    /// until the watchdog is fed, interrupt entry and main loop included.
     pub tick_instructions: u32,
     /// Most instructions between two sleeps so far, whatever caused them.
     pub longest_awake: u32,

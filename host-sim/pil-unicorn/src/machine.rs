@@ -106,7 +106,8 @@ pub(crate) struct State {
     blocks: Vec<(u32, u32)>,
     flash: Vec<u8>,
     awake: Awake,
-    /// Instructions of the newest stretch that was one tick and nothing else.
+    /// Instructions of the newest tick that nothing interrupted: from waking at its
+    /// edge until the watchdog is fed.
     pub(crate) tick_instructions: u64,
     /// Longest stretch so far.
     pub(crate) longest_awake: u64,
@@ -147,6 +148,10 @@ impl State {
 
     /// After an access to a peripheral: what is due, and when.
     fn touched(&mut self) {
+        // Bytes may be worked off before the next sleep; they are no part of the tick.
+        if self.soc.watchdog.take_fed() && self.awake.ticks == 1 && self.awake.others == 0 {
+            self.tick_instructions = self.awake.instructions;
+        }
         self.nvic.lines = self.soc.lines();
         let attention = self.nvic.reset_request
             || self.soc.flash.stall_ns > 0
@@ -163,9 +168,6 @@ impl State {
     fn sleep(&mut self) {
         let awake = std::mem::take(&mut self.awake);
         self.longest_awake = self.longest_awake.max(awake.instructions);
-        if awake.ticks == 1 && awake.others == 0 {
-            self.tick_instructions = awake.instructions;
-        }
         if awake.ticks > 0 {
             self.seen = Seen {
                 edge: self.soc.edge.unwrap_or(0),

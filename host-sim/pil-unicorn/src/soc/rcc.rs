@@ -250,6 +250,8 @@ pub(crate) struct Watchdog {
     reload: u32,
     /// When it was fed last [ns], if it runs; negative before time zero.
     fed_ns: Option<i64>,
+    /// It has been fed since this was asked last.
+    fed: bool,
 }
 
 impl Default for Watchdog {
@@ -259,6 +261,7 @@ impl Default for Watchdog {
             prescaler: 0,
             reload: 0xFFF,
             fed_ns: None,
+            fed: false,
         }
     }
 }
@@ -273,6 +276,12 @@ impl Watchdog {
     pub(crate) fn bites_at_ns(&self) -> Option<u64> {
         let at = self.fed_ns? + self.timeout_ns() as i64;
         Some(at.max(0) as u64)
+    }
+
+    /// Whether it has been fed since the last call: the program feeds it when the
+    /// work of a tick is done.
+    pub(crate) fn take_fed(&mut self) -> bool {
+        std::mem::take(&mut self.fed)
     }
 
     /// The time scale moves by `ns`.
@@ -295,6 +304,7 @@ impl Watchdog {
             (0x00, 0x5555) => self.open = true,
             (0x00, 0xAAAA) => {
                 self.open = false;
+                self.fed = true;
                 if self.fed_ns.is_some() {
                     self.fed_ns = Some(now_ns);
                 }
