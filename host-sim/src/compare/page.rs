@@ -1,12 +1,12 @@
 //! The page: one self-contained file in the style of a run's report.
 
-use minijinja::{Environment, Value, context};
+use minijinja::{Value, context};
 
 use super::case::MARGIN;
 use super::{Comparison, Move, Row, Variation};
 use crate::SimError;
 use crate::bench::Kind;
-use crate::report::{pictures, plot::Figure, style};
+use crate::report::{page, pictures, plot::Figure};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -180,8 +180,6 @@ pub(super) fn render(
     comparison: &Comparison,
     figures: &[(Figure, String)],
 ) -> Result<String, SimError> {
-    let mut env = Environment::new();
-    env.add_template("page.html", TEMPLATE)?;
     let options = &comparison.options;
     let kinds: Vec<&str> = options.kinds.iter().map(|k| k.name()).collect();
     let axes: Vec<Value> = comparison
@@ -223,8 +221,7 @@ pub(super) fn render(
             context! { axis => axis, variation => variation, margin => format!("{margin:.2}") }
         })
         .collect();
-    Ok(env.get_template("page.html")?.render(context! {
-        style => Value::from_safe_string(style().to_owned()),
+    let values = context! {
         version => env!("CARGO_PKG_VERSION"),
         kinds => kinds,
         columns => COLUMNS,
@@ -239,7 +236,8 @@ pub(super) fn render(
         seed => options.seed,
         last_seed => options.seed + options.seeds - 1,
         combinations => options.combinations,
-    })?)
+    };
+    page(TEMPLATE, values)
 }
 
 /// Fingerprint of an axis: name and parameters.

@@ -1,11 +1,11 @@
 //! The page: one self-contained file in the style of a run's report.
 
-use minijinja::{Environment, Value, context};
+use minijinja::{Value, context};
 
 use super::trial::{Law, Start};
 use super::{PAPER_BAND_S, PAPER_DELAY_S, Study};
 use crate::SimError;
-use crate::report::{plot::Figure, style};
+use crate::report::{page, pictures, plot::Figure};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -88,19 +88,6 @@ pub(super) fn findings(study: &Study) -> Vec<String> {
 }
 
 pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<String, SimError> {
-    let mut env = Environment::new();
-    env.add_template("page.html", TEMPLATE)?;
-    let pictures: Vec<Value> = figures
-        .iter()
-        .map(|(figure, svg)| {
-            context! {
-                id => &*figure.id,
-                title => &*figure.title,
-                caption => &*figure.caption,
-                svg => Value::from_safe_string(svg.clone()),
-            }
-        })
-        .collect();
     let starts: Vec<Value> = Start::ALL
         .into_iter()
         .map(|start| {
@@ -195,15 +182,14 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
     let announced = |start| study.notice.of(Law::Default, start).last().cloned();
     let (noticed, noticed_rest) = (announced(Start::HomeHeld), announced(Start::HomeRest));
     let band = PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S;
-    Ok(env.get_template("page.html")?.render(context! {
-        style => Value::from_safe_string(style().to_owned()),
+    let values = context! {
         version => env!("CARGO_PKG_VERSION"),
         robot => &*study.robot,
         hash => &*study.robot_hash,
         seeds => study.seeds,
         mass => study.mass_kg,
         load => study.load_n,
-        figures => pictures,
+        figures => pictures(figures),
         findings => findings(study),
         starts => starts,
         base => seconds(a.base_s),
@@ -227,7 +213,8 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
         noticed_rest_meets => noticed_rest.is_some_and(|n| n.meets()),
         cycle_ms => 1e3 * study.bus.cycle_s,
         frame_ms => format!("{:.2}", 1e3 * study.bus.frame_s),
-    })?)
+    };
+    page(TEMPLATE, values)
 }
 
 #[cfg(test)]

@@ -1,19 +1,17 @@
 //! The page: one self-contained file in the style of a run's report.
 
-use minijinja::{Environment, Value, context};
+use minijinja::{Value, context};
 
 use super::Results;
 use super::audit::Status;
 use super::charts::short;
 use super::precision::LIMIT_M;
 use crate::SimError;
-use crate::report::{pictures, plot::Figure, style};
+use crate::report::{page, pictures, plot::Figure};
 
 const TEMPLATE: &str = include_str!("page.html");
 
 pub(super) fn render(results: &Results, figures: &[(Figure, String)]) -> Result<String, SimError> {
-    let mut env = Environment::new();
-    env.add_template("page.html", TEMPLATE)?;
     let axes: Vec<Value> = results
         .checks
         .iter()
@@ -62,8 +60,7 @@ pub(super) fn render(results: &Results, figures: &[(Figure, String)]) -> Result<
         })
         .collect();
     let map = &results.precision;
-    Ok(env.get_template("page.html")?.render(context! {
-        style => Value::from_safe_string(style().to_owned()),
+    let values = context! {
         version => env!("CARGO_PKG_VERSION"),
         figures => pictures(figures),
         axes => axes,
@@ -79,7 +76,8 @@ pub(super) fn render(results: &Results, figures: &[(Figure, String)]) -> Result<
         worst_um => short(1e6 * map.worst_m()),
         precise => map.worst_m() < LIMIT_M,
         poses => map.poses,
-    })?)
+    };
+    page(TEMPLATE, values)
 }
 
 /// "8 of 10" axes of a reading.

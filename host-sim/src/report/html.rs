@@ -1,6 +1,6 @@
 //! The self-contained HTML page.
 
-use minijinja::{Environment, Value, context};
+use minijinja::{Environment, UndefinedBehavior, Value, context};
 
 use super::Summary;
 use super::figures::Source;
@@ -11,11 +11,20 @@ use crate::telemetry::{EventSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
 
-/// The style sheet of the report, for other pages of the program.
-pub(crate) fn style() -> &'static str {
-    let from = TEMPLATE.split_once("<style>");
-    let sheet = from.and_then(|(_, rest)| rest.split_once("</style>"));
-    sheet.map_or("", |(sheet, _)| sheet)
+/// A page of the program from its own template, which extends `base.html`: frame,
+/// style sheet and figures are the same on all of them. A value that a template
+/// prints or goes through and nobody gives is an error, not an empty place; `if` may ask.
+///
+/// # Errors
+/// [`SimError::Report`] if the template does not fit its values.
+pub(crate) fn page(template: &str, values: Value) -> Result<String, SimError> {
+    let mut env = Environment::new();
+    env.set_undefined_behavior(UndefinedBehavior::SemiStrict);
+    env.add_template("style.css", include_str!("style.css"))?;
+    env.add_template("figure.html", include_str!("figure.html"))?;
+    env.add_template("base.html", include_str!("base.html"))?;
+    env.add_template("page.html", template)?;
+    Ok(env.get_template("page.html")?.render(values)?)
 }
 
 /// Figures with their SVG text as values of a template.
@@ -71,8 +80,6 @@ pub(super) fn render(
     summary: &Summary,
     figures: &[(Figure, String)],
 ) -> Result<String, SimError> {
-    let mut env = Environment::new();
-    env.add_template("report.html", TEMPLATE)?;
     let targets: Vec<Value> = summary
         .targets
         .iter()
@@ -141,7 +148,7 @@ pub(super) fn render(
         .collect();
     let required = summary.targets.iter().filter(|t| t.required);
     let met = required.clone().filter(|t| t.pass).count();
-    let page = env.get_template("report.html")?.render(context! {
+    let values = context! {
         summary => context! {
             scenario => &*summary.scenario,
             robot => &*summary.robot,
@@ -149,6 +156,7 @@ pub(super) fn render(
             seed => summary.seed,
             hash => &*summary.hash,
             complete => summary.complete,
+            faults => &summary.faults,
         },
         scenario_text => &*source.scenario.description,
         robot_text => &*source.robot.description,
@@ -167,19 +175,13 @@ pub(super) fn render(
         events => events,
         start_up => start_up,
         parameters => parameters,
-    })?;
-    Ok(page)
+    };
+    page(TEMPLATE, values)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_style_sheet_is_found() {
-        assert!(style().contains("--bg"));
-        assert!(!style().contains('<'));
-    }
 
     #[test]
     fn boards_that_say_the_same_share_a_line() {

@@ -6,7 +6,7 @@ mod html;
 pub(crate) mod plot;
 mod summary;
 
-pub(crate) use html::{pictures, style};
+pub(crate) use html::{page, pictures};
 pub use summary::{RunInfo, Summary};
 
 use std::path::{Path, PathBuf};

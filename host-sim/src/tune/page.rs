@@ -1,13 +1,13 @@
 //! The page of a tuned axis: before and after.
 
-use minijinja::{Environment, Value, context};
+use minijinja::{Value, context};
 
 use super::{Test, Tuned};
 use crate::SimError;
 use crate::bench::Trace;
 use crate::compare::{Figures, MARGIN, Move, number, panel};
 use crate::report::plot::{Figure, Series, colour};
-use crate::report::{pictures, style};
+use crate::report::{page, pictures};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -135,8 +135,6 @@ fn lines(test: &Test) -> Vec<Value> {
 }
 
 pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<String, SimError> {
-    let mut env = Environment::new();
-    env.add_template("page.html", TEMPLATE)?;
     let ms = |s: f64| format!("{:.2}", s * 1e3);
     let short = |v: f64| {
         let text = format!("{v:.6}");
@@ -164,8 +162,7 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
     let valve = &tuned.config.axis.cylinder.fill_valve;
     let large = tuned.tests.iter().find(|t| t.motion == Move::Step100);
     let settle = |f: fn(&Test) -> Option<f64>| number(large.and_then(f), 3);
-    Ok(env.get_template("page.html")?.render(context! {
-        style => Value::from_safe_string(style().to_owned()),
+    let values = context! {
         version => env!("CARGO_PKG_VERSION"),
         name => &*tuned.config.name,
         description => &*tuned.config.description,
@@ -181,5 +178,6 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
         parameters => parameters,
         toml => &*tuned.toml,
         figures => pictures(figures),
-    })?)
+    };
+    page(TEMPLATE, values)
 }

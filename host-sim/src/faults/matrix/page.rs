@@ -1,13 +1,13 @@
 //! The report of the matrix, as a page and as JSON.
 
-use minijinja::{Environment, Value, context};
+use minijinja::{Value, context};
 use serde_json::json;
 
 use super::count;
 use super::judge::{Outcome, Verdict};
 use super::row::{Expect, Row, Since};
 use crate::SimError;
-use crate::report::style;
+use crate::report::page;
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -122,8 +122,6 @@ fn quoted(outcome: &Outcome) -> Vec<String> {
 }
 
 pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, SimError> {
-    let mut env = Environment::new();
-    env.add_template("page.html", TEMPLATE)?;
     let ms = |value: Option<f64>| {
         // Without the sign of a zero.
         let shown = |v: f64| if v.abs() < 0.05 { 0.0 } else { v };
@@ -164,8 +162,7 @@ pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, SimError
             }
         })
         .collect();
-    Ok(env.get_template("page.html")?.render(context! {
-        style => Value::from_safe_string(style().to_owned()),
+    let values = context! {
         version => env!("CARGO_PKG_VERSION"),
         seed => seed,
         rows => rows,
@@ -173,5 +170,6 @@ pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, SimError
         failed => count(outcomes, Verdict::Fail),
         missing => count(outcomes, Verdict::NotImplemented),
         wrong => outcomes.iter().map(|o| o.measured.wrong_frames).sum::<u64>(),
-    })?)
+    };
+    page(TEMPLATE, values)
 }
