@@ -167,6 +167,31 @@ fn assert_all_stopped(recording: &Recording, from_s: f64) {
     }
 }
 
+/// What a reset of joint 2 at `t` must lead to, once its outputs were off `commanded`
+/// seconds later: valves shut, one reset, all axes stopped. Gives the time until the
+/// valves are shut.
+fn assert_shut_after_one_reset(
+    what: &str,
+    recording: &Recording,
+    pil: &PilSummary,
+    t: f64,
+    commanded: f64,
+) -> f64 {
+    let physical = last(&recording.joints[1], t, |s| s.valves_open != 0);
+    assert!(
+        physical <= commanded + closing_s(1) + TICK_S,
+        "{physical} s"
+    );
+    assert_eq!(pil.boards[0].resets, 1);
+    assert_all_stopped(recording, t + 0.2);
+    println!(
+        "{what}: outputs off after {:.1} ms, valves shut after {:.1} ms",
+        commanded * 1e3,
+        physical * 1e3
+    );
+    physical
+}
+
 #[test]
 fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
     let (sound, _) = run(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
@@ -191,19 +216,8 @@ fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
         (WATCHDOG_S[0]..WATCHDOG_S[1] + TICK_S).contains(&commanded),
         "off after {commanded} s"
     );
-    let physical = last(rows, t, |s| s.valves_open != 0);
+    let physical = assert_shut_after_one_reset("program stops", &recording, &pil, t, commanded);
     assert!(physical > commanded, "{physical} s");
-    assert!(
-        physical <= commanded + closing_s(1) + TICK_S,
-        "{physical} s"
-    );
-    assert_eq!(pil.boards[0].resets, 1);
-    assert_all_stopped(&recording, t + 0.2);
-    println!(
-        "program stops: outputs off after {:.1} ms, valves shut after {:.1} ms",
-        commanded * 1e3,
-        physical * 1e3
-    );
 }
 
 #[test]
@@ -216,18 +230,7 @@ fn a_brown_out_in_mid_move_turns_the_outputs_off_and_the_board_comes_back_disarm
     let commanded = last(rows, t, energised);
     // The fault strikes within the tick of its instant; the next one has none.
     assert!(commanded <= 2.0 * TICK_S, "off after {commanded} s");
-    let physical = last(rows, t, |s| s.valves_open != 0);
-    assert!(
-        physical <= commanded + closing_s(1) + TICK_S,
-        "{physical} s"
-    );
-    assert_eq!(pil.boards[0].resets, 1);
-    assert_all_stopped(&recording, t + 0.2);
-    println!(
-        "supply fails: outputs off after {:.1} ms, valves shut after {:.1} ms",
-        commanded * 1e3,
-        physical * 1e3
-    );
+    assert_shut_after_one_reset("supply fails", &recording, &pil, t, commanded);
 }
 
 /// One emulated board by itself.

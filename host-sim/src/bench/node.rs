@@ -21,7 +21,7 @@ use super::commission::commission;
 use super::firmware::{Design, TICK};
 use super::run::{Action, Board, Sample};
 use super::suite::BenchError;
-use crate::sil::JointBoard;
+use crate::sil::{JointBoard, identity};
 
 /// Ticks of a bus cycle.
 const CYCLE_TICKS: u32 = CYCLE_US / TICK.get();
@@ -58,7 +58,7 @@ impl Node {
             .into_iter()
             .map(|(parameter, raw)| (parameter.id(), raw))
             .collect();
-        let board = JointBoard::new(address, &stored, ResetCause::PowerUp)
+        let board = JointBoard::new(identity(address), &stored, ResetCause::PowerUp)
             .map_err(|e| BenchError::Board(e.to_string()))?;
         Ok(Self {
             board,

@@ -50,8 +50,9 @@ pub(crate) struct JointBoard {
     valves: [PwmChannel; 4],
 }
 
-/// 96-bit unique id of a simulated processor: its address in every byte.
-fn identity(address: Address) -> NodeIdentity {
+/// The board at an address; the 96-bit unique id of its processor is the address in
+/// every byte.
+pub(crate) fn identity(address: Address) -> NodeIdentity {
     NodeIdentity {
         address,
         unique_id: [address.raw(); 12],
@@ -59,7 +60,7 @@ fn identity(address: Address) -> NodeIdentity {
 }
 
 /// Another processor behind the same straps.
-fn twin_identity(address: Address) -> NodeIdentity {
+pub(super) fn twin_identity(address: Address) -> NodeIdentity {
     NodeIdentity {
         address,
         unique_id: [!address.raw(); 12],
@@ -94,29 +95,13 @@ fn stored_parameters<P>(
 }
 
 impl JointBoard {
-    /// A board at `address`, in boot, all valves off. `stored` are the parameters
+    /// The board `who`, in boot, all valves off. `stored` are the parameters
     /// (number, raw value) that commissioning left in its memory, `cause` why its
     /// processor starts.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(crate) fn new(
-        address: Address,
-        stored: &[(u16, i32)],
-        cause: ResetCause,
-    ) -> Result<Self, SimError> {
-        Self::build(identity(address), stored, cause)
-    }
-
-    /// Another board with the same straps, as [`Self::new`].
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub(super) fn twin(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        Self::build(twin_identity(address), stored, ResetCause::PowerUp)
-    }
-
-    fn build(
         who: NodeIdentity,
         stored: &[(u16, i32)],
         cause: ResetCause,
@@ -228,27 +213,11 @@ pub(super) struct WheelBoard {
 }
 
 impl WheelBoard {
-    /// A board at `address`, in boot, bridge off. `stored` and `cause` as for joints.
+    /// The board `who`, in boot, bridge off. `stored` and `cause` as for joints.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(super) fn new(
-        address: Address,
-        stored: &[(u16, i32)],
-        cause: ResetCause,
-    ) -> Result<Self, SimError> {
-        Self::build(identity(address), stored, cause)
-    }
-
-    /// Another board with the same straps, as [`Self::new`].
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub(super) fn twin(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
-        Self::build(twin_identity(address), stored, ResetCause::PowerUp)
-    }
-
-    fn build(
         who: NodeIdentity,
         stored: &[(u16, i32)],
         cause: ResetCause,

@@ -24,7 +24,7 @@ use std::ops::ControlFlow;
 use wheeleg_protocol::LinkQuality;
 
 pub use self::audit::LineAudit;
-pub(crate) use self::boards::JointBoard;
+pub(crate) use self::boards::{JointBoard, identity};
 
 use self::observe::Observer;
 use self::operator::Operator;

@@ -8,7 +8,7 @@ use wheeleg_master::{Master, MasterConfig};
 use wheeleg_pil_link as link;
 use wheeleg_protocol::{Address, ResetCause};
 
-use super::boards::{JointBoard, WheelBoard};
+use super::boards::{JointBoard, WheelBoard, identity};
 use super::world::{JOINT_TICK_NS, World};
 use crate::SimError;
 use crate::faults::{FaultKind, FaultSpec, Victim};
@@ -108,10 +108,11 @@ impl World {
         if !(outside && matches!(self.down[i], Down::Off { .. })) {
             self.down[i] = Down::No;
         }
+        let who = identity(address);
         if i < 6 {
-            self.joints[i] = JointBoard::new(address, &self.stored.joints[i], cause)?;
+            self.joints[i] = JointBoard::new(who, &self.stored.joints[i], cause)?;
         } else {
-            self.wheels[i - 6] = WheelBoard::new(address, &self.stored.wheels[i - 6], cause)?;
+            self.wheels[i - 6] = WheelBoard::new(who, &self.stored.wheels[i - 6], cause)?;
         }
         Ok(())
     }

@@ -7,10 +7,10 @@ use wheeleg_protocol::frame::{VERSION, encode};
 use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
 use wheeleg_protocol::{
     Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, NackReason, ParamGet,
-    ParamSet, ParamValue,
+    ParamSet, ParamValue, ResetCause,
 };
 
-use super::boards::{JointBoard, WheelBoard};
+use super::boards::{JointBoard, WheelBoard, twin_identity};
 use super::bus::{Bus, Delivery, Driver};
 use super::traffic::micros;
 use crate::SimError;
@@ -55,14 +55,14 @@ impl Strangers {
     /// [`SimError::Simulation`] if the board refuses its parameters.
     pub(super) fn plug_in(&mut self, address: u8, stored: &NodeParams) -> Result<(), SimError> {
         let i = usize::from(address) - 1;
-        let Some(at) = Address::new(address) else {
+        let Some(who) = Address::new(address).map(twin_identity) else {
             return Ok(());
         };
         if i < 6 {
-            let board = JointBoard::twin(at, &stored.joints[i])?;
+            let board = JointBoard::new(who, &stored.joints[i], ResetCause::PowerUp)?;
             self.joints.push((address, board));
         } else {
-            let board = WheelBoard::twin(at, &stored.wheels[i - 6])?;
+            let board = WheelBoard::new(who, &stored.wheels[i - 6], ResetCause::PowerUp)?;
             self.wheels.push((address, board));
         }
         Ok(())

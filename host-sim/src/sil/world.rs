@@ -14,7 +14,7 @@ use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::{Address, ResetCause};
 
 use super::audit::{Audit, LineAudit};
-use super::boards::{JointBoard, WheelBoard};
+use super::boards::{JointBoard, WheelBoard, identity};
 use super::bus::Bus;
 use super::edges::Sensed;
 use super::power::{Client, Down};
@@ -131,19 +131,20 @@ impl World {
             .initial_state(seed)
             .map_err(|e| refused("plant", &e))?;
         let stored = &robot.node;
-        let address = |n: u8| {
-            Address::new(n).ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
+        let who = |n: u8| {
+            let address = Address::new(n).map(identity);
+            address.ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
         };
         let joint = |n: u8| {
             JointBoard::new(
-                address(n)?,
+                who(n)?,
                 &stored.joints[usize::from(n) - 1],
                 ResetCause::PowerUp,
             )
         };
         let wheel = |n: u8| {
             WheelBoard::new(
-                address(n)?,
+                who(n)?,
                 &stored.wheels[usize::from(n) - 7],
                 ResetCause::PowerUp,
             )

@@ -24,8 +24,7 @@ pub(crate) const PIN_RESET: u32 = 1 << 26;
 pub(crate) const BROWN_OUT_RESET: u32 = 1 << 27;
 /// Software.
 pub(crate) const SOFTWARE_RESET: u32 = 1 << 28;
-/// Independent watchdog.
-pub(crate) const WATCHDOG_RESET: u32 = 1 << 29;
+pub(crate) use wheeleg_pil_link::WATCHDOG_RESET;
 const RMVF: u32 = 1 << 23;
 
 /// Clock tree.
