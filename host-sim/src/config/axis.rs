@@ -13,11 +13,7 @@ use wheeleg_plant::sensors::AdcNoise;
 use super::builtin;
 use super::error::ConfigError;
 use super::params::{ParameterInfo, params};
-use super::plant::sections::{
-    AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
-    LineSection, NumericsSection, PotentiometerSection, SupplySection, ValveSection,
-};
-use super::plant::{adc_params, cylinder_params, gas_params, potentiometer_params, supply_params};
+use super::plant::pneumatics::{self, Pneumatics, Sensing};
 use super::reader::Reader;
 
 params! {
@@ -115,7 +111,7 @@ impl AxisConfig {
         let mut r = Reader::parse(&what, file, text, true)?;
         let top = r.table("");
         if let Some(top) = &top {
-            r.reject_unknown(top, &KNOWN);
+            r.reject_unknown(top, &[&OWN[..], &pneumatics::SECTIONS].concat());
         }
         let name = top.as_ref().and_then(|t| r.text(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
@@ -134,57 +130,20 @@ impl AxisConfig {
     }
 }
 
-/// Names at the top of an axis file.
-const KNOWN: [&str; 17] = [
-    "name",
-    "description",
-    "gas",
-    "supply",
-    "regulator",
-    "dump_valve",
-    "fill_valve",
-    "vent_valve",
-    "line",
-    "cylinder",
-    "friction",
-    "end_stop",
-    "chamber",
-    "moving",
-    "start",
-    "sensor",
-    "numerics",
-];
+/// Names at the top of an axis file besides those of [`pneumatics`].
+const OWN: [&str; 5] = ["name", "description", "chamber", "moving", "start"];
 
 fn read(r: &mut Reader) -> Option<AxisParams> {
-    let gas = r.section::<GasSection>("gas");
-    let supply = r.section::<SupplySection>("supply");
-    let regulator = r.section::<FlowSection>("regulator");
-    let dump_valve = r.section::<ValveSection>("dump_valve");
-    let fill_valve = r.section::<ValveSection>("fill_valve");
-    let vent_valve = r.section::<ValveSection>("vent_valve");
-    let line = r.section::<LineSection>("line");
-    let cylinder = r.section::<CylinderSection>("cylinder");
-    let friction = r.section::<FrictionSection>("friction");
-    let end_stop = r.section::<EndStopSection>("end_stop");
+    let pneumatics = Pneumatics::read(r);
     let chamber = r.section::<ChamberSection>("chamber");
     let moving = r.section::<MovingSection>("moving");
     let start = r.section::<AxisStartSection>("start");
-    if let Some(sensor) = r.table("sensor") {
-        r.reject_unknown(&sensor, &["potentiometer", "adc"]);
-    }
-    let potentiometer = r.section::<PotentiometerSection>("sensor.potentiometer");
-    let adc = r.section::<AdcSection>("sensor.adc");
-    let numerics = r.section::<NumericsSection>("numerics");
+    // On a bench the noise is stated as a bound: uniform within ± so many LSB.
+    let sensing = Sensing::read(r, |half_width_lsb| AdcNoise::Uniform { half_width_lsb });
 
     let (chamber, moving, start) = (chamber?, moving?, start?);
-    let mut cylinder = cylinder_params(
-        &cylinder?,
-        &line?,
-        &fill_valve?,
-        &vent_valve?,
-        &friction?,
-        &end_stop?,
-    );
+    let (pneumatics, sensing) = (pneumatics?, sensing?);
+    let mut cylinder = pneumatics.cylinder;
     cylinder.initial_pressure_a_pa = start.pressure_a;
     cylinder.initial_pressure_b_pa = start.pressure_b;
     cylinder.friction.pressure_area_m2 = chamber.friction_area;
@@ -193,26 +152,16 @@ fn read(r: &mut Reader) -> Option<AxisParams> {
             heat_transfer_w_m2_k: chamber.heat_transfer,
         };
     }
-    let adc = adc?;
-    let mut converter = adc_params(&adc);
-    // On a bench the noise is stated as a bound: uniform within ± so many LSB.
-    converter.noise = if adc.noise > 0.0 {
-        AdcNoise::Uniform {
-            half_width_lsb: adc.noise,
-        }
-    } else {
-        AdcNoise::None
-    };
     Some(AxisParams {
-        gas: gas_params(&gas?),
-        supply: supply_params(&supply?, &regulator?, &dump_valve?),
+        gas: pneumatics.gas,
+        supply: pneumatics.supply,
         cylinder,
         moving_mass_kg: moving.mass,
         load_n: moving.load,
         initial_stroke_m: start.stroke,
-        potentiometer: potentiometer_params(&potentiometer?),
-        adc: converter,
-        step_ns: (numerics?.step * 1e9).round() as u64,
+        potentiometer: sensing.potentiometer,
+        adc: sensing.adc,
+        step_ns: sensing.step_ns,
     })
 }
 

@@ -1,48 +1,22 @@
 //! The plant's parameters: sections of a robot file, and their conversion.
 
+pub(super) mod pneumatics;
 pub mod sections;
 
 use wheeleg_plant::PlantParams;
-use wheeleg_plant::chamber::GasModel;
 use wheeleg_plant::contact::ContactParams;
 use wheeleg_plant::cylinder::CylinderParams;
 use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
-use wheeleg_plant::endstop::EndStopParams;
-use wheeleg_plant::flow::{GasParams, Iso6358};
-use wheeleg_plant::friction::FrictionParams;
 use wheeleg_plant::ground::Ground;
 use wheeleg_plant::motor::MotorParams;
-use wheeleg_plant::sensors::{AdcNoise, AdcParams, PotentiometerParams};
-use wheeleg_plant::supply::SupplyParams;
-use wheeleg_plant::valve::ValveParams;
+use wheeleg_plant::sensors::AdcNoise;
 
-use self::sections::{
-    AdcSection, BodySection, ContactSection, CylinderSection, EndStopSection, FlowSection,
-    FrictionSection, GasSection, LineSection, LinkSection, MotorSection, NumericsSection,
-    PotentiometerSection, StartSection, SupplySection, ValveSection,
-};
+use self::pneumatics::{Pneumatics, Sensing};
+use self::sections::{BodySection, ContactSection, LinkSection, MotorSection, StartSection};
 use super::reader::Reader;
 
-/// Names of the plant's sections.
-pub(super) const SECTIONS: [&str; 17] = [
-    "gas",
-    "supply",
-    "regulator",
-    "dump_valve",
-    "fill_valve",
-    "vent_valve",
-    "line",
-    "cylinder",
-    "friction",
-    "end_stop",
-    "start",
-    "motor",
-    "sensor",
-    "numerics",
-    "body",
-    "link",
-    "contact",
-];
+/// Names of the plant's sections besides those of one cylinder.
+pub(super) const SECTIONS: [&str; 5] = ["start", "motor", "body", "link", "contact"];
 
 /// The six bodies of a leg, in the order of the chain.
 const LINKS: [&str; 6] = [
@@ -54,40 +28,9 @@ const LINKS: [&str; 6] = [
     "vertical_rod",
 ];
 
-pub(super) fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {
-    Iso6358 {
-        conductance_m3_s_pa: c,
-        critical_ratio: b,
-        subsonic_exponent: m,
-        linear_ratio: linear,
-    }
-}
-
-fn valve(v: &ValveSection) -> ValveParams {
-    ValveParams {
-        flow: iso(
-            v.conductance,
-            v.critical_ratio,
-            v.subsonic_exponent,
-            v.linear_ratio,
-        ),
-        t_on_s: v.t_on,
-        t_off_s: v.t_off,
-    }
-}
-
 /// Reads all sections of the plant.
 pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
-    let gas = r.section::<GasSection>("gas");
-    let supply = r.section::<SupplySection>("supply");
-    let regulator = r.section::<FlowSection>("regulator");
-    let dump_valve = r.section::<ValveSection>("dump_valve");
-    let fill_valve = r.section::<ValveSection>("fill_valve");
-    let vent_valve = r.section::<ValveSection>("vent_valve");
-    let line = r.section::<LineSection>("line");
-    let cylinder = r.section::<CylinderSection>("cylinder");
-    let friction = r.section::<FrictionSection>("friction");
-    let end_stop = r.section::<EndStopSection>("end_stop");
+    let pneumatics = Pneumatics::read(r);
     if let Some(start) = r.table("start") {
         r.reject_unknown(&start, &["yaw", "horizontal", "vertical"]);
     }
@@ -95,12 +38,7 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
     let horizontal = r.section::<StartSection>("start.horizontal");
     let vertical = r.section::<StartSection>("start.vertical");
     let motor = r.section::<MotorSection>("motor");
-    if let Some(sensor) = r.table("sensor") {
-        r.reject_unknown(&sensor, &["potentiometer", "adc"]);
-    }
-    let potentiometer = r.section::<PotentiometerSection>("sensor.potentiometer");
-    let adc = r.section::<AdcSection>("sensor.adc");
-    let numerics = r.section::<NumericsSection>("numerics");
+    let sensing = Sensing::read(r, |sigma_lsb| AdcNoise::Gaussian { sigma_lsb });
 
     let body = r.section::<BodySection>("body");
     if let Some(link) = r.table("link") {
@@ -109,25 +47,18 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
     let links = LINKS.map(|name| r.section::<LinkSection>(&format!("link.{name}")));
     let contact = r.section::<ContactSection>("contact");
 
-    let base = cylinder_params(
-        &cylinder?,
-        &line?,
-        &fill_valve?,
-        &vent_valve?,
-        &friction?,
-        &end_stop?,
-    );
     let starts = [yaw?, horizontal?, vertical?];
+    let (pneumatics, sensing) = (pneumatics?, sensing?);
     let (body, motor) = (body?, motor?);
     let [l1, l2, l3, l4, l5, l6] = links;
     let links = [l1?, l2?, l3?, l4?, l5?, l6?];
     Some(PlantParams {
-        gas: gas_params(&gas?),
-        supply: supply_params(&supply?, &regulator?, &dump_valve?),
+        gas: pneumatics.gas,
+        supply: pneumatics.supply,
         cylinders: std::array::from_fn(|i| CylinderParams {
             initial_pressure_a_pa: starts[i % 3].pressure_a,
             initial_pressure_b_pa: starts[i % 3].pressure_b,
-            ..base.clone()
+            ..pneumatics.cylinder.clone()
         }),
         initial_stroke_m: std::array::from_fn(|i| starts[i % 3].stroke),
         stroke_zero_m: std::array::from_fn(|i| body.stroke_zero[i % 3]),
@@ -136,99 +67,10 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
         // The ground is the scenario's.
         ground: Ground::default(),
         motors: [motor_params(&motor); 2],
-        potentiometers: [potentiometer_params(&potentiometer?); 6],
-        adc: adc_params(&adc?),
-        step_ns: (numerics?.step * 1e9).round() as u64,
+        potentiometers: [sensing.potentiometer; 6],
+        adc: sensing.adc,
+        step_ns: sensing.step_ns,
     })
-}
-
-pub(super) fn gas_params(s: &GasSection) -> GasParams {
-    GasParams {
-        gas_constant_j_kg_k: s.gas_constant,
-        heat_capacity_ratio: s.heat_capacity_ratio,
-        reference_density_kg_m3: s.reference_density,
-        reference_temperature_k: s.reference_temperature,
-        reference_pressure_pa: s.reference_pressure,
-        ambient_pressure_pa: s.ambient_pressure,
-        ambient_temperature_k: s.ambient_temperature,
-    }
-}
-
-pub(super) fn supply_params(
-    s: &SupplySection,
-    regulator: &FlowSection,
-    dump: &ValveSection,
-) -> SupplyParams {
-    SupplyParams {
-        source_pressure_pa: s.source_pressure,
-        set_pressure_pa: s.set_pressure,
-        droop_pa: s.droop,
-        regulator_flow: iso(
-            regulator.conductance,
-            regulator.critical_ratio,
-            regulator.subsonic_exponent,
-            regulator.linear_ratio,
-        ),
-        reservoir_m3: s.reservoir,
-        initial_pressure_pa: s.initial_pressure,
-        dump_valve: valve(dump),
-        switch_on_pa: s.switch_on,
-        switch_off_pa: s.switch_off,
-    }
-}
-
-pub(super) fn cylinder_params(
-    c: &CylinderSection,
-    line: &LineSection,
-    fill: &ValveSection,
-    vent: &ValveSection,
-    f: &FrictionSection,
-    e: &EndStopSection,
-) -> CylinderParams {
-    CylinderParams {
-        bore_m: c.bore,
-        rod_m: c.rod,
-        stroke_m: c.stroke,
-        dead_volume_a_m3: c.dead_volume_a,
-        dead_volume_b_m3: c.dead_volume_b,
-        line_volume_m3: line.volume,
-        line_flow: Some(iso(
-            line.conductance,
-            line.critical_ratio,
-            line.subsonic_exponent,
-            line.linear_ratio,
-        )),
-        line_delay_s: line.delay,
-        dead_wall_area_m2: line.wall_area,
-        piston_leak_m3_s_pa: c.piston_leak,
-        rod_leak_m3_s_pa: c.rod_leak,
-        fill_valve: valve(fill),
-        vent_valve: valve(vent),
-        timing_spread: c.timing_spread,
-        gas_model: GasModel::Polytropic {
-            exponent: c.exponent,
-        },
-        friction: FrictionParams {
-            coulomb_n: f.coulomb,
-            static_n: f.static_force,
-            stribeck_m_s: f.stribeck,
-            viscous_n_s_m: f.viscous,
-            bristle_stiffness_n_m: f.bristle_stiffness,
-            bristle_damping_n_s_m: f.bristle_damping,
-            elastic_share: f.elastic_share,
-            // Not selected for the robot.
-            pressure_area_m2: 0.0,
-        },
-        end_stop: EndStopParams {
-            stiffness_n_m: e.stiffness,
-            damping_s_m: e.damping,
-            cushion_length_m: e.cushion_length,
-            cushion_damping_n_s_m: e.cushion_damping,
-        },
-        // Replaced per cylinder from [start].
-        initial_pressure_a_pa: 0.0,
-        initial_pressure_b_pa: 0.0,
-    }
 }
 
 fn motor_params(s: &MotorSection) -> MotorParams {
@@ -287,27 +129,6 @@ fn contact_params(s: &ContactSection) -> ContactParams {
         bristle_damping_n_s_m: s.bristle_damping,
         sole_radius_m: s.sole_radius,
         switch_threshold_m: s.switch_threshold,
-    }
-}
-
-pub(super) fn potentiometer_params(s: &PotentiometerSection) -> PotentiometerParams {
-    PotentiometerParams {
-        electrical_stroke_m: s.electrical_stroke,
-        offset_m: s.offset,
-        gain: s.gain,
-        nonlinearity: s.nonlinearity,
-    }
-}
-
-pub(super) fn adc_params(s: &AdcSection) -> AdcParams {
-    AdcParams {
-        bits: s.bits,
-        oversampling: s.oversampling,
-        noise: if s.noise > 0.0 {
-            AdcNoise::Gaussian { sigma_lsb: s.noise }
-        } else {
-            AdcNoise::None
-        },
     }
 }
 

@@ -164,6 +164,7 @@ impl RobotConfig {
                 "node",
             ];
             known.extend(plant::SECTIONS);
+            known.extend(plant::pneumatics::SECTIONS);
             r.reject_unknown(top, &known);
         }
         let name = top.as_ref().and_then(|t| r.text(t, "name"));
