@@ -5,7 +5,7 @@ use plotters::style::RGBColor;
 use super::single::range;
 use super::{ComparedAxis, Comparison, Move, Row};
 use crate::bench::Kind;
-use crate::report::plot::{Bars, Column, Content, Figure, Limit, Panel, Series, colour};
+use crate::report::plot::{Bars, Column, Content, Figure, Panel, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;
 
@@ -73,15 +73,10 @@ impl Comparison {
         self.overlays
             .iter()
             .filter(|o| o.axis == axis && o.motion == motion)
-            .map(|o| Series {
-                label: o.kind.name().to_owned(),
-                colour: colour_of(o.kind),
-                width: if o.kind == Kind::Predictive { 3 } else { 2 },
-                points: o
-                    .points
-                    .iter()
-                    .map(|[t, r, x]| (*t, value(*r, *x)))
-                    .collect(),
+            .map(|o| {
+                let width = if o.kind == Kind::Predictive { 3 } else { 2 };
+                let points = o.points.iter().map(|[t, r, x]| (*t, value(*r, *x)));
+                line(o.kind.name(), colour_of(o.kind), width, points.collect())
             })
             .collect()
     }
@@ -106,18 +101,9 @@ pub(crate) fn panel(
     y: Option<(f64, f64)>,
     limits: &[f64],
 ) -> Panel {
-    Panel {
-        title: title.to_owned(),
-        x_range: (-0.05, end_s),
-        marks: Vec::new(),
-        content: Content::Lines {
-            y_range: y.unwrap_or_else(|| range(&series)),
-            series,
-            limits: limits.iter().map(|y| Limit { y: *y }).collect(),
-            y_label: unit.to_owned(),
-        },
-        height: 230,
-    }
+    let y = (unit, y.unwrap_or_else(|| range(&series)));
+    let content = Content::lines(y, series).limited(limits);
+    Panel::new(title, (-0.05, end_s), 230, content)
 }
 
 /// The large step with its end enlarged: two panels.
@@ -206,13 +192,12 @@ fn overview(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
             ),
         ],
     };
-    panels.push(Panel {
-        title: "Worst of all seeds and both directions; switches of four valves in 10 s".to_owned(),
-        x_range: (0.0, 1.0),
-        marks: Vec::new(),
-        height: bars.height(),
-        content: Content::Bars(bars),
-    });
+    panels.push(Panel::new(
+        "Worst of all seeds and both directions; switches of four valves in 10 s",
+        (0.0, 1.0),
+        bars.height(),
+        Content::Bars(bars),
+    ));
     Some(Figure {
         id: "comparison".to_owned(),
         title: format!("Overview: {name}, 100 mm step"),
@@ -277,12 +262,8 @@ fn tracking(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     for (motion, mut p) in panels {
         p.x_range.1 = end_s;
         stacked.push(p);
-        let reference = vec![Series {
-            label: String::new(),
-            colour: colour::INK,
-            width: 2,
-            points: comparison.reference(name, motion),
-        }];
+        let reference = comparison.reference(name, motion);
+        let reference = vec![line("", colour::INK, 2, reference)];
         let mut p = panel("Its reference", "[mm]", end_s, reference, None, &[]);
         p.height = 110;
         stacked.push(p);
@@ -341,30 +322,16 @@ fn spread(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
                 values.sort_by(f64::total_cmp);
                 let n = values.len() as f64;
                 let points = values.iter().enumerate();
-                Series {
-                    label: kind.name().to_owned(),
-                    colour: colour_of(*kind),
-                    width: 2,
-                    points: points
-                        .map(|(i, v)| (100.0 * (i as f64 + 1.0) / n, *v))
-                        .collect(),
-                }
+                let points = points.map(|(i, v)| (100.0 * (i as f64 + 1.0) / n, *v));
+                line(kind.name(), colour_of(*kind), 2, points.collect())
             })
             .filter(|s| !s.points.is_empty())
             .collect()
     };
-    let curves = |title: &str, series: Vec<Series>, limit: f64, top: f64| Panel {
-        title: title.to_owned(),
-        x_range: (0.0, 100.0),
-        marks: Vec::new(),
-        content: Content::Curves {
-            series,
-            limits: vec![Limit { y: limit }],
-            x_label: "share of the combinations [%]".to_owned(),
-            y_label: "[mm]".to_owned(),
-            y_range: (0.0, top),
-        },
-        height: 220,
+    let curves = |title: &str, series: Vec<Series>, limit: f64, top: f64| {
+        let share = "share of the combinations [%]";
+        let content = Content::curves(share, ("[mm]", (0.0, top)), series);
+        Panel::new(title, (0.0, 100.0), 220, content.limited(&[limit]))
     };
     let errors = sorted(|r| r.figures.steady_error_mm.map(f64::abs));
     if errors.is_empty() {

@@ -2,15 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use plotters::style::RGBColor;
-
 use super::case::{CaseId, Row, Scene};
 use super::moves::Played;
 use super::{axis_error, draw, load, save};
 use crate::SimError;
 use crate::bench::Trace;
 use crate::output;
-use crate::report::plot::{Content, Figure, Panel, RasterRow, Series, colour, runs};
+use crate::report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
 use crate::report::subfolder;
 
 /// A case that was played alone.
@@ -119,19 +117,18 @@ pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
         let rows = trace.rows.iter().enumerate();
         rows.map(|(k, r)| (time(k), f(r))).collect()
     };
-    let line = |label: &str, colour: RGBColor, points: Points| Series {
-        label: label.to_owned(),
-        colour,
-        width: 2,
-        points,
-    };
     let stroke = vec![
-        line("reference", colour::COMMAND, of(&|r| r.reference_m * 1e3)),
-        line("stroke", colour::ROBOT, of(&|r| r.stroke_m * 1e3)),
+        line(
+            "reference",
+            colour::COMMAND,
+            2,
+            of(&|r| r.reference_m * 1e3),
+        ),
+        line("stroke", colour::ROBOT, 2, of(&|r| r.stroke_m * 1e3)),
     ];
     let pressure = vec![
-        line("A", colour::MODEL, of(&|r| r.pressure_pa[0] * 1e-5)),
-        line("B", colour::SECOND, of(&|r| r.pressure_pa[1] * 1e-5)),
+        line("A", colour::MODEL, 2, of(&|r| r.pressure_pa[0] * 1e-5)),
+        line("B", colour::SECOND, 2, of(&|r| r.pressure_pa[1] * 1e-5)),
     ];
     let valves = ["fill A", "vent A", "fill B", "vent B"];
     let valves = valves.iter().enumerate().map(|(i, name)| {
@@ -144,17 +141,9 @@ pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
             lower: None,
         }
     });
-    let lines = |title: &str, unit: &str, series: Vec<Series>| Panel {
-        title: title.to_owned(),
-        x_range: (0.0, end),
-        marks: Vec::new(),
-        content: Content::Lines {
-            y_range: range(&series),
-            series,
-            limits: Vec::new(),
-            y_label: unit.to_owned(),
-        },
-        height: 200,
+    let lines = |title: &str, unit: &str, series: Vec<Series>| {
+        let content = Content::lines((unit, range(&series)), series);
+        Panel::new(title, (0.0, end), 200, content)
     };
     Figure {
         id: id.to_owned(),
@@ -163,15 +152,12 @@ pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
         panels: vec![
             lines("Stroke", "[mm]", stroke),
             lines("Chamber pressure", "[bar abs]", pressure),
-            Panel {
-                title: "On-time of the valves in each tick".to_owned(),
-                x_range: (0.0, end),
-                marks: Vec::new(),
-                content: Content::Raster {
-                    rows: valves.collect(),
-                },
-                height: 110,
-            },
+            Panel::new(
+                "On-time of the valves in each tick",
+                (0.0, end),
+                110,
+                Content::Raster(valves.collect()),
+            ),
         ],
     }
 }

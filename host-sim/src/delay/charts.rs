@@ -5,45 +5,19 @@ use plotters::style::RGBColor;
 use super::notice::Noticed;
 use super::trial::{LEAD_S, Law, Outcome, Start};
 use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, PAPER_BAND_S, PAPER_DELAY_S, Study};
-use crate::report::plot::{Content, Figure, Limit, Panel, RasterRow, Series, colour};
+use crate::report::plot::{Axis, Content, Figure, Panel, RasterRow, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;
 
-fn line(label: &str, colour: RGBColor, points: Points) -> Series {
-    Series {
-        label: label.to_owned(),
-        colour,
-        width: 2,
-        points,
-    }
-}
-
 fn curves(
     title: &str,
-    (x_label, x_range): (&str, (f64, f64)),
-    (y_label, y_range): (&str, (f64, f64)),
+    (x_label, x_range): Axis<'_>,
+    y: Axis<'_>,
     series: Vec<Series>,
+    limits: &[f64],
 ) -> Panel {
-    Panel {
-        title: title.to_owned(),
-        x_range,
-        marks: Vec::new(),
-        content: Content::Curves {
-            series,
-            limits: Vec::new(),
-            x_label: x_label.to_owned(),
-            y_label: y_label.to_owned(),
-            y_range,
-        },
-        height: 210,
-    }
-}
-
-fn with_limits(mut panel: Panel, at: &[f64]) -> Panel {
-    if let Content::Curves { limits, .. } = &mut panel.content {
-        limits.extend(at.iter().map(|&y| Limit { y }));
-    }
-    panel
+    let content = Content::curves(x_label, y, series).limited(limits);
+    Panel::new(title, x_range, 210, content)
 }
 
 /// One colour per kind of start.
@@ -86,7 +60,7 @@ fn starts(study: &Study) -> Figure {
                 points.push((*d, (i + 1) as f64 / n));
             }
             points.push((0.4, 1.0));
-            line(start.name(), colours(start), points)
+            line(start.name(), colours(start), 2, points)
         });
         let mut panel = curves(
             match law {
@@ -99,6 +73,7 @@ fn starts(study: &Study) -> Figure {
             ),
             ("started", (0.0, 1.02)),
             series.into(),
+            &[],
         );
         panel.marks = vec![PAPER_DELAY_S - PAPER_BAND_S, PAPER_DELAY_S + PAPER_BAND_S];
         panel
@@ -106,10 +81,7 @@ fn starts(study: &Study) -> Figure {
     let mut panels = vec![panel(Law::Paper), panel(Law::Default)];
     // The legend of seven lines is too long for one panel: four and three.
     for (i, panel) in panels.iter_mut().enumerate() {
-        if let Content::Curves { series, .. } = &mut panel.content {
-            let unnamed = if i == 0 { 4..7 } else { 0..4 };
-            series[unnamed].iter_mut().for_each(|s| s.label.clear());
-        }
+        panel.name_only(if i == 0 { 0..4 } else { 4..7 });
     }
     Figure {
         id: "starts".to_owned(),
@@ -137,9 +109,9 @@ fn home(study: &Study) -> Figure {
     let strokes = runs
         .iter()
         .zip([colour::ROBOT, colour::MODEL, colour::SECOND])
-        .map(|((name, o), c)| line(name, c, points(o, &|r| r.stroke_m * 1e3)))
+        .map(|((name, o), c)| line(name, c, 2, points(o, &|r| r.stroke_m * 1e3)))
         .collect();
-    let mut panels = vec![curves("stroke", time, ("[mm]", (0.0, 190.0)), strokes)];
+    let mut panels = vec![curves("stroke", time, ("[mm]", (0.0, 190.0)), strokes, &[])];
     for (name, o) in runs {
         panels.push(curves(
             &format!("{name}: pressure"),
@@ -149,14 +121,17 @@ fn home(study: &Study) -> Figure {
                 line(
                     "counter chamber A",
                     colour::ROBOT,
+                    2,
                     points(o, &|r| r.pressure_pa[0] * 1e-5),
                 ),
                 line(
                     "drive chamber B",
                     colour::MODEL,
+                    2,
                     points(o, &|r| r.pressure_pa[1] * 1e-5),
                 ),
             ],
+            &[],
         ));
     }
     for (panel, delay) in panels[1..].iter_mut().zip(runs.map(|(_, o)| o.delay_s)) {
@@ -201,12 +176,10 @@ fn ablation(study: &Study) -> Figure {
             }
         })
         .collect();
-    let panel = |title: &str, rows, mark| Panel {
-        title: title.to_owned(),
-        x_range: (0.0, end),
-        marks: vec![mark],
-        content: Content::Raster { rows },
-        height: 300,
+    let panel = |title: &str, rows, mark| {
+        let mut panel = Panel::new(title, (0.0, end), 300, Content::Raster(rows));
+        panel.marks = vec![mark];
+        panel
     };
     Figure {
         id: "ablation".to_owned(),
@@ -245,7 +218,7 @@ fn scaling(study: &Study) -> Figure {
         .map(|(tube, c)| {
             let points = p.scaling.iter().filter(|s| s.tube == *tube);
             let points = points.map(|s| (s.ratio_s_pa * to_bar, s.delay_s)).collect();
-            line(&format!("tubes × {tube}"), c, points)
+            line(&format!("tubes × {tube}"), c, 2, points)
         })
         .collect();
     Figure {
@@ -263,6 +236,7 @@ fn scaling(study: &Study) -> Figure {
             ),
             ("[s]", (0.0, top * 1.1)),
             series,
+            &[],
         )],
     }
 }
@@ -286,7 +260,7 @@ fn notice(study: &Study) -> Figure {
         kinds
             .iter()
             .map(|(start, load, name, c)| {
-                line(if named { name } else { "" }, *c, rows(*start, *load, y))
+                line(if named { name } else { "" }, *c, 2, rows(*start, *load, y))
             })
             .collect()
     };
@@ -299,22 +273,18 @@ fn notice(study: &Study) -> Figure {
             study.notice.seeds
         ),
         panels: vec![
-            with_limits(
-                curves(
-                    "start delay",
-                    x,
-                    ("[s]", (0.0, 0.35)),
-                    series(|r| r.delay_s, true),
-                ),
+            curves(
+                "start delay",
+                x,
+                ("[s]", (0.0, 0.35)),
+                series(|r| r.delay_s, true),
                 &[NOTICED_LIMIT_S],
             ),
-            with_limits(
-                curves(
-                    "motion before the command",
-                    x,
-                    ("[mm]", (0.0, 1.5)),
-                    series(|r| Some(r.early_mm), false),
-                ),
+            curves(
+                "motion before the command",
+                x,
+                ("[mm]", (0.0, 1.5)),
+                series(|r| Some(r.early_mm), false),
                 &[EARLY_LIMIT_MM],
             ),
         ],

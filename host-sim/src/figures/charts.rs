@@ -2,15 +2,15 @@
 
 use super::Results;
 use super::section6::{AxisCheck, Instant, Reading};
-use crate::report::plot::{Content, Figure, Heat, Limit, Panel, Series, colour};
+use crate::report::plot::{Axis, Content, Figure, Heat, Panel, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;
 
 /// A panel (its words without dotted letters, which the pictures' font lacks) of one curve or more, with the paper's axis as lines where the data goes beyond it.
 fn curves(
     title: &str,
-    (x_label, x_range): (&str, (f64, f64)),
-    (y_label, axis): (&str, (f64, f64)),
+    (x_label, x_range): Axis<'_>,
+    (y_label, axis): Axis<'_>,
     series: Vec<Series>,
 ) -> Panel {
     let (mut lo, mut hi) = axis;
@@ -21,33 +21,14 @@ fn curves(
     let air = 0.04 * (hi - lo);
     let below = if lo < axis.0 { lo - air } else { lo };
     let above = if hi > axis.1 { hi + air } else { hi };
-    let limits = [(lo < axis.0, axis.0), (hi > axis.1, axis.1)];
-    Panel {
-        title: title.to_owned(),
-        x_range,
-        marks: Vec::new(),
-        content: Content::Curves {
-            series,
-            limits: limits
-                .into_iter()
-                .filter(|(beyond, _)| *beyond)
-                .map(|(_, y)| Limit { y })
-                .collect(),
-            x_label: x_label.to_owned(),
-            y_label: y_label.to_owned(),
-            y_range: (below, above),
-        },
-        height: 190,
+    let mut content = Content::curves(x_label, (y_label, (below, above)), series);
+    if lo < axis.0 {
+        content = content.limited(&[axis.0]);
     }
-}
-
-fn line(label: &str, colour: plotters::style::RGBColor, points: Points) -> Series {
-    Series {
-        label: label.to_owned(),
-        colour,
-        width: 2,
-        points,
+    if hi > axis.1 {
+        content = content.limited(&[axis.1]);
     }
+    Panel::new(title, x_range, 190, content)
 }
 
 /// What the caption says about the axes of a figure.
@@ -112,8 +93,13 @@ fn reading_figures(reading: &Reading, motion: &[Instant], checks: &[AxisCheck]) 
     let two = |unit: &str, names: [&str; 2], axes: [(f64, f64); 2], points: [Points; 2]| {
         let [a, b] = points;
         vec![
-            curves(names[0], time, (unit, axes[0]), vec![line("", blue, a)]),
-            curves(names[1], time, (unit, axes[1]), vec![line("", orange, b)]),
+            curves(names[0], time, (unit, axes[0]), vec![line("", blue, 2, a)]),
+            curves(
+                names[1],
+                time,
+                (unit, axes[1]),
+                vec![line("", orange, 2, b)],
+            ),
         ]
     };
     let x = ("x [mm]", (0.0, 250.0));
@@ -126,13 +112,13 @@ fn reading_figures(reading: &Reading, motion: &[Instant], checks: &[AxisCheck]) 
                     "z",
                     x,
                     ("[mm]", (0.0, 200.0)),
-                    vec![line("", blue, over_x(|i| i.foot_m[2]))],
+                    vec![line("", blue, 2, over_x(|i| i.foot_m[2]))],
                 ),
                 curves(
                     "y",
                     x,
                     ("[mm]", (-1.0, 1.0)),
-                    vec![line("", orange, over_x(|i| i.foot_m[1]))],
+                    vec![line("", orange, 2, over_x(|i| i.foot_m[1]))],
                 ),
             ],
             "The paper draws the path of P in space, x 0 to 250, y −1 to 1, z 0 to 200 mm.",
@@ -204,13 +190,13 @@ pub(super) fn figures(results: &Results) -> Vec<Figure> {
                 "F6",
                 ("time [s]", (0.0, 10.0)),
                 ("[N]", (-30.0, 30.0)),
-                vec![line("inverse dynamics", colour::MODEL, points(|i| i.f6_n))],
+                vec![line("inverse dynamics", colour::MODEL, 2, points(|i| i.f6_n))],
             ),
             curves(
                 "Load on the foot",
                 ("time [s]", (0.0, 10.0)),
                 ("[N]", (0.0, 40.0)),
-                vec![line("", colour::SECOND, points(|i| i.load_n))],
+                vec![line("", colour::SECOND, 2, points(|i| i.load_n))],
             ),
         ],
     });
@@ -229,19 +215,18 @@ pub(super) fn figures(results: &Results) -> Vec<Figure> {
                 map.poses,
                 short(1e3 * worst_m),
             ),
-            panels: vec![Panel {
-                title: "s5 [mm] over s2".to_owned(),
-                x_range: range(&map.strokes_m),
-                marks: Vec::new(),
-                content: Content::Heat(Heat {
+            panels: vec![Panel::new(
+                "s5 [mm] over s2",
+                range(&map.strokes_m),
+                330,
+                Content::Heat(Heat {
                     columns,
                     values: cells,
                     y_range: range(&map.strokes_m),
                     x_label: "s2 [mm]".to_owned(),
                     legend: format!("light 0, dark {} nm", short(1e9 * worst_m)),
                 }),
-                height: 330,
-            }],
+            )],
         }
     };
     all.push(heat(

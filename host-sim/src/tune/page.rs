@@ -6,7 +6,7 @@ use super::{Test, Tuned};
 use crate::SimError;
 use crate::bench::Trace;
 use crate::compare::{Figures, MARGIN, Move, number, panel};
-use crate::report::plot::{Figure, Series, colour};
+use crate::report::plot::{Figure, Series, colour, line};
 use crate::report::{page, pictures};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -26,16 +26,11 @@ fn series(
     index: usize,
     value: impl Fn(&crate::bench::Row) -> f64 + Copy,
 ) -> Vec<Series> {
-    let line = |label: &str, colour, width, trace: &Trace| Series {
-        label: label.to_owned(),
-        colour,
-        width,
-        points: points(trace, value),
-    };
+    let points = |played: &super::Played| points(&played.measured[index], value);
     let [before, after] = &test.played;
     vec![
-        line("before", colour::MODEL, 2, &before.measured[index]),
-        line("after", colour::ROBOT, 3, &after.measured[index]),
+        line("before", colour::MODEL, 2, points(before)),
+        line("after", colour::ROBOT, 3, points(after)),
     ]
 }
 

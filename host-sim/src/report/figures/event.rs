@@ -1,8 +1,8 @@
 //! What every axis did around an event, on commanded, sensed and physical
 //! signals.
 
-use super::super::plot::{Content, Figure, Panel, Series, colour};
-use super::{JOINTS, Points, Source, fitted, line, lines, valves};
+use super::super::plot::{Content, Figure, Panel, Series, colour, line};
+use super::{JOINTS, Points, Source, fitted, valves};
 use crate::config::EventAction;
 use crate::telemetry::{JointSample, Row, WheelSample};
 
@@ -120,8 +120,12 @@ fn supply(s: &Source<'_>, window: (f64, f64)) -> [Panel; 2] {
     let range = near(window, &pressure, 0.0);
     let range = (range.0.min(0.0), range.1.max(8.0));
     [
-        s.panel("supply pressure", 110, lines("[bar abs]", range, pressure)),
-        s.panel("dump valve", 80, lines("", (-0.2, 1.2), dump)),
+        s.panel(
+            "supply pressure",
+            110,
+            Content::lines(("[bar abs]", range), pressure),
+        ),
+        s.panel("dump valve", 80, Content::lines(("", (-0.2, 1.2)), dump)),
     ]
 }
 
@@ -132,10 +136,10 @@ pub(super) fn figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
     let movement = |title: &str, value: fn(&JointSample) -> f64| {
         let series = joints(s, event, value);
         let range = near(window, &series, 1.0);
-        s.panel(title, 130, lines("[mm]", range, series))
+        s.panel(title, 130, Content::lines(("[mm]", range), series))
     };
     let mut panels = vec![
-        s.panel("mode", 150, lines("", (-0.5, 6.5), modes(s))),
+        s.panel("mode", 150, Content::lines(("", (-0.5, 6.5)), modes(s))),
         movement(
             "reference of the control law, change since the event",
             |v| v.reference_mm,
@@ -150,7 +154,7 @@ pub(super) fn figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
     ];
     for (title, series) in titles.into_iter().zip(rims(s)) {
         let range = near(window, &series, 20.0);
-        panels.push(s.panel(title, 100, lines("[mm/s]", range, series)));
+        panels.push(s.panel(title, 100, Content::lines(("[mm/s]", range), series)));
     }
     let dumps = s
         .scenario
@@ -162,11 +166,9 @@ pub(super) fn figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
     }
     for (i, panel) in panels.iter_mut().enumerate() {
         panel.x_range = window;
-        if let Content::Lines { series, .. } = &mut panel.content
-            && (5..7).contains(&i)
-        {
+        if (5..7).contains(&i) {
             // The panel above has the legend.
-            series.iter_mut().for_each(|l| l.label.clear());
+            panel.name_only(0..0);
         }
     }
     vec![

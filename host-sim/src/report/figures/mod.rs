@@ -2,7 +2,7 @@
 
 mod event;
 
-use super::plot::{Content, Figure, Limit, Panel, RasterRow, Series, colour, runs};
+use super::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
 use crate::analysis::{Analysis, ReferencePoint};
 use crate::config::{EventAction, LegChoice, RobotConfig, Scenario};
 use crate::telemetry::{JointSample, Recording, Row};
@@ -76,31 +76,9 @@ impl Source<'_> {
     }
 
     fn panel(&self, title: impl Into<String>, height: u32, content: Content) -> Panel {
-        Panel {
-            title: title.into(),
-            x_range: self.x_range(),
-            marks: self.marks(),
-            content,
-            height,
-        }
-    }
-}
-
-fn line(label: &str, colour: plotters::style::RGBColor, width: u32, points: Points) -> Series {
-    Series {
-        label: label.into(),
-        colour,
-        width,
-        points,
-    }
-}
-
-fn lines(y_label: &str, y_range: (f64, f64), series: Vec<Series>) -> Content {
-    Content::Lines {
-        series,
-        limits: Vec::new(),
-        y_label: y_label.into(),
-        y_range,
+        let mut panel = Panel::new(title, self.x_range(), height, content);
+        panel.marks = self.marks();
+        panel
     }
 }
 
@@ -173,7 +151,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
                 "Stroke of {name}. Command: as the node gets it from the bus, before its slew limit. \
                      The paper's axis is 0 to 180 mm over 10 s."
             ),
-            panels: vec![s.panel(name, 300, lines("[mm]", range, series))],
+            panels: vec![s.panel(name, 300, Content::lines(("[mm]", range), series))],
         }
     };
     let pair = |id: &str,
@@ -189,13 +167,8 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
             .into_iter()
             .map(|(title, axis, series)| {
                 let range = fitted(axis, &series);
-                let content = Content::Lines {
-                    limits: [axis.0, axis.1].map(|y| Limit { y }).into(),
-                    series,
-                    y_label: unit.into(),
-                    y_range: range,
-                };
-                s.panel(title, 220, content)
+                let content = Content::lines((unit, range), series);
+                s.panel(title, 220, content.limited(&[axis.0, axis.1]))
             })
             .collect(),
     };
@@ -266,12 +239,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
             title: "Fig. 16: force F6 on the vertical cylinder".into(),
             caption: "Net generalised force on b6: pressure forces less seal friction less end-stop reaction. \
                       Red lines: the paper's axis, ±30 N. The unfiltered trace is cut off at the edges of the figure; its peaks are in the table.".into(),
-            panels: vec![s.panel("F6", 300, Content::Lines {
-                series: force,
-                limits: vec![Limit { y: 30.0 }, Limit { y: -30.0 }],
-                y_label: "[N]".into(),
-                y_range: (-60.0, 60.0),
-            })],
+            panels: vec![s.panel("F6", 300, Content::lines(("[N]", (-60.0, 60.0)), force).limited(&[30.0, -30.0]))],
         },
     ]
 }
@@ -294,7 +262,7 @@ fn strokes(s: &Source<'_>) -> Figure {
             .collect();
         let range = fitted((0.0, 180.0), &series);
         let title = if first == 0 { "left leg" } else { "right leg" };
-        s.panel(title, 240, lines("[mm]", range, series))
+        s.panel(title, 240, Content::lines(("[mm]", range), series))
     });
     Figure {
         id: "strokes".into(),
@@ -332,7 +300,7 @@ fn pressures(s: &Source<'_>, first: usize) -> Figure {
             s.panel(
                 format!("joint {}", JOINTS[j]),
                 150,
-                lines("[bar abs]", range, series),
+                Content::lines(("[bar abs]", range), series),
             )
         })
         .collect();
@@ -382,7 +350,7 @@ fn valves(s: &Source<'_>, window: (f64, f64), id: &str, title: &str) -> Figure {
     let mut panel = s.panel(
         "joints 1 to 6; colour: commanded duty (A orange, B blue); dark: physically open",
         24 * 17,
-        Content::Raster { rows },
+        Content::Raster(rows),
     );
     panel.x_range = window;
     Figure {
@@ -439,8 +407,8 @@ fn feet(s: &Source<'_>) -> Figure {
         title: "Foot loads and switches".into(),
         caption: "Ground force normal to each sole (impacts cut off at 120 N), and the four optical switches of each foot as the node sees them.".into(),
         panels: vec![
-            s.panel("normal force", 220, lines("[N]", range, series)),
-            s.panel("foot switches closed", 150, Content::Raster { rows }),
+            s.panel("normal force", 220, Content::lines(("[N]", range), series)),
+            s.panel("foot switches closed", 150, Content::Raster(rows)),
         ],
     }
 }
@@ -482,9 +450,13 @@ fn body(s: &Source<'_>) -> Figure {
         title: "Chassis".into(),
         caption: "Travel, speed and pitch of the chassis.".into(),
         panels: vec![
-            s.panel("travel", 200, lines("[mm]", travel_range, travel)),
-            s.panel("speed", 140, lines("[mm/s]", speed_range, speed)),
-            s.panel("pitch", 120, lines("[deg]", pitch_range, pitch)),
+            s.panel(
+                "travel",
+                200,
+                Content::lines(("[mm]", travel_range), travel),
+            ),
+            s.panel("speed", 140, Content::lines(("[mm/s]", speed_range), speed)),
+            s.panel("pitch", 120, Content::lines(("[deg]", pitch_range), pitch)),
         ],
     }
 }

@@ -1,0 +1,57 @@
+//! Maps: one colour per cell.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::{FONT, Panel, colour, text, tick};
+
+/// Cells of a map, from the lower left, row by row upwards.
+pub(crate) struct Heat {
+    pub(crate) columns: usize,
+    pub(crate) values: Vec<f64>,
+    pub(crate) y_range: (f64, f64),
+    pub(crate) x_label: String,
+    /// What the colours mean, with the unit.
+    pub(crate) legend: String,
+}
+
+impl Panel {
+    pub(super) fn draw_heat<B: DrawingBackend>(
+        &self,
+        body: &DrawingArea<B, Shift>,
+        scale: u32,
+        axis_px: u32,
+        heat: &Heat,
+    ) -> Result<(), String> {
+        let ((x0, x1), (y0, y1)) = (self.x_range, heat.y_range);
+        let mut chart = self.chart(body, scale, axis_px, (y0, y1))?;
+        let columns = heat.columns.max(1);
+        let rows = heat.values.len().div_ceil(columns).max(1);
+        let largest = heat.values.iter().copied().fold(0.0, f64::max);
+        let step = ((x1 - x0) / columns as f64, (y1 - y0) / rows as f64);
+        for (i, value) in heat.values.iter().enumerate() {
+            let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+            let corner = (x0 + column * step.0, y0 + row * step.1);
+            let share = if largest > 0.0 { value / largest } else { 0.0 };
+            let cell = Rectangle::new(
+                [corner, (corner.0 + step.0, corner.1 + step.1)],
+                colour::heat(share).filled(),
+            );
+            chart.draw_series(std::iter::once(cell)).map_err(text)?;
+        }
+        let font = (FONT, 13 * scale).into_font().color(&colour::INK);
+        let mut mesh = chart.configure_mesh();
+        mesh.disable_mesh()
+            .axis_style(colour::INK.stroke_width(scale))
+            .label_style(font.clone())
+            .axis_desc_style(font)
+            .x_labels(11)
+            .y_labels((self.height / 28).clamp(3, 11) as usize)
+            .y_label_formatter(&|v| tick(*v))
+            .x_label_formatter(&|v| tick(*v));
+        if axis_px > 0 {
+            mesh.x_desc(heat.x_label.as_str());
+        }
+        mesh.draw().map_err(text)
+    }
+}
