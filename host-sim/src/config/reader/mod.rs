@@ -1,0 +1,215 @@
+//! Reads a TOML file with positions, and collects everything that is wrong.
+
+mod entry;
+mod plain;
+mod quantities;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use toml_edit::{Document, Item};
+
+use super::error::{ConfigError, Problem};
+use super::params::{FieldSpec, ParameterInfo, Params};
+use super::suggest::closest;
+
+pub(crate) use entry::Entry;
+use entry::{Field, fields};
+
+/// A parsed file and the problems found so far.
+pub(crate) struct Reader {
+    file: String,
+    text: Arc<str>,
+    document: Document<String>,
+    problems: Vec<Problem>,
+    parameters: Vec<ParameterInfo>,
+    /// Whether every quantity must name its source.
+    source_required: bool,
+}
+
+impl Reader {
+    /// Parses `text`; `file` is the name shown in messages.
+    pub(crate) fn parse(
+        what: &str,
+        file: &str,
+        text: &str,
+        source_required: bool,
+    ) -> Result<Self, ConfigError> {
+        let shared: Arc<str> = Arc::from(text);
+        match Document::parse(text.to_owned()) {
+            Ok(document) => Ok(Self {
+                file: file.to_owned(),
+                text: shared,
+                document,
+                problems: Vec::new(),
+                parameters: Vec::new(),
+                source_required,
+            }),
+            Err(e) => {
+                let span = e.span().unwrap_or(0..0);
+                let message = format!("not valid TOML: {}", e.message());
+                let problem = Problem::at(file, &shared, span, message, "here", None);
+                Err(ConfigError::new(what, vec![problem]))
+            }
+        }
+    }
+
+    /// The result: what was read, or every problem found.
+    pub(crate) fn finish<T>(
+        self,
+        what: &str,
+        value: Option<T>,
+    ) -> Result<(T, Vec<ParameterInfo>), ConfigError> {
+        match value {
+            Some(value) if self.problems.is_empty() => Ok((value, self.parameters)),
+            _ => Err(ConfigError::new(what, self.problems)),
+        }
+    }
+
+    pub(crate) fn problem(
+        &mut self,
+        span: Option<Range<usize>>,
+        message: String,
+        label: impl Into<String>,
+        help: Option<String>,
+    ) {
+        let span = span.unwrap_or(0..0);
+        self.problems.push(Problem::at(
+            &self.file, &self.text, span, message, label, help,
+        ));
+    }
+
+    fn item(&self, path: &str) -> Option<&Item> {
+        let mut item = self.document.as_item();
+        if path.is_empty() {
+            return Some(item);
+        }
+        for key in path.split('.') {
+            item = item.as_table_like()?.get(key)?;
+        }
+        Some(item)
+    }
+
+    /// Number of entries of the array of tables at `path`; a wrong type is a
+    /// problem, absence is zero.
+    pub(crate) fn array_len(&mut self, path: &str) -> usize {
+        let Some(item) = self.item(path) else {
+            return 0;
+        };
+        match (item.as_array_of_tables(), item.as_array()) {
+            (Some(tables), _) => tables.len(),
+            (None, Some(array)) => array.len(),
+            _ => {
+                let span = item.span();
+                let message = format!("`{path}` must be a list of tables");
+                let help = format!("write each entry under a [[{path}]] heading");
+                self.problem(span, message, "not a list", Some(help));
+                0
+            }
+        }
+    }
+
+    /// Lifts entry `index` of an array of tables out as its own reader level.
+    pub(crate) fn entry(&self, path: &str, index: usize) -> Entry {
+        let item = self.item(path);
+        let table: Option<(Vec<Field>, Range<usize>)> = item.and_then(|i| {
+            if let Some(tables) = i.as_array_of_tables() {
+                tables
+                    .get(index)
+                    .map(|t| (fields(t), t.span().unwrap_or(0..0)))
+            } else {
+                let value = i.as_array()?.get(index)?;
+                let span = value.span().unwrap_or(0..0);
+                value.as_inline_table().map(|t| (fields(t), span))
+            }
+        });
+        let (fields, span) = table.unwrap_or((Vec::new(), 0..0));
+        Entry {
+            path: format!("{path}[{index}]"),
+            fields,
+            span,
+        }
+    }
+
+    /// The table at `path` as an entry.
+    pub(crate) fn table(&self, path: &str) -> Option<Entry> {
+        let item = self.item(path)?;
+        let table = item.as_table_like()?;
+        Some(Entry {
+            path: path.to_owned(),
+            fields: fields(table),
+            span: item.span().unwrap_or(0..0),
+        })
+    }
+
+    /// Reads the section `[path]` of parameters.
+    pub(crate) fn section<T: Params>(&mut self, path: &str) -> Option<T> {
+        let Some(entry) = self.table(path) else {
+            let keys: Vec<&str> = T::FIELDS.iter().map(|f| f.key).collect();
+            self.problem(
+                None,
+                format!("section [{path}] is missing"),
+                "expected somewhere in this file",
+                Some(format!("it holds: {}", keys.join(", "))),
+            );
+            return None;
+        };
+        let known: Vec<&str> = T::FIELDS.iter().map(|f| f.key).collect();
+        self.reject_unknown(&entry, &known);
+        let missing: Vec<&FieldSpec> = T::FIELDS
+            .iter()
+            .filter(|f| entry.get(f.key).is_none())
+            .collect();
+        if !missing.is_empty() {
+            let names: Vec<String> = missing
+                .iter()
+                .map(|f| format!("{} ({})", f.key, f.dimension.units()[0].0))
+                .collect();
+            self.problem(
+                Some(entry.span.clone()),
+                format!("[{path}] lacks {}", names.join(", ")),
+                "in this section",
+                Some("every parameter must be given: there are no hidden defaults".into()),
+            );
+        }
+        let values: Vec<Option<Vec<f64>>> = T::FIELDS
+            .iter()
+            .map(|spec| {
+                entry
+                    .get(spec.key)
+                    .and_then(|_| self.quantity(&entry, spec))
+            })
+            .collect();
+        let complete: Vec<Vec<f64>> = values.into_iter().collect::<Option<_>>()?;
+        let mut values = complete.into_iter();
+        Some(T::build(&mut || values.next().unwrap_or_default()))
+    }
+
+    /// Reports every field of `entry` that is not in `known`.
+    pub(crate) fn reject_unknown(&mut self, entry: &Entry, known: &[&str]) {
+        for (key, span, _) in &entry.fields {
+            if known.contains(&key.as_str()) {
+                continue;
+            }
+            let place = match entry.path.as_str() {
+                "" => "at the top of the file".to_owned(),
+                path => format!("in [{path}]"),
+            };
+            let help = match closest(key, known.iter().copied()) {
+                Some(word) => format!("did you mean `{word}`?"),
+                None => format!("known here: {}", known.join(", ")),
+            };
+            self.problem(
+                Some(span.clone()),
+                format!("unknown field `{key}` {place}"),
+                "not known",
+                Some(help),
+            );
+        }
+    }
+
+    /// Adds a parameter to the listing.
+    pub(crate) fn list(&mut self, info: ParameterInfo) {
+        self.parameters.push(info);
+    }
+}
