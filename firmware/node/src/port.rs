@@ -95,7 +95,17 @@ impl BusPort {
 
     /// The next frame to send: an answer before a slot reply, because it is due
     /// at once.
+    #[inline]
     pub fn take(&mut self) -> Option<Transmission> {
+        // Asked in every turn of the main loop: without a frame, none is copied.
+        if self.answer.is_none() && self.slot_reply.is_none() {
+            return None;
+        }
+        self.take_waiting()
+    }
+
+    #[inline(never)]
+    fn take_waiting(&mut self) -> Option<Transmission> {
         self.answer.take().or_else(|| self.slot_reply.take())
     }
 
