@@ -3,7 +3,7 @@
 //! There is no pressure sensor. What is in the chambers follows from what the
 //! valves have let in and out: every on-time that is sent is also followed
 //! through the switching delays ([`valves`]), the flow of ISO 6358 through each
-//! opening and the piston's motion give the two pressures ([`gas`]), and the
+//! opening and the piston's motion give the two pressures ([`air`], [`gas`]), and the
 //! measured stroke corrects speed and load ([`motion`]). Errors of the pressures
 //! die out by themselves, because a filling chamber ends at the supply and a
 //! venting one at the atmosphere, whatever was assumed before.
@@ -16,9 +16,11 @@
 //! pressures in 1/256 Pa absolute, forces in mN, accelerations in mm/s². Volumes
 //! enter as lengths (volume over piston area), flows as speeds: a chamber of
 //! length L with inflow q obeys `dp/dt = n (K p₁ ψ(p₂/p₁) − p v) / L` with
-//! K = C ρ0 R T / area. Only [`AxisModel::new`], which runs when parameters
-//! change, uses `f32`.
+//! K = C ρ0 R T / area. So are the coefficients: there is no floating point in a
+//! board's control.
 
+pub mod air;
+mod data;
 pub mod gas;
 pub mod learn;
 mod model;
@@ -27,7 +29,8 @@ pub mod predictive;
 pub mod probe;
 pub mod valves;
 
-pub use model::{AxisData, AxisField, AxisModel};
+pub use data::{AxisData, AxisField};
+pub use model::AxisModel;
 
 use wheeleg_units::saturate_i32;
 
@@ -35,6 +38,47 @@ use wheeleg_units::saturate_i32;
 #[inline]
 pub(crate) const fn scaled(a: i32, b: i32, shift: u32) -> i32 {
     saturate_i32((a as i64).wrapping_mul(b as i64).wrapping_shr(shift))
+}
+
+/// `a × b / 2^shift`, rounded down, of a quotient that is known to fit.
+#[inline]
+pub(crate) const fn part(a: i32, b: i32, shift: u32) -> i32 {
+    (a as i64).wrapping_mul(b as i64).wrapping_shr(shift) as i32
+}
+
+/// `a × 2^shift / b` to 16 significant bits of `b`, saturating; 0 for a `b` that is
+/// not positive. Four divisions of 32 bits instead of one of 64, which takes ten
+/// times as long.
+#[inline(never)]
+pub(crate) fn quotient(a: i64, b: i64, shift: u32) -> i32 {
+    if b <= 0 {
+        return 0;
+    }
+    let bits = 64_u32.wrapping_sub(b.leading_zeros());
+    let down = bits.saturating_sub(16);
+    let divisor = b.wrapping_shr(down) as u32;
+    let size = a.unsigned_abs();
+    let dividend = if down >= shift {
+        size.wrapping_shr(down.wrapping_sub(shift))
+    } else {
+        size.wrapping_shl(shift.wrapping_sub(down))
+    };
+    // 48 bits by 16 bits, in two digits of 16 bits.
+    let high = u32::try_from(dividend.wrapping_shr(16)).unwrap_or(u32::MAX);
+    let first = high.checked_div(divisor).unwrap_or(0);
+    let rest = high.wrapping_sub(first.wrapping_mul(divisor));
+    let low = rest.wrapping_shl(16) | (dividend & 0xFFFF) as u32;
+    let second = low.checked_div(divisor).unwrap_or(0);
+    let quotient = if first >= 1 << 15 {
+        i32::MAX
+    } else {
+        first.wrapping_shl(16).wrapping_add(second) as i32
+    };
+    if a < 0 {
+        quotient.wrapping_neg()
+    } else {
+        quotient
+    }
 }
 
 /// `value` limited to ±`bound`.
@@ -63,7 +107,7 @@ pub(crate) fn square_root(value: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::square_root;
+    use super::{quotient, square_root};
     use proptest::prelude::*;
 
     proptest! {
@@ -72,6 +116,23 @@ mod tests {
             let exact = f64::from(value).sqrt();
             prop_assert!((f64::from(square_root(value)) - exact).abs() <= 1.0 + exact * 1e-6);
         }
+    }
+
+    proptest! {
+        #[test]
+        fn quotients_are_good_to_sixteen_bits(
+            a in -(1_i64 << 46)..1 << 46, b in 1_i64..1 << 46, shift in 0_u32..17,
+        ) {
+            let exact = a as f64 * f64::from(1 << shift) / b as f64;
+            let limited = exact.clamp(-f64::from(i32::MAX), f64::from(i32::MAX));
+            let difference = (f64::from(quotient(a, b, shift)) - limited).abs();
+            prop_assert!(difference <= 1.0 + exact.abs() * 4e-5, "{difference} {exact}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_quotient_is_zero() {
+        assert_eq!((quotient(5, 0, 3), quotient(5, -1, 3)), (0, 0));
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The predictive law and the delay probe against simple worlds of their own.
 
+use proptest::prelude::*;
 use wheeleg_control::axis::probe::DelayProbe;
 use wheeleg_control::axis::{AxisData, AxisField, AxisModel};
 use wheeleg_control::joint::{
-    ConfigError, JointConfig, JointController, JointGains, JointInput, JointParameter, Law,
+    ConfigError, Gain, JointConfig, JointController, JointGains, JointInput, JointParameter, Law,
 };
 use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 
@@ -178,4 +179,140 @@ fn the_probe_finds_the_opening_delay() {
         assert!(found.abs_diff(t_on) <= 300, "{t_on}: {found}");
     }
     assert_eq!(probe(3_500, false), None, "a piston that never moves");
+}
+
+/// The coefficients in floating point, from the formulas of the module's text.
+fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
+    let number = |value: PositionMm| f64::from(value.raw()) / 65_536.0;
+    let (bore, rod, stroke) = (number(data.bore), number(data.rod), number(data.stroke));
+    let (dead_a, dead_b) = (number(data.dead_a) * 1e3, number(data.dead_b) * 1e3);
+    let supply = number(data.supply) * 1e3;
+    let (on, line) = (
+        f64::from(data.valve_on.get()),
+        f64::from(data.line_delay.get()),
+    );
+    let quarter_pi = std::f64::consts::FRAC_PI_4;
+    let (area_a, area_rod) = (quarter_pi * bore * bore, quarter_pi * rod * rod);
+    let area_b = area_a - area_rod;
+    let flow = data.conductance.to_num::<f64>() * 10.0 * 1.185 * 287.05 * 293.15;
+    let (flow_a, flow_b) = (flow / area_a, flow / area_b);
+    let horizon = (f64::from(TICK.get()) + on + line) * 1e-6;
+    let ambient = 101_325.0;
+    let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
+    let force_rod = 1e-3 * ambient * area_rod;
+    let top = 0.92 * flow_b.min(1.5 * flow_a);
+    let slope = 0.19 / horizon;
+    let brake = 0.7 * slope * top;
+    let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
+        + mean * area_b / (dead_b + 0.5 * area_b * stroke);
+    let nimble = 0.9 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
+    let two = |bits: i32| 2_f64.powi(bits);
+    vec![
+        ("flow_a", flow_a * two(16)),
+        ("flow_b", flow_b * two(16)),
+        ("lead_a", dead_a / area_a * two(16)),
+        ("lead_b", dead_b / area_b * two(16)),
+        ("force_a", 1e-3 * area_a * two(24)),
+        ("force_b", 1e-3 * area_b * two(24)),
+        ("force_rod", force_rod),
+        ("pressure_a", 256_000.0 / area_a * two(12)),
+        ("pressure_b", 256_000.0 / area_b * two(12)),
+        ("half_pressure_a", 128_000.0 / area_a * two(12)),
+        ("area_ratio", area_a / area_b * two(24)),
+        ("supply", supply * two(8)),
+        ("mean", mean * two(8)),
+        ("low", low * two(8)),
+        ("high", high * two(8)),
+        (
+            "force_out",
+            1e-3 * (high * area_a - low * area_b) - force_rod,
+        ),
+        (
+            "force_in",
+            1e-3 * (high * area_b - low * area_a) + force_rod,
+        ),
+        ("horizon", horizon * two(32)),
+        ("slope", slope * two(8)),
+        ("damping", 0.43 / horizon * two(8)),
+        ("brake", brake),
+        ("top_speed", top * two(16)),
+        ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),
+        ("observe_stroke", 0.45 * two(16)),
+        ("observe_speed", 67.5 * two(16)),
+        ("observe_load", 3375.0),
+        ("stick_step", 4.0 * number(data.breakaway) * two(8)),
+    ]
+}
+
+fn coefficient(model: &AxisModel, name: &str) -> i32 {
+    match name {
+        "flow_a" => model.flow_a,
+        "flow_b" => model.flow_b,
+        "lead_a" => model.lead_a,
+        "lead_b" => model.lead_b,
+        "force_a" => model.force_a,
+        "force_b" => model.force_b,
+        "force_rod" => model.force_rod,
+        "pressure_a" => model.pressure_a,
+        "pressure_b" => model.pressure_b,
+        "half_pressure_a" => model.half_pressure_a,
+        "area_ratio" => model.area_ratio,
+        "supply" => model.supply,
+        "mean" => model.mean,
+        "low" => model.low,
+        "high" => model.high,
+        "force_out" => model.force_out,
+        "force_in" => model.force_in,
+        "horizon" => model.horizon,
+        "slope" => model.slope,
+        "damping" => model.damping,
+        "brake" => model.brake,
+        "top_speed" => model.top_speed,
+        "nimble_mass" => model.nimble_mass,
+        "observe_stroke" => model.observe_stroke,
+        "observe_speed" => model.observe_speed,
+        "observe_load" => model.observe_load,
+        "stick_step" => model.stick_step,
+        other => panic!("{other}"),
+    }
+}
+
+proptest! {
+    /// Made of integers, and as good as made of numbers.
+    #[test]
+    fn coefficients_are_within_a_thousandth_of_the_exact_ones(
+        bore in 4.0_f64..100.0, rod in 0.0_f64..0.9, stroke in 1.0_f64..1000.0,
+        dead in (0.05_f64..500.0, 0.05_f64..500.0), conductance in 0.005_f64..20.0,
+        supply in 200.0_f64..1700.0, breakaway in 10.0_f64..500.0,
+        on in 0_u32..50_000, line in 0_u32..20_000,
+    ) {
+        let data = AxisData {
+            bore: PositionMm::from_f64(bore),
+            rod: PositionMm::from_f64(bore * rod),
+            stroke: PositionMm::from_f64(stroke),
+            dead_a: PositionMm::from_f64(dead.0),
+            dead_b: PositionMm::from_f64(dead.1),
+            conductance: Gain::from_num(conductance),
+            supply: PositionMm::from_f64(supply),
+            breakaway: PositionMm::from_f64(breakaway),
+            valve_on: Micros(on),
+            line_delay: Micros(line),
+            ..AxisData::default()
+        };
+        let model = AxisModel::new(&data, TICK).expect("in range");
+        for (name, exact) in exact(&data) {
+            // A difference of two forces may be small; what the format cannot hold
+            // stands at its end.
+            let scale = if name.starts_with("force_") {
+                f64::from(model.supply) / 256.0 * bore * bore * 1e-3
+            } else {
+                exact
+            };
+            let exact = exact.clamp(0.0, f64::from(i32::MAX));
+            let difference = (f64::from(coefficient(&model, name)) - exact).abs();
+            let allowed = 2.0 + 1e-3 * scale;
+            let allowed = if name == "nimble_mass" { allowed + 0.01 * exact } else { allowed };
+            prop_assert!(difference <= allowed, "{name}: {} {exact}", coefficient(&model, name));
+        }
+    }
 }

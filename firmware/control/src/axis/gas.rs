@@ -1,8 +1,7 @@
 //! The two chambers: pressures from what the valves let through.
 
 use super::model::AxisModel;
-use super::{scaled, square_root};
-use wheeleg_units::saturate_i32;
+use super::{part, scaled, square_root};
 
 /// Full scale of the flow function and of pressure ratios, 2^15.
 const ONE: u32 = 1 << 15;
@@ -45,7 +44,7 @@ impl FlowCurve {
         let numerator = (low.max(0) as u32).wrapping_shr(8).wrapping_shl(11);
         let denominator = (high.max(1 << 12) as u32).wrapping_shr(12);
         let ratio = numerator.checked_div(denominator).unwrap_or(ONE).min(ONE);
-        let drive = scaled(high, self.psi(ratio), 15);
+        let drive = part(high, self.psi(ratio), 15);
         if forward { drive } else { drive.wrapping_neg() }
     }
 }
@@ -59,38 +58,78 @@ pub struct Pressures {
     pub b: i32,
 }
 
-/// Rates of one chamber with a valve open, or with the piston moving, in Pa/ms:
-/// of filling, of venting, of compression.
+/// What flows through the valves of one chamber while they are open, as powers:
+/// pressure times a speed of the piston, in 2^8 Pa mm/s.
+///
+/// Neither the piston's place nor the time is in them, so that those of one tick
+/// serve for that tick and for the dead time ahead.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ChamberRates {
-    /// Through the open fill valve.
+pub struct ChamberFlows {
+    /// Through the open fill valve; 0 until asked for.
     pub fill: i32,
-    /// Through the open vent valve; positive lowers the pressure.
+    /// Through the open vent valve, positive lowers the pressure; 0 until asked for.
     pub vent: i32,
-    /// By the piston's motion.
-    pub squeeze: i32,
 }
 
-impl ChamberRates {
-    /// Change of pressure in 1/256 Pa over `span` µs of motion, with the valves
-    /// open for `fill` and `vent` µs of it.
+/// Power of `pressure` (1/256 Pa) at `speed` (raw mm/s): 2^-24 Pa mm/s to 2^8.
+/// Below 2^28.
+#[inline]
+pub(super) const fn power(pressure: i32, speed: i32) -> i32 {
+    part(pressure, speed, 32)
+}
+
+impl ChamberFlows {
+    /// Works out the flows that are `wanted` and not yet known, for an open valve's
+    /// `flow` as a speed of the piston, raw mm/s.
+    #[inline]
+    pub fn want(&mut self, model: &AxisModel, flow: i32, pressure: i32, wanted: Wanted) {
+        if wanted.fill && self.fill == 0 {
+            self.fill = power(model.curve.drive(model.supply, pressure), flow);
+        }
+        if wanted.vent && self.vent == 0 {
+            self.vent = power(model.curve.drive(pressure, model.ambient), flow);
+        }
+    }
+
+    /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
+    /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
+    /// `stiffness` ([`AxisModel::stiffness_a`]).
     #[inline]
     #[must_use]
-    pub fn change(&self, fill: i32, vent: i32, span: i32) -> i32 {
-        // |rates| below 2^21 Pa/ms, times below 2^20 µs.
-        let sum = i64::from(self.fill)
-            .wrapping_mul(i64::from(fill))
-            .wrapping_sub(i64::from(self.vent).wrapping_mul(i64::from(vent)))
-            .wrapping_add(i64::from(self.squeeze).wrapping_mul(i64::from(span)));
-        // 2^-6 Pa/ms × µs = 2^-6 / 1000 Pa; to 2^-8 Pa: × 4/1000 = × 67 109 / 2^24.
-        saturate_i32(sum.wrapping_mul(67_109).wrapping_shr(24))
+    pub fn change(&self, open: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
+        let [fill, vent] = open;
+        let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
+        // Powers below 2^28, times below 2^17: 2^24 Pa mm/s µs below 2^31.
+        let work = product(self.fill, fill)
+            .wrapping_sub(product(self.vent, vent))
+            .wrapping_add(product(squeeze, span))
+            .wrapping_add(1 << 15)
+            .wrapping_shr(16) as i32;
+        // × n/L: see `stiffness_a`.
+        scaled(work, stiffness, 10)
+    }
+
+    /// Openings of the fill and of the vent valve, µs, that change the pressure by
+    /// `change` (1/256 Pa). The flow that does it must be known.
+    #[inline]
+    #[must_use]
+    pub fn needs(&self, change: i32, stiffness: i32) -> [i32; 2] {
+        let power = if change > 0 { self.fill } else { self.vent };
+        // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
+        let rate = part(power, stiffness, 22).max(SLOWEST);
+        // Below 2^31.
+        let size = change.saturating_abs().min(500_000 << 8).wrapping_shl(4);
+        let need = size.checked_div(rate).unwrap_or(0);
+        if change > 0 { [need, 0] } else { [0, need] }
     }
 }
 
-/// Fractional bits of the rates: steps of 1/16 Pa/ms.
-const RATE_BITS: u32 = 6;
+/// Shortest length of a chamber, 1/256 mm (4 mm; a line alone is longer).
+const SHORTEST: i32 = 4 << 8;
+/// Slowest change of pressure that is counted on, 1/256 Pa per 16 µs (50 Pa/ms).
+const SLOWEST: i32 = 205;
 
-/// Which rates of a chamber are wanted; what is not costs nothing.
+/// Which flows of a chamber are wanted; what is not costs nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wanted {
     /// Filling.
@@ -100,72 +139,34 @@ pub struct Wanted {
 }
 
 impl AxisModel {
-    /// Rates of chamber A with the piston at `stroke` (raw mm) moving at `speed`.
+    /// n / L of chamber A with the piston at `stroke` (raw mm), × 1.048576 × 2^22 / mm:
+    /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
     #[inline]
     #[must_use]
-    pub fn rates_a(&self, p: i32, stroke: i32, speed: i32, wanted: Wanted) -> ChamberRates {
-        let length = stroke.saturating_add(self.lead_a);
-        self.rates(p, self.flow_a, length, speed.wrapping_neg(), wanted)
+    pub fn stiffness_a(&self, stroke: i32) -> i32 {
+        self.stiffness(stroke.saturating_add(self.lead_a))
     }
 
-    /// Rates of chamber B.
+    /// n / L of chamber B.
     #[inline]
     #[must_use]
-    pub fn rates_b(&self, p: i32, stroke: i32, speed: i32, wanted: Wanted) -> ChamberRates {
-        let length = self
-            .stroke
-            .saturating_sub(stroke)
-            .saturating_add(self.lead_b);
-        self.rates(p, self.flow_b, length, speed, wanted)
+    pub fn stiffness_b(&self, stroke: i32) -> i32 {
+        let length = self.stroke.saturating_sub(stroke);
+        self.stiffness(length.saturating_add(self.lead_b))
     }
 
     #[inline]
-    fn rates(&self, p: i32, flow: i32, length: i32, closing: i32, wanted: Wanted) -> ChamberRates {
-        // n / L in 2^22 per mm: L in 1/256 mm, at least 1 mm.
-        let short = length.wrapping_shr(8).max(256);
-        let stiffness = self.exponent.checked_div(short).unwrap_or(0);
-        let rate = |pressure: i32, speed: i32| {
-            // 1/256 Pa × 2^-16 mm/s = 2^-24 Pa mm/s; to 2^-6, then × 2^-22 /mm.
-            let power = i64::from(pressure)
-                .wrapping_mul(i64::from(speed))
-                .wrapping_shr(18);
-            let rate = power.wrapping_mul(i64::from(stiffness)).wrapping_shr(22);
-            // Pa/s to Pa/ms: × 1/1000 = × 67 109 / 2^26. |rate| < 2^38.
-            saturate_i32(rate.wrapping_mul(67_109).wrapping_shr(26))
-        };
-        ChamberRates {
-            fill: if wanted.fill {
-                rate(self.curve.drive(self.supply, p), flow)
-            } else {
-                0
-            },
-            vent: if wanted.vent {
-                rate(self.curve.drive(p, self.ambient), flow)
-            } else {
-                0
-            },
-            squeeze: rate(p, closing),
-        }
-    }
-
-    /// Opening in µs that changes a chamber by `change` (1/256 Pa, positive) at `rate`.
-    #[inline]
-    #[must_use]
-    pub fn opening(&self, change: i32, rate: i32) -> i32 {
-        // Pa × 1000 / (Pa/ms) = µs; the rate has RATE_BITS, the change 8 bits.
-        let least = 50_i32.wrapping_shl(RATE_BITS);
-        let numerator = change.wrapping_shr(8).min(500_000).wrapping_mul(4000);
-        numerator
-            .checked_div(rate.max(least).wrapping_shr(RATE_BITS.wrapping_sub(2)))
-            .unwrap_or(0)
+    fn stiffness(&self, length: i32) -> i32 {
+        let short = length.wrapping_shr(8).max(SHORTEST);
+        self.exponent.checked_div(short).unwrap_or(0)
     }
 
     /// Force of the two pressures, mN, positive extending.
     #[inline]
     #[must_use]
     pub fn pressure_force(&self, p: Pressures) -> i32 {
-        scaled(p.a, self.force_a, 32)
-            .saturating_sub(scaled(p.b, self.force_b, 32))
+        part(p.a, self.force_a, 32)
+            .saturating_sub(part(p.b, self.force_b, 32))
             .saturating_sub(self.force_rod)
     }
 }

@@ -1,104 +1,9 @@
-//! Data of an axis in physical units, and the coefficients made of them.
+//! The coefficients of a control tick, made of an axis's data.
 
+use super::data::{AxisData, AxisField};
 use super::gas::FlowCurve;
 use super::valves::ValveTimes;
-use crate::joint::Gain;
-use fixed::types::I16F16;
 use wheeleg_units::{Micros, PositionMm};
-
-/// What the controller is told about its axis. Formats are those of the
-/// parameter table; a number of a [`PositionMm`] is read in the unit named.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct AxisData {
-    /// Bore, 4…100 mm.
-    pub bore: PositionMm,
-    /// Rod diameter, 0 mm…0.9 of the bore.
-    pub rod: PositionMm,
-    /// Dead volume of chamber A with its line, cm³, 0.05…500.
-    pub dead_a: PositionMm,
-    /// Dead volume of chamber B with its line, cm³, 0.05…500.
-    pub dead_b: PositionMm,
-    /// Sonic conductance of one open valve with its line, dm³/(s·bar), 0.005…20.
-    pub conductance: Gain,
-    /// Critical pressure ratio of that path, 0…0.9.
-    pub critical_ratio: Gain,
-    /// Supply pressure, kPa absolute, 200…1700.
-    pub supply: PositionMm,
-    /// Mass that moves with the rod, kg, 0.02…200: the first guess.
-    pub mass: PositionMm,
-    /// Coulomb friction, N, 0…500.
-    pub coulomb: PositionMm,
-    /// Break-away friction, N, Coulomb friction…500.
-    pub breakaway: PositionMm,
-    /// Viscous friction, N·s/m, 0…1000.
-    pub viscous: PositionMm,
-    /// Energised to open, µs, 0…50 000.
-    pub valve_on: Micros,
-    /// Released to shut, µs, 0…50 000.
-    pub valve_off: Micros,
-    /// Margin by which pulses and gaps exceed these, µs, 1…10 000.
-    pub margin: Micros,
-    /// Wave's way from a valve to its chamber, µs, 0…20 000.
-    pub line_delay: Micros,
-    /// Rest begins within this error, mm, 0.02…5: three times the noise of the
-    /// position, and no less than the converter's step.
-    pub band: PositionMm,
-    /// Full stroke, mm.
-    pub stroke: PositionMm,
-}
-
-impl Default for AxisData {
-    /// Bore 20, stroke 180 mm, the throttled valves and tubes of wheeleg-2003.
-    fn default() -> Self {
-        Self {
-            bore: PositionMm::from_int(20),
-            rod: PositionMm::from_int(8),
-            dead_a: const { PositionMm::new(I16F16::lit("15.1")) },
-            dead_b: const { PositionMm::new(I16F16::lit("15.1")) },
-            conductance: const { Gain::lit("0.085") },
-            critical_ratio: const { Gain::lit("0.3") },
-            supply: const { PositionMm::new(I16F16::lit("701.325")) },
-            mass: const { PositionMm::new(I16F16::lit("1.5")) },
-            coulomb: PositionMm::from_int(10),
-            breakaway: PositionMm::from_int(15),
-            viscous: PositionMm::from_int(40),
-            valve_on: Micros(3500),
-            valve_off: Micros(2000),
-            margin: Micros(350),
-            line_delay: Micros(2900),
-            band: const { PositionMm::new(I16F16::lit("0.12")) },
-            stroke: PositionMm::from_int(180),
-        }
-    }
-}
-
-/// Name of rejected axis data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum AxisField {
-    /// Bore.
-    Bore,
-    /// Rod.
-    Rod,
-    /// Dead volume of A or B.
-    DeadVolume,
-    /// Conductance.
-    Conductance,
-    /// Critical ratio.
-    CriticalRatio,
-    /// Supply pressure.
-    Supply,
-    /// Mass.
-    Mass,
-    /// Coulomb, break-away or viscous friction.
-    Friction,
-    /// Switching or line delay, or its margin.
-    Delay,
-    /// Rest band.
-    Band,
-    /// Stroke.
-    Stroke,
-}
 
 /// Coefficients for one control tick. Stroke and speed in raw I16F16,
 /// pressures in 1/256 Pa, forces in mN.
@@ -122,7 +27,7 @@ pub struct AxisModel {
     pub flow_a: i32,
     /// The same for B.
     pub flow_b: i32,
-    /// Polytropic exponent × 2^30.
+    /// Polytropic exponent × 1.048576 × 2^30: see [`AxisModel::stiffness_a`].
     pub exponent: i32,
     /// mN per 1/256 Pa, × 2^32, of A and B.
     pub force_a: i32,
@@ -185,23 +90,26 @@ pub struct AxisModel {
 }
 
 /// R T of air at 293.15 K, J/kg, times its density at the reference atmosphere
-/// of ISO 8778, kg/m³: Pa.
-const RHO_R_T: f32 = 1.185 * 287.05 * 293.15;
+/// of ISO 8778, kg/m³: 1.185 × 287.05 × 293.15 Pa. Times 1e-8 m³/(s Pa) and 1e9 mm³:
+/// mm³/s of choked outflow per dm³/(s bar).
+const CHOKED_MM3_S: u64 = 997_162;
 /// Ambient pressure, Pa (ASSUMED: sea level).
-const AMBIENT_PA: f32 = 101_325.0;
-/// Polytropic exponent (ASSUMED: usual for small cylinders).
-const EXPONENT: f32 = 1.2;
-/// Slope of the speed law times the dead time.
-const SLOPE: f32 = 0.19;
-/// Gain of the speed error times the dead time.
-const DAMPING: f32 = 0.43;
-/// Deceleration over slope times top speed.
-const BRAKE: f32 = 0.7;
-/// Top speed as a share of that of a choked outlet.
-const TOP: f32 = 0.92;
+const AMBIENT_PA: u64 = 101_325;
+/// Polytropic exponent × 100 (ASSUMED: usual for small cylinders).
+const EXPONENT_PERCENT: u64 = 120;
+/// Slope of the speed law times the dead time, × 100.
+const SLOPE_PERCENT: u64 = 19;
+/// Gain of the speed error times the dead time, × 100.
+const DAMPING_PERCENT: u64 = 43;
+/// Deceleration over slope times top speed, × 100.
+const BRAKE_PERCENT: u64 = 70;
+/// Top speed as a share of that of a choked outlet, × 100.
+const TOP_PERCENT: u64 = 92;
 /// Bandwidth of the observer, rad/s: noise of a 12-bit converter with 16-fold
 /// oversampling gives 1 mm/s of speed.
-const OBSERVER: f32 = 150.0;
+const OBSERVER: u64 = 150;
+/// π/4 × 2^30.
+const QUARTER_PI: u64 = 843_314_857;
 
 impl AxisModel {
     /// Checks the data and works out the coefficients for a tick of `tick`.
@@ -212,181 +120,179 @@ impl AxisModel {
     /// its top. The three factors were found on one axis (bore 20 × 180 mm,
     /// VQ110U-class valves) and hold for others because they have no unit.
     ///
+    /// In integers, like the tick: every coefficient is within 0.1 % of the exact
+    /// one, or a step of its format.
+    ///
     /// # Errors
     /// [`AxisField`] names what is outside its range.
     pub fn new(data: &AxisData, tick: Micros) -> Result<Self, AxisField> {
-        let d = Physical::of(data);
-        check(d.bore_mm, 4.0, 100.0, AxisField::Bore)?;
-        check(d.rod_mm, 0.0, 0.9 * d.bore_mm, AxisField::Rod)?;
-        check(d.dead_a_mm3, 50.0, 5e5, AxisField::DeadVolume)?;
-        check(d.dead_b_mm3, 50.0, 5e5, AxisField::DeadVolume)?;
-        check(d.conductance, 0.005, 20.0, AxisField::Conductance)?;
-        check(d.critical, 0.0, 0.9, AxisField::CriticalRatio)?;
-        check(d.supply_pa, 2e5, 1.7e6, AxisField::Supply)?;
-        check(d.mass_kg, 0.02, 200.0, AxisField::Mass)?;
-        check(d.coulomb_n, 0.0, 500.0, AxisField::Friction)?;
-        check(d.breakaway_n, d.coulomb_n, 500.0, AxisField::Friction)?;
-        check(d.viscous, 0.0, 1000.0, AxisField::Friction)?;
-        check(d.on_us, 0.0, 5e4, AxisField::Delay)?;
-        check(d.off_us, 0.0, 5e4, AxisField::Delay)?;
-        check(d.line_us, 0.0, 2e4, AxisField::Delay)?;
-        check(d.margin_us, 1.0, 1e4, AxisField::Delay)?;
-        check(d.band_mm, 0.02, 5.0, AxisField::Band)?;
-        check(d.stroke_mm, 1.0, 1000.0, AxisField::Stroke)?;
-        Ok(Self::coefficients(&d, tick))
+        data.check()?;
+        Ok(Self::coefficients(data, tick))
     }
 
-    fn coefficients(d: &Physical, tick: Micros) -> Self {
-        let quarter_pi = core::f32::consts::FRAC_PI_4;
-        let area_a = quarter_pi * d.bore_mm * d.bore_mm;
-        let area_rod = quarter_pi * d.rod_mm * d.rod_mm;
-        let area_b = area_a - area_rod;
-        // dm³/(s bar) = 1e-8 m³/(s Pa); m³/s over mm² = 1e9 mm/s.
-        let flow = d.conductance * 1e-8 * RHO_R_T * 1e9;
-        let (flow_a, flow_b) = (flow / area_a, flow / area_b);
-        let tick_us = tick.get() as f32;
-        let tick_s = tick_us * 1e-6;
-        let horizon_us = tick_us + d.on_us + d.line_us;
-        let horizon_s = horizon_us * 1e-6;
+    fn coefficients(data: &AxisData, tick: Micros) -> Self {
+        // Formats as "value × 2^bits": the two digits at the end of a name. What a
+        // 64-bit product needs at most is said beside it; data are within `check`.
+        let raw = |value: PositionMm| u64::from(value.raw().unsigned_abs());
+        let micros = |value: Micros| u64::from(value.get());
+        let circle_16 = |diameter: PositionMm| {
+            let square_16 = raw(diameter).wrapping_mul(raw(diameter)).wrapping_shr(16);
+            square_16.wrapping_mul(QUARTER_PI).wrapping_shr(30)
+        };
+        let area_a_16 = circle_16(data.bore);
+        let area_rod_16 = circle_16(data.rod);
+        let area_b_16 = area_a_16.saturating_sub(area_rod_16);
+        // 2^29 × 2^20 × 2^8.
+        let flow_24 =
+            u64::from(data.conductance.to_bits().unsigned_abs()).wrapping_mul(CHOKED_MM3_S);
+        let flow_a_16 = ratio(flow_24.wrapping_shl(8), area_a_16);
+        let flow_b_16 = ratio(flow_24.wrapping_shl(8), area_b_16);
+        let tick_us = micros(tick);
+        let horizon_us = tick_us
+            .wrapping_add(micros(data.valve_on))
+            .wrapping_add(micros(data.line_delay));
+        let seconds_32 = |us: u64| ratio(us.wrapping_shl(32), 1_000_000);
 
-        let low = AMBIENT_PA * 1.03;
-        let high = d.supply_pa * 0.985;
-        let mean = 0.5 * (AMBIENT_PA + d.supply_pa);
-        let to_force = |pa: f32, area: f32| pa * area * 1e-3;
-        let rod_mn = to_force(AMBIENT_PA, area_rod);
-        let force_out = to_force(high, area_a) - to_force(low, area_b) - rod_mn;
-        let force_in = to_force(high, area_b) - to_force(low, area_a) + rod_mn;
+        let ambient_8 = AMBIENT_PA << 8;
+        // kPa × 2^16 to Pa × 2^8: × 1000 / 256.
+        let supply_8 = raw(data.supply).wrapping_mul(1000).wrapping_shr(8);
+        let low_8 = percent(ambient_8, 103);
+        let high_8 = ratio(supply_8.wrapping_mul(985), 1000);
+        let mean_8 = ambient_8.wrapping_add(supply_8).wrapping_shr(1);
+        // mN per 1/256 Pa × 2^32: 2^24 / 1000 × mm².
+        let force_32 = |area_16: u64| ratio(area_16.wrapping_mul(256), 1000);
+        let force = |pa_8: u64, area_16: u64| pa_8.wrapping_mul(force_32(area_16)).wrapping_shr(32);
+        let rod = force(ambient_8, area_rod_16);
+        let force_out = force(high_8, area_a_16)
+            .saturating_sub(force(low_8, area_b_16))
+            .saturating_sub(rod);
+        let force_in = force(high_8, area_b_16)
+            .wrapping_add(rod)
+            .saturating_sub(force(low_8, area_a_16));
 
         // Speed law. The larger piston side is the slower outlet, of choked speed
         // C ρ0 R T / area.
-        let top = TOP * flow_b.min(flow_a * 1.5);
-        let slope = SLOPE / horizon_s;
-        let damping = DAMPING / horizon_s;
-        let brake = BRAKE * slope * top;
+        let slower_16 = flow_b_16.min(flow_a_16.wrapping_mul(3).wrapping_shr(1));
+        let top_16 = percent(slower_16, TOP_PERCENT);
+        let per_horizon_8 = |percents: u64| ratio(percents.wrapping_mul(2_560_000), horizon_us);
+        let slope_8 = per_horizon_8(SLOPE_PERCENT);
+        // × 2^14: 2^25 × 2^37.
+        let slope_14 = ratio((SLOPE_PERCENT * 10_000) << 14, horizon_us);
+        let brake = percent(
+            slope_14.wrapping_mul(top_16).wrapping_shr(30),
+            BRAKE_PERCENT,
+        );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
         // how fast the force can change, mN/s.
-        let volume_a = d.dead_a_mm3 + 0.5 * area_a * d.stroke_mm;
-        let volume_b = d.dead_b_mm3 + 0.5 * area_b * d.stroke_mm;
-        let slew = EXPONENT
-            * flow
-            * 1e-3
-            * (d.supply_pa * 0.9 * area_a / volume_a + mean * area_b / volume_b)
-            * 0.5;
-        let nimble = 0.9 * slew / (brake * slope);
+        let volume_8 = |dead: PositionMm, area_16: u64| {
+            let dead_8 = raw(dead).wrapping_mul(1000).wrapping_shr(8);
+            dead_8.wrapping_add(area_16.wrapping_mul(raw(data.stroke)).wrapping_shr(25))
+        };
+        let stiffness_8 = |pa_8: u64, area_16: u64, dead: PositionMm| {
+            // 2^29 × 2^29, Pa/mm.
+            ratio(pa_8.wrapping_mul(area_16), volume_8(dead, area_16)).wrapping_shr(8)
+        };
+        let both_8 = percent(stiffness_8(supply_8, area_a_16, data.dead_a), 90)
+            .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b));
+        // Half of both; 2^29 × 2^31 × 2^-12.
+        let slew = flow_24
+            .wrapping_shr(20)
+            .wrapping_mul(both_8)
+            .wrapping_shr(13);
+        let slew = ratio(slew.wrapping_mul(EXPONENT_PERCENT), 100_000);
+        // kg = mN/s over mm/s³. 2^37 × 2^24.
+        let nimble_16 = ratio(
+            percent(slew, 90).wrapping_shl(24),
+            brake.wrapping_mul(slope_8),
+        );
 
-        let raw = |value: f32| (value * 65_536.0) as i32;
-        let pressure = |value: f32| (value * 256.0) as i32;
-        let seconds = |value: f32| (value * 4_294_967_296.0) as i32;
-        let micros = |value: f32| value as i32;
-        // 1/256 Pa per mN for an area in mm²: 1000/area × 256.
-        let per_force = |area: f32| (256_000.0 / area * 4096.0) as i32;
-        let w = OBSERVER;
+        let to_mn = |newton: PositionMm| raw(newton).wrapping_mul(1000).wrapping_shr(16);
+        // 1/256 Pa per mN for an area in mm²: 256 000/area, × 2^12.
+        let per_force_12 = |area_16: u64| ratio((256_000 << 12) << 16, area_16);
+        let lead_16 = |dead: PositionMm, area_16: u64| {
+            ratio(raw(dead).wrapping_mul(1000).wrapping_shl(16), area_16)
+        };
+        let critical = u64::from(data.critical_ratio.to_bits().unsigned_abs());
+        let times = ValveTimes {
+            tick: number(tick_us),
+            on: number(micros(data.valve_on)),
+            off: number(micros(data.valve_off)),
+            line: number(micros(data.line_delay)),
+            shortest_pulse: number(micros(data.valve_on.saturating_add(data.margin))),
+            shortest_gap: number(micros(data.valve_off.saturating_add(data.margin))),
+        };
         Self {
-            times: ValveTimes {
-                tick: micros(tick_us),
-                on: micros(d.on_us),
-                off: micros(d.off_us),
-                line: micros(d.line_us),
-                shortest_pulse: micros(d.on_us + d.margin_us),
-                shortest_gap: micros(d.off_us + d.margin_us),
-            },
+            times,
             curve: FlowCurve {
-                critical: (d.critical * 32_768.0) as u32,
-                stretch: (32_768.0 / (1.0 - d.critical)) as u32,
+                critical: critical.wrapping_shr(9) as u32,
+                stretch: ratio(1 << 39, (1_u64 << 24).saturating_sub(critical)) as u32,
             },
-            supply: pressure(d.supply_pa),
-            ambient: pressure(AMBIENT_PA),
-            stroke: raw(d.stroke_mm),
-            lead_a: raw(d.dead_a_mm3 / area_a),
-            lead_b: raw(d.dead_b_mm3 / area_b),
-            flow_a: raw(flow_a),
-            flow_b: raw(flow_b),
-            exponent: (EXPONENT * 1_073_741_824.0) as i32,
-            force_a: (area_a * 16_777.216) as i32,
-            force_b: (area_b * 16_777.216) as i32,
-            force_rod: rod_mn as i32,
-            half_pressure_a: per_force(2.0 * area_a),
-            area_ratio: (area_a / area_b * 16_777_216.0) as i32,
-            pressure_b: per_force(area_b),
-            pressure_a: per_force(area_a),
-            mean: pressure(mean),
-            low: pressure(low),
-            high: pressure(high),
-            force_out: force_out as i32,
-            force_in: force_in as i32,
-            coulomb: (d.coulomb_n * 1e3) as i32,
-            breakaway: (d.breakaway_n * 1e3) as i32,
-            viscous: (d.viscous * 256.0) as i32,
-            horizon: seconds(horizon_s),
-            horizon_us: micros(horizon_us),
-            tick: seconds(tick_s),
-            mass: raw(d.mass_kg),
-            nimble_mass: raw(nimble.clamp(0.01, 1000.0)),
-            slope: (slope * 256.0) as i32,
-            damping: (damping * 256.0) as i32,
-            brake: brake as i32,
-            top_speed: raw(top),
-            observe_stroke: raw(3.0 * w * tick_s),
-            observe_speed: raw(3.0 * w * w * tick_s),
-            observe_load: (w * w * w * tick_s) as i32,
-            stick_step: (4.0 * d.breakaway_n * 1e3 * tick_s * 256.0) as i32,
-            band: raw(d.band_mm),
+            supply: number(supply_8),
+            ambient: number(ambient_8),
+            stroke: number(raw(data.stroke)),
+            lead_a: number(lead_16(data.dead_a, area_a_16)),
+            lead_b: number(lead_16(data.dead_b, area_b_16)),
+            flow_a: number(flow_a_16),
+            flow_b: number(flow_b_16),
+            exponent: const { ((EXPONENT_PERCENT << 50) / 100 / 1_000_000) as i32 },
+            force_a: number(force_32(area_a_16)),
+            force_b: number(force_32(area_b_16)),
+            force_rod: number(rod),
+            half_pressure_a: number(per_force_12(area_a_16.wrapping_shl(1))),
+            area_ratio: number(ratio(area_a_16.wrapping_shl(24), area_b_16)),
+            pressure_b: number(per_force_12(area_b_16)),
+            pressure_a: number(per_force_12(area_a_16)),
+            mean: number(mean_8),
+            low: number(low_8),
+            high: number(high_8),
+            force_out: number(force_out),
+            force_in: number(force_in),
+            coulomb: number(to_mn(data.coulomb)),
+            breakaway: number(to_mn(data.breakaway)),
+            viscous: number(raw(data.viscous).wrapping_shr(8)),
+            horizon: number(seconds_32(horizon_us)),
+            horizon_us: number(horizon_us),
+            tick: number(seconds_32(tick_us)),
+            mass: number(raw(data.mass)),
+            nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
+            slope: number(slope_8),
+            damping: number(per_horizon_8(DAMPING_PERCENT)),
+            brake: number(brake),
+            top_speed: number(top_16),
+            observe_stroke: number(seconds_32(tick_us.wrapping_mul(3 * OBSERVER)).wrapping_shr(16)),
+            observe_speed: number(
+                seconds_32(tick_us.wrapping_mul(3 * OBSERVER * OBSERVER)).wrapping_shr(16),
+            ),
+            observe_load: number(ratio(
+                tick_us.wrapping_mul(OBSERVER * OBSERVER * OBSERVER),
+                1_000_000,
+            )),
+            // Four times the break-away force in a second, × 2^8.
+            stick_step: number(ratio(
+                to_mn(data.breakaway)
+                    .wrapping_mul(tick_us)
+                    .wrapping_mul(4 << 8),
+                1_000_000,
+            )),
+            band: number(raw(data.band)),
         }
     }
 }
 
-/// The data as plain numbers, mm and s.
-struct Physical {
-    bore_mm: f32,
-    rod_mm: f32,
-    dead_a_mm3: f32,
-    dead_b_mm3: f32,
-    conductance: f32,
-    critical: f32,
-    supply_pa: f32,
-    mass_kg: f32,
-    coulomb_n: f32,
-    breakaway_n: f32,
-    viscous: f32,
-    on_us: f32,
-    off_us: f32,
-    line_us: f32,
-    margin_us: f32,
-    band_mm: f32,
-    stroke_mm: f32,
+/// `a / b`, rounded down; 0 where there is no quotient. One copy of the long
+/// division's call.
+#[inline(never)]
+fn ratio(a: u64, b: u64) -> u64 {
+    a.checked_div(b).unwrap_or(0)
 }
 
-impl Physical {
-    fn of(data: &AxisData) -> Self {
-        let number = |value: PositionMm| value.raw() as f32 / 65_536.0;
-        let gain = |value: Gain| value.to_bits() as f32 / 16_777_216.0;
-        let micros = |value: Micros| value.get() as f32;
-        Self {
-            bore_mm: number(data.bore),
-            rod_mm: number(data.rod),
-            dead_a_mm3: number(data.dead_a) * 1e3,
-            dead_b_mm3: number(data.dead_b) * 1e3,
-            conductance: gain(data.conductance),
-            critical: gain(data.critical_ratio),
-            supply_pa: number(data.supply) * 1e3,
-            mass_kg: number(data.mass),
-            coulomb_n: number(data.coulomb),
-            breakaway_n: number(data.breakaway),
-            viscous: number(data.viscous),
-            on_us: micros(data.valve_on),
-            off_us: micros(data.valve_off),
-            line_us: micros(data.line_delay),
-            margin_us: micros(data.margin),
-            band_mm: number(data.band),
-            stroke_mm: number(data.stroke),
-        }
-    }
+/// `value × percents / 100`, to one in a hundred thousand.
+fn percent(value: u64, percents: u64) -> u64 {
+    ratio(value.wrapping_mul(percents), 100)
 }
 
-fn check(value: f32, low: f32, high: f32, field: AxisField) -> Result<(), AxisField> {
-    if value >= low && value <= high {
-        Ok(())
-    } else {
-        Err(field)
-    }
+/// As a coefficient, saturating.
+#[inline(never)]
+fn number(value: u64) -> i32 {
+    i32::try_from(value).unwrap_or(i32::MAX)
 }

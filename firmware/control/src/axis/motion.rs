@@ -1,8 +1,8 @@
 //! Stroke, speed and load from the measured stroke and the pressure force.
 
 use super::model::AxisModel;
-use super::{scaled, within};
-use wheeleg_units::saturate_i32;
+use super::{part, quotient, scaled, within};
+use core::hash::{Hash, Hasher};
 
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
 const STICK: i32 = 4 << 16;
@@ -38,30 +38,25 @@ impl Inertia {
     #[must_use]
     pub fn new(model: &AxisModel, mass: i32) -> Self {
         let mass = mass.max(1000);
+        let wide = i64::from(mass);
         // 1/kg = mm/s² per mN: 2^(24+16) / raw kg.
-        let per_force = (1_i64 << 40).checked_div(i64::from(mass)).unwrap_or(0);
+        let per_force = quotient(1 << 40, wide, 0);
         let share = if mass > model.nimble_mass {
-            let ratio = i64::from(model.nimble_mass)
-                .wrapping_shl(16)
-                .checked_div(i64::from(mass))
-                .unwrap_or(0);
-            cube_root(ratio as u32)
+            cube_root(quotient(i64::from(model.nimble_mass), wide, 16) as u32)
         } else {
             1 << 16
         };
         let squared = scaled(share, share, 16);
         let slope = scaled(model.slope, share, 16).max(1 << 8);
         // 2^32 / (2 slope²) with slope × 2^8: 2^47 / slope².
-        let linear = (1_i64 << 47)
-            .checked_div(i64::from(slope).wrapping_mul(i64::from(slope)))
-            .unwrap_or(0);
+        let square = i64::from(slope).wrapping_mul(i64::from(slope));
         Self {
             mass,
-            per_force: saturate_i32(per_force),
+            per_force,
             slope,
             damping: scaled(model.damping, share, 16),
             brake: scaled(model.brake, squared, 16),
-            linear: saturate_i32(linear),
+            linear: quotient(1 << 47, square, 0),
             load_gain: scaled(model.observe_load, mass, 16),
         }
     }
@@ -75,22 +70,33 @@ impl Inertia {
 }
 
 /// Cube root of a share × 2^16 of at most one.
+///
+/// Newton's method on a share that is brought into 1/8…1 by shifts of three bits.
 fn cube_root(share: u32) -> i32 {
-    let (mut low, mut high) = (0_u64, 1_u64 << 16);
-    for _ in 0..17 {
-        let middle = low.wrapping_add(high).wrapping_add(1).wrapping_shr(1);
-        let cube = middle.wrapping_mul(middle).wrapping_mul(middle);
-        if cube <= u64::from(share).wrapping_shl(32) {
-            low = middle;
-        } else {
-            high = middle.wrapping_sub(1);
-        }
+    if share >= 1 << 16 {
+        return 1 << 16;
     }
-    low as i32
+    if share == 0 {
+        return 0;
+    }
+    // Below 2^16: it fits 32 bits with 16 bits more.
+    let third = share.leading_zeros().wrapping_sub(16) / 3;
+    let near = share.wrapping_shl(third.wrapping_mul(3));
+    // The chord from 1/8 to 1.
+    let mut root = near
+        .wrapping_mul(9362)
+        .wrapping_shr(14)
+        .wrapping_add(28_087);
+    for _ in 0..4 {
+        let square = root.wrapping_mul(root.min((1 << 16) - 1)).wrapping_shr(16);
+        let step = near.wrapping_shl(16).checked_div(square).unwrap_or(0);
+        root = root.wrapping_mul(2).wrapping_add(step) / 3;
+    }
+    root.wrapping_shr(third) as i32
 }
 
 /// Estimated motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Motion {
     /// Stroke, raw mm.
     pub stroke: i32,
@@ -104,6 +110,25 @@ pub struct Motion {
     pub friction: i32,
     /// Held by its friction.
     pub stuck: bool,
+}
+
+impl Hash for Motion {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. What an update
+        // works out before anything reads it is not kept from tick to tick.
+        let Self {
+            stroke,
+            speed,
+            load,
+            acceleration: _,
+            friction: _,
+            stuck: _,
+        } = self;
+        state.write_i32(*stroke);
+        state.write_i32(*speed);
+        state.write_i32(*load);
+    }
 }
 
 impl Motion {
@@ -130,7 +155,7 @@ impl Motion {
             drive
         } else {
             // Coulomb over ±4 mm/s, raw: × coulomb / 2^18.
-            scaled(within(self.speed, STICK), model.coulomb, 18).saturating_add(scaled(
+            part(within(self.speed, STICK), model.coulomb, 18).saturating_add(scaled(
                 self.speed,
                 model.viscous,
                 24,
@@ -140,18 +165,19 @@ impl Motion {
         // mm/s² × s × 2^32 to raw mm/s: / 2^16.
         let gained = scaled(self.acceleration, model.tick, 16);
         let mean = self.speed.saturating_add(gained.wrapping_shr(1));
-        self.stroke = self.stroke.saturating_add(scaled(mean, model.tick, 32));
+        self.stroke = self.stroke.saturating_add(part(mean, model.tick, 32));
         self.speed = self.speed.saturating_add(gained);
         if self.stuck {
             self.speed = self.speed.wrapping_sub(self.speed.wrapping_shr(3));
         }
+        // Below 2^19; the shares below 2^24: what follows fits.
         let innovation = within(measured.saturating_sub(self.stroke), 8 << 16);
         self.stroke = self
             .stroke
-            .saturating_add(scaled(innovation, model.observe_stroke, 16));
+            .saturating_add(part(innovation, model.observe_stroke, 16));
         self.speed = self
             .speed
-            .saturating_add(scaled(innovation, model.observe_speed, 16));
+            .saturating_add(part(innovation, model.observe_speed, 16));
         // Near an end the cushion brakes: that is no load.
         let cushioned = if self.speed > 0 {
             self.stroke > model.stroke.saturating_sub(CUSHION)
@@ -161,7 +187,7 @@ impl Motion {
         if !self.stuck && !cushioned {
             let load = self
                 .load
-                .saturating_add(scaled(innovation, inertia.load_gain, 16));
+                .saturating_add(part(innovation, inertia.load_gain, 16));
             self.load = within(load, model.force_out.max(model.force_in));
         }
     }

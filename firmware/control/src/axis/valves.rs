@@ -6,8 +6,7 @@
 //! the line. The same rules are followed here, in whole microseconds, on the
 //! on-times that were really sent.
 
-/// Time "never".
-const NEVER: i32 = i32::MAX;
+use core::hash::{Hash, Hasher};
 
 /// Changes that can be under way at once.
 const EDGES: usize = 4;
@@ -43,11 +42,13 @@ impl ValveTimes {
 }
 
 /// One valve as followed from its coil.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug)]
 pub struct ValveTrack {
     coil: bool,
     open: bool,
-    /// Time until each change of the effect, oldest first.
+    /// Changes of the effect under way.
+    pending: u8,
+    /// Time until each of them, oldest first; beyond `pending` without meaning.
     edges: [i32; EDGES],
     /// Time since the coil changed.
     since: i32,
@@ -59,6 +60,27 @@ impl Default for ValveTrack {
     }
 }
 
+impl Hash for ValveTrack {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. Fields share a
+        // word such that a flipped bit of any flips one bit of it.
+        let Self {
+            coil,
+            open,
+            pending,
+            edges: [first, second, third, fourth],
+            since,
+        } = self;
+        let flags = u32::from(*coil)
+            | u32::from(*open).wrapping_shl(1)
+            | u32::from(*pending).wrapping_shl(2);
+        state.write_i32(since ^ flags.rotate_right(8) as i32);
+        state.write_i32(first ^ second.rotate_left(16));
+        state.write_i32(third ^ fourth.rotate_left(16));
+    }
+}
+
 impl ValveTrack {
     /// Shut for a long time.
     #[must_use]
@@ -66,7 +88,8 @@ impl ValveTrack {
         Self {
             coil: false,
             open: false,
-            edges: [NEVER; EDGES],
+            pending: 0,
+            edges: [0; EDGES],
             since: LONG,
         }
     }
@@ -94,17 +117,15 @@ impl ValveTrack {
         };
         self.coil = !self.coil;
         self.since = at.wrapping_neg();
-        // Called back before it moved: the change under way does not happen.
-        let under_way = self.edges.iter().take_while(|edge| **edge != NEVER).count();
-        if lasted < took
-            && let Some(last) = self.edges.get_mut(under_way.wrapping_sub(1))
-        {
-            *last = NEVER;
-        } else if let Some(next) = self.edges.get_mut(under_way) {
+        if lasted < took && self.pending > 0 {
+            // Called back before it moved: the change under way does not happen.
+            self.pending = self.pending.wrapping_sub(1);
+        } else if let Some(next) = self.edges.get_mut(usize::from(self.pending)) {
             *next = at.wrapping_add(delay).wrapping_add(times.line);
+            self.pending = self.pending.wrapping_add(1);
         } else {
             // More changes than a line can hold: only the end is known.
-            self.edges = [NEVER; EDGES];
+            self.pending = 0;
             self.open = self.coil;
         }
     }
@@ -120,15 +141,11 @@ impl ValveTrack {
             self.change(on, times);
         }
         self.since = self.since.wrapping_add(times.tick).min(LONG);
-        if !self.open && self.edges.first() == Some(&NEVER) {
-            return 0;
+        if self.pending == 0 {
+            return if self.open { times.tick } else { 0 };
         }
         let opened = self.pass(times.tick);
-        for edge in &mut self.edges {
-            if *edge != NEVER {
-                *edge = edge.wrapping_sub(times.tick);
-            }
-        }
+        self.edges = self.edges.map(|edge| edge.wrapping_sub(times.tick));
         opened
     }
 
@@ -136,9 +153,9 @@ impl ValveTrack {
     #[inline]
     fn pass(&mut self, span: i32) -> i32 {
         let (mut opened, mut from) = (0_i32, 0_i32);
-        for _ in 0..EDGES {
+        while self.pending > 0 {
             let [first, second, third, fourth] = self.edges;
-            if first > span || first == NEVER {
+            if first > span {
                 break;
             }
             if self.open {
@@ -146,7 +163,8 @@ impl ValveTrack {
             }
             from = first;
             self.open = !self.open;
-            self.edges = [second, third, fourth, NEVER];
+            self.pending = self.pending.wrapping_sub(1);
+            self.edges = [second, third, fourth, 0];
         }
         if self.open {
             opened = opened.wrapping_add(span.wrapping_sub(from));
@@ -156,18 +174,33 @@ impl ValveTrack {
 
     /// For how long the chamber will still see the valve open, if its coil falls
     /// as soon as the shortest pulse allows, µs.
+    ///
+    /// The time open is the sum of the times of closing less the sum of those of
+    /// opening: changes alternate, and the last closes.
     #[inline]
     #[must_use]
     pub fn committed(&self, times: &ValveTimes) -> i32 {
-        if !self.open && self.edges.first() == Some(&NEVER) {
-            return 0;
-        }
-        let mut ahead = *self;
-        if ahead.coil {
+        let fall = if self.coil {
+            if usize::from(self.pending) >= EDGES {
+                return 0;
+            }
             let left = times.shortest_pulse.wrapping_sub(self.since).max(0);
-            ahead.change(left, times);
+            left.wrapping_add(times.off).wrapping_add(times.line)
+        } else {
+            0
+        };
+        let mut sum = 0_i32;
+        for edge in self.edges.iter().take(usize::from(self.pending)) {
+            // The sum so far is that of an even or odd number of changes: each turns
+            // the sign of all before it.
+            sum = edge.wrapping_sub(sum);
         }
-        ahead.pass(LONG.wrapping_sub(1))
+        if self.coil {
+            // The fall is the last change, and closes.
+            fall.wrapping_sub(sum)
+        } else {
+            sum
+        }
     }
 
     /// On-time of the next tick for `need` µs of opening beyond what is
@@ -240,7 +273,7 @@ mod tests {
         ] {
             track.advance(on, &TIMES);
         }
-        assert!(!track.open && track.edges == [NEVER; EDGES]);
+        assert!(!track.open && track.pending == 0);
     }
 
     #[test]

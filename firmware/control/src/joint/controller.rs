@@ -58,7 +58,7 @@ impl JointController {
             fade: 0,
             fade_step: 0,
             sent: [0; VALVE_COUNT],
-            predictive: config.axis().copied().map(Predictive::new),
+            predictive: config.axis().map(Predictive::new),
             config,
         }
     }
@@ -146,8 +146,8 @@ impl JointController {
     /// measured position, and forgets the integral and the rest state, so that the
     /// next [`JointController::step`] starts afresh with a valid velocity.
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
-        if let Some(law) = &mut self.predictive {
-            let velocity = law.follow(measured, &self.sent);
+        if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
+            let velocity = law.follow(model, measured, &self.sent);
             law.release();
             return velocity;
         }
@@ -169,15 +169,18 @@ impl JointController {
         let reference = input.reference.limit(low, high);
         limits.reference = reference != input.reference;
         let error = reference.saturating_sub(input.measured);
-        if let Some(law) = &mut self.predictive {
-            let velocity = law.follow(input.measured, &self.sent);
-            let drive = law.drive(&JointInput {
-                reference,
-                ..*input
-            });
+        if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
+            let velocity = law.follow(model, input.measured, &self.sent);
+            let drive = law.drive(
+                model,
+                &JointInput {
+                    reference,
+                    ..*input
+                },
+            );
             limits.duty = drive.limited;
             return JointOutput {
-                duty: law.duty(&drive),
+                duty: Predictive::duty(model, &drive),
                 openings: ValveOpenings::SHUT,
                 direct: Some(drive.on),
                 error,

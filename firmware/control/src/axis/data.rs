@@ -1,0 +1,179 @@
+//! What a controller is told about its axis, in physical units.
+
+use crate::joint::Gain;
+use fixed::types::I16F16;
+use wheeleg_units::{Micros, PositionMm};
+
+/// What the controller is told about its axis. Formats are those of the
+/// parameter table; a number of a [`PositionMm`] is read in the unit named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct AxisData {
+    /// Bore, 4…100 mm.
+    pub bore: PositionMm,
+    /// Rod diameter, 0 mm…0.9 of the bore.
+    pub rod: PositionMm,
+    /// Dead volume of chamber A with its line, cm³, 0.05…500.
+    pub dead_a: PositionMm,
+    /// Dead volume of chamber B with its line, cm³, 0.05…500.
+    pub dead_b: PositionMm,
+    /// Sonic conductance of one open valve with its line, dm³/(s·bar), 0.005…20.
+    pub conductance: Gain,
+    /// Critical pressure ratio of that path, 0…0.9.
+    pub critical_ratio: Gain,
+    /// Supply pressure, kPa absolute, 200…1700.
+    pub supply: PositionMm,
+    /// Mass that moves with the rod, kg, 0.02…200: the first guess.
+    pub mass: PositionMm,
+    /// Coulomb friction, N, 0…500.
+    pub coulomb: PositionMm,
+    /// Break-away friction, N, Coulomb friction…500.
+    pub breakaway: PositionMm,
+    /// Viscous friction, N·s/m, 0…1000.
+    pub viscous: PositionMm,
+    /// Energised to open, µs, 0…50 000.
+    pub valve_on: Micros,
+    /// Released to shut, µs, 0…50 000.
+    pub valve_off: Micros,
+    /// Margin by which pulses and gaps exceed these, µs, 1…10 000.
+    pub margin: Micros,
+    /// Wave's way from a valve to its chamber, µs, 0…20 000.
+    pub line_delay: Micros,
+    /// Rest begins within this error, mm, 0.02…5: three times the noise of the
+    /// position, and no less than the converter's step.
+    pub band: PositionMm,
+    /// Full stroke, mm.
+    pub stroke: PositionMm,
+}
+
+impl Default for AxisData {
+    /// Bore 20, stroke 180 mm, the throttled valves and tubes of wheeleg-2003.
+    fn default() -> Self {
+        Self {
+            bore: PositionMm::from_int(20),
+            rod: PositionMm::from_int(8),
+            dead_a: const { PositionMm::new(I16F16::lit("15.1")) },
+            dead_b: const { PositionMm::new(I16F16::lit("15.1")) },
+            conductance: const { Gain::lit("0.085") },
+            critical_ratio: const { Gain::lit("0.3") },
+            supply: const { PositionMm::new(I16F16::lit("701.325")) },
+            mass: const { PositionMm::new(I16F16::lit("1.5")) },
+            coulomb: PositionMm::from_int(10),
+            breakaway: PositionMm::from_int(15),
+            viscous: PositionMm::from_int(40),
+            valve_on: Micros(3500),
+            valve_off: Micros(2000),
+            margin: Micros(350),
+            line_delay: Micros(2900),
+            band: const { PositionMm::new(I16F16::lit("0.12")) },
+            stroke: PositionMm::from_int(180),
+        }
+    }
+}
+
+/// Name of rejected axis data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum AxisField {
+    /// Bore.
+    Bore,
+    /// Rod.
+    Rod,
+    /// Dead volume of A or B.
+    DeadVolume,
+    /// Conductance.
+    Conductance,
+    /// Critical ratio.
+    CriticalRatio,
+    /// Supply pressure.
+    Supply,
+    /// Mass.
+    Mass,
+    /// Coulomb, break-away or viscous friction.
+    Friction,
+    /// Switching or line delay, or its margin.
+    Delay,
+    /// Rest band.
+    Band,
+    /// Stroke.
+    Stroke,
+}
+
+impl AxisData {
+    /// Ranges of the data, as its fields say.
+    pub(super) fn check(&self) -> Result<(), AxisField> {
+        const fn raw(value: I16F16) -> i32 {
+            value.to_bits()
+        }
+        let rows = [
+            (self.bore.raw(), 4 << 16, 100 << 16, AxisField::Bore),
+            (
+                self.dead_a.raw(),
+                raw(const { I16F16::lit("0.05") }),
+                500 << 16,
+                AxisField::DeadVolume,
+            ),
+            (
+                self.dead_b.raw(),
+                raw(const { I16F16::lit("0.05") }),
+                500 << 16,
+                AxisField::DeadVolume,
+            ),
+            (
+                self.conductance.to_bits(),
+                const { Gain::lit("0.005").to_bits() },
+                20 << 24,
+                AxisField::Conductance,
+            ),
+            (
+                self.critical_ratio.to_bits(),
+                0,
+                const { Gain::lit("0.9").to_bits() },
+                AxisField::CriticalRatio,
+            ),
+            (self.supply.raw(), 200 << 16, 1700 << 16, AxisField::Supply),
+            (
+                self.mass.raw(),
+                raw(const { I16F16::lit("0.02") }),
+                200 << 16,
+                AxisField::Mass,
+            ),
+            (self.coulomb.raw(), 0, 500 << 16, AxisField::Friction),
+            (
+                self.breakaway.raw(),
+                self.coulomb.raw(),
+                500 << 16,
+                AxisField::Friction,
+            ),
+            (self.viscous.raw(), 0, 1000 << 16, AxisField::Friction),
+            (
+                self.band.raw(),
+                raw(const { I16F16::lit("0.02") }),
+                5 << 16,
+                AxisField::Band,
+            ),
+            (self.stroke.raw(), 1 << 16, 1000 << 16, AxisField::Stroke),
+        ];
+        for (value, low, high, field) in rows {
+            if value < low || value > high {
+                return Err(field);
+            }
+        }
+        // At most nine tenths of the bore.
+        let bore_tenths = i64::from(self.bore.raw()).wrapping_mul(9);
+        if self.rod.raw() < 0 || i64::from(self.rod.raw()).wrapping_mul(10) > bore_tenths {
+            return Err(AxisField::Rod);
+        }
+        let delays = [
+            (self.valve_on, 0, 50_000),
+            (self.valve_off, 0, 50_000),
+            (self.line_delay, 0, 20_000),
+            (self.margin, 1, 10_000),
+        ];
+        for (delay, low, high) in delays {
+            if delay.get() < low || delay.get() > high {
+                return Err(AxisField::Delay);
+            }
+        }
+        Ok(())
+    }
+}

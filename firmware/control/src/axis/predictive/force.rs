@@ -1,0 +1,186 @@
+//! The force that is wanted at the end of the dead time.
+
+use super::STILL;
+use super::rest::REFERENCE_RESTS;
+use crate::axis::gas::Pressures;
+use crate::axis::model::AxisModel;
+use crate::axis::motion::{Inertia, Motion};
+use crate::axis::{part, scaled, square_root, within};
+
+/// Fast enough for the sign of friction to be that of the motion (10 mm/s).
+const SLIDES: i32 = 10 << 16;
+
+/// Motion at the end of the dead time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ahead {
+    /// Raw mm.
+    pub(super) stroke: i32,
+    /// Mean speed until then, raw mm/s.
+    pub(super) mean: i32,
+    /// Speed then, raw mm/s.
+    pub(super) speed: i32,
+}
+
+impl Ahead {
+    /// Where the present acceleration takes the piston.
+    #[inline]
+    pub(super) const fn new(model: &AxisModel, motion: &Motion) -> Self {
+        let gained = scaled(motion.acceleration, model.horizon, 16);
+        let mean = motion.speed.saturating_add(gained.wrapping_shr(1));
+        Self {
+            stroke: motion.stroke.saturating_add(part(mean, model.horizon, 32)),
+            mean,
+            speed: motion.speed.saturating_add(gained),
+        }
+    }
+
+    /// Corrects the speed for the pressures that will be there.
+    #[inline]
+    pub(super) fn correct(
+        &mut self,
+        model: &AxisModel,
+        inertia: &Inertia,
+        motion: &Motion,
+        pressures: Pressures,
+    ) {
+        let drive = model.pressure_force(pressures).saturating_add(motion.load);
+        self.speed = if motion.stuck && drive.saturating_abs() < model.breakaway {
+            0
+        } else {
+            // Mean of the accelerations now and then.
+            let then = inertia.acceleration(drive.saturating_sub(motion.friction));
+            let mean = motion.acceleration.saturating_add(then).wrapping_shr(1);
+            motion.speed.saturating_add(scaled(mean, model.horizon, 16))
+        };
+    }
+}
+
+/// Extra force on a piston that sticks: it grows until the piston slips.
+#[derive(Clone, Copy, Debug, Default, Hash)]
+pub(super) struct Push {
+    /// mN × 2^8.
+    force: i32,
+}
+
+impl Push {
+    /// One tick with `missing` raw mm to a reference of `reference_speed`.
+    #[inline]
+    fn update(&mut self, model: &AxisModel, still: bool, missing: i32, reference_speed: i32) {
+        if !still {
+            self.force = self.force.saturating_sub(self.force.wrapping_shr(3));
+        } else if reference_speed.wrapping_abs() <= REFERENCE_RESTS {
+            let step = if missing > 0 {
+                model.stick_step
+            } else {
+                model.stick_step.wrapping_neg()
+            };
+            let most = model.force_out.min(1 << 22).wrapping_shl(8);
+            self.force = within(self.force.saturating_add(step), most);
+        }
+    }
+}
+
+/// What is asked for, and with what.
+pub(super) struct Wish<'a> {
+    /// Raw mm.
+    pub(super) reference: i32,
+    /// Raw mm/s.
+    pub(super) reference_speed: i32,
+    /// As estimated.
+    pub(super) motion: &'a Motion,
+    /// At the end of the dead time.
+    pub(super) ahead: Ahead,
+    /// Mass and what follows from it.
+    pub(super) inertia: &'a Inertia,
+}
+
+impl Wish<'_> {
+    /// F*, mN. `grip` gives the friction to feed forward of that which is told.
+    #[inline]
+    pub(super) fn force(
+        &self,
+        model: &AxisModel,
+        push: &mut Push,
+        grip: impl Fn(i32) -> i32,
+    ) -> i32 {
+        let Self {
+            reference,
+            reference_speed,
+            motion,
+            ahead,
+            inertia,
+        } = *self;
+        let load = motion.load;
+        let error = reference
+            .saturating_add(part(reference_speed, model.horizon, 32))
+            .saturating_sub(ahead.stroke);
+        // The force that can brake, beside the load: seven tenths of it are used.
+        let left = if error > 0 {
+            model.force_in.saturating_sub(load)
+        } else {
+            model.force_out.saturating_add(load)
+        };
+        let possible = inertia.acceleration(scaled(left, 45_875, 16));
+        let brake = inertia.brake.min(possible).max(200);
+        let (speed, slope) = speed_law(error, brake, inertia, model.top_speed);
+        let wanted = reference_speed.saturating_add(speed);
+        // 1/s × 2^8 times raw mm/s: mm/s² × 2^24.
+        let pull = scaled(slope, reference_speed.saturating_sub(ahead.speed), 24);
+        let damp = scaled(inertia.damping, wanted.saturating_sub(ahead.speed), 24);
+        let limit = inertia.brake.saturating_mul(5) >> 1;
+        let acceleration = within(pull.saturating_add(damp), limit);
+
+        let still = motion.speed.wrapping_abs() < STILL;
+        let missing = reference.saturating_sub(motion.stroke);
+        push.update(model, still, missing, reference_speed);
+        let grip = grip(if still {
+            model.breakaway
+        } else {
+            model.coulomb
+        });
+        let along = if ahead.speed.wrapping_abs() > SLIDES {
+            ahead.speed
+        } else {
+            wanted
+        };
+        // Full grip from 10 mm/s: × grip / (10 × 2^16).
+        let friction = scaled(within(along, SLIDES), grip / 10, 16);
+        scaled(inertia.mass, acceleration, 16)
+            .saturating_add(friction)
+            .saturating_add(scaled(wanted, model.viscous, 24))
+            .saturating_add(push.force.wrapping_shr(8))
+            .saturating_sub(load)
+    }
+}
+
+/// Speed towards the target, raw mm/s, and its slope over the error, 1/s × 2^8.
+#[inline]
+fn speed_law(error: i32, brake: i32, inertia: &Inertia, top: i32) -> (i32, i32) {
+    // Half of the error up to which the law is a straight line: brake / (2 slope²),
+    // mm/s² × s² × 2^32 to raw mm.
+    let half = scaled(brake, inertia.linear, 16);
+    let size = error.saturating_abs();
+    if size <= half.saturating_mul(2) {
+        return (scaled(inertia.slope, error, 8), inertia.slope);
+    }
+    // (32 v)² = 2 brake e × 2^10, e raw: × 2^11 / 2^16.
+    let square = i64::from(brake)
+        .wrapping_mul(i64::from(size.saturating_sub(half)))
+        .wrapping_shr(5);
+    let square = u32::try_from(square).unwrap_or(u32::MAX);
+    // At most 65 536 / 32 mm/s: fits raw mm/s.
+    let root = square_root(square).max(1) as i32;
+    let speed = root.wrapping_shl(11);
+    if speed >= top {
+        return (if error < 0 { top.wrapping_neg() } else { top }, 0);
+    }
+    let slope = brake.wrapping_shl(13).checked_div(root).unwrap_or(0);
+    (
+        if error < 0 {
+            speed.wrapping_neg()
+        } else {
+            speed
+        },
+        slope,
+    )
+}

@@ -1,0 +1,182 @@
+//! When the piston may rest, and when it must move again.
+
+use crate::axis::model::AxisModel;
+use crate::axis::motion::Motion;
+use crate::axis::part;
+use core::hash::{Hash, Hasher};
+
+/// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
+const CATCH: i32 = 6 << 16;
+/// A reference slower than this is a step (1 mm/s).
+pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
+/// Ticks in the band before rest.
+const REST_TICKS: u16 = 30;
+/// Ticks near the target without coming to rest after which the band widens …
+const PATIENCE: u16 = 500;
+/// … by one band in so many ticks, up to three bands in all.
+const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
+const PATIENCE_SHIFT: u32 = 9;
+/// Ticks outside three bands before the end of rest.
+const RELEASE_TICKS: u16 = 4;
+
+/// Rest at a target, and how long it has been tried.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rest {
+    target: i32,
+    held: u16,
+    released: u16,
+    near: u16,
+    settled: bool,
+}
+
+impl Hash for Rest {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. Fields that are
+        // narrower than a word share one, each in its own bits.
+        let Self {
+            target,
+            held,
+            released,
+            near,
+            settled,
+        } = self;
+        state.write_i32(*target);
+        state.write_u32(u32::from(*held) | u32::from(*released).wrapping_shl(16));
+        state.write_u32(u32::from(*near) | u32::from(*settled).wrapping_shl(16));
+    }
+}
+
+impl Rest {
+    /// At rest.
+    pub(super) const fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Forgets the rest state with the piston at `stroke`.
+    #[inline]
+    pub(super) const fn release(&mut self, stroke: i32) {
+        self.settled = false;
+        self.held = 0;
+        self.target = stroke;
+    }
+
+    /// Takes over the reference; whether it is a new target.
+    #[inline]
+    pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
+        let new = reference.saturating_sub(self.target).saturating_abs() > model.band;
+        if new {
+            self.target = reference;
+            self.near = 0;
+        }
+        new
+    }
+
+    /// One tick; whether the valves are to stay shut.
+    #[inline]
+    pub(super) fn quiet(&mut self, model: &AxisModel, now: &Approach) -> bool {
+        let narrow = model.band;
+        let error = now
+            .reference
+            .saturating_sub(now.motion.stroke)
+            .saturating_abs();
+        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        let near = steps && !self.settled && error < narrow.saturating_mul(24);
+        if near {
+            self.near = self.near.saturating_add(1).min(PATIENCE.saturating_mul(4));
+        } else if !self.settled {
+            self.near = self.near.saturating_sub(1);
+        }
+        // Patience: what has not come to rest for long may do so in a wider band.
+        let beyond = self.beyond().min(2 * PATIENCE_STEP);
+        // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
+        let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
+        let band = narrow.wrapping_add(extra(narrow));
+        let catch = CATCH.wrapping_add(extra(CATCH));
+
+        let slow = error < band && now.motion.speed.wrapping_abs() < catch;
+        let quiet = steps && (slow || now.stops_within(model, band));
+        self.held = if quiet {
+            self.held.saturating_add(1)
+        } else {
+            0
+        };
+        if self.held > REST_TICKS {
+            self.settled = true;
+        }
+        let release = narrow.saturating_mul(2).saturating_add(band);
+        let away = now.reference.saturating_sub(now.measured).saturating_abs();
+        let outside = away > release;
+        if self.settled && (outside || !steps) {
+            self.released = self.released.saturating_add(1);
+            if self.released >= RELEASE_TICKS || !steps {
+                self.settled = false;
+                self.held = 0;
+                self.released = 0;
+            }
+        } else {
+            self.released = 0;
+        }
+        self.settled || quiet
+    }
+
+    /// Ticks near the target beyond what patience allows.
+    fn beyond(&self) -> i32 {
+        i32::from(self.near.saturating_sub(PATIENCE))
+    }
+
+    /// What is fed forward for friction that is less than told makes a relay: where
+    /// the piston does not come to rest, it fades.
+    #[inline]
+    pub(super) fn faded(&self, grip: i32) -> i32 {
+        let left = (2 * PATIENCE_STEP).saturating_sub(self.beyond()).max(0);
+        part(grip, left, PATIENCE_SHIFT.wrapping_add(1))
+    }
+}
+
+/// How the piston comes to its target.
+pub(super) struct Approach<'a> {
+    /// Raw mm.
+    pub(super) reference: i32,
+    /// Raw mm/s.
+    pub(super) reference_speed: i32,
+    /// As measured, raw mm.
+    pub(super) measured: i32,
+    /// As estimated.
+    pub(super) motion: &'a Motion,
+    /// Pressure force, mN.
+    pub(super) force: i32,
+    /// kg × 2^16.
+    pub(super) mass: i32,
+}
+
+impl Approach<'_> {
+    /// Whether friction alone stops the piston within the band, if the valves shut:
+    /// the way is the kinetic energy over what friction has left beside the
+    /// forces that act.
+    #[inline]
+    fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
+        let speed = self.motion.speed.wrapping_shr(8);
+        let error = self.reference.saturating_sub(self.motion.stroke);
+        if error.saturating_abs() > band.saturating_mul(12) {
+            return false;
+        }
+        let net = self.force.saturating_add(self.motion.load);
+        let along = if speed < 0 { net.saturating_neg() } else { net };
+        let stopping = model.coulomb.saturating_sub(along);
+        if stopping < model.coulomb >> 2 {
+            return false;
+        }
+        // kg × mm²/s² = µJ = mN × mm, all × 2^16.
+        let energy = i64::from(self.mass)
+            .wrapping_mul(i64::from(speed).wrapping_mul(i64::from(speed)))
+            .wrapping_shr(17);
+        let ahead = if speed < 0 {
+            error.saturating_neg()
+        } else {
+            error
+        };
+        let work = |way: i32| i64::from(stopping).wrapping_mul(i64::from(way));
+        energy > work(ahead.saturating_sub(band)) && energy < work(ahead.saturating_add(band))
+    }
+}
