@@ -14,7 +14,6 @@ use crate::sizes::elf::Elf;
 
 /// The part on the boards.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabi";
-const PROFILE: &str = "firmware";
 const PACKAGE: &str = "wheeleg-board";
 
 /// Images by the feature that they are built with.
@@ -22,6 +21,15 @@ const IMAGES: [(&str, &[&str]); 2] = [
     ("outputs", &["joint", "wheel"]),
     ("hil", &["joint-hil", "wheel-hil"]),
 ];
+
+/// The profile of an image, by its name: flash is short on a joint board alone.
+pub(crate) fn profile(image: &str) -> &'static str {
+    if image.contains("joint") {
+        "firmware-joint"
+    } else {
+        "firmware"
+    }
+}
 
 /// Images that drive outputs: the ones with budgets.
 pub(crate) const SHIPPED: [&str; 2] = ["joint", "wheel"];
@@ -76,14 +84,10 @@ pub(crate) fn build_into(way: Way, folder: &Path) -> StepResult<Vec<Image>> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut images = Vec::new();
     for (feature, names) in IMAGES {
-        let mut command = cargo(way, "build", feature)?;
         for name in names {
-            command.args(["--bin", name]);
-        }
-        run(&mut command)?;
-        for name in names {
+            run(&mut cargo(way, "build", feature, name)?)?;
             let elf = folder.join(format!("{name}.elf"));
-            fs::copy(products(way).join(name), &elf)
+            fs::copy(product(way, name), &elf)
                 .with_context(|| format!("cannot copy the image {name}"))?;
             let contents = Elf::read(&elf)?;
             if contents.has_symbol(MUTANT_MARK) {
@@ -105,13 +109,10 @@ pub(crate) fn build_into(way: Way, folder: &Path) -> StepResult<Vec<Image>> {
 
 /// Builds the programs that exercise one driver on an emulated board.
 pub(crate) fn probes(way: Way, folder: &Path) -> StepResult {
-    run(cargo(way, "build", "probe")?.args(["--bin", PROBE]))?;
+    run(&mut cargo(way, "build", "probe", PROBE)?)?;
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    fs::copy(
-        products(way).join(PROBE),
-        folder.join(format!("{PROBE}.elf")),
-    )
-    .with_context(|| format!("cannot copy the image {PROBE}"))?;
+    fs::copy(product(way, PROBE), folder.join(format!("{PROBE}.elf")))
+        .with_context(|| format!("cannot copy the image {PROBE}"))?;
     Ok(())
 }
 
@@ -119,16 +120,12 @@ pub(crate) fn probes(way: Way, folder: &Path) -> StepResult {
 /// `<folder>/<feature>/joint.elf`. Never beside the images that are flashed.
 pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
     for (feature, what) in MUTANTS {
-        let mut command = cargo(way, "build", feature)?;
-        for name in SHIPPED {
-            command.args(["--bin", name]);
-        }
-        run(&mut command)?;
         let place = folder.join(feature);
         fs::create_dir_all(&place).with_context(|| format!("cannot make {}", place.display()))?;
         for name in SHIPPED {
+            run(&mut cargo(way, "build", feature, name)?)?;
             let elf = place.join(format!("{name}.elf"));
-            fs::copy(products(way).join(name), &elf)
+            fs::copy(product(way, name), &elf)
                 .with_context(|| format!("cannot copy the image {name}"))?;
             let marked = Elf::read(&elf)?.has_symbol(MUTANT_MARK);
             if !marked {
@@ -144,11 +141,10 @@ pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
 /// with a panic planted in it, must *not* link: else the check shows nothing.
 pub(crate) fn link_check() -> StepResult {
     let way = set_up(TARGET)?;
-    let mut command = cargo(way, "build", "outputs")?;
-    command.args(["--bin", "link_check_joint", "--bin", "link_check_wheel"]);
-    run(&mut command)?;
-    let mut command = cargo(way, "build", "planted")?;
-    command.args(["--bin", "planted_panic"]);
+    for name in ["link_check_joint", "link_check_wheel"] {
+        run(&mut cargo(way, "build", "outputs", name)?)?;
+    }
+    let mut command = cargo(way, "build", "planted", "planted_panic")?;
     Ok(must_not_link(&mut command)?)
 }
 
@@ -176,9 +172,9 @@ pub(crate) fn literal_check() -> StepResult {
             .context(image.name)?;
     }
     let way = set_up(TARGET)?;
-    let mut command = cargo(way, "build", "planted")?;
-    run(command.args(["--bin", "planted_literal"]))?;
-    let planted = Elf::read(&products(way).join("planted_literal"))?;
+    const PLANTED: &str = "planted_literal";
+    run(&mut cargo(way, "build", "planted", PLANTED)?)?;
+    let planted = Elf::read(&product(way, PLANTED))?;
     match planted.no_literal_parsing() {
         Err(_) => Ok(()),
         Ok(()) => Err(anyhow::anyhow!("a planted run-time literal is not found").into()),
@@ -195,10 +191,12 @@ fn lint() -> StepResult {
         ));
     }
     for (feature, names) in IMAGES {
-        let mut command = cargo(way, "clippy", feature)?;
-        // The crates below are linted on the host.
+        // In one profile: lints do not depend on it. The crates below are linted on
+        // the host.
+        let (first, rest) = names.split_first().context("a feature has images")?;
+        let mut command = cargo(way, "clippy", feature, first)?;
         command.args(["--no-deps", "--lib"]);
-        for name in names {
+        for name in rest {
             command.args(["--bin", name]);
         }
         run(command.args(["--", "-D", "warnings"]))?;
@@ -206,9 +204,9 @@ fn lint() -> StepResult {
     Ok(())
 }
 
-/// Where the compiled images lie.
-fn products(way: Way) -> PathBuf {
-    folder(way).join(TARGET).join(PROFILE)
+/// Where a compiled image lies.
+fn product(way: Way, image: &str) -> PathBuf {
+    folder(way).join(TARGET).join(profile(image)).join(image)
 }
 
 /// Own target folders: the flags differ from every other build's, and each
@@ -220,13 +218,14 @@ fn folder(way: Way) -> PathBuf {
     })
 }
 
-/// `cargo <sub>` for the board crate alone, so that no other crate's features
-/// reach into an image.
-fn cargo(way: Way, sub: &str, features: &str) -> StepResult<Command> {
+/// `cargo <sub>` for an image of the board crate alone, so that no other crate's
+/// features reach into it.
+fn cargo(way: Way, sub: &str, features: &str, image: &str) -> StepResult<Command> {
     let mut command = cargo_for(way, sub);
     command
         .args(["--locked", "--package", PACKAGE, "--features", features])
-        .args(["--profile", PROFILE, "--target", TARGET])
+        .args(["--profile", profile(image), "--target", TARGET])
+        .args(["--bin", image])
         .env("CARGO_TARGET_DIR", folder(way))
         // Stack sizes go into a section that is not loaded; the flag is unstable,
         // what it does to the code is nothing.

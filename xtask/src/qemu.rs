@@ -8,6 +8,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use serde_json::{Value, json};
 
+use crate::firmware;
 use crate::no_std::{Way, cargo_for, set_up};
 use crate::pil;
 use crate::process::{ask, cargo, command, run, target_dir};
@@ -16,7 +17,6 @@ use crate::tools::{apt_install, have, may_apt};
 
 const EMULATOR: &str = "qemu-system-arm";
 const TARGET: &str = "thumbv7em-none-eabi";
-const PROFILE: &str = "firmware";
 const PACKAGE: &str = "wheeleg-board-qemu";
 const IMAGES: [&str; 3] = ["qemu-joint", "qemu-wheel", "qemu-hil-joint"];
 
@@ -74,18 +74,26 @@ fn emulator() -> StepResult {
 fn images() -> StepResult<PathBuf> {
     let way = set_up(TARGET)?;
     println!("    way: {}", way.describe());
-    let mut build = cargo_for(way, "build");
-    build
-        .args(["--locked", "--package", PACKAGE, "--features", "image"])
-        .args(["--profile", PROFILE, "--target", TARGET]);
-    run(&mut build)?;
     let products = match way {
         Way::Rustup => target_dir(),
         Way::DebianBuildStd => target_dir().join("debian"),
-    };
-    let folder = products.join(TARGET).join(PROFILE);
+    }
+    .join(TARGET);
+    // All in one folder, where the simulator looks for them.
+    let folder = products.join("firmware");
     for image in IMAGES {
-        let path = folder.join(image);
+        let profile = firmware::profile(image);
+        let mut build = cargo_for(way, "build");
+        build
+            .args(["--locked", "--package", PACKAGE, "--features", "image"])
+            .args(["--profile", profile, "--target", TARGET, "--bin", image]);
+        run(&mut build)?;
+        let (product, path) = (products.join(profile).join(image), folder.join(image));
+        if product != path {
+            fs::create_dir_all(&folder)
+                .with_context(|| format!("cannot make {}", folder.display()))?;
+            fs::copy(&product, &path).with_context(|| format!("cannot copy {image}"))?;
+        }
         present(&path)?;
     }
     Ok(folder)

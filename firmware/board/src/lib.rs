@@ -30,5 +30,6 @@ pub mod led;
 pub mod marks;
 pub mod reset;
 pub mod ring;
+mod same_core;
 pub mod store;
 pub mod straps;

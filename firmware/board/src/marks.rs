@@ -1,5 +1,6 @@
 //! Time stamps of received bytes, from the interrupt handler to the main loop.
 
+use crate::same_core::Announce;
 use core::sync::atomic::{AtomicU32, Ordering};
 use wheeleg_units::Micros;
 
@@ -55,7 +56,7 @@ impl Marks {
     /// Adds a mark; the interrupt handler alone calls this.
     pub fn push(&self, mark: Mark) {
         let head = self.head.load(Ordering::Relaxed);
-        if head.wrapping_sub(self.tail.load(Ordering::Acquire)) >= CAPACITY as u32 {
+        if head.wrapping_sub(self.tail.seen()) >= CAPACITY as u32 {
             let lost = self.lost.load(Ordering::Relaxed);
             self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
             return;
@@ -65,14 +66,14 @@ impl Marks {
             time.store(mark.time.get(), Ordering::Relaxed);
             position.store(u32::from(mark.position), Ordering::Relaxed);
         }
-        self.head.store(head.wrapping_add(1), Ordering::Release);
+        self.head.announce(head.wrapping_add(1));
     }
 
     /// The oldest mark; the main loop alone calls this and [`Marks::pop`].
     #[must_use]
     pub fn peek(&self) -> Option<Mark> {
         let tail = self.tail.load(Ordering::Relaxed);
-        if tail == self.head.load(Ordering::Acquire) {
+        if tail == self.head.seen() {
             return None;
         }
         let index = Self::index(tail);
@@ -88,7 +89,7 @@ impl Marks {
     pub fn pop(&self) -> Option<Mark> {
         let mark = self.peek()?;
         let tail = self.tail.load(Ordering::Relaxed);
-        self.tail.store(tail.wrapping_add(1), Ordering::Release);
+        self.tail.announce(tail.wrapping_add(1));
         Some(mark)
     }
 

@@ -11,14 +11,18 @@ pub struct Clock {
 
 impl Clock {
     /// The unwrapped time of `now`.
+    #[inline]
     pub fn unwrap(&mut self, now: Micros) -> u64 {
         let newest = self.time_us.unwrap_or(u64::from(now.get()));
         // Low word of the newest time; the shorter way round is taken, so an
         // instant slightly in the past is in the past.
         let low = (newest & 0xFFFF_FFFF) as u32;
-        let step = now.get().wrapping_sub(low) as i32;
-        let time = newest.saturating_add_signed(i64::from(step));
-        self.time_us = Some(newest.max(time));
+        let step = now.get().wrapping_sub(low);
+        if step > i32::MAX as u32 {
+            return newest.saturating_sub(u64::from(step.wrapping_neg()));
+        }
+        let time = newest.wrapping_add(u64::from(step));
+        self.time_us = Some(time);
         time
     }
 }

@@ -17,30 +17,34 @@ const fn plane(ticks: u8, bit: u8) -> u8 {
 /// The eight counters stand upright: bit n of the three planes is the counter of
 /// switch n, so that all of them count in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Debounce {
-    /// All ones where the number of samples has a one.
-    target: [u8; 3],
+pub struct Debounce<const TICKS: u8> {
     state: u8,
     planes: [u8; 3],
 }
 
-impl Debounce {
-    /// Switches that must be stable for `ticks` samples (1…7; 0 acts as 1, more as
-    /// 7); all off.
-    pub const fn new(ticks: u8) -> Self {
-        let ticks = match ticks {
-            0 => 1,
-            ticks if ticks > MOST => MOST,
-            ticks => ticks,
-        };
+impl<const TICKS: u8> Default for Debounce<TICKS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const TICKS: u8> Debounce<TICKS> {
+    /// All ones where the number of samples has a one.
+    const TARGET: [u8; 3] = {
+        assert!(TICKS >= 1 && TICKS <= MOST, "1 to 7 samples");
+        [plane(TICKS, 1), plane(TICKS, 2), plane(TICKS, 4)]
+    };
+
+    /// Switches that must be stable for `TICKS` samples, 1…7; all off.
+    pub const fn new() -> Self {
         Self {
-            target: [plane(ticks, 1), plane(ticks, 2), plane(ticks, 4)],
             state: 0,
             planes: [0; 3],
         }
     }
 
     /// Takes one sample of the raw levels and returns the debounced ones.
+    #[inline]
     pub fn sample(&mut self, raw: u8) -> u8 {
         let changed = raw ^ self.state;
         let [ones, twos, fours] = self.planes;
@@ -48,7 +52,7 @@ impl Debounce {
         let ones_up = !ones & changed;
         let twos_up = (twos ^ ones) & changed;
         let fours_up = (fours ^ (ones & twos)) & changed;
-        let [one, two, four] = self.target;
+        let [one, two, four] = Self::TARGET;
         let reached = !((ones_up ^ one) | (twos_up ^ two) | (fours_up ^ four)) & changed;
         self.state ^= reached;
         self.planes = [ones_up & !reached, twos_up & !reached, fours_up & !reached];
@@ -67,7 +71,7 @@ mod tests {
 
     #[test]
     fn change_takes_exactly_three_samples_both_ways() {
-        let mut switches = Debounce::new(3);
+        let mut switches = Debounce::<3>::new();
         assert_eq!(
             [0b0001, 0b0001, 0b0001, 0b0000, 0b0000, 0b0000].map(|raw| switches.sample(raw)),
             [0, 0, 1, 1, 1, 0]
@@ -76,20 +80,27 @@ mod tests {
 
     #[test]
     fn every_number_of_samples_is_counted_to_the_last() {
-        for ticks in 1..=MOST {
-            let mut switches = Debounce::new(ticks);
+        fn count<const TICKS: u8>() {
+            let mut switches = Debounce::<TICKS>::new();
             for level in [0xFF, 0x00] {
-                for sample in 1..=ticks {
-                    let expected = if sample == ticks { level } else { !level };
-                    assert_eq!(switches.sample(level), expected, "{sample} of {ticks}");
+                for sample in 1..=TICKS {
+                    let expected = if sample == TICKS { level } else { !level };
+                    assert_eq!(switches.sample(level), expected, "{sample} of {TICKS}");
                 }
             }
         }
+        count::<1>();
+        count::<2>();
+        count::<3>();
+        count::<4>();
+        count::<5>();
+        count::<6>();
+        count::<7>();
     }
 
     #[test]
     fn chatter_shorter_than_three_samples_is_ignored() {
-        let mut switches = Debounce::new(3);
+        let mut switches = Debounce::<3>::new();
         for raw in [1, 1, 0, 1, 1, 0, 1, 0, 1, 1, 0] {
             assert_eq!(switches.sample(raw), 0);
         }
@@ -97,7 +108,7 @@ mod tests {
 
     #[test]
     fn switches_are_independent() {
-        let mut switches = Debounce::new(2);
+        let mut switches = Debounce::<2>::new();
         assert_eq!(switches.sample(0b1000_0001), 0);
         assert_eq!(switches.sample(0b1000_0010), 0b1000_0000);
         assert_eq!(switches.sample(0b0000_0010), 0b1000_0010);

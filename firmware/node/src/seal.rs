@@ -104,9 +104,71 @@ impl Seal {
     }
 }
 
+/// Seals of what only a request changes, part by part. A tick looks at one of
+/// them, so a flipped bit is found within as many ticks as there are parts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PartSeals<const PARTS: usize> {
+    seals: [Seal; PARTS],
+    turn: u8,
+}
+
+impl<const PARTS: usize> PartSeals<PARTS> {
+    /// Nothing sealed yet.
+    pub(crate) const fn new() -> Self {
+        Self {
+            seals: [Seal { sum: 0 }; PARTS],
+            turn: 0,
+        }
+    }
+
+    /// The part whose turn it is.
+    #[inline]
+    pub(crate) fn next(&mut self) -> usize {
+        let part = self.turn;
+        let next = part.wrapping_add(1);
+        self.turn = if usize::from(next) < PARTS { next } else { 0 };
+        usize::from(part)
+    }
+
+    /// Whether a part is as it was. One that does not exist is damage, too.
+    #[inline]
+    pub(crate) fn holds(&self, part: usize, now: Seal) -> bool {
+        self.seals.get(part) == Some(&now)
+    }
+
+    /// Whether all parts are as they were.
+    pub(crate) fn all_hold(&self, now: impl Fn(usize) -> Seal) -> bool {
+        let mut parts = self.seals.iter().zip(0..);
+        parts.all(|(seal, part)| *seal == now(part))
+    }
+
+    /// Seals all parts.
+    pub(crate) fn set(&mut self, seals: [Seal; PARTS]) {
+        self.seals = seals;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_part_has_its_turn_and_a_damaged_turn_is_damage() {
+        let mut seals = PartSeals::<3>::new();
+        let state = [1_u32, 2, 3];
+        seals.set(core::array::from_fn(|part| Seal::of(&state[part])));
+        for part in [0, 1, 2, 0, 1, 2] {
+            assert_eq!(seals.next(), part);
+            assert!(seals.holds(part, Seal::of(&state[part])));
+            assert!(!seals.holds(part, Seal::of(&0_u32)));
+        }
+        assert!(seals.all_hold(|part| Seal::of(&state[part])));
+        assert!(!seals.all_hold(|part| Seal::of(&(state[part] ^ u32::from(part == 2)))));
+        seals.turn = 0x80;
+        let part = seals.next();
+        assert!(!seals.holds(part, Seal::default()));
+        assert_eq!(seals.next(), 0, "back in the round");
+    }
 
     #[test]
     fn every_single_bit_flip_is_detected() {

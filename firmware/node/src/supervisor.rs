@@ -301,6 +301,7 @@ impl Supervisor {
     }
 
     /// Supervision at the start of a tick: deadlines, link, own state, staging.
+    #[inline]
     pub fn begin_tick(&mut self, now: Micros, times: &SupervisionTimes) {
         if self.overrun.begin(now, times.tick) {
             self.fault(Fault::TickOverrun, Event::BoardFault, now);
@@ -342,6 +343,7 @@ impl Supervisor {
     }
 
     /// The tick ended at `end`.
+    #[inline]
     pub fn end_tick(&mut self, end: Micros, times: &SupervisionTimes) {
         if self.overrun.end(end, times.tick) {
             self.fault(Fault::TickOverrun, Event::BoardFault, end);

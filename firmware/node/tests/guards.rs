@@ -35,7 +35,7 @@ fn in_mode(mode: Mode) -> Supervisor {
 
 #[test]
 fn a_closed_switch_stays_closed() {
-    let mut switches = Debounce::new(3);
+    let mut switches = Debounce::<3>::new();
     for sample in 0..100 {
         let expected = if sample < 2 { 0 } else { 0b101 };
         assert_eq!(switches.sample(0b101), expected, "sample {sample}");

@@ -24,6 +24,20 @@ pub const fn shift_right_round(value: i64, bits: u32) -> i64 {
     }
 }
 
+/// [`shift_right_round`] of numbers of 32 bits, in a few instructions: `bits` of 1…30
+/// and a magnitude of at most 2^31 − 2^29; beyond, the result wraps. Never panics.
+#[inline]
+#[must_use]
+pub const fn shift_right_round_i32(value: i32, bits: u32) -> i32 {
+    let half = 1_i32.wrapping_shl(bits.wrapping_sub(1));
+    // Ties of negative numbers go down: one less before a shift that floors.
+    let below = value >> 31;
+    value
+        .wrapping_add(half)
+        .wrapping_add(below)
+        .wrapping_shr(bits)
+}
+
 /// Narrows to `i32`, saturating at both ends. Never panics.
 #[must_use]
 pub const fn saturate_i32(value: i64) -> i32 {
@@ -50,7 +64,22 @@ pub const fn saturate_i16(value: i64) -> i16 {
 
 #[cfg(test)]
 mod tests {
-    use super::{saturate_i16, saturate_i32, shift_right_round};
+    use super::{saturate_i16, saturate_i32, shift_right_round, shift_right_round_i32};
+
+    #[test]
+    fn the_short_form_rounds_as_the_long_one() {
+        for bits in [1, 4, 8, 10, 29] {
+            for base in [0, 1 << bits, 3 << (bits - 1), 0x1234_5678, 0x5FFF_FFFF] {
+                for value in (base - 3..=base + 3).flat_map(|v: i32| [v, -v]) {
+                    if value.unsigned_abs() <= (1 << 31) - (1 << 29) {
+                        let long = shift_right_round(i64::from(value), bits);
+                        let short = shift_right_round_i32(value, bits);
+                        assert_eq!(i64::from(short), long, "{value} {bits}");
+                    }
+                }
+            }
+        }
+    }
 
     #[test]
     fn halves_round_away_from_zero_on_both_sides() {

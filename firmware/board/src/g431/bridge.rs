@@ -6,7 +6,7 @@
 use super::inhibit::Inhibited;
 use super::{pac, pins};
 use core::convert::Infallible;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use pac::timer::vals::{Bkp, Ocm, Ossi};
@@ -18,9 +18,10 @@ const MAX: u16 = 100;
 const PRESCALER: u16 = 84;
 
 static DUTY: AtomicU32 = AtomicU32::new(0);
-static BACKWARD: AtomicBool = AtomicBool::new(false);
+/// 1 for backward.
+static BACKWARD: AtomicU32 = AtomicU32::new(0);
 /// What the pin shows.
-static SHOWN_BACKWARD: AtomicBool = AtomicBool::new(false);
+static SHOWN_BACKWARD: AtomicU32 = AtomicU32::new(0);
 
 /// Magnitude, effective from the next tick edge.
 #[derive(Debug)]
@@ -59,12 +60,12 @@ impl digital::ErrorType for Sign {
 
 impl OutputPin for Sign {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        BACKWARD.store(false, Ordering::Relaxed);
+        BACKWARD.store(0, Ordering::Relaxed);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        BACKWARD.store(true, Ordering::Relaxed);
+        BACKWARD.store(1, Ordering::Relaxed);
         Ok(())
     }
 }
@@ -129,7 +130,7 @@ pub(super) fn apply() {
     if backward != SHOWN_BACKWARD.load(Ordering::Relaxed) {
         tim.ccr(0).write(|r| r.set_ccr(0));
         tim.egr().write(|r| r.set_ug(true));
-        pins::set_motor_backward(backward);
+        pins::set_motor_backward(backward != 0);
         SHOWN_BACKWARD.store(backward, Ordering::Relaxed);
     }
     tim.ccr(0).write(|r| r.set_ccr(duty));

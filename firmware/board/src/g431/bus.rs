@@ -4,6 +4,7 @@
 use super::{latch, pac, timebase};
 use crate::marks::{Mark, Marks};
 use crate::ring::{RING, end_of_first, stretches};
+use crate::same_core::Announce;
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
 use pac::bdma::vals::{Dir, Size};
@@ -145,7 +146,7 @@ impl Bus {
     /// Whether nothing is being sent or scheduled.
     #[inline]
     pub(super) fn is_free(&self) -> bool {
-        !SENDING.load(Ordering::Acquire)
+        !SENDING.seen()
     }
 
     /// Schedules a frame; the transmitter is free.

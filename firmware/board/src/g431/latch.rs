@@ -1,5 +1,6 @@
 //! What an interrupt handler latched at a tick edge, until the main loop takes it.
 
+use crate::same_core::Announce;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use wheeleg_node::hardware::{PinError, PositionSensor, SensorError, SwitchBank};
 use wheeleg_units::{AdcCode, Micros};
@@ -23,14 +24,14 @@ const VALID: u32 = 1 << 16;
 /// Work for the main loop.
 #[inline]
 pub fn wake() {
-    WAKE.store(true, Ordering::Release);
+    WAKE.announce(true);
 }
 
 /// Whether a handler has run since the last call.
 #[inline]
 pub fn take_wake() -> bool {
     // Called with interrupts masked: load and store are one.
-    let wake = WAKE.load(Ordering::Acquire);
+    let wake = WAKE.seen();
     WAKE.store(false, Ordering::Relaxed);
     wake
 }
@@ -45,23 +46,21 @@ pub fn post(edge: u32, sample: Option<u16>, port_a: u32) {
         Ordering::Relaxed,
     );
     PORT_A.store(port_a, Ordering::Relaxed);
-    PENDING.store(true, Ordering::Release);
+    PENDING.announce(true);
     wake();
 }
 
 /// The edge of the tick that waits, if one does.
 #[inline]
 pub fn pending() -> Option<Micros> {
-    PENDING
-        .load(Ordering::Acquire)
-        .then(|| Micros(EDGE.load(Ordering::Relaxed)))
+    PENDING.seen().then(|| Micros(EDGE.load(Ordering::Relaxed)))
 }
 
 /// Whether an edge before `time` is still on its way: hardware has captured it at
 /// `captured`, and its inputs are being converted.
 #[inline]
 pub fn edge_under_way(captured: u32, time: Micros) -> bool {
-    captured != EDGE.load(Ordering::Acquire) && time.get().wrapping_sub(captured) as i32 > 0
+    captured != EDGE.seen() && time.get().wrapping_sub(captured) as i32 > 0
 }
 
 /// Takes the waiting tick; its inputs are now those of the sensors below.

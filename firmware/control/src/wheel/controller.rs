@@ -61,8 +61,9 @@ pub struct WheelController {
     inhibit: bool,
     limit: bool,
     stop: bool,
+    /// Inputs of the last sample, if there was one.
     input: WheelInput,
-    previous: Option<WheelCount>,
+    sampled: bool,
     negative: bool,
 }
 
@@ -86,10 +87,10 @@ impl core::hash::Hash for WheelController {
             limit,
             stop,
             input,
-            previous,
+            sampled,
             negative,
         } = self;
-        (run, memory, command, final_position, input.actual, previous).hash(state);
+        (run, memory, command, final_position, input.actual).hash(state);
         // Each in a byte of its own, four to a word.
         let [velocity_low, velocity_high] = velocity.to_bits().to_le_bytes();
         let [acceleration_low, acceleration_high] = acceleration.to_bits().to_le_bytes();
@@ -113,7 +114,7 @@ impl core::hash::Hash for WheelController {
                 u8::from(*stop),
                 u8::from(input.limit),
             ],
-            [u8::from(input.stop), 0, 0, 0],
+            [u8::from(input.stop), u8::from(*sampled), 0, 0],
         ] {
             state.write_u32(u32::from_le_bytes(bytes));
         }
@@ -172,6 +173,8 @@ impl WheelController {
     ///
     /// # Errors
     /// [`WheelError`]; nothing has changed then.
+    // Inlined, because most callers name the command: then a store is left of it.
+    #[inline(always)]
     pub fn apply(&mut self, command: WheelCommand) -> Result<(), WheelError> {
         match command {
             WheelCommand::Reset => *self = Self::new(),
@@ -225,6 +228,7 @@ impl WheelController {
         self.integral_velocity = 0;
     }
 
+    #[inline]
     fn enter(&mut self, mode: WheelMode) -> Result<(), WheelError> {
         if mode == WheelMode::Idle {
             self.idle();
@@ -286,17 +290,23 @@ impl WheelController {
     }
 
     /// One sample. Never panics.
+    #[inline]
     pub fn step(&mut self, input: &WheelInput) -> WheelOutput {
         self.timer = self.next_timer;
+        let actual = input.actual;
+        let last = if self.sampled {
+            self.input.actual
+        } else {
+            actual
+        };
+        let velocity = actual.wrapping_difference(last);
         self.input = *input;
+        self.sampled = true;
         self.limit |= input.limit;
         self.stop |= input.stop;
         if input.limit {
             self.idle();
         }
-        let actual = input.actual;
-        let velocity = actual.wrapping_difference(self.previous.unwrap_or(actual));
-        self.previous = Some(actual);
 
         let mode = self.mode();
         let (motor, command, error) = self.run(actual, velocity);

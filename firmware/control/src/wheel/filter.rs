@@ -1,13 +1,13 @@
 //! The lead filter.
 
 use super::types::LeadFilter;
-use wheeleg_units::shift_right_round;
+use wheeleg_units::{saturate_i32, shift_right_round, shift_right_round_i32};
 
 /// Fractional bits of the internal motor command.
 const FRACTION: u32 = 10;
 /// Range of the 8-bit port, with the fraction.
-const PORT_MAX: i64 = 127 << FRACTION;
-const PORT_MIN: i64 = -(128 << FRACTION);
+const PORT_MAX: i32 = 127 << FRACTION;
+const PORT_MIN: i32 = -(128 << FRACTION);
 
 /// Old samples of the filter, cleared in idle.
 ///
@@ -37,19 +37,25 @@ impl FilterMemory {
     /// One sample of the full filter; `error` is a 24-bit difference.
     #[inline]
     pub(super) fn update(&mut self, filter: LeadFilter, error: i32) -> MotorCommand {
-        // |256 X + A X'| < 2^32 and K < 2^8: below 2^40.
-        let lead = i64::from(error)
-            .wrapping_mul(256)
-            .wrapping_sub(i64::from(filter.zero).wrapping_mul(i64::from(self.error)));
-        let forward = lead.wrapping_mul(i64::from(filter.gain));
-        let feedback = i64::from(filter.pole).wrapping_mul(i64::from(self.command));
-        let command = forward.wrapping_sub(shift_right_round(feedback, 8));
-        let limited = command.clamp(PORT_MIN, PORT_MAX);
+        let [zero, pole, gain] = [filter.zero, filter.pole, filter.gain].map(i32::from);
+        // Two products of 32 bits: errors of 24 bits, factors of 16.
+        let newest = i64::from(error).wrapping_mul(i64::from(gain.wrapping_shl(8)));
+        let last = i64::from(self.error).wrapping_mul(i64::from(zero.wrapping_mul(gain)));
+        // The command is within the port's range, 2^17, and its factor below 2^8.
+        let feedback = shift_right_round_i32(pole.wrapping_mul(self.command), 8);
+        let command = newest.wrapping_sub(last).wrapping_sub(i64::from(feedback));
+        let limited = if command > i64::from(PORT_MAX) {
+            PORT_MAX
+        } else if command < i64::from(PORT_MIN) {
+            PORT_MIN
+        } else {
+            command as i32
+        };
         self.error = error;
-        self.command = limited as i32;
+        self.command = limited;
         MotorCommand {
-            value: to_port(shift_right_round(limited, FRACTION)),
-            saturated: limited != command,
+            value: to_port(shift_right_round_i32(limited, FRACTION)),
+            saturated: i64::from(limited) != command,
         }
     }
 
@@ -60,7 +66,7 @@ impl FilterMemory {
         let scaled = i64::from(filter.gain).wrapping_mul(i64::from(error_sixteenths));
         let command = shift_right_round(scaled, 6);
         MotorCommand {
-            value: to_port(command),
+            value: to_port(saturate_i32(command)),
             saturated: !(-128..=127).contains(&command),
         }
     }
@@ -68,6 +74,6 @@ impl FilterMemory {
 
 /// To the 8-bit port, saturating.
 #[inline]
-fn to_port(command: i64) -> i8 {
+fn to_port(command: i32) -> i8 {
     command.clamp(-128, 127) as i8
 }

@@ -109,23 +109,27 @@ impl Profile {
     /// One sample at w and the stop after it, w + (w − a) + (w − 2a) + … while
     /// positive, cover (n + 1) w − a n (n + 1)/2 with n = ⌊w/a⌋. That rises with w,
     /// so the largest w of a given n is (way + a n (n + 1)/2) / (n + 1), if
-    /// that is at least n a. Since v − a always allows the stop, the search ends
-    /// after at most three n.
+    /// that is at least n a, that is, if the way is at least a n (n + 1)/2. Since
+    /// v − a always allows the stop, the search ends after at most three n.
     #[inline]
     fn choose(&self) -> u32 {
         // All terms below 2^31: v < 2^15 + 2^15, n a <= v, way <= 2^31.
         let a = self.acceleration;
         let high = self.velocity.wrapping_add(a).min(self.maximum);
         let mut n = high.checked_div(a).unwrap_or(0);
+        let mut stop = a
+            .wrapping_mul(n)
+            .wrapping_mul(n.wrapping_add(1))
+            .wrapping_shr(1);
         for _ in 0..4 {
-            let next = n.wrapping_add(1);
-            let gain = a.wrapping_mul(n).wrapping_mul(next).wrapping_shr(1);
-            let best = self.remaining.wrapping_add(gain).checked_div(next);
-            let best = best.unwrap_or(0).min(high);
-            if best >= n.wrapping_mul(a) {
-                return best;
+            if stop <= self.remaining {
+                let way = self.remaining.wrapping_add(stop);
+                let best = way.checked_div(n.wrapping_add(1)).unwrap_or(0);
+                return best.min(high);
             }
-            n = n.saturating_sub(1);
+            // The way of one n less; that of n = 0 is zero.
+            stop = stop.wrapping_sub(a.wrapping_mul(n));
+            n = n.wrapping_sub(1);
         }
         self.velocity.saturating_sub(a)
     }

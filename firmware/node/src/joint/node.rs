@@ -10,7 +10,7 @@ use crate::debounce::Debounce;
 use crate::hardware::{ParameterStore, PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::JointParameters;
-use crate::seal::Seal;
+use crate::seal::{PartSeals, Seal};
 use crate::sensor::{Reading, Rejection, SensorMonitor};
 use crate::snapshot::{JointSnapshot, TickReport};
 use crate::transmission::Transmission;
@@ -53,14 +53,12 @@ pub struct JointNode<V, S, W> {
     pub(super) monitor: SensorMonitor,
     pub(super) target: Target,
     pub(super) state: TickState,
-    /// Seals of what only a request changes, part by part.
-    fixed_seals: [Seal; PARTS],
-    /// The part that the next tick looks at.
-    part: u8,
+    /// Seals of what only a request changes.
+    fixed_seals: PartSeals<PARTS>,
     /// Seal of what a tick changes.
     seal: Seal,
     pub(super) snapshot: JointSnapshot,
-    pub(super) switches: Debounce,
+    pub(super) switches: Debounce<SWITCH_TICKS>,
     pub(super) valves: V,
     sensor: S,
     switch_pins: W,
@@ -101,11 +99,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 motion: MotionWatch::default(),
                 boot_ticks: Ticks::ZERO,
             },
-            fixed_seals: [Seal::default(); PARTS],
-            part: 0,
+            fixed_seals: PartSeals::new(),
             seal: Seal::default(),
             snapshot: JointSnapshot::at_boot(),
-            switches: Debounce::new(SWITCH_TICKS),
+            switches: Debounce::new(),
             parameters,
             settings: settings.tick,
             valves,
@@ -278,25 +275,15 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Whether everything is as the last tick or request left it.
     #[inline(never)]
     fn is_intact(&self) -> bool {
-        let fixed = self.fixed_seals.iter().zip(0..);
-        self.seal.holds(&self.moving())
-            && fixed
-                .into_iter()
-                .all(|(seal, part)| *seal == self.fixed(part))
+        self.seal.holds(&self.moving()) && self.fixed_seals.all_hold(|part| self.fixed(part))
     }
 
     /// As [`JointNode::is_intact`], for a tick: all of the state, and one part of
     /// what is fixed, another one each tick.
     #[inline]
     fn looks_intact(&mut self) -> bool {
-        let part = usize::from(self.part);
-        self.part = if part.wrapping_add(1) < PARTS {
-            self.part.wrapping_add(1)
-        } else {
-            0
-        };
-        // A part that does not exist is damage too.
-        self.fixed_seals.get(part) == Some(&self.fixed(part)) && self.seal.holds(&self.moving())
+        let part = self.fixed_seals.next();
+        self.fixed_seals.holds(part, self.fixed(part)) && self.seal.holds(&self.moving())
     }
 
     #[inline]
@@ -308,7 +295,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     #[inline(never)]
     fn reseal_all(&mut self) {
         let seals = core::array::from_fn(|part| self.fixed(part));
-        self.fixed_seals = seals;
+        self.fixed_seals.set(seals);
         self.reseal();
     }
 

@@ -1,7 +1,9 @@
-//! A flipped bit in what a wheel board keeps between two samples means Hold.
+//! A flipped bit in what a wheel board keeps between two samples means Hold: at the
+//! next sample for what a sample changes and for the controller's registers, within
+//! [`PARTS`] samples for the configuration.
 
 use super::motion::Target;
-use super::node::WheelNode;
+use super::node::{PARTS, WheelNode};
 use crate::NodeIdentity;
 use crate::hardware::{Encoder, MotorDrive, NoDumpValve, NoSwitches, PinError};
 use crate::mode::{Event, Mode};
@@ -9,7 +11,8 @@ use crate::parameters::WheelParameters;
 use wheeleg_control::wheel::{
     LeadFilter, SampleTimer, WheelAcceleration, WheelCommand, WheelVelocity,
 };
-use wheeleg_protocol::{Address, Fault};
+use wheeleg_protocol::param::WheelParam;
+use wheeleg_protocol::{Address, Fault, WheelControlMode};
 use wheeleg_units::{Micros, WheelCount};
 
 struct Motor(i8);
@@ -59,9 +62,44 @@ fn armed() -> Node {
 fn holds_after(damage: impl FnOnce(&mut Node)) -> bool {
     let mut node = armed();
     damage(&mut node);
-    node.tick(Micros(21 * 520));
+    is_held_at(&mut node, 21)
+}
+
+fn is_held_at(node: &mut Node, sample: u32) -> bool {
+    node.tick(Micros(sample * 520));
     let held = node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt);
     held && node.motor.0 == 0
+}
+
+/// A flipped bit of the configuration is found in its turn, from whichever part the
+/// node looks at next.
+fn found_in_turn(damage: impl Fn(&mut Node)) {
+    let mut latest = 0;
+    for earlier in 0..PARTS as u32 {
+        let mut node = armed();
+        for sample in 0..earlier {
+            assert!(!is_held_at(&mut node, 21 + sample));
+        }
+        damage(&mut node);
+        let found = (1..=PARTS as u32).find(|sample| is_held_at(&mut node, 20 + earlier + sample));
+        latest = latest.max(found.expect("found within one round"));
+    }
+    assert_eq!(latest, PARTS as u32, "each part is looked at once a round");
+}
+
+#[test]
+fn damaged_configuration_is_seen_within_a_round() {
+    found_in_turn(|node| {
+        let speed = WheelParam::MaxSpeed.id();
+        let raw = node.parameters.by_id(speed).unwrap();
+        node.parameters = node.parameters.with(speed, raw - 1, true).unwrap();
+    });
+    found_in_turn(|node| node.settings.max_speed ^= 1);
+    found_in_turn(|node| node.settings.stop_ramp = Micros::ZERO);
+    found_in_turn(|node| {
+        node.core.times.tick = Micros(node.core.times.tick.get() ^ 1);
+    });
+    found_in_turn(|node| node.control_mode = WheelControlMode::ProportionalVelocity);
 }
 
 #[test]
@@ -70,12 +108,11 @@ fn untouched_state_is_sound() {
 }
 
 #[test]
-fn damaged_controller_settings_and_state_are_seen() {
+fn damaged_controller_and_state_are_seen() {
     assert!(holds_after(|node| {
         let command = WheelCommand::Position(WheelCount::wrapping_new(1));
         node.controller.apply(command).unwrap();
     }));
-    assert!(holds_after(|node| node.settings.max_speed ^= 1));
     assert!(holds_after(|node| node.state.drive ^= 1));
     assert!(holds_after(|node| {
         node.target = Target::at(WheelCount::wrapping_new(1));
@@ -83,9 +120,6 @@ fn damaged_controller_settings_and_state_are_seen() {
     assert!(holds_after(|node| {
         node.state.drive ^= 1;
         node.change(|node| node.target = Target::at(WheelCount::ZERO));
-    }));
-    assert!(holds_after(|node| {
-        node.core.times.tick = Micros(node.core.times.tick.get() ^ 1);
     }));
 }
 

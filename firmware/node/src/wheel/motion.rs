@@ -85,7 +85,16 @@ pub(super) fn engage(controller: &mut WheelController, mode: WheelControlMode, a
     let _ = controller.apply(WheelCommand::Enter(enter));
 }
 
+/// Hands speed and acceleration to the controller, which refuses them while a
+/// profile runs.
+#[inline]
+pub(super) fn tune_profile(controller: &mut WheelController, settings: &WheelSettings) {
+    let _ = controller.apply(WheelCommand::MaximumVelocity(settings.max_speed));
+    let _ = controller.apply(WheelCommand::Acceleration(settings.acceleration));
+}
+
 /// Gives the controller the command of this sample.
+#[inline]
 pub(super) fn command(
     controller: &mut WheelController,
     mode: WheelControlMode,
@@ -107,6 +116,7 @@ pub(super) fn command(
         WheelControlMode::Trapezoidal => {
             let arrived = controller.command() == target.position;
             if controller.mode() == WheelMode::Position && !arrived {
+                tune_profile(controller, settings);
                 let _ = controller.apply(WheelCommand::FinalPosition(target.position));
                 let _ = controller.apply(WheelCommand::Enter(WheelMode::Trapezoidal));
             }

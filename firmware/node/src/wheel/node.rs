@@ -3,14 +3,14 @@
 use core::hash::Hash;
 
 use super::encoder::EncoderWatch;
-use super::motion::Target;
+use super::motion::{Target, tune_profile};
 use super::settings::WheelSettings;
 use crate::board::{BoardCore, NodeIdentity, receive};
 use crate::debounce::Debounce;
 use crate::hardware::{DumpValve, Encoder, MotorDrive, ParameterStore, SwitchBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::WheelParameters;
-use crate::seal::Seal;
+use crate::seal::{PartSeals, Seal};
 use crate::snapshot::{TickReport, WheelSnapshot};
 use crate::transmission::Transmission;
 use crate::{ConfigError, SWITCH_TICKS};
@@ -20,6 +20,10 @@ use wheeleg_units::{Micros, Ticks, WheelCount};
 
 /// Samples in Boot: long enough for the switch to be debounced.
 const BOOT_TICKS: Ticks = Ticks(10);
+
+/// Parts in which the configuration is sealed: parameters, settings, times. A
+/// sample looks at one of them.
+pub(super) const PARTS: usize = 3;
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -51,12 +55,12 @@ pub struct WheelNode<M, E, P, D> {
     pub(super) controller: WheelController,
     pub(super) target: Target,
     pub(super) state: TickState,
-    /// Seal of what only a request changes.
-    fixed_seal: Seal,
+    /// Seals of what only a request changes.
+    fixed_seals: PartSeals<PARTS>,
     /// Seal of what a sample changes.
     seal: Seal,
     pub(super) snapshot: WheelSnapshot,
-    switches: Debounce,
+    switches: Debounce<SWITCH_TICKS>,
     pub(super) motor: M,
     encoder: E,
     switch_pins: P,
@@ -91,10 +95,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             controller: WheelController::new(),
             target: Target::default(),
             state: TickState::default(),
-            fixed_seal: Seal::default(),
+            fixed_seals: PartSeals::new(),
             seal: Seal::default(),
             snapshot: WheelSnapshot::at_boot(),
-            switches: Debounce::new(SWITCH_TICKS),
+            switches: Debounce::new(),
             motor,
             encoder,
             switch_pins: supply_switch,
@@ -164,7 +168,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.is_intact() {
+        if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -280,31 +284,22 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     /// Hands parameters to the controller.
     pub(super) fn tune(&mut self) {
         let settings = &self.settings;
-        // Speed and acceleration are refused while a profile runs; `drive`
-        // hands them over again before the next one starts.
         let _ = self.controller.apply(WheelCommand::Filter(settings.filter));
         let _ = self
             .controller
             .apply(WheelCommand::SampleTimer(settings.timer));
-        self.tune_profile();
+        // Refused while a profile runs; the next one takes them before it starts.
+        tune_profile(&mut self.controller, settings);
     }
 
-    pub(super) fn tune_profile(&mut self) {
-        let speed = WheelCommand::MaximumVelocity(self.settings.max_speed);
-        let acceleration = WheelCommand::Acceleration(self.settings.acceleration);
-        let _ = self.controller.apply(speed);
-        let _ = self.controller.apply(acceleration);
-    }
-
-    /// What shapes the outputs of the next sample and is changed by requests alone.
-    #[inline(always)]
-    fn fixed(&self) -> impl Hash + '_ {
-        (
-            &self.parameters,
-            &self.settings,
-            &self.core.times,
-            self.control_mode,
-        )
+    /// Seal of one part of what shapes the outputs and is changed by requests alone.
+    #[inline]
+    fn fixed(&self, part: usize) -> Seal {
+        match part {
+            0 => Seal::of(&self.parameters),
+            1 => Seal::of(&self.settings),
+            _ => Seal::of(&(&self.core.times, self.control_mode)),
+        }
     }
 
     /// What shapes the outputs of the next sample and is changed by every sample.
@@ -313,10 +308,18 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         (&self.state, &self.target, &self.controller)
     }
 
-    /// Whether the state is as the last sample or request left it.
-    #[inline]
+    /// Whether everything is as the last sample or request left it.
+    #[inline(never)]
     fn is_intact(&self) -> bool {
-        self.fixed_seal.holds(&self.fixed()) && self.seal.holds(&self.moving())
+        self.seal.holds(&self.moving()) && self.fixed_seals.all_hold(|part| self.fixed(part))
+    }
+
+    /// As [`WheelNode::is_intact`], for a sample: all of the state, and one part of
+    /// what is fixed, another one each sample.
+    #[inline]
+    fn looks_intact(&mut self) -> bool {
+        let part = self.fixed_seals.next();
+        self.fixed_seals.holds(part, self.fixed(part)) && self.seal.holds(&self.moving())
     }
 
     #[inline]
@@ -325,9 +328,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.seal = seal;
     }
 
+    #[inline(never)]
     fn reseal_all(&mut self) {
-        let seal = Seal::of(&self.fixed());
-        self.fixed_seal = seal;
+        let seals = core::array::from_fn(|part| self.fixed(part));
+        self.fixed_seals.set(seals);
         self.reseal();
     }
 

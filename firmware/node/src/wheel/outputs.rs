@@ -1,11 +1,11 @@
 //! From the mode and the control law to the drive of a sample.
 
-use super::motion::{Target, command, engage};
+use super::motion::{Target, command, engage, tune_profile};
 use super::node::WheelNode;
 use crate::hardware::{DumpValve, Encoder, MotorDrive, PinError, SwitchBank};
 use crate::mode::Mode;
 use wheeleg_control::wheel::{WheelCommand, WheelInput, WheelMode, WheelOutput, WheelStatus};
-use wheeleg_protocol::{DisarmReason, Fault, Limit, LimitBits, WheelControlMode};
+use wheeleg_protocol::{DisarmReason, Fault, Limit, LimitBits};
 use wheeleg_units::{Micros, Ticks};
 
 /// Fractional bits of the mean drive.
@@ -27,7 +27,8 @@ const fn mean(mean: i32, percent: i8) -> i32 {
 /// and the newest drive, and none where they disagree on the direction. So the
 /// ramp neither follows a single sample nor undoes braking that has begun.
 fn ramp_from(mean: i32, newest: i8) -> i8 {
-    let mean = i8::try_from(mean >> MEAN_FRACTION_BITS).unwrap_or(0);
+    // The mean of per cents is one.
+    let mean = (mean >> MEAN_FRACTION_BITS) as i8;
     match (mean > 0, newest > 0) {
         (true, true) => mean.min(newest),
         (false, false) => mean.max(newest),
@@ -38,14 +39,6 @@ fn ramp_from(mean: i32, newest: i8) -> i8 {
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, D> {
     /// Closed loop.
     pub(super) fn drive(&mut self, limits: &mut LimitBits, now: Micros) -> WheelOutput {
-        // The other modes read neither speed nor acceleration of the controller.
-        let ramps = matches!(
-            self.control_mode,
-            WheelControlMode::Trapezoidal | WheelControlMode::IntegralVelocity
-        );
-        if ramps && self.controller.mode() != WheelMode::Trapezoidal {
-            self.tune_profile();
-        }
         let motion = command(
             &mut self.controller,
             self.control_mode,
@@ -118,6 +111,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.state.ramp_from = 0;
         self.target = Target::at(self.state.actual);
         engage(&mut self.controller, self.control_mode, self.state.actual);
+        tune_profile(&mut self.controller, &self.settings);
     }
 }
 
