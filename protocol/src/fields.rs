@@ -87,6 +87,29 @@ wire_enum! {
 }
 
 impl ResetCause {
+    /// What to do about it.
+    #[must_use]
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Self::Unknown => "Read the board's log.",
+            Self::PowerUp => {
+                "If nobody switched it off, this was a brown-out: check the supply of this board, its fuse and its plug."
+            }
+            Self::Watchdog => {
+                "The watchdog has stopped a program that hung: report this with the firmware version and the log."
+            }
+            Self::BrownOut => {
+                "This was a brown-out: check the supply of this board, its fuse and its plug."
+            }
+            Self::ProcessorFault | Self::Panic => {
+                "Report this with the firmware version and the log; if it returns, replace the board."
+            }
+            Self::ClockLoss => "Replace the board: its crystal is damaged.",
+            Self::Software | Self::OptionBytes => "Nothing: somebody works on the board.",
+            Self::Pin => "Check the reset pin of this board, if nobody pressed it.",
+        }
+    }
+
     /// Whether something failed in operation, so that the board latches a fault.
     #[must_use]
     pub const fn is_fault(self) -> bool {

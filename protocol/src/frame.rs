@@ -68,6 +68,36 @@ type Tables = Table<16>;
 
 static CRC: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISCSI);
 
+/// CRC-32C piece by piece, with the tables that frames use.
+#[derive(Clone)]
+pub struct Checksum(crc::Digest<'static, u32, Tables>);
+
+impl Default for Checksum {
+    fn default() -> Self {
+        Self(CRC.digest())
+    }
+}
+
+impl core::fmt::Debug for Checksum {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Checksum")
+    }
+}
+
+impl Checksum {
+    /// Takes the next bytes.
+    #[inline(never)]
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The checksum of all bytes so far.
+    #[must_use]
+    pub fn finalize(self) -> u32 {
+        self.0.finalize()
+    }
+}
+
 /// CRC-32C of a byte string.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {

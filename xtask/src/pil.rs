@@ -143,7 +143,7 @@ fn tests(emulator: &Path, images: &Images) -> StepResult {
     // Optimised, as the program of the figures below is: one build serves both.
     test.args(["test", "--locked", "--release", "--no-fail-fast"]);
     test.args(["--package", "wheeleg-tests", "--features", "pil"]);
-    for name in ["pil", "pil_faults", "pil_mutants"] {
+    for name in ["pil", "pil_faults", "pil_store", "pil_mutants"] {
         test.args(["--test", name]);
     }
     run(test

@@ -7,7 +7,7 @@
 //! the stack holds one chain of calls and one interrupt frame.
 
 use wheeleg_node::hardware::{
-    DumpValve, Encoder, MotorDrive, PositionSensor, SwitchBank, ValveBank,
+    DumpValve, Encoder, MotorDrive, ParameterStore, PositionSensor, SwitchBank, ValveBank,
 };
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::snapshot::TickReport;
@@ -27,6 +27,12 @@ pub trait Application {
     fn take_transmission(&mut self) -> Option<Transmission>;
     /// Time from this tick's edge to the next.
     fn period(&self) -> Micros;
+    /// Whether the parameters are to be stored.
+    fn save_is_due(&self) -> bool;
+    /// Stores the parameters.
+    fn save(&mut self, store: &mut impl ParameterStore, at: Micros);
+    /// The board's transmitter was cut off by its time limit.
+    fn driver_cut_off(&mut self, at: Micros);
 }
 
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V, S, W> {
@@ -49,6 +55,18 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     fn period(&self) -> Micros {
         JOINT_TICK
     }
+
+    fn save_is_due(&self) -> bool {
+        self.save_is_due()
+    }
+
+    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+        self.save(store, at);
+    }
+
+    fn driver_cut_off(&mut self, at: Micros) {
+        self.driver_cut_off(at);
+    }
 }
 
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for WheelNode<M, E, P, D> {
@@ -70,6 +88,18 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
 
     fn period(&self) -> Micros {
         Micros(self.tick_period_us())
+    }
+
+    fn save_is_due(&self) -> bool {
+        self.save_is_due()
+    }
+
+    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+        self.save(store, at);
+    }
+
+    fn driver_cut_off(&mut self, at: Micros) {
+        self.driver_cut_off(at);
     }
 }
 
@@ -104,6 +134,18 @@ pub trait Board {
 
     /// Schedules a transmission. A start that is past becomes as soon as possible.
     fn transmit(&mut self, transmission: &Transmission);
+
+    /// Whether the driver's time limit has cut the transmission off that is under way;
+    /// then the transmitter is free. Asked while it is not.
+    fn take_cut_off(&mut self) -> bool;
+
+    /// Gives the parameter memory to `save`, which may keep the processor from
+    /// everything else for tens of milliseconds, and forgets what was received
+    /// meanwhile: its times are wrong.
+    fn store(&mut self, save: impl FnOnce(&mut Self::Memory));
+
+    /// Memory that keeps parameters.
+    type Memory: ParameterStore;
 
     /// Sleeps until something has happened since the last call.
     fn idle(&mut self);
@@ -140,6 +182,15 @@ pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
             let report = application.tick(at);
             application.tick_done(board.now());
             board.tick_finished(&report, application.period());
+            if !board.transmitter_is_free() {
+                if board.take_cut_off() {
+                    application.driver_cut_off(at);
+                }
+            } else if application.save_is_due() {
+                // Its outputs are off: nothing is saved while it is armed. Nothing is
+                // being sent: the handler of a frame's end would be late.
+                board.store(|memory| application.save(memory, at));
+            }
         }
         None => board.idle(),
     }
@@ -161,6 +212,7 @@ pub fn run<A: Application, B: Board>(application: &mut A, board: &mut B) -> ! {
 mod tests {
     use super::*;
     use std::collections::VecDeque;
+    use wheeleg_node::hardware::StoreError;
     use wheeleg_node::mode::Mode;
     use wheeleg_protocol::FaultBits;
 
@@ -173,6 +225,18 @@ mod tests {
         Finished(u32),
         Sent(u32),
         Idle,
+        Cut(u32),
+        Saved(u32),
+    }
+
+    /// A memory that takes everything.
+    #[derive(Default)]
+    struct Memory;
+
+    impl ParameterStore for Memory {
+        fn save(&mut self, _: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError> {
+            Ok(())
+        }
     }
 
     #[derive(Default)]
@@ -180,6 +244,7 @@ mod tests {
         bytes: VecDeque<(u32, Vec<u8>)>,
         ticks: VecDeque<u32>,
         sending: bool,
+        cut_off: bool,
         did: Vec<Did>,
     }
 
@@ -215,6 +280,18 @@ mod tests {
             self.did.push(Did::Sent(transmission.start_at.get()));
         }
 
+        fn take_cut_off(&mut self) -> bool {
+            self.sending &= !self.cut_off;
+            core::mem::take(&mut self.cut_off)
+        }
+
+        type Memory = Memory;
+
+        fn store(&mut self, save: impl FnOnce(&mut Memory)) {
+            save(&mut Memory);
+            self.bytes.clear();
+        }
+
         fn idle(&mut self) {
             self.did.push(Did::Idle);
         }
@@ -225,6 +302,7 @@ mod tests {
     struct Echo {
         did: Vec<Did>,
         frames: VecDeque<u32>,
+        save: bool,
     }
 
     impl Application for Echo {
@@ -254,6 +332,20 @@ mod tests {
 
         fn period(&self) -> Micros {
             Micros(520)
+        }
+
+        fn save_is_due(&self) -> bool {
+            self.save
+        }
+
+        fn save(&mut self, memory: &mut impl ParameterStore, at: Micros) {
+            memory.save(core::iter::empty()).expect("room");
+            self.save = false;
+            self.did.push(Did::Saved(at.get()));
+        }
+
+        fn driver_cut_off(&mut self, at: Micros) {
+            self.did.push(Did::Cut(at.get()));
         }
     }
 
@@ -292,6 +384,37 @@ mod tests {
         assert_eq!(older(Some(after), None), Some(Event::Bytes(after)));
         assert_eq!(older(None, Some(after)), Some(Event::Tick(after)));
         assert_eq!(older(None, None), None);
+    }
+
+    #[test]
+    fn a_save_waits_for_a_tick_and_the_transmitter_and_what_came_meanwhile_is_forgotten() {
+        let mut board = Rig {
+            bytes: [(2500, vec![1])].into(),
+            ticks: [1000, 2000].into(),
+            sending: true,
+            cut_off: true,
+            ..Rig::default()
+        };
+        let mut application = Echo {
+            save: true,
+            ..Echo::default()
+        };
+        for _ in 0..3 {
+            step(&mut application, &mut board);
+        }
+        let expected = [
+            Did::Tick(1000),
+            Did::Done(777),
+            Did::Cut(1000),
+            Did::Tick(2000),
+            Did::Done(777),
+            Did::Saved(2000),
+        ];
+        assert_eq!(application.did, expected);
+        assert_eq!(
+            board.did,
+            [Did::Finished(520), Did::Finished(520), Did::Idle]
+        );
     }
 
     #[test]

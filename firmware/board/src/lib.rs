@@ -9,7 +9,7 @@
 //! | [`executive`] | the main loop: events in the order of their time stamps |
 //! | [`marks`], [`ring`] | received bytes from interrupt to main loop |
 //! | [`straps`], [`reset`], [`led`] | address, cause of reset, status light |
-//! | [`store`] | parameters in two flash pages |
+//! | [`store`] | parameters in two flash pages (of `wheeleg-node`) |
 //! | `g431` | the STM32G431CB: the only place with registers and `unsafe` |
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
@@ -31,5 +31,6 @@ pub mod marks;
 pub mod reset;
 pub mod ring;
 mod same_core;
-pub mod store;
 pub mod straps;
+
+pub use wheeleg_node::store;

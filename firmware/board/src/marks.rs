@@ -93,6 +93,11 @@ impl Marks {
         Some(mark)
     }
 
+    /// Forgets all marks.
+    pub fn clear(&self) {
+        self.tail.announce(self.head.seen());
+    }
+
     /// Marks that found the queue full.
     #[must_use]
     pub fn lost(&self) -> u32 {
@@ -128,6 +133,12 @@ mod tests {
             }
         }
         assert_eq!((pushed, marks.lost()), (popped, 0));
+        marks.push(mark(1));
+        marks.push(mark(2));
+        marks.clear();
+        assert_eq!(marks.pop(), None);
+        marks.push(mark(3));
+        assert_eq!(marks.pop(), Some(mark(3)));
     }
 
     #[test]

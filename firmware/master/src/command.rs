@@ -113,6 +113,29 @@ pub enum Command {
         /// Gain.
         k: u8,
     },
+    /// Take the boards as they are for the commissioned ones.
+    Commission,
+    /// Ask a board for one of its parameters.
+    ReadParameter {
+        /// Bus address, 1..=8.
+        node: u8,
+        /// Number of the parameter.
+        id: u16,
+    },
+    /// Set a parameter of a board. The board checks it against its limits.
+    WriteParameter {
+        /// Bus address, 1..=8.
+        node: u8,
+        /// Number of the parameter.
+        id: u16,
+        /// Raw value in the parameter's format.
+        raw: i32,
+    },
+    /// Store a board's parameters in its memory.
+    SaveParameters {
+        /// Bus address, 1..=8.
+        node: u8,
+    },
     /// Energise all axes at their present position.
     Arm,
     /// Valves and motors off.
@@ -195,6 +218,10 @@ commands! {
     Disarm = 0x0121, "none", "Valves and motors off.", Self::Disarm =>
     ClearFault = 0x0122, "none", "Clears latched faults of all nodes and the E-stop of the master.", Self::ClearFault =>
     EmergencyStop = 0x0123, "none", "E-stop bit in every SYNC from the next on: HOLD and supply dump. Never queued, never refused for lateness.", Self::EmergencyStop =>
+    Commission = 0x0124, "none", "Takes the boards as they are for the commissioned ones; refused unless disarmed and every board is identified.", Self::Commission =>
+    ReadParameter = 0x0130, "board 1-8, number", "Reads a parameter of a board.", Self::ReadParameter { .. } =>
+    WriteParameter = 0x0131, "board 1-8, number, raw value", "Sets a parameter of a board, which checks it against its limits.", Self::WriteParameter { .. } =>
+    SaveParameters = 0x0132, "board 1-8", "Stores a board's parameters in its memory; refused unless disarmed.", Self::SaveParameters { .. } =>
     Stand = 0x0201, "none", "Slews all joints to the start pose of the gait.", Self::Stand =>
     Hold = 0x0202, "none", "Freezes every joint at its measured stroke and stops the wheels.", Self::Hold =>
     StartGait = 0x0203, "none", "Starts the gait from the start pose.", Self::StartGait =>

@@ -3,6 +3,10 @@
 use crate::layer0::odometry::WheelGeometry;
 use crate::layer1::homing::HomingConfig;
 use crate::layer1::params::GaitParams;
+use crate::setpoint::NODES;
+
+/// Unique id of a board's processor.
+pub type UniqueId = [u8; 12];
 
 /// Frame in which the foot switches of the right leg are reported.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,6 +49,9 @@ pub struct MasterConfig {
     /// Sequence of the first acyclic request; one that differs from run to run
     /// keeps nodes from taking it for a repetition.
     pub first_sequence: u16,
+    /// Boards that were commissioned, by address 1..=8. Another board at such an
+    /// address bars arming; `None` takes any.
+    pub commissioned: [Option<UniqueId>; NODES],
 }
 
 impl Default for MasterConfig {
@@ -57,6 +64,7 @@ impl Default for MasterConfig {
             wheel_drive: WheelDrive::default(),
             switch_frame: SwitchFrame::default(),
             first_sequence: 1,
+            commissioned: [None; NODES],
         }
     }
 }

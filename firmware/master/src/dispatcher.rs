@@ -113,12 +113,27 @@ pub enum Refusal {
         /// Bus address.
         node: u8,
     },
+    /// A node is not the board that was commissioned at its address.
+    ForeignBoard {
+        /// Bus address.
+        node: u8,
+    },
+    /// There is no board with this number.
+    NoSuchBoard {
+        /// Number given.
+        node: u8,
+    },
     /// A node has an active fault.
     NodeFault {
         /// Bus address.
         node: u8,
         /// Active fault bits.
         faults: u16,
+    },
+    /// A node was reset while it did this: nobody knows whether it is done.
+    NodeReset {
+        /// Bus address.
+        node: u8,
     },
     /// A node answered no.
     NodeRefused {

@@ -1,10 +1,13 @@
 //! What the master reports to its user: a bounded queue of events.
 
 use heapless::Deque;
+use wheeleg_protocol::{FaultRecord, LinkRecord, LogEntry};
 use wheeleg_units::PositionMm;
 
+use crate::config::UniqueId;
 use crate::contact::{Sector, Side};
 use crate::dispatcher::{Refusal, Ticket};
+use crate::finding::Finding;
 
 /// Why all axes were told to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,7 +77,69 @@ pub enum Event {
         /// Bus address.
         node: u8,
         /// Their unique ids.
-        unique_ids: [[u8; 12]; 2],
+        unique_ids: [UniqueId; 2],
+    },
+    /// A board is not the one that was commissioned at its address: the robot will not arm.
+    ForeignBoard {
+        /// Bus address.
+        node: u8,
+        /// Unique id that was commissioned.
+        commissioned: UniqueId,
+        /// Unique id that was found.
+        found: UniqueId,
+        /// Address at which the board found was commissioned, if at any.
+        belongs: Option<u8>,
+    },
+    /// A board was taken over as the one at its address.
+    Commissioned {
+        /// Bus address.
+        node: u8,
+        /// Its unique id.
+        unique_id: UniqueId,
+    },
+    /// Something is wrong with a board or with the line.
+    Found {
+        /// Bus address; `None`: nobody can tell.
+        node: Option<u8>,
+        /// What.
+        finding: Finding,
+    },
+    /// A board has said why it stopped or started; asked for by the master itself.
+    Diagnosis {
+        /// Bus address.
+        node: u8,
+        /// Its answer.
+        record: FaultRecord,
+    },
+    /// A board has said what it has heard; asked for in turn.
+    Link {
+        /// Bus address.
+        node: u8,
+        /// Its answer.
+        record: LinkRecord,
+    },
+    /// A record of a board's log.
+    Log {
+        /// Bus address.
+        node: u8,
+        /// The record; its time is the board's.
+        entry: LogEntry,
+    },
+    /// Records that a board's log had no room for.
+    LogLost {
+        /// Bus address.
+        node: u8,
+        /// How many.
+        records: u16,
+    },
+    /// Value of a board's parameter, read or now in force.
+    Parameter {
+        /// Bus address.
+        node: u8,
+        /// Number of the parameter.
+        id: u16,
+        /// Raw value.
+        raw: i32,
     },
     /// A node missed three cycles in a row.
     NodeLost(

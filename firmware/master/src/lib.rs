@@ -22,6 +22,7 @@ pub mod contact;
 pub mod dispatcher;
 pub mod event;
 pub mod fifo;
+pub mod finding;
 pub mod layer0;
 pub mod layer1;
 pub mod master;

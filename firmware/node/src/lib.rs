@@ -40,6 +40,7 @@ pub mod port;
 pub mod seal;
 pub mod sensor;
 pub mod snapshot;
+pub mod store;
 pub mod supervisor;
 pub mod time;
 mod transmission;

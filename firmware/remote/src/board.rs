@@ -1,12 +1,12 @@
 //! The two applications, each behind the same face.
 
-use wheeleg_node::hardware::{DumpPin, FourValves, HBridge};
+use wheeleg_node::hardware::{DumpPin, FourValves, HBridge, ParameterStore};
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::{JointParameters, WheelParameters};
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{ConfigError, JOINT_TICK, NodeIdentity, Transmission};
 use wheeleg_pil_link::{Inputs, Outputs, Switches as WireSwitches};
-use wheeleg_protocol::NackReason;
+use wheeleg_protocol::{NackReason, ResetCause};
 use wheeleg_units::Micros;
 
 use crate::pins::{
@@ -43,6 +43,15 @@ pub trait Board<'p>: Sized {
         parameters: Self::Parameters,
         pins: &'p Self::Pins,
     ) -> Result<Self, ConfigError>;
+
+    /// Says why the board started, before its first tick.
+    fn started_by(&mut self, cause: ResetCause);
+
+    /// Whether the parameters are to be stored.
+    fn save_is_due(&self) -> bool;
+
+    /// Stores the parameters.
+    fn save(&mut self, store: &mut impl ParameterStore, at: Micros);
 
     /// Latches the inputs of the tick that is about to start.
     fn latch(&mut self, inputs: &Inputs);
@@ -131,8 +140,20 @@ impl<'p> Board<'p> for RemoteJoint<'p> {
             mask,
         };
         let sensor = Potentiometer(&pins.code);
-        let node = JointNode::new(identity, parameters, valves, sensor, switches)?;
+        let node = JointNode::from_store(identity, parameters, valves, sensor, switches)?;
         Ok(Self { node, pins, mask })
+    }
+
+    fn started_by(&mut self, cause: ResetCause) {
+        self.node.started_by(cause);
+    }
+
+    fn save_is_due(&self) -> bool {
+        self.node.save_is_due()
+    }
+
+    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+        self.node.save(store, at);
     }
 
     fn latch(&mut self, inputs: &Inputs) {
@@ -225,12 +246,24 @@ impl<'p> Board<'p> for RemoteWheel<'p> {
         };
         let encoder = Quadrature(&pins.count);
         let dump = DumpPin(Output(&pins.dump));
-        let node = WheelNode::new(identity, parameters, bridge, encoder, supply, dump)?;
+        let node = WheelNode::from_store(identity, parameters, bridge, encoder, supply, dump)?;
         Ok(Self {
             node,
             pins,
             has_supply,
         })
+    }
+
+    fn started_by(&mut self, cause: ResetCause) {
+        self.node.started_by(cause);
+    }
+
+    fn save_is_due(&self) -> bool {
+        self.node.save_is_due()
+    }
+
+    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+        self.node.save(store, at);
     }
 
     fn latch(&mut self, inputs: &Inputs) {

@@ -1,12 +1,15 @@
 //! From a request to its reply.
 
+use core::marker::PhantomData;
+
 use heapless::{String, Vec};
+use wheeleg_node::hardware::{ParameterStore, StoreError};
 use wheeleg_node::{ConfigError, NodeIdentity};
 use wheeleg_pil_link::{
     Figures, Hello, Image, LINK_VERSION, Nonvolatile, Outputs, Power, Ran, Reply, Request, Run,
     Sent, Straps, Trip, text,
 };
-use wheeleg_protocol::Address;
+use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_units::Micros;
 
 use crate::board::Board;
@@ -153,11 +156,13 @@ impl<'p, B: Board<'p>> Session<'p, B> {
 
     /// The board leaves reset.
     fn start(&mut self, identity: NodeIdentity) -> Result<(), &'static str> {
-        let board =
+        let mut board =
             B::new(identity, self.parameters.clone(), self.pins).map_err(|error| match error {
                 ConfigError::Address => "the address is none of this image's boards",
                 ConfigError::Parameters => "the stored parameters contradict each other",
             })?;
+        // The only way in which this board starts: the supply comes up.
+        board.started_by(ResetCause::PowerUp);
         self.board = Some(board);
         self.active = Outputs::default();
         Ok(())
@@ -197,6 +202,10 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             board.tick(now);
             let took = stopwatch.tick_ended();
             board.tick_done(Micros(now.get().wrapping_add(took.get())));
+            if board.save_is_due() {
+                let mut memory = Memory::<B>(&mut self.parameters, PhantomData);
+                board.save(&mut memory, now);
+            }
         }
         let mut sent = Vec::new();
         while !sent.is_full()
@@ -244,6 +253,20 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             resets: self.resets,
             ..Figures::default()
         }
+    }
+}
+
+/// What the session keeps of the parameters through a power cut of its board.
+struct Memory<'m, 'p, B: Board<'p>>(&'m mut B::Parameters, PhantomData<&'p ()>);
+
+impl<'p, B: Board<'p>> ParameterStore for Memory<'_, 'p, B> {
+    fn save(&mut self, records: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError> {
+        let mut set = B::Parameters::default();
+        for (id, raw) in records {
+            set = B::with(&set, id, raw).map_err(|_| StoreError)?;
+        }
+        *self.0 = set;
+        Ok(())
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod channels;
 mod check;
+mod commission;
 mod compare;
 mod delay;
 mod export;
@@ -55,6 +56,8 @@ enum Command {
     Channels(channels::ChannelsArgs),
     /// Write the robot for other programs.
     Export(export::ExportArgs),
+    /// Print the unique ids of a robot's boards, as a section for its file.
+    Commission(commission::CommissionArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
     /// Measure and explain the start delay of a pneumatic joint; writes a report.
@@ -80,6 +83,7 @@ pub fn main() -> ExitCode {
         Some(Command::Params(args)) => params::command(&args),
         Some(Command::Channels(args)) => channels::command(&args),
         Some(Command::Export(args)) => export::command(&args),
+        Some(Command::Commission(args)) => commission::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
         Some(Command::Delay(args)) => delay::command(&args),
         Some(Command::Compare(args)) => compare::command(&args),

@@ -155,6 +155,21 @@ fn pil_text(pil: &PilSummary) -> String {
     out
 }
 
+/// Messages printed; the report has all of them.
+const MESSAGES: usize = 40;
+
+/// What went wrong, with the remedies.
+fn messages_text(messages: &[String]) -> String {
+    let mut out = String::new();
+    for message in messages.iter().take(MESSAGES) {
+        let _ = writeln!(out, "event   {message}");
+    }
+    if let Some(more) = messages.len().checked_sub(MESSAGES).filter(|n| *n > 0) {
+        let _ = writeln!(out, "event   and {more} more, in the report");
+    }
+    out
+}
+
 fn run_text(finished: &Finished) -> String {
     let s = &finished.summary;
     let mut out = String::new();
@@ -187,6 +202,7 @@ fn run_text(finished: &Finished) -> String {
     for fault in &s.faults {
         let _ = writeln!(out, "fault   {fault}");
     }
+    out.push_str(&messages_text(&s.messages));
     let _ = writeln!(out, "hash    {}", s.hash);
     let _ = writeln!(
         out,

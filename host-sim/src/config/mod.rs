@@ -3,6 +3,7 @@
 
 pub mod axis;
 pub mod builtin;
+mod commissioned;
 mod error;
 mod node;
 mod params;
@@ -22,12 +23,13 @@ pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
 pub use scenario::{
-    EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet,
+    EventAction, GroundPatch, LegChoice, Motion, ParameterChoice, Scenario, ScenarioEvent,
+    TargetSet,
 };
 pub use suggest::closest;
 
 /// Commands that a scenario can give, by the names of the master's table.
-pub const COMMAND_NAMES: [&str; 13] = [
+pub const COMMAND_NAMES: [&str; 17] = [
     "JointReference",
     "TransmitPosition",
     "OpenAllValves",
@@ -41,4 +43,8 @@ pub const COMMAND_NAMES: [&str; 13] = [
     "Hold",
     "StartGait",
     "StopGait",
+    "Commission",
+    "ReadParameter",
+    "WriteParameter",
+    "SaveParameters",
 ];

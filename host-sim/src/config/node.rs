@@ -5,6 +5,7 @@ use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
 use super::params::ParameterInfo;
 use super::quantity::pretty;
 use super::reader::{Entry, Reader};
+use super::scenario::ParameterChoice;
 
 /// Parameters that the master sends to the boards before arming, as raw
 /// numbers of the wire format.
@@ -48,6 +49,29 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
     list_defaults(r, "node.joint", JOINT_PARAMS);
     list_defaults(r, "node.wheel", WHEEL_PARAMS);
     params
+}
+
+/// Reads `parameter`, by its name in the table of `board`, and `value`, a number in
+/// the parameter's unit.
+pub(super) fn choice(r: &mut Reader, entry: &Entry, board: Option<u8>) -> Option<ParameterChoice> {
+    entry.get("parameter")?;
+    let table = match board {
+        Some(7..) => WHEEL_PARAMS,
+        _ => JOINT_PARAMS,
+    };
+    let names: Vec<(&str, &'static ParamInfo)> = table.iter().map(|p| (p.name, p)).collect();
+    let info = r.choice(entry, "parameter", &names)?;
+    let raw = entry.get("value").and_then(|(span, item)| {
+        let value = item.as_float().or(item.as_integer().map(|n| n as f64));
+        let Some(value) = value else {
+            let message = format!("`value` must be a number in {}", info.unit);
+            r.problem(Some(span), message, "not a number", None);
+            return None;
+        };
+        // What is beyond its limits is refused by the board, which is there to do it.
+        Some((value * scale(info.format)).round() as i32)
+    });
+    Some(ParameterChoice { id: info.id, raw })
 }
 
 /// A raw number in its unit without the tail of its binary fraction.

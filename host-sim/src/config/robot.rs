@@ -1,9 +1,11 @@
 //! A robot: everything about the machine that a run needs, in SI units.
 
+use wheeleg_master::config::UniqueId;
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::dynamics::floating::FloatingParams;
 use wheeleg_protocol::link::{BAUD, CYCLE_US};
 
+use super::commissioned;
 use super::error::ConfigError;
 use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
@@ -137,6 +139,8 @@ pub struct RobotConfig {
     pub spatial: SpatialParams,
     /// Board parameters that differ from the boards' defaults.
     pub node: NodeParams,
+    /// Unique id of the board that belongs to each address 1 to 8; `None` takes any.
+    pub commissioned: [Option<UniqueId>; 8],
     /// Every parameter as written, for listings and reports.
     pub parameters: Vec<ParameterInfo>,
 }
@@ -162,6 +166,7 @@ impl RobotConfig {
                 "reference",
                 "spatial",
                 "node",
+                "commissioned",
             ];
             known.extend(plant::SECTIONS);
             known.extend(plant::pneumatics::SECTIONS);
@@ -177,6 +182,7 @@ impl RobotConfig {
         let plant = plant::read(&mut r);
         let spatial = r.section::<SpatialParams>("spatial");
         let node = node::read(&mut r);
+        let commissioned = commissioned::read(&mut r);
         let robot = (|| {
             Some(Self {
                 name: name?,
@@ -189,6 +195,7 @@ impl RobotConfig {
                 plant: plant?,
                 spatial: spatial?,
                 node,
+                commissioned,
                 parameters: Vec::new(),
             })
         })();

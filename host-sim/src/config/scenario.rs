@@ -57,7 +57,20 @@ pub enum EventAction {
         stroke_m: Option<f64>,
         /// Wheel travel in m, for commands that take one.
         travel_m: Option<f64>,
+        /// Board 1 to 8, for commands that take one.
+        board: Option<u8>,
+        /// A board's parameter and its raw value, for commands that take them.
+        parameter: Option<ParameterChoice>,
     },
+}
+
+/// A parameter of a board, and a value for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ParameterChoice {
+    /// Its number.
+    pub id: u16,
+    /// Raw value in its format; `None` where none was given.
+    pub raw: Option<i32>,
 }
 
 /// A timed event.
@@ -371,7 +384,17 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
     let action = if matches!(kind, ActionKind::Command) {
         r.reject_unknown(
             entry,
-            &["at", "action", "command", "joint", "stroke", "travel"],
+            &[
+                "at",
+                "action",
+                "command",
+                "joint",
+                "stroke",
+                "travel",
+                "board",
+                "parameter",
+                "value",
+            ],
         );
         let commands: Vec<(&str, &str)> = super::COMMAND_NAMES.iter().map(|n| (*n, *n)).collect();
         let name = r.choice(entry, "command", &commands);
@@ -392,7 +415,12 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         );
         let stroke_m = optional(r, entry, &stroke);
         let travel_m = optional(r, entry, &travel);
+        let board = entry.get("board").and_then(|_| r.whole(entry, "board", 8));
+        let board = board.map(|number| number as u8);
+        let parameter = super::node::choice(r, entry, board);
         EventAction::Command {
+            board,
+            parameter,
             name: name?.to_owned(),
             joint: joint.map(|j| j as u8),
             stroke_m,

@@ -155,6 +155,11 @@ impl Injector {
         Some(bytes)
     }
 
+    /// Whether the guard of the board's driver cuts its transmissions off.
+    pub(crate) fn cuts_off(&self, address: u8) -> bool {
+        self.strikes(FaultKind::Babble, address)
+    }
+
     /// What a driver that is stuck on sends in the time of so many bytes.
     pub(crate) fn babble(&mut self, address: u8, bytes: usize) -> Option<Vec<u8>> {
         let stuck = self.strikes(FaultKind::BabbleUnguarded, address);

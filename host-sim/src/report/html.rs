@@ -6,8 +6,9 @@ use super::Summary;
 use super::figures::Source;
 use super::plot::Figure;
 use crate::SimError;
+use crate::pil::NODE_NAMES;
 use crate::sil::START_UP;
-use crate::telemetry::{EventSample, Row};
+use crate::telemetry::{EventSample, LinkSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
 
@@ -74,6 +75,22 @@ fn grouped(events: &[Row<EventSample>]) -> Vec<(f64, &str, String)> {
         .collect()
 }
 
+/// What each board heard on the bus, as it told last; without those that never told.
+fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
+    let last = NODE_NAMES.iter().zip(links);
+    let last = last.filter_map(|(name, rows)| Some((name, rows.last()?)));
+    last.map(|(name, row)| {
+        let v = &row.v;
+        context! {
+            node => *name,
+            frames => v.frames,
+            counts => [v.overflow, v.truncated, v.short, v.crc, v.version, v.length, v.address, v.unsent],
+            drift => v.drift_ppm.to_string().replace('-', "−"),
+        }
+    })
+    .collect()
+}
+
 /// Renders the page: no scripts, no links to anywhere else.
 pub(super) fn render(
     source: &Source<'_>,
@@ -122,7 +139,10 @@ pub(super) fn render(
         .iter()
         .map(|r| r.v.text.trim_start_matches(START_UP).to_owned())
         .collect();
-    let events: Vec<Value> = grouped(&all[begin..])
+    // What the boards logged themselves stands in the log and its tables.
+    let told = all[begin..].iter().filter(|r| r.v.kind != "log").cloned();
+    let told: Vec<Row<EventSample>> = told.collect();
+    let events: Vec<Value> = grouped(&told)
         .into_iter()
         .map(|(t_s, kind, text)| {
             context! {
@@ -173,6 +193,7 @@ pub(super) fn render(
         figures => figures,
         delays => delays,
         events => events,
+        links => links(&source.recording.links),
         start_up => start_up,
         parameters => parameters,
     };

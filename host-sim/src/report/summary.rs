@@ -40,6 +40,8 @@ pub struct Summary {
     pub seed: u64,
     /// Faults injected, of the scenario and of the command line.
     pub faults: Vec<String>,
+    /// What went wrong and what to do about it, in order of time.
+    pub messages: Vec<String>,
     /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
     pub hash: String,
     /// Messages that could not be written to the log file.
@@ -63,6 +65,14 @@ pub struct Summary {
     pub pil: Option<PilSummary>,
 }
 
+/// Faults and findings as the user reads them, with their time.
+fn messages(recording: &Recording) -> Vec<String> {
+    let faults = recording.events.iter().filter(|e| e.v.kind == "fault");
+    faults
+        .map(|e| format!("{:.3} s: {}", e.t_s(), e.v.text))
+        .collect()
+}
+
 impl Summary {
     /// Collects the summary of a run.
     #[must_use]
@@ -80,6 +90,7 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             seed: info.seed,
             faults: scenario.faults.iter().map(ToString::to_string).collect(),
+            messages: messages(recording),
             hash: recording.hash.clone(),
             dropped_messages: recording.dropped,
             simulated_s: info.simulated_s,

@@ -17,6 +17,7 @@ use wheeleg_protocol::{Address, NackReason, ResetCause};
 use wheeleg_units::Micros;
 
 use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
+use super::memory::Taken;
 use crate::SimError;
 
 /// Counts of the valve timer in one tick: 1 µs each.
@@ -173,6 +174,20 @@ impl JointBoard {
         each!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
     }
 
+    /// What is to be stored now, if the board wants it: then it takes it as stored.
+    pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
+        let mut taken = Taken::default();
+        each!(&mut self.application, node => if node.save_is_due() {
+            node.save(&mut taken, now);
+        });
+        taken.0
+    }
+
+    /// The driver-enable guard has cut a transmission off.
+    pub(super) fn driver_cut_off(&mut self, at: Micros) {
+        each!(&mut self.application, node => node.driver_cut_off(at));
+    }
+
     /// What the application wants to send.
     pub(crate) fn take_transmission(&mut self) -> Option<Transmission> {
         each!(&mut self.application, node => node.take_transmission())
@@ -312,6 +327,20 @@ impl WheelBoard {
     /// Hands received bytes over; the last one ended at `t_end`.
     pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         each_wheel!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
+    }
+
+    /// What is to be stored now, if the board wants it: then it takes it as stored.
+    pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
+        let mut taken = Taken::default();
+        each_wheel!(&mut self.application, node => if node.save_is_due() {
+            node.save(&mut taken, now);
+        });
+        taken.0
+    }
+
+    /// The driver-enable guard has cut a transmission off.
+    pub(super) fn driver_cut_off(&mut self, at: Micros) {
+        each_wheel!(&mut self.application, node => node.driver_cut_off(at));
     }
 
     /// What the application wants to send.

@@ -165,6 +165,12 @@ impl Bus {
         self.under_way.front().map(|d| d.end_ns)
     }
 
+    /// Whether `from` has a transmission under way or scheduled.
+    #[must_use]
+    pub(super) fn is_driven_by(&self, from: Driver) -> bool {
+        self.under_way.iter().any(|d| d.from == from)
+    }
+
     /// Takes the delivery due at or before `now_ns`, earliest first.
     pub(super) fn take_due(&mut self, now_ns: u64) -> Option<Delivery> {
         if self.next_delivery_ns()? > now_ns {

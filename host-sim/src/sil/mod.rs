@@ -11,20 +11,26 @@ mod boards;
 mod bus;
 mod edges;
 mod hal;
+mod memory;
 mod observe;
 mod operator;
 mod power;
 mod setup;
 mod strangers;
 mod traffic;
+mod words;
 mod world;
 
 use std::ops::ControlFlow;
 
+use wheeleg_master::command::{Command, CommandCode};
+use wheeleg_master::config::UniqueId;
+use wheeleg_master::event::Event;
 use wheeleg_protocol::LinkQuality;
 
 pub use self::audit::LineAudit;
 pub(crate) use self::boards::{JointBoard, identity};
+pub(crate) use self::words::hex;
 
 use self::observe::Observer;
 use self::operator::Operator;
@@ -35,6 +41,8 @@ use crate::faults::Schedule;
 use crate::pil::{Nodes, Outside, PilSummary};
 use crate::telemetry::{EventKind, Recorder};
 
+/// Longest time from power-up to the end of commissioning, s.
+const COMMISSION_S: f64 = 2.0;
 /// Beginning of every event in the record that tells of the time before it.
 pub(crate) const START_UP: &str = "start-up, ";
 
@@ -188,6 +196,55 @@ pub(crate) fn run_on(
     })
 }
 
+/// Powers the robot up and takes its boards over for the commissioned ones; gives
+/// their unique ids, addresses 1 to 8.
+///
+/// # Errors
+/// [`SimError::Simulation`] with the reason if a board is missing, doubled, of
+/// another version or of the wrong kind.
+pub fn commission(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    nodes: &Nodes,
+) -> Result<[UniqueId; 8], SimError> {
+    let boards = Outside::connect(nodes, robot)?;
+    let plant = setup::plant(scenario, robot);
+    let master = setup::master(scenario, robot);
+    let mut world = World::new(robot, &plant, master, seed, boards)?;
+    for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
+        world.strike(fault, true)?;
+    }
+    let mut ids = [[0; 12]; 8];
+    let mut said: Vec<String> = Vec::new();
+    let mut asked = false;
+    let limit_ns = (robot.start_up.limit_s.min(COMMISSION_S) * 1e9) as u64;
+    while world.now_ns() < limit_ns {
+        world.step()?;
+        // Every board has been asked who it is by then, more than once.
+        if !asked && world.now_ns() >= limit_ns / 2 {
+            asked = true;
+            world
+                .submit(Command::Commission)
+                .map_err(|reject| SimError::simulation(format!("refused: {reject:?}"), ""))?;
+        }
+        while let Some((_, event)) = world.master().take_event() {
+            match event {
+                Event::Commissioned { node, unique_id } => {
+                    ids[usize::from(node) - 1] = unique_id;
+                }
+                Event::Done(ticket) if ticket.code == CommandCode::Commission => return Ok(ids),
+                Event::Link { .. } | Event::Log { .. } | Event::NodeReady(_) => {}
+                other => said.push(words::describe(&other)),
+            }
+        }
+    }
+    Err(SimError::simulation(
+        format!("the boards cannot be commissioned: {}", said.join("; ")),
+        "mend what the master names, and try again",
+    ))
+}
+
 /// What the master counted on the line, in words.
 fn link_text(link: &LinkQuality) -> String {
     let kinds = [
@@ -230,26 +287,21 @@ fn act(
         }
         EventAction::EStop => {
             recorder.event(t_ns, EventKind::Scenario, "E-stop pressed");
-            operator.submit(
-                world,
-                wheeleg_master::command::Command::EmergencyStop,
-                t_ns,
-                recorder,
-            )
+            operator.submit(world, Command::EmergencyStop, t_ns, recorder)
         }
-        EventAction::ClearFault => operator.submit(
-            world,
-            wheeleg_master::command::Command::ClearFault,
-            t_ns,
-            recorder,
-        ),
+        EventAction::ClearFault => operator.submit(world, Command::ClearFault, t_ns, recorder),
         EventAction::Command {
             name,
             joint,
             stroke_m,
             travel_m,
+            board,
+            parameter,
         } => {
-            let command = operator::command(name, *joint, *stroke_m, *travel_m)?;
+            let command = match operator::parameter_command(name, *board, *parameter)? {
+                Some(command) => command,
+                None => operator::command(name, *joint, *stroke_m, *travel_m)?,
+            };
             operator.submit(world, command, t_ns, recorder)
         }
     }

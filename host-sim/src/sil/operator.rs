@@ -3,16 +3,17 @@
 
 use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_master::contact::Side;
-use wheeleg_master::event::{Event, HoldReason};
+use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
-use wheeleg_protocol::{Address, Fault, FaultBits};
+use wheeleg_protocol::LinkRecord;
 use wheeleg_units::PositionMm;
 
 use super::START_UP;
+use super::words::describe;
 use super::world::World;
 use crate::SimError;
-use crate::config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
-use crate::telemetry::{EventKind, Recorder};
+use crate::config::{LegChoice, Motion, ParameterChoice, Scenario, ScenarioEvent, StartUpParams};
+use crate::telemetry::{EventKind, LinkSample, Recorder};
 
 /// How far the start-up has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +79,7 @@ pub(super) fn command(
         "WheelReference" => Command::WheelReference {
             travel_mm: mm(travel_m.ok_or_else(|| missing("travel"))?),
         },
+        "Commission" => Command::Commission,
         "Arm" => Command::Arm,
         "Disarm" => Command::Disarm,
         "ClearFault" => Command::ClearFault,
@@ -93,6 +95,43 @@ pub(super) fn command(
             ));
         }
     })
+}
+
+/// A command about a board's parameters, if it is one.
+///
+/// # Errors
+/// [`SimError::Simulation`] naming the argument that is missing.
+pub(super) fn parameter_command(
+    name: &str,
+    board: Option<u8>,
+    parameter: Option<ParameterChoice>,
+) -> Result<Option<Command>, SimError> {
+    let missing = |argument: &str| {
+        SimError::simulation(
+            format!("the command {name} of the scenario needs `{argument}`"),
+            format!("add `{argument}` to the event"),
+        )
+    };
+    let node = || board.ok_or_else(|| missing("board"));
+    let id = || parameter.map(|p| p.id).ok_or_else(|| missing("parameter"));
+    let raw = || {
+        parameter
+            .and_then(|p| p.raw)
+            .ok_or_else(|| missing("value"))
+    };
+    Ok(Some(match name {
+        "ReadParameter" => Command::ReadParameter {
+            node: node()?,
+            id: id()?,
+        },
+        "WriteParameter" => Command::WriteParameter {
+            node: node()?,
+            id: id()?,
+            raw: raw()?,
+        },
+        "SaveParameters" => Command::SaveParameters { node: node()? },
+        _ => return Ok(None),
+    }))
 }
 
 /// Side of a leg as the master names it.
@@ -127,7 +166,10 @@ impl<'a> Operator<'a> {
         let now_ns = world.now_ns();
         let now_us = now_ns / 1000;
         while let Some((time_us, event)) = world.master().take_event() {
-            self.notes.push((time_us, describe(&event)));
+            // Counters and logs are no part of the story.
+            if !matches!(event, Event::Link { .. } | Event::Log { .. }) {
+                self.notes.push((time_us, describe(&event)));
+            }
             match event {
                 Event::Homed if self.stage == Stage::Homing => {
                     self.stage = Stage::Settling {
@@ -137,6 +179,7 @@ impl<'a> Operator<'a> {
                 Event::HomingFailed { .. }
                 | Event::Hold(_)
                 | Event::SchemaMismatch { .. }
+                | Event::ForeignBoard { .. }
                 | Event::Refused { .. } => return Err(self.not_ready(now_ns)),
                 _ => {}
             }
@@ -284,10 +327,22 @@ impl<'a> Operator<'a> {
                 Event::Hold(_)
                 | Event::HomingFailed { .. }
                 | Event::SchemaMismatch { .. }
+                | Event::ForeignBoard { .. }
+                | Event::WrongRole(_)
+                | Event::NodeLost(_)
+                | Event::Found { .. }
+                | Event::Diagnosis { .. }
                 | Event::DuplicateAddress { .. } => EventKind::Fault,
-                Event::Done(_) | Event::Refused { .. } | Event::Position { .. } => {
-                    EventKind::Command
+                Event::Log { .. } | Event::LogLost { .. } => EventKind::Log,
+                Event::Link { node, record } => {
+                    let node = usize::from(node) - 1;
+                    recorder.link(t_ns, node, link_sample(&record));
+                    continue;
                 }
+                Event::Done(_)
+                | Event::Refused { .. }
+                | Event::Position { .. }
+                | Event::Parameter { .. } => EventKind::Command,
                 Event::Armed | Event::Disarmed => EventKind::Mode,
                 _ => EventKind::Info,
             };
@@ -303,76 +358,17 @@ fn refused(command: &Command, reason: &str) -> SimError {
     )
 }
 
-/// An event of the master in words.
-fn describe(event: &Event) -> String {
-    let text = match *event {
-        Event::Done(ticket) => format!("{:?} done", ticket.code),
-        Event::Refused { ticket, reason } => format!("{:?} refused: {reason:?}", ticket.code),
-        Event::NodeReady(node) => format!("{} identified, interface matches", board(node)),
-        Event::SchemaMismatch {
-            node,
-            master,
-            theirs,
-        } => format!(
-            "{} has interface {theirs:016x}, the master has {master:016x}: will not arm",
-            board(node)
-        ),
-        Event::DuplicateAddress { node, unique_ids } => {
-            let hex = |id: [u8; 12]| id.iter().map(|b| format!("{b:02x}")).collect::<String>();
-            let [one, other] = unique_ids.map(hex);
-            let remedy = Fault::DuplicateAddress.remedy();
-            format!(
-                "two boards at the address of {}, unique ids {one} and {other}: will not arm. {remedy}",
-                board(node)
-            )
-        }
-        Event::WrongRole(node) => format!("{} answers as another kind of board", board(node)),
-        Event::NodeLost(node) => format!("{} is lost", board(node)),
-        Event::NodeBack(node) => format!("{} answers", board(node)),
-        Event::Armed => "all axes armed".to_owned(),
-        Event::Disarmed => "all axes disarmed".to_owned(),
-        Event::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
-        Event::Homed => "start pose reached".to_owned(),
-        Event::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
-        Event::GaitDone { steps } => format!("gait over after {steps} steps"),
-        Event::TrajectoryDone => "foot trajectory over".to_owned(),
-        Event::TouchDown { side, sector } => match sector {
-            Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
-            None => format!("{} foot stands flat", word(side)),
-        },
-        Event::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
-        Event::Position { joint, stroke_mm } => {
-            format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
-        }
-    };
-    format!("master: {text}")
-}
-
-/// Name of a side or sector inside a sentence.
-fn word(name: impl std::fmt::Debug) -> String {
-    format!("{name:?}").to_lowercase()
-}
-
-/// Name of a board by its bus address.
-fn board(address: u8) -> String {
-    Address::new(address).map_or_else(|| format!("address {address}"), |a| a.to_string())
-}
-
-fn hold_reason(reason: &HoldReason) -> String {
-    match *reason {
-        HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
-        HoldReason::NodeFault { node, faults } => {
-            let words: Vec<&str> = FaultBits::from_raw(faults)
-                .iter()
-                .map(|fault| fault.sentence())
-                .collect();
-            format!("{} reports: {}", board(node), words.join(" "))
-        }
-        HoldReason::NodeDisarmed(node) => {
-            format!("{} is no longer armed: it has restarted", board(node))
-        }
-        HoldReason::SupplyLost => "supply pressure lost".to_owned(),
-        HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
-        HoldReason::EmergencyStop => "E-stop".to_owned(),
+fn link_sample(record: &LinkRecord) -> LinkSample {
+    LinkSample {
+        frames: record.frames,
+        overflow: record.overflow,
+        truncated: record.truncated,
+        short: record.short,
+        crc: record.crc,
+        version: record.version,
+        length: record.length,
+        address: record.address,
+        unsent: record.unsent,
+        drift_ppm: i32::from(record.drift_ppm),
     }
 }

@@ -9,6 +9,7 @@ use wheeleg_pil_link as link;
 use wheeleg_protocol::{Address, ResetCause};
 
 use super::boards::{JointBoard, WheelBoard, identity};
+use super::traffic::micros;
 use super::world::{JOINT_TICK_NS, World};
 use crate::SimError;
 use crate::faults::{FaultKind, FaultSpec, Victim};
@@ -30,6 +31,12 @@ pub(super) enum Down {
         /// When power comes back, ns.
         until_ns: u64,
     },
+    /// It stores its parameters, which keeps its processor from everything else: its
+    /// outputs stay as they are, off.
+    Storing {
+        /// When that is done, ns.
+        until_ns: u64,
+    },
     /// Its program has stopped: its outputs stay as they are.
     Hung {
         /// When the watchdog bites, ns.
@@ -42,7 +49,7 @@ impl Down {
     fn ended_by(self) -> ResetCause {
         match self {
             Self::Hung { .. } => ResetCause::Watchdog,
-            Self::No | Self::Off { .. } => ResetCause::PowerUp,
+            Self::No | Self::Off { .. } | Self::Storing { .. } => ResetCause::PowerUp,
         }
     }
 }
@@ -109,12 +116,31 @@ impl World {
             self.down[i] = Down::No;
         }
         let who = identity(address);
+        let stored = self.memories[i].records();
         if i < 6 {
-            self.joints[i] = JointBoard::new(who, &self.stored.joints[i], cause)?;
+            self.joints[i] = JointBoard::new(who, &stored, cause)?;
         } else {
-            self.wheels[i - 6] = WheelBoard::new(who, &self.stored.wheels[i - 6], cause)?;
+            self.wheels[i - 6] = WheelBoard::new(who, &stored, cause)?;
         }
         Ok(())
+    }
+
+    /// A board that wants to stores its parameters, once it has nothing to send, and
+    /// stands still meanwhile.
+    pub(super) fn store(&mut self, address: u8) {
+        if self.bus.is_driven_by(address) {
+            return;
+        }
+        let i = usize::from(address) - 1;
+        let now = micros(self.faults.clock_ns(address, self.now_ns));
+        let taken = match self.joints.get_mut(i) {
+            Some(board) => board.take_save(now),
+            None => self.wheels[i - 6].take_save(now),
+        };
+        if let Some(records) = taken {
+            let until_ns = self.memories[i].begin(records, self.now_ns);
+            self.down[i] = Down::Storing { until_ns };
+        }
     }
 
     /// Boards whose time without power, or in a stopped program, is over; a
@@ -125,6 +151,14 @@ impl World {
             let until_ns = match down {
                 Down::No => continue,
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
+                // The tick of the last edge before the end is worked off then.
+                Down::Storing { until_ns } => {
+                    if until_ns < self.now_ns.saturating_add(JOINT_TICK_NS) {
+                        self.memories[usize::from(raw) - 1].end();
+                        self.down[usize::from(raw) - 1] = Down::No;
+                    }
+                    continue;
+                }
             };
             let Some(address) = Address::new(raw).filter(|_| until_ns <= self.now_ns) else {
                 continue;
@@ -192,6 +226,9 @@ impl World {
             },
             _ => return Ok(()),
         };
+        if let Down::Off { .. } = down {
+            self.memories[usize::from(address) - 1].power_fails(self.now_ns);
+        }
         self.down[usize::from(address) - 1] = down;
         let Some(outside) = &mut self.outside else {
             return Ok(());

@@ -97,6 +97,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         wheel_drive: WheelDrive::Profile,
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
+        commissioned: robot.commissioned,
         ..MasterConfig::default()
     }
 }

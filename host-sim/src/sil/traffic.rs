@@ -104,27 +104,38 @@ impl World {
         let now_ns = self.now_ns;
         let (bus, audit) = (&mut self.bus, &mut self.audit);
         let (faults, outside) = (&mut self.faults, &mut self.outside);
+        // True if the guard of the board's driver cut it off.
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
             // Start times are on the board's own clock.
             let now = micros(faults.clock_ns(from, now_ns));
             let start_ns = now_ns + faults.duration_ns(from, ahead_us(now, t.start_at));
             let Some(bytes) = faults.board_sends(from, t.bytes.to_vec()) else {
-                return;
+                return false;
             };
             match outside {
                 // What goes on the line is what the board outside sends.
-                Some(outside) if outside.has(from) => outside.expect_frame(from, start_ns, bytes),
-                _ => transmit(bus, audit, faults, from, start_ns, bytes),
+                Some(outside) if outside.has(from) => {
+                    outside.expect_frame(from, start_ns, bytes);
+                    false
+                }
+                _ => {
+                    transmit(bus, audit, faults, from, start_ns, bytes);
+                    faults.cuts_off(from)
+                }
             }
         };
         for (board, address) in self.joints.iter_mut().zip(1..) {
             while let Some(t) = board.take_transmission() {
-                send(address, t);
+                if send(address, t) {
+                    board.driver_cut_off(micros(now_ns));
+                }
             }
         }
         for (board, address) in self.wheels.iter_mut().zip(7..) {
             while let Some(t) = board.take_transmission() {
-                send(address, t);
+                if send(address, t) {
+                    board.driver_cut_off(micros(now_ns));
+                }
             }
         }
         while let Some((from, t)) = self.strangers.take_transmission() {

@@ -17,6 +17,7 @@ use super::audit::{Audit, LineAudit};
 use super::boards::{JointBoard, WheelBoard, identity};
 use super::bus::Bus;
 use super::edges::Sensed;
+use super::memory::Memory;
 use super::power::{Client, Down};
 use super::strangers::Strangers;
 use super::traffic::{NS_PER_US, micros};
@@ -68,6 +69,8 @@ pub(super) struct World {
     pub(super) client: Client,
     pub(super) outside: Option<Outside>,
     pub(super) stored: NodeParams,
+    /// Parameter memories, addresses 1 to 8.
+    pub(super) memories: [Memory; 8],
 }
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
@@ -193,6 +196,10 @@ impl World {
             faults: Injector::new(seed),
             down: [Down::No; 8],
             outside,
+            memories: std::array::from_fn(|i| {
+                let joints = stored.joints.iter().chain(&stored.wheels);
+                Memory::new(joints.into_iter().nth(i).map_or(&[], Vec::as_slice))
+            }),
             stored: stored.clone(),
         })
     }
@@ -285,6 +292,7 @@ impl World {
             let now = micros(self.faults.clock_ns(address, self.now_ns));
             if self.runs(address) {
                 self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
+                self.store(address);
             }
         }
         self.strangers.joint_tick(self.now_ns);
@@ -325,6 +333,7 @@ impl World {
         let now_ns = self.faults.clock_ns(address, self.now_ns);
         if self.runs(address) {
             self.wheels[wheel].tick(micros(now_ns), edges, switch);
+            self.store(address);
         }
         self.strangers.wheel_sample(address, self.now_ns);
         self.next_wheel_ns[wheel] += u64::from(self.wheels[wheel].period_us()) * NS_PER_US;

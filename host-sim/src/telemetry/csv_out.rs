@@ -26,6 +26,9 @@ pub fn write_csv(folder: &Path, recording: &Recording, rate_hz: u32) -> Result<(
     table(folder, "bus", &recording.bus, period_ns)?;
     table(folder, "supply", &recording.supply, period_ns)?;
     table(folder, "master", &recording.master, period_ns)?;
+    for (i, rows) in recording.links.iter().enumerate() {
+        table(folder, &format!("link-{}", i + 1), rows, 0)?;
+    }
     table(folder, "events", &recording.events, 0)
 }
 

@@ -20,6 +20,6 @@ pub use hash::TelemetryHash;
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder, Recording, Row};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, channels, json_schema};
 pub use samples::{
-    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, MasterSample,
-    StateSample, SupplySample, WheelSample,
+    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
+    MasterSample, StateSample, SupplySample, WheelSample,
 };

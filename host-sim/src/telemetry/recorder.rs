@@ -11,8 +11,8 @@ use super::filter::LowPass2;
 use super::hash::TelemetryHash;
 use super::registry::{ChannelDef, Sample, channels, json_schema};
 use super::samples::{
-    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, MasterSample,
-    StateSample, SupplySample, WheelSample,
+    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
+    MasterSample, StateSample, SupplySample, WheelSample,
 };
 use crate::SimError;
 
@@ -61,6 +61,8 @@ pub struct Recording {
     pub supply: Vec<Row<SupplySample>>,
     /// Master.
     pub master: Vec<Row<MasterSample>>,
+    /// Bus as each board has heard it, addresses 1 to 8.
+    pub links: [Vec<Row<LinkSample>>; 8],
     /// Events.
     pub events: Vec<Row<EventSample>>,
     /// Determinism hash of the log, 64 hexadecimal digits.
@@ -119,6 +121,7 @@ mod index {
     pub(super) const STATE: usize = 14;
     pub(super) const EVENTS: usize = 15;
     pub(super) const RUN: usize = 16;
+    pub(super) const LINK: usize = 17;
 }
 
 impl Recorder {
@@ -250,6 +253,15 @@ impl Recorder {
         self.log_periodic(index::STATE, t_ns, &sample);
     }
 
+    /// Records what a board has heard; `node` is 0 to 7 for addresses 1 to 8.
+    ///
+    /// # Panics
+    /// If `node` is above 7.
+    pub fn link(&mut self, t_ns: u64, node: usize, sample: LinkSample) {
+        self.log(index::LINK + node, t_ns, &sample);
+        self.data.links[node].push(Row { t_ns, v: sample });
+    }
+
     /// Records an event.
     pub fn event(&mut self, t_ns: u64, kind: EventKind, text: impl Into<String>) {
         let sample = EventSample {
@@ -377,6 +389,7 @@ mod tests {
         assert_eq!(topic(index::STATE), "/state");
         assert_eq!(topic(index::EVENTS), "/events");
         assert_eq!(topic(index::RUN), "/run");
-        assert_eq!(channels().len(), index::RUN + 1);
+        assert_eq!(topic(index::LINK), "/link/1");
+        assert_eq!(channels().len(), index::LINK + 8);
     }
 }

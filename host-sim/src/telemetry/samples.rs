@@ -245,6 +245,30 @@ samples! {
         plant: String, "hex", 0, Host;
     }
 
+    /// What a board has heard on the bus since it started, as it tells when the master asks. Counters stop at their largest value.
+    LinkSample = "wheeleg.Link" {
+        /// Sound frames.
+        frames: u32, "1", 0, Node;
+        /// Frames with too many bytes.
+        overflow: u16, "1", 0, Node;
+        /// Frames that end inside a COBS block.
+        truncated: u16, "1", 0, Node;
+        /// Frames shorter than header and CRC.
+        short: u16, "1", 0, Node;
+        /// Frames with a wrong CRC.
+        crc: u16, "1", 0, Node;
+        /// Frames of another protocol version.
+        version: u16, "1", 0, Node;
+        /// Frames with a wrong length field.
+        length: u16, "1", 0, Node;
+        /// Frames with an address that does not exist.
+        address: u16, "1", 0, Node;
+        /// Own frames that were replaced before they were sent.
+        unsent: u16, "1", 0, Node;
+        /// Board clock less master clock over the last second.
+        drift_ppm: i32, "ppm", 0, Node;
+    }
+
     /// Something that happened.
     EventSample = "wheeleg.Event" {
         /// Kind: info, scenario, command, mode, fault, contact.
@@ -269,6 +293,8 @@ pub enum EventKind {
     Fault,
     /// A foot touched or left the ground.
     Contact,
+    /// A record of a board's own log.
+    Log,
 }
 
 impl EventKind {
@@ -282,6 +308,7 @@ impl EventKind {
             Self::Mode => "mode",
             Self::Fault => "fault",
             Self::Contact => "contact",
+            Self::Log => "log",
         }
     }
 }
@@ -302,7 +329,7 @@ const FAST_HZ: u32 = 500;
 /// One sample per bus cycle.
 const CYCLE_HZ: u32 = 100;
 
-pub(super) static CHANNELS: [ChannelDef; 17] = [
+pub(super) static CHANNELS: [ChannelDef; 25] = [
     channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
     channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),
     channel::<JointSample>("/joint/3", FAST_HZ, "Left vertical cylinder (b6)"),
@@ -320,6 +347,14 @@ pub(super) static CHANNELS: [ChannelDef; 17] = [
     channel::<StateSample>("/state", 10, "Fingerprint of the simulated state"),
     channel::<EventSample>("/events", 0, "Events"),
     channel::<EventSample>("/run", 0, "Scenario, robot and seed of this log, at time 0"),
+    channel::<LinkSample>("/link/1", 0, "Bus as heard by joint 1"),
+    channel::<LinkSample>("/link/2", 0, "Bus as heard by joint 2"),
+    channel::<LinkSample>("/link/3", 0, "Bus as heard by joint 3"),
+    channel::<LinkSample>("/link/4", 0, "Bus as heard by joint 4"),
+    channel::<LinkSample>("/link/5", 0, "Bus as heard by joint 5"),
+    channel::<LinkSample>("/link/6", 0, "Bus as heard by joint 6"),
+    channel::<LinkSample>("/link/7", 0, "Bus as heard by wheel 7"),
+    channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8"),
 ];
 
 #[cfg(test)]

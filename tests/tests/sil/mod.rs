@@ -54,6 +54,8 @@ pub(crate) fn command(name: &str) -> EventAction {
         joint: None,
         stroke_m: None,
         travel_m: None,
+        board: None,
+        parameter: None,
     }
 }
 
@@ -64,6 +66,8 @@ pub(crate) fn command_to(name: &str, joint: u8) -> EventAction {
         joint: Some(joint),
         stroke_m: None,
         travel_m: None,
+        board: None,
+        parameter: None,
     }
 }
 

@@ -1,10 +1,12 @@
 //! The board as the executive sees it, and the second half of its start.
 
 use super::bus::Bus;
+use super::flash::ParameterPages;
 use super::start::Start;
 use super::{adc, bridge, clock, encoder, latch, pac, pins, tick, timebase, watchdog};
 use crate::executive::{Board, Event, older};
 use crate::led::Status;
+use crate::store::Store;
 use pac::Interrupt;
 use wheeleg_node::hardware::HBridge;
 use wheeleg_node::snapshot::TickReport;
@@ -147,6 +149,20 @@ impl<const WHEEL: bool> Board for G431<WHEEL> {
 
     fn transmit(&mut self, transmission: &Transmission) {
         self.bus.transmit(transmission);
+    }
+
+    #[inline]
+    fn take_cut_off(&mut self) -> bool {
+        self.bus.take_cut_off()
+    }
+
+    type Memory = Store<ParameterPages>;
+
+    #[inline(never)]
+    fn store(&mut self, save: impl FnOnce(&mut Self::Memory)) {
+        // SAFETY: the main loop runs one at a time, and start-up is over.
+        save(&mut unsafe { super::parameters::store() });
+        self.bus.forget();
     }
 
     #[inline]

@@ -34,6 +34,9 @@ const POSITION_MASK: u16 = (RING - 1) as u16;
 const _: () = assert!(RING.is_power_of_two());
 /// Time of a byte, µs.
 const BYTE_US: u16 = 10;
+/// A frame whose end is noted later than this after the driver was off was cut
+/// off; handlers wait for each other for less, µs.
+const LATE_US: u32 = 30;
 
 /// Memory that DMA reads or writes.
 #[repr(align(4))]
@@ -51,6 +54,8 @@ static KICK: AtomicU32 = AtomicU32::new(0);
 
 static MARKS: Marks = Marks::new();
 static SENDING: AtomicBool = AtomicBool::new(false);
+/// When the driver is off again.
+static END: AtomicU32 = AtomicU32::new(0);
 
 fn cr3(transmit: bool) -> pac::usart::regs::Cr3 {
     let mut cr3 = pac::usart::regs::Cr3(0);
@@ -149,6 +154,25 @@ impl Bus {
         !SENDING.seen()
     }
 
+    /// Whether the driver's time limit has cut the transmission off that is under way:
+    /// it had to be over before. Then it is.
+    #[inline]
+    pub(super) fn take_cut_off(&mut self) -> bool {
+        let cut_off = is_late(timebase::now().get());
+        if cut_off {
+            end_transmission();
+        }
+        cut_off
+    }
+
+    /// Forgets all that was received and not handed over.
+    pub(super) fn forget(&mut self) {
+        cortex_m::interrupt::free(|_| {
+            MARKS.clear();
+            self.read = position();
+        });
+    }
+
     /// Schedules a frame; the transmitter is free.
     pub(super) fn transmit(&mut self, transmission: &Transmission) {
         if !self.is_free() {
@@ -222,6 +246,8 @@ fn arm(length: u16, start_at: u32) {
         } else {
             start_at
         };
+        let over = begin.wrapping_add(u32::from(end));
+        END.store(over, Ordering::Relaxed);
         tim2.ccr(OPEN).write_value(begin.wrapping_sub(LEAD_US));
         tim2.ccr(BEGIN).write_value(begin);
         tim2.sr().write_value(flags);
@@ -229,11 +255,37 @@ fn arm(length: u16, start_at: u32) {
     });
 }
 
+/// Where DMA writes the next byte.
+#[inline]
+fn position() -> u16 {
+    let left = pac::DMA1.ch(RX.0).ndtr().read().ndt();
+    (RING as u16).wrapping_sub(left) & POSITION_MASK
+}
+
+#[inline]
+fn is_late(time: u32) -> bool {
+    time.wrapping_sub(END.load(Ordering::Relaxed)) as i32 > LATE_US as i32
+}
+
+/// Nothing is sent, and nothing is scheduled.
+#[inline(never)]
+fn end_transmission() {
+    // The compare values match again in 71 minutes: nothing may be armed then.
+    pac::TIM2.dier().modify(|r| r.set_ccde(BEGIN, false));
+    pac::TIM15
+        .smcr()
+        .write_value(pac::timer::regs::Smcr2chCmp(0));
+    let usart = pac::USART1;
+    usart.cr3().write_value(cr3(false));
+    usart.cr1().modify(|r| r.set_tcie(false));
+    usart.icr().write(|r| r.set_tc(true));
+    SENDING.store(false, Ordering::Release);
+}
+
 #[inline]
 fn mark(time: u32) {
-    let left = pac::DMA1.ch(RX.0).ndtr().read().ndt();
     MARKS.push(Mark {
-        position: (RING as u16).wrapping_sub(left) & POSITION_MASK,
+        position: position(),
         time: Micros(time),
     });
     latch::wake();
@@ -251,15 +303,12 @@ pub fn on_usart() {
     }
     // The flag also stands after the line was idle; the enable says that it is ours.
     if status.tc() && usart.cr1().read().tcie() {
-        // The compare values match again in 71 minutes: nothing may be armed then.
-        pac::TIM2.dier().modify(|r| r.set_ccde(BEGIN, false));
-        pac::TIM15
-            .smcr()
-            .write_value(pac::timer::regs::Smcr2chCmp(0));
-        usart.cr3().write_value(cr3(false));
-        usart.cr1().modify(|r| r.set_tcie(false));
-        usart.icr().write(|r| r.set_tc(true));
-        SENDING.store(false, Ordering::Release);
+        if is_late(time) {
+            // The main loop sees it, as one that never ends.
+            usart.cr1().modify(|r| r.set_tcie(false));
+        } else {
+            end_transmission();
+        }
         latch::wake();
     }
 }

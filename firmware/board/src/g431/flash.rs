@@ -1,6 +1,6 @@
 //! The two parameter pages of the internal flash.
 
-use super::pac;
+use super::{pac, watchdog};
 use crate::store::{Flash, FlashError};
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -38,7 +38,9 @@ impl ParameterPages {
         )
     }
 
-    fn unlocked(change: impl FnOnce() -> Result<(), FlashError>) -> Result<(), FlashError> {
+    /// One operation. One copy in flash serves both kinds.
+    #[inline(never)]
+    fn unlocked(change: &mut dyn FnMut()) -> Result<(), FlashError> {
         let flash = pac::FLASH;
         wait();
         for key in KEYS {
@@ -46,7 +48,8 @@ impl ParameterPages {
         }
         // Flags of an earlier operation are cleared by writing them.
         flash.sr().write_value(flash.sr().read());
-        let result = change();
+        change();
+        let result = outcome();
         flash.cr().write(|r| r.set_lock(true));
         result
     }
@@ -75,23 +78,24 @@ impl Flash for ParameterPages {
     }
 
     fn erase(&mut self, page: usize) -> Result<(), FlashError> {
+        // A blank store is erased twice, and half the watchdog's time is one erasure.
+        watchdog::feed();
         let number = FIRST.saturating_add(u32::try_from(page).map_err(|_| FlashError)?);
         if page >= 2 {
             return Err(FlashError);
         }
-        Self::unlocked(|| {
+        Self::unlocked(&mut || {
             pac::FLASH.cr().write(|r| {
                 r.set_per(true);
                 r.set_pnb(number as u8);
             });
             pac::FLASH.cr().modify(|r| r.set_strt(true));
-            outcome()
         })
     }
 
     fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError> {
         let address = Self::address(page, word).ok_or(FlashError)?;
-        Self::unlocked(|| {
+        Self::unlocked(&mut || {
             pac::FLASH.cr().write(|r| r.set_pg(true));
             let (low, high) = (value as u32, (value >> 32) as u32);
             // SAFETY: an aligned, erased double word of a page that holds no
@@ -101,7 +105,6 @@ impl Flash for ParameterPages {
                 cortex_m::asm::isb();
                 core::ptr::write_volatile(address.wrapping_add(4) as *mut u32, high);
             }
-            outcome()
         })
     }
 }

@@ -44,7 +44,7 @@ fn make(
         let parameters = g431::parameters::load(JointParameters::default(), |held, id, raw| {
             held.with(id, raw, true)
         });
-        JointNode::new(identity, parameters, valves, potentiometer, feet)
+        JointNode::from_store(identity, parameters, valves, potentiometer, feet)
     });
     node?.as_mut().ok()
 }

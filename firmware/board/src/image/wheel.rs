@@ -48,7 +48,7 @@ fn make(
         let parameters = g431::parameters::load(WheelParameters::default(), |held, id, raw| {
             held.with(id, raw, true)
         });
-        WheelNode::new(identity, parameters, motor, encoder, supply, DumpPin(dump))
+        WheelNode::from_store(identity, parameters, motor, encoder, supply, DumpPin(dump))
     });
     node?.as_mut().ok()
 }

@@ -18,6 +18,14 @@ pub const PROFILE_JOBS: usize = 4;
 pub enum Purpose {
     /// Enumeration.
     Identify,
+    /// A question of the master's own ([`super::questions`]).
+    Report,
+    /// A look whether a board that stored its parameters is still the one that was
+    /// asked to.
+    Saved(
+        /// Whom to answer.
+        Ticket,
+    ),
     /// Part of arming, disarming or clearing all nodes.
     Group,
     /// Part of a HOLD of all axes; nobody waits for it.
@@ -29,6 +37,17 @@ pub enum Purpose {
         /// Whom to answer.
         Ticket,
     ),
+}
+
+impl Purpose {
+    /// Whom to answer, if it is a user.
+    #[must_use]
+    pub const fn ticket(self) -> Option<Ticket> {
+        match self {
+            Self::User(ticket) | Self::Saved(ticket) => Some(ticket),
+            _ => None,
+        }
+    }
 }
 
 /// A request that waits or is under way.
@@ -77,7 +96,7 @@ impl Jobs {
     /// user command among them.
     pub fn clear(&mut self, mut dropped: impl FnMut(Ticket)) {
         while let Some(job) = self.queue.pop_front() {
-            if let Purpose::User(ticket) = job.purpose {
+            if let Some(ticket) = job.purpose.ticket() {
                 dropped(ticket);
             }
         }

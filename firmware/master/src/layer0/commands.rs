@@ -151,6 +151,46 @@ impl Layer0 {
                 };
                 self.ask(accepted, wheel_address(side)?, message.into())
             }
+            Command::Commission => {
+                if self.power != Power::Disarmed {
+                    return Err(Refusal::NotDisarmed);
+                }
+                let liveness = &self.liveness;
+                self.nodes
+                    .commission(|index| liveness.alive(index), self.schema_hash)?;
+                for to in Address::nodes() {
+                    if let Some(unique_id) = self.nodes.commissioned(to) {
+                        let node = to.raw();
+                        events.push(now_us, Event::Commissioned { node, unique_id });
+                    }
+                }
+                Ok(true)
+            }
+            Command::ReadParameter { node, id } => {
+                let to = board_address(node)?;
+                self.ask(accepted, to, proto::ParamGet { id }.into())
+            }
+            Command::WriteParameter { node, id, raw } => {
+                let to = board_address(node)?;
+                let message = proto::ParamSet { id, value: raw };
+                self.ask(accepted, to, message.into())
+            }
+            Command::SaveParameters { node } => {
+                if self.power != Power::Disarmed {
+                    return Err(Refusal::NotDisarmed);
+                }
+                let to = board_address(node)?;
+                if !self.jobs.has_room(2) {
+                    return Err(Refusal::Busy);
+                }
+                // What it has counted before and after tells whether it was reset.
+                let _fits = self.jobs.push(Job {
+                    to,
+                    message: proto::LinkReport {}.into(),
+                    purpose: Purpose::Report,
+                });
+                self.ask(accepted, to, proto::ParamSave {}.into())
+            }
             // The E-stop does not queue, and commands of layer 1 are never routed here.
             _ => Err(Refusal::NotMoving),
         }
@@ -322,6 +362,12 @@ impl Layer0 {
 
 fn joint_address(joint: u8) -> Result<Address, Refusal> {
     Address::joint(joint).ok_or(Refusal::NoSuchJoint { joint })
+}
+
+fn board_address(node: u8) -> Result<Address, Refusal> {
+    Address::new(node)
+        .filter(|address| address.is_node())
+        .ok_or(Refusal::NoSuchBoard { node })
 }
 
 fn wheel_address(side: Side) -> Result<Address, Refusal> {

@@ -251,6 +251,8 @@ impl Layer0 {
             self.counters.stale_replies = self.counters.stale_replies.wrapping_add(1);
             return;
         }
+        let before = self.nodes.get(index).and_then(|node| node.last);
+        self.questions.on_reply(index, before.as_ref(), &reply);
         self.nodes.store(from, reply);
         if let Some(count) = reply.wheel_position() {
             match from.raw() {

@@ -12,9 +12,11 @@
 pub mod acyclic;
 mod commands;
 mod cycle;
+pub mod line;
 pub mod liveness;
 pub mod nodes;
 pub mod odometry;
+pub mod questions;
 pub mod reflex;
 mod requests;
 mod safety;
@@ -28,12 +30,14 @@ use crate::config::MasterConfig;
 use crate::contact::FootSwitches;
 use crate::dispatcher::{Refusal, Ticket};
 use crate::event::HoldReason;
-use crate::setpoint::{JOINTS, Phase, PushProfile, Setpoints, TravelSetpoint, WHEELS};
+use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, TravelSetpoint, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
+use line::Line;
 use liveness::Liveness;
 use nodes::Nodes;
 use odometry::Odometry;
+use questions::Questions;
 use reflex::Reflexes;
 use wheels::{WheelUnits, Wheels};
 
@@ -78,6 +82,10 @@ pub struct Layer0 {
     decoder: Decoder,
     nodes: Nodes,
     liveness: Liveness,
+    questions: Questions,
+    line: Line,
+    /// Nodes that are missed while they store their parameters.
+    stalled: [bool; NODES],
     odometry: Odometry,
     wheels: Wheels,
     reflexes: Reflexes,
@@ -122,8 +130,11 @@ impl Layer0 {
             cycle: 0,
             cycle_start_us: 0,
             decoder: Decoder::new(),
-            nodes: Nodes::default(),
+            nodes: Nodes::new(config.commissioned),
             liveness: Liveness::default(),
+            questions: Questions::default(),
+            line: Line::default(),
+            stalled: [false; NODES],
             odometry: Odometry::new(config.wheels),
             wheels: Wheels::default(),
             reflexes: Reflexes::default(),

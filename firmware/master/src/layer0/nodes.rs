@@ -2,6 +2,7 @@
 
 use wheeleg_protocol::{Address, BoardKind, Identity, NodeMode, SlotReply};
 
+use crate::config::UniqueId;
 use crate::dispatcher::Refusal;
 use crate::setpoint::NODES;
 
@@ -17,8 +18,10 @@ pub enum Enumerated {
     Schema(Identity),
     /// Not the kind of board its address stands for, or the straps say otherwise.
     Role(Identity),
+    /// Another board than the one that was commissioned here.
+    Foreign(Identity),
     /// Two boards answer at this address: their unique ids.
-    Twins([[u8; 12]; 2]),
+    Twins([UniqueId; 2]),
 }
 
 /// One node.
@@ -28,6 +31,8 @@ pub struct Node {
     pub enumerated: Enumerated,
     /// It did not answer the last question who it is.
     pub in_vain: bool,
+    /// Frames that it has counted since it started, when last asked.
+    pub frames: Option<u32>,
     /// Its reply in the last cycle, if it answered.
     pub reply: Option<SlotReply>,
     /// Its last reply ever.
@@ -37,10 +42,11 @@ pub struct Node {
 impl Node {
     /// Unique id of the board, once it has said who it is.
     #[must_use]
-    pub const fn unique_id(&self) -> Option<[u8; 12]> {
+    pub const fn unique_id(&self) -> Option<UniqueId> {
         match self.enumerated {
             Enumerated::Unknown | Enumerated::Twins(_) => None,
             Enumerated::Ready(identity)
+            | Enumerated::Foreign(identity)
             | Enumerated::Schema(identity)
             | Enumerated::Role(identity) => Some(identity.unique_id),
         }
@@ -57,9 +63,60 @@ impl Node {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nodes {
     nodes: [Node; NODES],
+    commissioned: [Option<UniqueId>; NODES],
 }
 
 impl Nodes {
+    /// No node known; `commissioned` is the board that belongs to each address.
+    #[must_use]
+    pub fn new(commissioned: [Option<UniqueId>; NODES]) -> Self {
+        Self {
+            nodes: Default::default(),
+            commissioned,
+        }
+    }
+
+    /// Board that was commissioned at `address`, if one was.
+    #[must_use]
+    pub fn commissioned(&self, address: Address) -> Option<UniqueId> {
+        self.commissioned.get(address.slot()?).copied().flatten()
+    }
+
+    /// Address at which a board was commissioned, if at any.
+    #[must_use]
+    pub fn home_of(&self, unique_id: UniqueId) -> Option<u8> {
+        let mut homes = Address::nodes().zip(&self.commissioned);
+        let home = homes.find(|(_, id)| **id == Some(unique_id))?;
+        Some(home.0.raw())
+    }
+
+    /// Takes the boards as they are for the commissioned ones.
+    ///
+    /// # Errors
+    /// The first board that bars it: not identified, of another version or role, or
+    /// one of two at its address. Then nothing changed.
+    pub fn commission(
+        &mut self,
+        alive: impl Fn(usize) -> bool,
+        master: u64,
+    ) -> Result<(), Refusal> {
+        let mut trial = *self;
+        trial.commissioned = [None; NODES];
+        for ((node, place), index) in trial.nodes.iter_mut().zip(&mut trial.commissioned).zip(0..) {
+            if let Enumerated::Foreign(identity) = node.enumerated {
+                node.enumerated = judged(Address::of_slot(index), identity, master);
+            }
+            *place = node.unique_id();
+        }
+        match trial.bar_to_arming(alive, master) {
+            Some(bar) if !matches!(bar, Refusal::NodeFault { .. }) => Err(bar),
+            _ => {
+                *self = trial;
+                Ok(())
+            }
+        }
+    }
+
     /// Node index 0..8.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<&Node> {
@@ -88,11 +145,6 @@ impl Nodes {
 
     /// Stores an identity after checking it against the master's schema hash.
     pub fn identify(&mut self, from: Address, identity: Identity, schema_hash: u64) -> Enumerated {
-        let kind = if from.is_joint() {
-            BoardKind::Joint
-        } else {
-            BoardKind::Wheel
-        };
         let node = from.slot().and_then(|index| self.get(index));
         if let Some(twins) = node.filter(|node| node.has_twin()) {
             return twins.enumerated;
@@ -101,17 +153,33 @@ impl Nodes {
         let result = if let Some(known) = known.filter(|known| *known != identity.unique_id) {
             // Known and not lost since: this is another board.
             Enumerated::Twins([known, identity.unique_id])
-        } else if identity.schema_hash != schema_hash {
-            Enumerated::Schema(identity)
-        } else if identity.board != kind || identity.address != from {
-            Enumerated::Role(identity)
+        } else if self
+            .commissioned(from)
+            .is_some_and(|id| id != identity.unique_id)
+        {
+            Enumerated::Foreign(identity)
         } else {
-            Enumerated::Ready(identity)
+            judged(Some(from), identity, schema_hash)
         };
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.enumerated = result;
         }
         result
+    }
+
+    /// Takes the frames that a node has counted. True if it goes on counting from
+    /// where it was: a board that was reset since begins anew.
+    pub fn counted(&mut self, from: Address, frames: u32) -> bool {
+        let node = from.slot().and_then(|index| self.nodes.get_mut(index));
+        let before = node.and_then(|node| node.frames.replace(frames));
+        before.is_some_and(|before| before <= frames)
+    }
+
+    /// What a node has counted is not compared any more: it has said why it started.
+    pub fn forget_count(&mut self, from: Address) {
+        if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
+            node.frames = None;
+        }
     }
 
     /// A node did not answer the question who it is: it is missing, or it and a twin
@@ -153,6 +221,7 @@ impl Nodes {
                         master,
                         theirs: identity.schema_hash,
                     }),
+                    Enumerated::Foreign(_) => Some(Refusal::ForeignBoard { node: address }),
                     Enumerated::Role(_) => Some(Refusal::WrongRole { node: address }),
                     Enumerated::Twins(_) => Some(Refusal::DuplicateAddress { node: address }),
                     Enumerated::Unknown => Some(Refusal::NodeMissing { node: address }),
@@ -200,6 +269,22 @@ impl Nodes {
             node.last
                 .is_some_and(|reply| matches!(reply.mode, NodeMode::Armed | NodeMode::Tracking))
         })
+    }
+}
+
+/// What a board is by what it says of itself.
+fn judged(from: Option<Address>, identity: Identity, schema_hash: u64) -> Enumerated {
+    let kind = if from.is_some_and(Address::is_joint) {
+        BoardKind::Joint
+    } else {
+        BoardKind::Wheel
+    };
+    if identity.schema_hash != schema_hash {
+        Enumerated::Schema(identity)
+    } else if identity.board != kind || Some(identity.address) != from {
+        Enumerated::Role(identity)
+    } else {
+        Enumerated::Ready(identity)
     }
 }
 

@@ -1,7 +1,10 @@
 //! Acyclic part of the cycle: sends requests, judges answers, enumerates.
 
+use wheeleg_protocol::frame::encoded_len;
 use wheeleg_protocol::link::{CYCLE_US, GiveUp, Outcome, SlotTiming, Step};
-use wheeleg_protocol::{Address, Disarm, Discover, Envelope, Identify, Message};
+use wheeleg_protocol::{
+    Address, Disarm, Discover, Envelope, Identify, LinkRecord, LinkReport, Message,
+};
 
 use super::acyclic::{Job, Purpose};
 use super::cycle::frame_of;
@@ -10,6 +13,8 @@ use super::{GroupKind, Layer0, Power};
 use crate::TxBytes;
 use crate::dispatcher::{Refusal, Ticket};
 use crate::event::{Event, Events};
+use crate::finding::Finding;
+use crate::setpoint::NODES;
 
 impl Layer0 {
     /// The request to send at `now_us`, if one is due and its answer will be in
@@ -42,10 +47,22 @@ impl Layer0 {
         None
     }
 
-    /// Waiting requests first; otherwise asks a present node that is not known.
+    /// Waiting requests first, then the master's own questions; otherwise asks a
+    /// present node that is not known.
     fn next_job(&mut self) -> Option<Job> {
         if let Some(job) = self.jobs.pop() {
             return Some(job);
+        }
+        let liveness = &self.liveness;
+        let question = self
+            .questions
+            .next(self.cycle, |index| liveness.alive(index));
+        if let Some((to, message)) = question {
+            return Some(Job {
+                to,
+                message,
+                purpose: Purpose::Report,
+            });
         }
         let to = self.nodes.next_unknown(self.ask_from)?;
         self.ask_from = usize::from(to.raw());
@@ -73,24 +90,24 @@ impl Layer0 {
         }
     }
 
-    /// Takes a frame from the bus that is no slot reply.
-    pub(super) fn on_answer(
+    /// Takes a frame from the bus that is no slot reply. False if nobody asked for it.
+    fn on_answer(
         &mut self,
         envelope: Envelope,
         message: &Message,
         now_us: u64,
         events: &mut Events,
-    ) {
+    ) -> bool {
         let Some(outcome) = self.requester.on_message(envelope, message) else {
             if let Message::Identity(_) = message {
                 // Nobody asked any more: a second board answers a question to one.
                 self.identified(envelope.source, Ok(*message), now_us, events);
             }
             self.counters.unexpected = self.counters.unexpected.wrapping_add(1);
-            return;
+            return false;
         };
         let Some(job) = self.in_flight.take() else {
-            return;
+            return true;
         };
         let result = match outcome {
             Outcome::Answered(answer) => Ok(answer),
@@ -100,6 +117,7 @@ impl Layer0 {
             }),
         };
         self.conclude(job, result, now_us, events);
+        true
     }
 
     fn conclude(
@@ -111,12 +129,14 @@ impl Layer0 {
     ) {
         match job.purpose {
             Purpose::Identify => self.identified(job.to, result, now_us, events),
+            Purpose::Report => self.reported(job.to, result, now_us, events),
             Purpose::Group => self.group_answer(result.err(), now_us, events),
             // A node that does not brake is frozen by its set-point all the same;
             // its own supervision stops it when it stops hearing SYNC.
             Purpose::Stop => {}
             // A wheel that kept its old profile still arrives; its speed shows it.
             Purpose::Profile => {}
+            Purpose::Saved(ticket) => self.saved(ticket, job.to, result, now_us, events),
             Purpose::User(ticket) => self.user_answer(ticket, job, result, now_us, events),
         }
     }
@@ -143,12 +163,108 @@ impl Layer0 {
                     theirs: identity.schema_hash,
                 },
             ),
+            Enumerated::Foreign(identity) => {
+                let found = identity.unique_id;
+                if let Some(commissioned) = self.nodes.commissioned(from) {
+                    let belongs = self.nodes.home_of(found);
+                    events.push(
+                        now_us,
+                        Event::ForeignBoard {
+                            node,
+                            commissioned,
+                            found,
+                            belongs,
+                        },
+                    );
+                }
+            }
             Enumerated::Role(_) => events.push(now_us, Event::WrongRole(node)),
             Enumerated::Twins(unique_ids) => {
                 events.push(now_us, Event::DuplicateAddress { node, unique_ids });
             }
             Enumerated::Unknown => {}
         }
+    }
+
+    /// The answer to a question of the master's own. One that is not answered is
+    /// not repeated: a board that comes back is asked anew.
+    fn reported(
+        &mut self,
+        from: Address,
+        result: Result<Message, Refusal>,
+        now_us: u64,
+        events: &mut Events,
+    ) {
+        let (node, Some(index)) = (from.raw(), from.slot()) else {
+            return;
+        };
+        match result {
+            Ok(Message::FaultRecord(record)) => {
+                events.push(now_us, Event::Diagnosis { node, record });
+                // What led to it.
+                self.questions.log(index);
+                self.nodes.forget_count(from);
+            }
+            Ok(Message::LinkRecord(record)) => {
+                self.heard(from, record, now_us, events);
+            }
+            Ok(Message::LogRecords(records)) => {
+                for entry in records.iter() {
+                    events.push(now_us, Event::Log { node, entry });
+                }
+                if records.lost > 0 {
+                    let records = records.lost;
+                    events.push(now_us, Event::LogLost { node, records });
+                }
+                if records.left > 0 {
+                    self.questions.log(index);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// What a board has heard. True if it was not reset since it was asked last.
+    fn heard(
+        &mut self,
+        from: Address,
+        record: LinkRecord,
+        now_us: u64,
+        events: &mut Events,
+    ) -> bool {
+        let (node, index) = (from.raw(), from.slot().unwrap_or(NODES));
+        let known = self.nodes.get(index).is_some_and(|n| n.frames.is_some());
+        let went_on = self.nodes.counted(from, record.frames);
+        if known && !went_on {
+            self.questions.why(index);
+        }
+        events.push(now_us, Event::Link { node, record });
+        if let Some(babbler) = self.line.heard(index, &record) {
+            let (node, finding) = (Some(babbler.raw()), Finding::Babbler);
+            events.push(now_us, Event::Found { node, finding });
+        }
+        went_on
+    }
+
+    /// A board says that it has stored its parameters. If it was reset meanwhile,
+    /// those that it has stored are not those that it was told.
+    fn saved(
+        &mut self,
+        ticket: Ticket,
+        from: Address,
+        result: Result<Message, Refusal>,
+        now_us: u64,
+        events: &mut Events,
+    ) {
+        let reason = match result {
+            Ok(Message::LinkRecord(record)) if self.heard(from, record, now_us, events) => {
+                events.push(now_us, Event::Done(ticket));
+                return;
+            }
+            Err(reason) => reason,
+            Ok(_) => Refusal::NodeReset { node: from.raw() },
+        };
+        events.push(now_us, Event::Refused { ticket, reason });
     }
 
     fn group_answer(&mut self, failed: Option<Refusal>, now_us: u64, events: &mut Events) {
@@ -200,11 +316,26 @@ impl Layer0 {
         events: &mut Events,
     ) {
         match result {
+            Ok(_) if matches!(job.message, Message::ParamSave(_)) => {
+                let look = Job {
+                    to: job.to,
+                    message: LinkReport {}.into(),
+                    purpose: Purpose::Saved(ticket),
+                };
+                if !self.jobs.push(look) {
+                    let reason = Refusal::Busy;
+                    events.push(now_us, Event::Refused { ticket, reason });
+                }
+            }
             Ok(answer) => {
                 if let Message::Position(position) = answer {
                     let joint = job.to.raw();
                     let stroke_mm = wheeleg_units::PositionMm::from_raw(position.position_raw);
                     events.push(now_us, Event::Position { joint, stroke_mm });
+                }
+                if let Message::ParamValue(value) = answer {
+                    let (node, id, raw) = (job.to.raw(), value.id, value.value);
+                    events.push(now_us, Event::Parameter { node, id, raw });
                 }
                 events.push(now_us, Event::Done(ticket));
             }
@@ -214,10 +345,15 @@ impl Layer0 {
 
     /// Takes bytes received from the bus; the last one ended at `t_end_us`.
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end_us: u64, events: &mut Events) {
+        let mut sound = false;
         for &byte in bytes {
+            self.line.byte();
             let Some(Ok(frame)) = self.decoder.push(byte) else {
                 continue;
             };
+            let encoded = encoded_len(frame.payload.len());
+            self.line.sound(encoded);
+            sound = true;
             let envelope = Envelope::from(frame.header);
             let parsed = Message::parse(&frame);
             if envelope.source == Address::MASTER {
@@ -228,9 +364,20 @@ impl Layer0 {
                 Ok(Message::SlotReply(reply)) if envelope.destination == Address::MASTER => {
                     self.on_reply(envelope.source, reply);
                 }
-                Ok(message) => self.on_answer(envelope, &message, t_end_us, events),
-                Err(_) => self.counters.unexpected = self.counters.unexpected.wrapping_add(1),
+                Ok(message) => {
+                    if !self.on_answer(envelope, &message, t_end_us, events) {
+                        self.line.unasked(envelope.source, encoded);
+                    }
+                }
+                Err(_) => {
+                    self.line.unasked(envelope.source, encoded);
+                    self.counters.unexpected = self.counters.unexpected.wrapping_add(1);
+                }
             }
+        }
+        if !sound {
+            let into_us = t_end_us.saturating_sub(self.cycle_start_us);
+            self.line.stretch(bytes, into_us);
         }
     }
 }

@@ -1,13 +1,15 @@
 //! Stops: E-stop, HOLD of all axes, and what triggers them.
 
-use wheeleg_protocol::{Address, EmergencyBrake, InputBits};
+use wheeleg_protocol::{Address, EmergencyBrake, InputBits, Message};
 
-use super::acyclic::Purpose;
+use super::acyclic::{Job, Purpose};
+use super::line::Found;
 use super::liveness::Change;
 use super::nodes::Node;
 use super::{GroupKind, Layer0, Power, STALL_CYCLES};
 use crate::dispatcher::Refusal;
 use crate::event::{Event, Events, HoldReason};
+use crate::finding::Finding;
 use crate::setpoint::Setpoints;
 
 /// Cycles that the nodes have to show a closed loop after the last of them
@@ -48,8 +50,18 @@ impl Layer0 {
         let mut refuse = |ticket| events.push(now_us, Event::Refused { ticket, reason });
         self.jobs.clear(&mut refuse);
         self.requester.cancel();
-        if let Some(Purpose::User(ticket)) = self.in_flight.take().map(|job| job.purpose) {
-            refuse(ticket);
+        match self.in_flight.take() {
+            Some(Job {
+                purpose: Purpose::Report,
+                to,
+                message,
+            }) => self.questions.again(to, &message),
+            Some(job) => {
+                if let Some(ticket) = job.purpose.ticket() {
+                    refuse(ticket);
+                }
+            }
+            None => {}
         }
         if let Some(group) = self.group.take() {
             refuse(group.ticket);
@@ -99,12 +111,62 @@ impl Layer0 {
         }
     }
 
+    /// Whether the node at `address` is just storing its parameters.
+    fn is_saving(&self, address: u8) -> bool {
+        self.power == Power::Disarmed
+            && self.in_flight.is_some_and(|job| {
+                job.to.raw() == address && matches!(job.message, Message::ParamSave(_))
+            })
+    }
+
+    /// A save stalls the board for two or three cycles, and it was asked to: it is
+    /// missed only when it does not come back.
+    fn unless_saving(
+        &mut self,
+        index: usize,
+        address: u8,
+        change: Option<Change>,
+    ) -> Option<Change> {
+        let saving = self.is_saving(address);
+        let stalled = self.stalled.get_mut(index)?;
+        match change {
+            Some(Change::Lost) if saving => {
+                *stalled = true;
+                None
+            }
+            Some(Change::Back) if core::mem::take(stalled) => None,
+            None if *stalled && !saving => {
+                *stalled = false;
+                Some(Change::Lost)
+            }
+            other => other,
+        }
+    }
+
+    /// What was on the line in this cycle beside what was asked for.
+    fn watch_line(&mut self, now_us: u64, events: &mut Events) {
+        let (nodes, questions) = (&self.nodes, &mut self.questions);
+        let replied = |index| nodes.get(index).is_some_and(|node| node.reply.is_some());
+        self.line.end_cycle(replied, |found| {
+            let (node, finding) = match found {
+                Found::Babble => (None, Finding::BusBabble),
+                Found::Flood(from) => (Some(from.raw()), Finding::LineFull),
+                Found::BabbleOver => {
+                    questions.links();
+                    return;
+                }
+            };
+            events.push(now_us, Event::Found { node, finding });
+        });
+    }
+
     /// Ends a cycle for the supervision of the nodes.
     pub(super) fn supervise(&mut self, now_us: u64, events: &mut Events) {
         if self.cycle == 0 {
             // No SYNC was sent: nobody could answer.
             return;
         }
+        self.watch_line(now_us, events);
         let mut lost = None;
         let mut changes = [None; crate::setpoint::NODES];
         self.liveness.end_cycle(|index, change| {
@@ -114,11 +176,16 @@ impl Layer0 {
         });
         for (index, change) in changes.into_iter().enumerate() {
             let address = Address::of_slot(index).map_or(0, Address::raw);
-            match change {
+            match self.unless_saving(index, address, change) {
                 Some(Change::Lost) => {
                     lost = lost.or(Some(address));
                     self.nodes.forget(index);
+                    self.questions.lost(index);
                     events.push(now_us, Event::NodeLost(address));
+                    if self.line.is_spoilt(index) {
+                        let (node, finding) = (Some(address), Finding::SlotBabble);
+                        events.push(now_us, Event::Found { node, finding });
+                    }
                     match address {
                         7 => self.odometry.rebase(crate::contact::Side::Left),
                         8 => self.odometry.rebase(crate::contact::Side::Right),
@@ -149,6 +216,9 @@ impl Layer0 {
         if self.power == Power::Armed
             && let Some(node) = self.nodes.first_disarmed()
         {
+            if self.hold.is_none() {
+                self.questions.why(usize::from(node).saturating_sub(1));
+            }
             self.hold_all(HoldReason::NodeDisarmed(node), now_us, events);
         }
         let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);

@@ -7,8 +7,9 @@ use wheeleg_master::event::Event;
 use wheeleg_master::telemetry::Record;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{
-    Ack, Address, BoardKind, Decoder, Envelope, FaultBits, Identity, InputBits, LimitBits,
-    MAX_ENCODED, Message, Nack, NackReason, NodeMode, Position, SCHEMA_HASH, SlotReply, Sync,
+    Ack, Address, BoardKind, Decoder, DisarmReason, Envelope, FaultBits, FaultCode, FaultRecord,
+    Identity, InputBits, LimitBits, LinkRecord, LogRecords, MAX_ENCODED, Message, Nack, NackReason,
+    NodeMode, ParamValue, Position, ResetCause, SCHEMA_HASH, SlotReply, Sync,
 };
 use wheeleg_units::{PositionMm, WheelCount};
 
@@ -31,7 +32,23 @@ pub(crate) struct FakeNode {
     pub(crate) refuse_arm: bool,
     pub(crate) echo_offset: u8,
     pub(crate) requests: Vec<Message>,
+    pub(crate) unique_id: [u8; 12],
+    pub(crate) fault_record: FaultRecord,
+    pub(crate) link: LinkRecord,
+    pub(crate) log: LogRecords,
+    pub(crate) parameter: i32,
+    /// Cycles for which a save will stall the board.
+    pub(crate) save_cycles: u8,
+    /// Cycles for which the board is stalled still.
+    pub(crate) stall: u8,
 }
+
+/// An empty log.
+pub(crate) const NO_LOG: LogRecords = LogRecords {
+    lost: 0,
+    left: 0,
+    entries: [0; 32],
+};
 
 impl FakeNode {
     fn new(address: Address) -> Self {
@@ -64,6 +81,33 @@ impl FakeNode {
             refuse_arm: false,
             echo_offset: 0,
             requests: Vec::new(),
+            unique_id: [address.raw(); 12],
+            fault_record: FaultRecord {
+                active: FaultBits::NONE,
+                sticky: FaultBits::NONE,
+                first_fault: FaultCode::NONE,
+                first_time_us: 0,
+                disarm_reason: DisarmReason::Reset,
+                limits: LimitBits::NONE,
+                reset_cause: ResetCause::PowerUp,
+                clock_offset_us: 0,
+            },
+            link: LinkRecord {
+                frames: 0,
+                overflow: 0,
+                truncated: 0,
+                short: 0,
+                crc: 0,
+                version: 0,
+                length: 0,
+                address: 0,
+                unsent: 0,
+                drift_ppm: 0,
+            },
+            log: NO_LOG,
+            parameter: 0,
+            save_cycles: 0,
+            stall: 0,
         }
     }
 
@@ -117,7 +161,7 @@ impl FakeNode {
                 address: self.address,
                 firmware: [1, 0, 0],
                 schema_hash: self.schema_hash,
-                unique_id: [self.address.raw(); 12],
+                unique_id: self.unique_id,
             }
             .into(),
             Message::Arm(_) if self.refuse_arm => nack(NackReason::FaultLatched),
@@ -150,6 +194,32 @@ impl FakeNode {
                 age_us: 0,
             }
             .into(),
+            Message::FaultReport(_) => self.fault_record.into(),
+            Message::LinkReport(_) => self.link.into(),
+            Message::LogRead(_) => core::mem::replace(&mut self.log, NO_LOG).into(),
+            Message::ParamGet(get) => ParamValue {
+                id: get.id,
+                value: self.parameter,
+            }
+            .into(),
+            Message::ParamSet(set) => {
+                self.parameter = set.value;
+                ParamValue {
+                    id: set.id,
+                    value: set.value,
+                }
+                .into()
+            }
+            Message::ParamSave(_) => {
+                self.stall = self.save_cycles;
+                match self.save_cycles {
+                    0 => Ack { request }.into(),
+                    _ => {
+                        self.save_cycles = 0;
+                        nack(NackReason::Busy)
+                    }
+                }
+            }
             _ => Ack { request }.into(),
         }
     }
@@ -215,7 +285,8 @@ impl Rig {
         assert_eq!(envelope.destination, Address::BROADCAST);
         let mut t = start + 1_020;
         for node in &mut self.nodes {
-            if node.silent {
+            node.stall = node.stall.saturating_sub(1);
+            if node.silent || node.stall > 0 {
                 continue;
             }
             let reply = Message::from(node.on_sync(&sync));
@@ -227,7 +298,7 @@ impl Rig {
             let (envelope, request) = decode(&bytes).expect("a request");
             let node = &mut self.nodes[envelope.destination.slot().unwrap()];
             t += 700;
-            if !node.silent {
+            if !node.silent && node.stall == 0 {
                 let answer = node.on_request(&request);
                 let bytes = emit(&answer, node.address, envelope.sequence);
                 self.master.on_bus_bytes(&bytes, t);

@@ -5,6 +5,9 @@ use super::row::{Expect, Row, Stop};
 use super::run::Ran;
 use crate::config::RobotConfig;
 
+/// Mode of a board that is disarmed.
+const IDLE: u8 = 1;
+
 /// Wheels must stand within this after their ramp may begin at the latest, ms.
 const WHEEL_STOP_MS: f64 = 440.0;
 /// Sampling of the log and rounding of times, ms.
@@ -103,6 +106,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         }
         Expect::GoesOn { deviation_mm } => goes_on(&mut f, deviation_mm, &m),
         Expect::Degrades => degrades(&mut f, &m),
+        Expect::StartsAnew { board } => starts_anew(&mut f, board, ran, &m),
         Expect::NoArming => f.check(ran.error.is_some(), || "the robot gets ready".to_owned()),
         Expect::NotImplemented(_) => {}
     }
@@ -175,6 +179,20 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, m: &Measured) {
     f.check(m.latched, || "not latched".to_owned());
     if row.estop {
         f.within("supply dump commanded", m.dump_ms, expected.all_ms);
+    }
+}
+
+fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
+    f.check(!m.drives, || "an axis drives".to_owned());
+    let rows = ran.recording.joints.get(usize::from(board) - 1);
+    let last = rows.and_then(|rows| rows.last()).map(|row| row.v.mode);
+    f.check(last == Some(IDLE), || {
+        format!("the board ends in mode {last:?}, not disarmed")
+    });
+    if let Some(ms) = m.detected_ms {
+        f.0.push(format!(
+            "a fault is latched, or all axes hold, after {ms:.1} ms"
+        ));
     }
 }
 

@@ -51,6 +51,8 @@ pub struct Measured {
     pub stopped: bool,
     /// No axis drives again, though the cause may be gone and arming was asked for.
     pub latched: bool,
+    /// An axis drives at or after the instant.
+    pub drives: bool,
     /// Frames that were put on the line, start-up included.
     pub sent_frames: u64,
     /// Frames that a receiver accepted.
@@ -139,6 +141,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
     m.supply_switch_ms = supply().find(|s| !s.v.pressure_switch).map(|s| ms(s.t_s()));
     m.stopped = m.commanded_ms.is_some() && m.sensed_ms.is_some();
     m.latched = m.stopped && ran.arming_asked;
+    m.drives = drives(r, at_s);
     m.held_mm = worst(&safe).and_then(|from_s| held_mm(r, from_s));
     m.deviation_mm = sound.and_then(|sound| deviation_mm(r, sound, at_s));
     let after = |t: f64| t >= since_s;
@@ -260,6 +263,15 @@ fn safe_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64>
     }
 }
 
+/// Whether any axis drives at or after `from_s`.
+fn drives(r: &Recording, from_s: f64) -> bool {
+    let after = |t_s: f64| t_s >= from_s - 1e-9;
+    let mut joints = r.joints.iter().flatten();
+    let mut wheels = r.wheels.iter().flatten();
+    joints.any(|s| after(s.t_s()) && (DRIVING.contains(&s.v.mode) || commanded_open(&s.v)))
+        || wheels.any(|s| after(s.t_s()) && DRIVING.contains(&s.v.mode))
+}
+
 fn stand_s(r: &Recording, from_s: f64) -> Option<f64> {
     let times: Vec<Option<f64>> = r
         .wheels
@@ -303,7 +315,9 @@ fn deviation_mm(r: &Recording, sound: &Recording, from_s: f64) -> Option<f64> {
 fn reads(ran: &Ran) -> Vec<String> {
     let from_ns = (ran.at_s * 1e9).round() as u64;
     let events = ran.recording.events.iter();
-    let events = events.filter(|e| e.t_ns >= from_ns && e.v.kind != "contact");
+    // What the scenario does is not what the robot says of it.
+    let said = |kind: &str| kind != "contact" && kind != "scenario";
+    let events = events.filter(|e| e.t_ns >= from_ns && said(&e.v.kind));
     let mut lines: Vec<String> = Vec::new();
     let dropped = ran.recording.dropped;
     let told = (dropped > 0).then(|| format!("{dropped} messages could not be written to the log"));

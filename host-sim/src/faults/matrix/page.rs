@@ -80,6 +80,9 @@ pub(super) fn reaction(row: &Row) -> String {
         }
         Expect::GoesOn { .. } => "the motion goes on".to_owned(),
         Expect::Degrades => "goes on, or all axes stop; nothing wrong is acted on".to_owned(),
+        Expect::StartsAnew { board } => {
+            format!("board {board} starts anew, disarmed, with the old parameters or the new ones")
+        }
         Expect::NoArming => "the robot does not arm".to_owned(),
         Expect::NotImplemented(reason) => reason.to_owned(),
     }

@@ -62,6 +62,11 @@ pub enum Expect {
     /// The motion goes on, or every axis is stopped and stays so; what was not on
     /// the line is not acted on.
     Degrades,
+    /// This board, disarmed, is reset and stays disarmed; nothing else happens.
+    StartsAnew {
+        /// Bus address.
+        board: u8,
+    },
     /// The robot does not arm.
     NoArming,
     /// It cannot be injected, and why.
@@ -104,6 +109,19 @@ pub enum Variant {
     Long,
 }
 
+/// What the user asks of a board's parameters in a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ask {
+    /// Disarm the robot: parameters are stored only then.
+    Disarm,
+    /// Set one of a joint's, by name, to a value in its unit.
+    Write(u8, &'static str, f64),
+    /// Store those of a board.
+    Save(u8),
+    /// Read one of a joint's.
+    Read(u8, &'static str),
+}
+
 /// One row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -111,6 +129,8 @@ pub struct Row {
     pub id: &'static str,
     /// What goes wrong.
     pub strikes: &'static [Strike],
+    /// What the user asks, s after the instant.
+    pub asks: &'static [(f64, Ask)],
     /// Whether the E-stop is pressed 100 ms after the instant; latencies count from then.
     pub estop: bool,
     /// When.
@@ -157,6 +177,7 @@ pub(super) const fn row(
     Row {
         id,
         strikes,
+        asks: &[],
         estop: false,
         phase,
         after_s: AFTER_S,
@@ -191,6 +212,11 @@ impl Row {
 
     pub(super) const fn answering(mut self, boards: u8) -> Self {
         self.answering = boards;
+        self
+    }
+
+    pub(super) const fn asking(mut self, asks: &'static [(f64, Ask)]) -> Self {
+        self.asks = asks;
         self
     }
 

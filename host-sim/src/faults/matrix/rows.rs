@@ -1,7 +1,8 @@
 //! The table: every row of the fault matrix (host-sim/FAULTS.md).
 
 use super::row::{
-    Expect, FOR_GOOD, Phase, Row, Strike, Variant, at, missing, row, stop, stop_axis, stop_moving,
+    Ask, Expect, FOR_GOOD, Phase, Row, Strike, Variant, at, missing, row, stop, stop_axis,
+    stop_moving,
 };
 
 /// Watchdog of 50 ms and one bus cycle; not before the watchdog time less the
@@ -21,6 +22,16 @@ const SENSOR_SHUT_MS: f64 = 4.1;
 const OTHERS_MS: f64 = 35.0;
 /// Two bus cycles and a tick: every board has heard the E-stop, ms.
 const ESTOP_MS: f64 = 23.0;
+
+/// A user changes a parameter and stores it, and looks at it later.
+const SAVE: [(f64, Ask); 5] = [
+    (-0.3, Ask::Disarm),
+    (-0.2, Ask::Read(3, FOLLOWING)),
+    (-0.1, Ask::Write(3, FOLLOWING, 55.0)),
+    (0.0, Ask::Save(3)),
+    (0.8, Ask::Read(3, FOLLOWING)),
+];
+const FOLLOWING: &str = "following_error";
 
 const ETHERNET: &str = "there is no Ethernet user interface yet";
 const UPDATE: &str = "there is no firmware update over the bus yet";
@@ -63,12 +74,15 @@ pub const ROWS: &[Row] = &[
     row("node-off/wheel", &[at("node-off:wheel8", FOR_GOOD)], Phase::Push,
         stop_axis(8, ABSENT_MS, 1.1, ABSENT_SHUT_MS), &["wheel 8 is lost"]).answering(7),
     row("node-reset/joint", &[at("node-reset:joint3", FOR_GOOD)], Phase::Flight,
-        stop_axis(3, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 3", "reset"]),
+        stop_axis(3, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 3 says why: it has started anew"]),
     row("babble/guarded", &[at("babble:joint5", 0.3)], Phase::Push,
-        stop(ABSENT_MS, ABSENT_SHUT_MS), &["joint 5 is lost"]).answering(7)
-        .noted("the other seven boards' slots are unaffected"),
+        stop_axis(5, [0.0, 12.0], 13.0, ABSENT_SHUT_MS),
+        &["joint 5 is lost", "joint 5: It sends rubbish in its own slot", "replace this board",
+          "joint 5 says why: first fault", "its driver was cut off"]).answering(7)
+        .noted("the other seven boards' slots are unaffected; the board that is cut off stops by itself"),
     row("babble/unguarded", &[at("babble-unguarded:joint5", 0.3)], Phase::Push,
-        stop([9.0, 60.0], LINK_SHUT_MS), &["babble"]),
+        stop([9.0, 60.0], LINK_SHUT_MS),
+        &["source unknown", "Unplug the boards one by one", "joint 5: It heard nothing of the rubbish", "replace this board"]),
     row("duplicate-address/joint", &[at("duplicate-address:joint4", FOR_GOOD)], Phase::Push,
         stop([9.0, 1000.0], 1000.0), &["joint 4", "address straps"])
         .noted("a board that is plugged in is silent for its self-test; its first reply collides after that"),
@@ -78,7 +92,7 @@ pub const ROWS: &[Row] = &[
     row("e-stop/walking", &[], Phase::Flight,
         stop([0.0, ESTOP_MS], ESTOP_MS), &["E-stop"]).with_estop(),
     row("e-stop/bus-full", &[at("bus-full", FOR_GOOD)], Phase::Push,
-        stop([0.0, ESTOP_MS], ESTOP_MS), &["E-stop", "Emergency stop."]).with_estop()
+        stop([0.0, ESTOP_MS], ESTOP_MS), &["E-stop", "Emergency stop.", "wheel 8: It fills the line", "Unplug this board"]).with_estop()
         .noted("the line is loaded to more than 95 %"),
     // The line.
     row("bit-errors/1e-6", &[at("bit-errors=1e-6", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
@@ -149,22 +163,30 @@ pub const ROWS: &[Row] = &[
     missing("foot-sinks", SOFT),
     // Brown-out.
     row("brown-out/motion", &[at("brown-out:joint2=30", FOR_GOOD)], Phase::Push,
-        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2 is lost", "supply"]),
+        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2 is lost", "joint 2 says why: it has started anew", "brown-out: check the supply of this board"]),
     row("brown-out/supply-board", &[at("brown-out:wheel7=30", FOR_GOOD)], Phase::Push,
-        stop_axis(7, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 7 is lost", "supply"]),
-    row("brown-out/save", &[at("brown-out:joint3=30", FOR_GOOD)], Phase::Stand,
-        stop_axis(3, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 3", "parameters saved"])
-        .noted("needs a request to save; the store itself is tested with power cut at every word (firmware/board)"),
+        stop_axis(7, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 7 is lost", "wheel 7 says why: it has started anew", "brown-out: check the supply of this board"]),
+    row("brown-out/save", &[later("brown-out:joint3=30", 0.02, FOR_GOOD)], Phase::Stand,
+        Expect::StartsAnew { board: 3 },
+        &["SaveParameters refused: joint 3", "joint 3 says why: it has started anew",
+          "brown-out: check the supply of this board", "parameter following_error of joint 3 is 60 mm"])
+        .asking(&SAVE)
+        .noted("the power fails while the page for the new set is erased; every other instant of a save, in the tests of the store and of `sil`, and on the emulated board"),
+    row("brown-out/saved", &[later("brown-out:joint3=30", 0.3, FOR_GOOD)], Phase::Stand,
+        Expect::StartsAnew { board: 3 },
+        &["SaveParameters done", "joint 3 says why: it has started anew", "parameter following_error of joint 3 is 55 mm"])
+        .asking(&SAVE)
+        .noted("the power fails when the parameters are stored: the new set is there"),
     missing("brown-out/update", UPDATE),
     // Processor.
     row("processor-hang", &[at("node-hang:joint3", FOR_GOOD)], Phase::Flight,
-        stop_axis(3, [0.0, 60.0], 51.1, 75.0), &["joint 3: The board was reset", "watchdog"])
+        stop_axis(3, [0.0, 60.0], 51.1, 75.0), &["joint 3 says why:", "The board was reset in operation", "The program did not feed the hardware watchdog", "report this with the firmware version"])
         .noted("the watchdog period is 50 ms (firmware/board/BOARD.md), not the 20 ms of the matrix: a flash save stalls the board for about 20 ms"),
     row("stack-overflow", &[at("node-reset:joint2", FOR_GOOD)], Phase::Push,
-        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2", "reset"])
+        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2 says why: it has started anew"])
         .noted("as seen from outside: the fault handler of the image resets the board; the images' worst stack is bounded by `cargo xtask sizes`"),
     row("panic", &[at("node-reset:wheel8", FOR_GOOD)], Phase::Push,
-        stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 8", "reset"])
+        stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 8 says why: it has started anew"])
         .noted("as seen from outside: the panic handler resets the board; the link check proves that no panic is reachable"),
     // Time.
     row("clock-drift/200ppm", &[at("clock-drift:joint6=200", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),

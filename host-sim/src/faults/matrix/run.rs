@@ -4,14 +4,16 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
+use wheeleg_protocol::param::JOINT_PARAMS;
 
 use super::judge::{Outcome, judge};
 use super::measure::{Measured, measure};
-use super::row::{Expect, Phase, Row, Variant};
+use super::row::{Ask, Expect, Phase, Row, Variant};
 use super::rows::ROWS;
 use crate::SimError;
 use crate::config::{
-    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
+    EventAction, LegChoice, Motion, ParameterChoice, RobotConfig, Scenario, ScenarioEvent,
+    TargetSet, builtin,
 };
 use crate::faults::{FaultSpec, check};
 use crate::run::DEFAULT_SCENARIO;
@@ -125,9 +127,14 @@ impl Robots {
                 .events
                 .push(event(at_s + ESTOP_S, EventAction::EStop));
         }
+        for (after_s, ask) in row.asks {
+            scenario.events.push(event(at_s + after_s, asked(ask)));
+        }
         let arming_asked = matches!(row.expect, Expect::Stop(_) | Expect::Degrades);
         if arming_asked {
-            scenario.events.push(event(duration_s - ARM_S, arm()));
+            scenario
+                .events
+                .push(event(duration_s - ARM_S, command("Arm")));
         }
         check(&scenario)?;
         let (recording, line, error) = simulate(&scenario, robot, self.seed);
@@ -144,12 +151,43 @@ impl Robots {
     }
 }
 
-fn arm() -> EventAction {
+fn command(name: &str) -> EventAction {
     EventAction::Command {
-        name: "Arm".to_owned(),
+        name: name.to_owned(),
         joint: None,
         stroke_m: None,
         travel_m: None,
+        board: None,
+        parameter: None,
+    }
+}
+
+/// What a user asks of a joint's parameters.
+fn asked(ask: &Ask) -> EventAction {
+    let (name, node, of) = match *ask {
+        Ask::Disarm => return command("Disarm"),
+        Ask::Save(node) => ("SaveParameters", node, None),
+        Ask::Read(node, of) => ("ReadParameter", node, Some((of, None))),
+        Ask::Write(node, of, value) => ("WriteParameter", node, Some((of, Some(value)))),
+    };
+    let chosen = of.and_then(|(of, value)| {
+        let info = JOINT_PARAMS.iter().find(|info| info.name == of)?;
+        let scale = f64::from(info.format.fraction_bits()).exp2();
+        Some(ParameterChoice {
+            id: info.id,
+            raw: value.map(|value: f64| (value * scale).round() as i32),
+        })
+    });
+    match command(name) {
+        EventAction::Command { name, .. } => EventAction::Command {
+            name,
+            joint: None,
+            stroke_m: None,
+            travel_m: None,
+            board: Some(node),
+            parameter: chosen,
+        },
+        other => other,
     }
 }
 

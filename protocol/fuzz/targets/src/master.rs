@@ -54,7 +54,8 @@ enum Action {
     Inputs(u8, u8),
     /// A node echoes another cycle.
     Echo(u8, u8),
-    /// A node is somewhere else at once.
+    /// A node is somewhere else at once; what it says of its link and its log is
+    /// another, too, and its next save takes another time.
     Position(u8, i32),
     /// A node was built from another interface definition.
     Schema(u8, bool),
@@ -121,6 +122,7 @@ impl<'a> Arbitrary<'a> for AnyCommand {
             20 | 21 => Command::StartGait,
             22 => Command::StopGait,
             23 => Command::SetGait(any_gait(u)?),
+            _ if u.ratio(1, 2_u8)? => any_service(u, joint, raw)?,
             _ => Command::FootTrajectory {
                 side,
                 shape: any_shape(u)?,
@@ -130,6 +132,17 @@ impl<'a> Arbitrary<'a> for AnyCommand {
         let client = if u.ratio(1, 8_u8)? { u.arbitrary()? } else { 0 };
         Ok(Self(command, late, client))
     }
+}
+
+/// A command about the boards themselves: 0 and 9 are no boards.
+fn any_service(u: &mut Unstructured<'_>, joint: u8, raw: i32) -> arbitrary::Result<Command> {
+    let (node, id) = (joint + u8::from(u.arbitrary::<bool>()?) * 2, u.arbitrary()?);
+    Ok(match u.int_in_range(0..=5_u8)? {
+        0 => Command::Commission,
+        1 => Command::ReadParameter { node, id },
+        2 | 3 => Command::WriteParameter { node, id, raw },
+        _ => Command::SaveParameters { node },
+    })
 }
 
 fn any_gait(u: &mut Unstructured<'_>) -> arbitrary::Result<GaitParams> {
@@ -271,7 +284,17 @@ impl Play {
                     InputBits::from_raw(raw).unwrap_or(InputBits::NONE);
             }
             Action::Echo(node, offset) => self.rig.nodes[index(node)].echo_offset = offset,
-            Action::Position(node, raw) => self.rig.nodes[index(node)].position = i64::from(raw),
+            Action::Position(node, raw) => {
+                let node = &mut self.rig.nodes[index(node)];
+                node.position = i64::from(raw);
+                let [a, b, c, d] = raw.to_le_bytes();
+                node.link.frames = raw as u32;
+                node.link.crc = u16::from(a);
+                node.log.left = b & 3;
+                node.log.lost = u16::from(c);
+                node.log.entries.fill(d);
+                node.save_cycles = d % 8;
+            }
             Action::Schema(node, own) => {
                 let other = u64::from(!own);
                 self.rig.nodes[index(node)].schema_hash = SCHEMA_HASH ^ other;

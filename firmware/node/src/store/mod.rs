@@ -18,7 +18,10 @@
 #[cfg(test)]
 mod tests;
 
-use crc::{CRC_32_ISCSI, Crc, NoTable};
+use crate::hardware::{ParameterStore, StoreError};
+use heapless::Vec;
+use wheeleg_protocol::frame::Checksum;
+use wheeleg_protocol::param::{JointParam, WheelParam};
 
 /// Pages of the store.
 pub const PAGES: usize = 2;
@@ -27,8 +30,15 @@ pub const WORDS: usize = 256;
 /// Records that a page holds.
 pub const RECORDS_MAX: usize = WORDS - 2;
 
+/// Records of the largest set that a board makes: every parameter it has.
+const SET_MAX: usize = if JointParam::COUNT > WheelParam::COUNT {
+    JointParam::COUNT
+} else {
+    WheelParam::COUNT
+};
+const _: () = assert!(SET_MAX <= RECORDS_MAX);
+
 const MAGIC: u16 = 0x5757;
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// The flash did not do what it was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,6 +115,17 @@ pub struct Store<F> {
     flash: F,
 }
 
+impl<F: Flash> ParameterStore for Store<F> {
+    #[inline(never)]
+    fn save(&mut self, records: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError> {
+        let mut set: Vec<Record, SET_MAX> = Vec::new();
+        for (id, raw) in records {
+            set.push(Record { id, raw }).map_err(|_| StoreError)?;
+        }
+        Self::save(self, &set).map(|_| ()).map_err(|_| StoreError)
+    }
+}
+
 impl<F: Flash> Store<F> {
     /// A store in these pages, whatever they hold.
     pub const fn new(flash: F) -> Self {
@@ -150,23 +171,34 @@ impl<F: Flash> Store<F> {
             self.flash.erase(1)?;
         }
         self.flash.erase(page)?;
-        let mut digest = CRC.digest();
+        let mut digest = Checksum::default();
         let header = u64::from(MAGIC) | (records.len() as u64) << 16 | u64::from(sequence) << 32;
-        let words = core::iter::once(header).chain(records.iter().map(|r| r.to_word()));
-        let mut end = 0_usize;
-        for (index, word) in words.enumerate() {
-            digest.update(&word.to_le_bytes());
-            self.flash.write(page, index, word)?;
-            end = index.saturating_add(1);
+        self.put(&mut digest, page, 0, header)?;
+        for (index, record) in (1..).zip(records) {
+            self.put(&mut digest, page, index, record.to_word())?;
         }
         let crc = digest.finalize();
         let commit = u64::from(crc) | u64::from(!crc) << 32;
-        self.flash.write(page, end, commit)?;
+        self.flash
+            .write(page, records.len().saturating_add(1), commit)?;
         // What hardware reports is believed only as far as it can be read back.
         match self.whole(page) {
             Some(copy) if copy.sequence == sequence => Ok(sequence),
             _ => Err(SaveError::Flash),
         }
+    }
+
+    /// Writes a word that the checksum covers.
+    #[inline(never)]
+    fn put(
+        &mut self,
+        digest: &mut Checksum,
+        page: usize,
+        index: usize,
+        word: u64,
+    ) -> Result<(), FlashError> {
+        digest.update(&word.to_le_bytes());
+        self.flash.write(page, index, word)
     }
 
     fn newest(&self) -> Option<Whole> {
@@ -185,14 +217,16 @@ impl<F: Flash> Store<F> {
         self.read(page, &mut |_| {})
     }
 
-    /// Hands the records of a page to `take`; gives the set if it was whole.
-    fn read(&self, page: usize, take: &mut impl FnMut(Record)) -> Option<Whole> {
+    /// Hands the records of a page to `take`; gives the set if it was whole. One copy
+    /// in flash serves both callers.
+    #[inline(never)]
+    fn read(&self, page: usize, take: &mut dyn FnMut(Record)) -> Option<Whole> {
         let header = self.flash.read(page, 0)?;
         let count = usize::from((header >> 16) as u16);
         if header as u16 != MAGIC || count > RECORDS_MAX {
             return None;
         }
-        let mut digest = CRC.digest();
+        let mut digest = Checksum::default();
         digest.update(&header.to_le_bytes());
         for index in 1..=count {
             let word = self.flash.read(page, index)?;

@@ -3,6 +3,7 @@
 use super::*;
 use core::cell::Cell;
 use proptest::prelude::*;
+use std::vec::Vec;
 
 /// How far the operation that the power cut hits gets.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,72 @@
+//! What the master finds out about the boards and the line by itself, with the
+//! sentence and the remedy of each. (Faults that a board latches have theirs in the
+//! protocol's table.)
+
+macro_rules! findings {
+    ($( $name:ident: $sentence:literal, $remedy:literal; )*) => {
+        /// Something that a person has to know and can mend.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Finding { $( #[doc = $sentence] $name, )* }
+
+        impl Finding {
+            /// All rows.
+            pub const ALL: &'static [Self] = &[ $( Self::$name ),* ];
+
+            /// What was found, for a person.
+            #[must_use]
+            pub const fn sentence(self) -> &'static str {
+                match self { $( Self::$name => $sentence ),* }
+            }
+
+            /// What to do about it.
+            #[must_use]
+            pub const fn remedy(self) -> &'static str {
+                match self { $( Self::$name => $remedy ),* }
+            }
+        }
+
+        impl core::fmt::Display for Finding {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                write!(f, "{} {}", self.sentence(), self.remedy())
+            }
+        }
+    };
+}
+
+findings! {
+    NodeLost: "It has missed three cycles.",
+        "Check its supply, its bus plug and its fuse.";
+    OtherInterface: "Its firmware was built from another interface definition than the master's.",
+        "Flash master and board from the same version.";
+    WrongRole: "It answers as another kind of board than its address stands for.",
+        "Check the address straps, and that the right image is flashed.";
+    ForeignBoard: "It is not the board that was commissioned at this address.",
+        "Put the right board in, or commission the robot anew.";
+    SlotBabble: "It sends rubbish in its own slot, where its driver-enable guard lets it through.",
+        "Switch the robot off and replace this board: its processor or line driver is damaged.";
+    BusBabble: "The bus is full of rubbish, and no slot tells who babbles: source unknown, the board's driver-enable guard is broken too.",
+        "Unplug the boards one by one until the line is quiet: the last one unplugged babbles.";
+    Babbler: "It heard nothing of the rubbish that all others heard: it babbled itself, and its driver-enable guard is broken.",
+        "Switch the robot off and replace this board.";
+    LineFull: "It fills the line with frames that nobody asked for.",
+        "Unplug this board or tool, or flash it with the master's version.";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_finding_has_a_sentence_and_a_remedy_of_its_own() {
+        for (i, a) in Finding::ALL.iter().enumerate() {
+            for text in [a.sentence(), a.remedy()] {
+                assert!(text.len() > 15 && text.ends_with('.'), "{text}");
+            }
+            assert!(
+                Finding::ALL[i + 1..]
+                    .iter()
+                    .all(|b| b.sentence() != a.sentence() && b.remedy() != a.remedy())
+            );
+        }
+    }
+}

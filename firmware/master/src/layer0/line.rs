@@ -1,0 +1,361 @@
+//! What is on the line beside what was asked for, and who sends it.
+//!
+//! A board that babbles within its driver-enable guard spoils its own slot alone:
+//! the slot names it. Without the guard it spoils all of them, and nobody can be
+//! heard; when the line is quiet again, the boards' own counters tell: a board whose
+//! driver is on hears nothing, so the one that has counted no errors has made them.
+
+use wheeleg_protocol::link::SlotTiming;
+use wheeleg_protocol::{Address, LinkRecord, Message, MessageType};
+
+use crate::setpoint::NODES;
+
+const TIMING: SlotTiming = SlotTiming::DEFAULT;
+/// A reply on the line, delimiters included.
+const REPLY_BYTES: usize = Message::encoded_len(MessageType::SlotReply);
+/// Rubbish in a slot that is no accident: half a reply, bytes.
+const SPOILT_SLOT: u32 = REPLY_BYTES as u32 / 2;
+/// Cycles in a row in which a slot is spoilt until it names its board; as many as
+/// make a board lost.
+const SPOILT_CYCLES: u8 = 3;
+/// Rubbish in a cycle that no damage of the traffic explains: 40 % of the line. All
+/// replies and the longest answer make less than 500 bytes with 232 of replies in
+/// slots, and an answer is not repeated in the same cycle.
+const BABBLE_BYTES: u32 = 400;
+/// Cycles in a row with so much rubbish.
+const BABBLE_CYCLES: u8 = 2;
+/// Cycles without after which the line is quiet.
+const QUIET_CYCLES: u8 = 10;
+/// Frames in a cycle that nobody asked for: 30 % of the line, bytes.
+const FLOOD_BYTES: u32 = 300;
+/// Cycles in a row with so many of them.
+const FLOOD_CYCLES: u8 = 10;
+/// Errors that babble leaves in the counters of whoever hears it, at least.
+const HEARD_ERRORS: u32 = 4;
+
+/// State of a condition that lasts: told at its begin, and again after its end.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lasting {
+    cycles: u8,
+    quiet: u8,
+    told: bool,
+}
+
+/// What a cycle brought for a condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Edge {
+    None,
+    Begins,
+    Ends,
+}
+
+impl Lasting {
+    fn cycle(&mut self, now: bool, begin: u8) -> Edge {
+        if now {
+            self.quiet = 0;
+            self.cycles = self.cycles.saturating_add(1);
+            if self.cycles >= begin && !self.told {
+                self.told = true;
+                return Edge::Begins;
+            }
+            return Edge::None;
+        }
+        self.cycles = 0;
+        self.quiet = self.quiet.saturating_add(1);
+        if self.told && self.quiet >= QUIET_CYCLES {
+            self.told = false;
+            return Edge::Ends;
+        }
+        Edge::None
+    }
+}
+
+/// What was found in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// The line is full of rubbish.
+    Babble,
+    /// It is over.
+    BabbleOver,
+    /// This node sends what nobody asked for.
+    Flood(Address),
+}
+
+/// Watch over the line.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Line {
+    /// Bytes since the last sound frame.
+    open: u32,
+    /// Bytes of this cycle that belong to no sound frame.
+    rubbish: u32,
+    /// The same by slot.
+    slots: [u32; NODES],
+    /// Bytes of this cycle in frames that nobody asked for, by node.
+    unasked: [u32; NODES],
+    spoilt: [u8; NODES],
+    babble: Lasting,
+    floods: [Lasting; NODES],
+    /// Errors that each node had counted before the babble, and after.
+    before: [Option<u32>; NODES],
+    after: [Option<u32>; NODES],
+    asks: bool,
+}
+
+impl Line {
+    /// A byte was heard.
+    #[inline]
+    pub fn byte(&mut self) {
+        self.open = self.open.saturating_add(1);
+    }
+
+    /// It ended a sound frame of `encoded` bytes, delimiters included.
+    pub fn sound(&mut self, encoded: usize) {
+        // Its first delimiter may have been the last one of the frame before it.
+        let own = u32::try_from(encoded).unwrap_or(u32::MAX);
+        self.rubbish = self.rubbish.saturating_add(self.open.saturating_sub(own));
+        self.open = 0;
+    }
+
+    /// A stretch of bytes without a sound frame ended `into_us` after the start of SYNC.
+    /// One that has the shape of a reply is a damaged reply, or two boards' at once.
+    pub fn stretch(&mut self, bytes: &[u8], into_us: u64) {
+        let whole = bytes.len().abs_diff(REPLY_BYTES) <= 1;
+        if whole && bytes.first() == Some(&0) && bytes.last() == Some(&0) {
+            return;
+        }
+        let (Some(first), Some(second)) = (Address::of_slot(0), Address::of_slot(1)) else {
+            return;
+        };
+        let begin = |address| TIMING.slot_start_us(address).unwrap_or(0);
+        let pitch = begin(second).saturating_sub(begin(first));
+        let sync = TIMING
+            .frame_us(MessageType::Sync)
+            .saturating_add(begin(first));
+        // A stretch that ends with its slot is within it.
+        let into = into_us.saturating_sub(u64::from(sync).saturating_add(1));
+        let slot = into.checked_div(u64::from(pitch));
+        let slot = slot.and_then(|slot| usize::try_from(slot).ok());
+        if let Some(rubbish) = slot.and_then(|slot| self.slots.get_mut(slot)) {
+            *rubbish = rubbish.saturating_add(u32::try_from(bytes.len()).unwrap_or(u32::MAX));
+        }
+    }
+
+    /// A sound frame that nobody asked for.
+    pub fn unasked(&mut self, from: Address, encoded: usize) {
+        if let Some(bytes) = from.slot().and_then(|index| self.unasked.get_mut(index)) {
+            *bytes = bytes.saturating_add(u32::try_from(encoded).unwrap_or(u32::MAX));
+        }
+    }
+
+    /// Ends a cycle; `replied` says which nodes were heard in it. Calls `found` for
+    /// what begins or ends.
+    pub fn end_cycle(&mut self, replied: impl Fn(usize) -> bool, mut found: impl FnMut(Found)) {
+        let rubbish = self.rubbish.saturating_add(core::mem::take(&mut self.open));
+        self.rubbish = 0;
+        match self.babble.cycle(rubbish >= BABBLE_BYTES, BABBLE_CYCLES) {
+            Edge::Begins => {
+                self.asks = false;
+                found(Found::Babble);
+            }
+            Edge::Ends => {
+                self.asks = true;
+                self.after = [None; NODES];
+                found(Found::BabbleOver);
+            }
+            Edge::None => {}
+        }
+        let slots = self.spoilt.iter_mut().zip(&mut self.slots);
+        for (index, (spoilt, bytes)) in slots.enumerate() {
+            let now = core::mem::take(bytes) >= SPOILT_SLOT && !replied(index);
+            *spoilt = if now { spoilt.saturating_add(1) } else { 0 };
+        }
+        let floods = self.floods.iter_mut().zip(&mut self.unasked);
+        for (index, (flood, bytes)) in floods.enumerate() {
+            let now = core::mem::take(bytes) >= FLOOD_BYTES;
+            if flood.cycle(now, FLOOD_CYCLES) == Edge::Begins
+                && let Some(address) = Address::of_slot(index)
+            {
+                found(Found::Flood(address));
+            }
+        }
+    }
+
+    /// Whether the slot of node index 0..8 has been spoilt for as long as a board is
+    /// given to answer, and its alone.
+    #[must_use]
+    pub fn is_spoilt(&self, index: usize) -> bool {
+        let spoilt = |slot: &u8| *slot >= SPOILT_CYCLES;
+        !self.babble.told
+            && self.spoilt.get(index).is_some_and(spoilt)
+            && self.spoilt.iter().filter(|slot| spoilt(slot)).count() == 1
+    }
+
+    /// Takes what node index 0..8 has heard. Gives the board that babbled, once, when
+    /// all others have counted rubbish since the babble began and it has not.
+    pub fn heard(&mut self, index: usize, record: &LinkRecord) -> Option<Address> {
+        let errors = [
+            record.overflow,
+            record.truncated,
+            record.short,
+            record.crc,
+            record.version,
+            record.length,
+            record.address,
+        ];
+        let errors = errors
+            .iter()
+            .fold(0_u32, |sum, count| sum.saturating_add(u32::from(*count)));
+        if self.babble.told {
+            // Not over, or just so: neither from before nor from after.
+            return None;
+        }
+        if !self.asks {
+            if let Some(before) = self.before.get_mut(index) {
+                *before = Some(errors);
+            }
+            return None;
+        }
+        if let Some(after) = self.after.get_mut(index) {
+            *after = Some(errors);
+        }
+        let mut deaf = None;
+        for (index, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
+            // One that was reset since has counted anew: it tells nothing.
+            let grown = (*after)?.checked_sub((*before)?)?;
+            if grown < HEARD_ERRORS {
+                if deaf.is_some() {
+                    self.asks = false;
+                    return None;
+                }
+                deaf = Some(index);
+            }
+        }
+        self.asks = false;
+        self.before = self.after;
+        deaf.and_then(Address::of_slot)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(errors: u16) -> LinkRecord {
+        LinkRecord {
+            frames: 1000,
+            overflow: 0,
+            truncated: errors / 2,
+            short: 0,
+            crc: errors - errors / 2,
+            version: 0,
+            length: 0,
+            address: 0,
+            unsent: 0,
+            drift_ppm: 0,
+        }
+    }
+
+    fn cycles(line: &mut Line, count: usize, bytes: u32) -> Vec<Found> {
+        let mut found = Vec::new();
+        for _ in 0..count {
+            (0..bytes).for_each(|_| line.byte());
+            line.end_cycle(|_| false, |f| found.push(f));
+        }
+        found
+    }
+
+    #[test]
+    fn broken_replies_and_answers_are_no_babble() {
+        let mut line = Line::default();
+        assert_eq!(cycles(&mut line, 50, 8 * 29 + 60), []);
+        for _ in 0..50 {
+            (0..232).for_each(|_| line.byte());
+            line.sound(232);
+            assert_eq!(cycles(&mut line, 1, 300), []);
+        }
+    }
+
+    #[test]
+    fn who_heard_nothing_of_it_has_babbled() {
+        for guilty in 0..NODES {
+            let mut line = Line::default();
+            for index in 0..NODES {
+                assert_eq!(line.heard(index, &record(7)), None);
+            }
+            assert_eq!(cycles(&mut line, 30, 1000), [Found::Babble]);
+            assert_eq!(cycles(&mut line, 20, 0), [Found::BabbleOver]);
+            for index in 0..NODES {
+                let errors = if index == guilty { 8 } else { 60 };
+                let told = line.heard(index, &record(errors));
+                let last = index + 1 == NODES;
+                assert_eq!(told, last.then(|| Address::of_slot(guilty)).flatten());
+            }
+            assert_eq!(line.heard(0, &record(60)), None, "told once");
+        }
+    }
+
+    #[test]
+    fn nobody_is_accused_when_all_or_two_are_deaf_or_one_was_reset() {
+        let after: [[u16; NODES]; 4] = [
+            [60; NODES],
+            [7; NODES],
+            [60, 60, 7, 60, 60, 7, 60, 60],
+            [60, 60, 7, 60, 60, 0, 60, 60],
+        ];
+        for counts in after {
+            let mut line = Line::default();
+            for index in 0..NODES {
+                line.heard(index, &record(7));
+            }
+            cycles(&mut line, 30, 1000);
+            cycles(&mut line, 20, 0);
+            for (index, errors) in counts.iter().enumerate() {
+                assert_eq!(line.heard(index, &record(*errors)), None, "{counts:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_spoilt_slot_names_its_board_unless_others_are_spoilt_too() {
+        let slot_end = |slot: u64| 1020 + 100 + slot * 310 + 310;
+        let mut line = Line::default();
+        let mut twins = [7; REPLY_BYTES];
+        [twins[0], twins[REPLY_BYTES - 1]] = [0; 2];
+        for _ in 0..5 {
+            line.stretch(&twins, slot_end(4));
+            line.end_cycle(|index| index != 4, |_| {});
+            assert!(!line.is_spoilt(4), "two replies at once");
+        }
+        for cycle in 0..3 {
+            assert!(!line.is_spoilt(4), "{cycle}");
+            line.stretch(&[7; 31], slot_end(4));
+            line.end_cycle(|index| index != 4, |_| {});
+        }
+        let named: Vec<usize> = (0..NODES).filter(|i| line.is_spoilt(*i)).collect();
+        assert_eq!(named, [4]);
+        for _ in 0..3 {
+            line.stretch(&[7; 31], slot_end(4));
+            line.stretch(&[7; 31], slot_end(5));
+            line.end_cycle(|_| false, |_| {});
+        }
+        assert!(!(0..NODES).any(|i| line.is_spoilt(i)));
+        line.end_cycle(|_| true, |_| {});
+        line.stretch(&[7; 31], slot_end(4));
+        line.end_cycle(|index| index != 4, |_| {});
+        assert!(!line.is_spoilt(4), "begins anew");
+    }
+
+    #[test]
+    fn who_fills_the_line_is_named_once() {
+        let mut line = Line::default();
+        let mut found = Vec::new();
+        let wheel = Address::wheel(8).unwrap();
+        for _ in 0..30 {
+            line.unasked(wheel, 200);
+            line.unasked(wheel, 200);
+            line.unasked(Address::joint(1).unwrap(), 200);
+            line.end_cycle(|_| true, |f| found.push(f));
+        }
+        assert_eq!(found, [Found::Flood(wheel)]);
+    }
+}

@@ -1,0 +1,225 @@
+//! Questions that the master asks by itself, in time that nobody else needs: why a
+//! board failed or started anew, what it has heard, what it has logged.
+//!
+//! They take one acyclic exchange in ten cycles, and one at once after a fault.
+
+use wheeleg_protocol::{Address, FaultReport, LinkReport, LogRead, Message, NodeMode, SlotReply};
+
+use crate::setpoint::NODES;
+
+/// Cycles between two questions of the round.
+const PERIOD_CYCLES: u32 = 10;
+/// Questions of a round: link and log of every board.
+const ROUND: usize = 2 * NODES;
+/// Time for which the boards go on recording, ms: three rounds of 1.6 s.
+const LEASE_MS: u16 = 5_000;
+
+/// What is to be asked of one board.
+#[derive(Clone, Copy, Debug, Default)]
+struct Open {
+    why: bool,
+    link: bool,
+    log: bool,
+    /// It was lost since it was last heard.
+    lost: bool,
+    /// Faults that its newest reply showed.
+    faults: u16,
+}
+
+/// What is to be asked of whom.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Questions {
+    nodes: [Open; NODES],
+    turn: usize,
+    next_cycle: u32,
+}
+
+impl Questions {
+    /// A reply of node index 0..8; `before` is the one before it, if the node has not
+    /// been lost since. A new fault is a question, and a start in operation.
+    pub fn on_reply(&mut self, index: usize, before: Option<&SlotReply>, reply: &SlotReply) {
+        let Some(node) = self.nodes.get_mut(index) else {
+            return;
+        };
+        let faults = reply.active_faults.raw();
+        let started =
+            reply.mode == NodeMode::Boot && before.is_some_and(|b| b.mode != NodeMode::Boot);
+        node.why |= faults & !node.faults != 0 || started || core::mem::take(&mut node.lost);
+        node.faults = faults;
+    }
+
+    /// Node index 0..8 is lost: when it is heard again, it is asked why.
+    pub fn lost(&mut self, index: usize) {
+        if let Some(node) = self.nodes.get_mut(index) {
+            *node = Open {
+                lost: true,
+                ..Open::default()
+            };
+        }
+    }
+
+    /// Node index 0..8 is to say why it stopped.
+    pub fn why(&mut self, index: usize) {
+        if let Some(node) = self.nodes.get_mut(index) {
+            node.why = true;
+        }
+    }
+
+    /// Node index 0..8 has more to log than was read.
+    pub fn log(&mut self, index: usize) {
+        if let Some(node) = self.nodes.get_mut(index) {
+            node.log = true;
+        }
+    }
+
+    /// All nodes are to say what they have heard.
+    pub fn links(&mut self) {
+        for node in &mut self.nodes {
+            node.link = true;
+        }
+    }
+
+    /// A question that has not been answered is asked again.
+    pub fn again(&mut self, to: Address, message: &Message) {
+        let Some(node) = to.slot().and_then(|index| self.nodes.get_mut(index)) else {
+            return;
+        };
+        match message {
+            Message::FaultReport(_) => node.why = true,
+            Message::LogRead(_) => node.log = true,
+            _ => node.link = true,
+        }
+    }
+
+    /// The next question in cycle `cycle` to a node that is `alive`; it is then taken
+    /// as asked.
+    pub fn next(
+        &mut self,
+        cycle: u32,
+        alive: impl Fn(usize) -> bool,
+    ) -> Option<(Address, Message)> {
+        let mut open = Address::nodes().zip(&mut self.nodes).enumerate();
+        let urgent = open.find_map(|(index, (to, node))| {
+            if !alive(index) {
+                return None;
+            }
+            let message: Message = if core::mem::take(&mut node.why) {
+                FaultReport {}.into()
+            } else if core::mem::take(&mut node.log) {
+                read_log()
+            } else if core::mem::take(&mut node.link) {
+                LinkReport {}.into()
+            } else {
+                return None;
+            };
+            Some((to, message))
+        });
+        urgent.or_else(|| self.routine(cycle, alive))
+    }
+
+    fn routine(&mut self, cycle: u32, alive: impl Fn(usize) -> bool) -> Option<(Address, Message)> {
+        // Half the counter's range ahead means: due.
+        if self.next_cycle.wrapping_sub(cycle) as i32 > 0 {
+            return None;
+        }
+        self.next_cycle = cycle.wrapping_add(PERIOD_CYCLES);
+        let turn = self.turn;
+        self.turn = if turn.saturating_add(1) < ROUND {
+            turn.saturating_add(1)
+        } else {
+            0
+        };
+        let index = turn.checked_rem(NODES)?;
+        let to = Address::of_slot(index).filter(|_| alive(index))?;
+        Some(if turn < NODES {
+            (to, LinkReport {}.into())
+        } else {
+            (to, read_log())
+        })
+    }
+}
+
+fn read_log() -> Message {
+    LogRead { lease_ms: LEASE_MS }.into()
+}
+
+// A lease outlasts the round that renews it, with a lost answer or two.
+const _: () = assert!(LEASE_MS as u32 > 2 * ROUND as u32 * PERIOD_CYCLES * 10);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_protocol::{Fault, FaultBits, InputBits, LimitBits};
+
+    fn reply(mode: NodeMode, faults: FaultBits) -> SlotReply {
+        SlotReply {
+            position_raw: 0,
+            velocity_raw: 0,
+            effort_raw: 0,
+            active_faults: faults,
+            mode,
+            limits: LimitBits::NONE,
+            inputs: InputBits::NONE,
+            sync_echo: 0,
+        }
+    }
+
+    /// Questions of the cycles 0 to `cycles`, at most one a cycle.
+    fn asked(questions: &mut Questions, cycles: u32) -> Vec<(u8, Message)> {
+        let next = |cycle| questions.next(cycle, |_| true);
+        let found: Vec<_> = (0..cycles).filter_map(next).collect();
+        found.into_iter().map(|(to, m)| (to.raw(), m)).collect()
+    }
+
+    #[test]
+    fn a_round_asks_every_living_board_for_its_link_and_its_log() {
+        let mut questions = Questions::default();
+        let round = asked(&mut questions, 160);
+        let expected: Vec<_> = (1..=8)
+            .map(|n| (n, LinkReport {}.into()))
+            .chain((1..=8).map(|n| (n, read_log())))
+            .collect();
+        assert_eq!(round, expected);
+        for cycle in 0..320 {
+            let asked = questions.next(160 + cycle, |index| index == 3);
+            assert!(asked.is_none_or(|(to, _)| to.raw() == 4));
+        }
+    }
+
+    #[test]
+    fn a_new_fault_is_asked_for_at_once_and_once() {
+        let mut questions = Questions::default();
+        questions.next_cycle = 100;
+        let fault = reply(NodeMode::Hold, Fault::NoMotion.into());
+        questions.on_reply(2, None, &fault);
+        questions.on_reply(2, Some(&fault), &fault);
+        assert_eq!(asked(&mut questions, 50), [(3, FaultReport {}.into())]);
+        let another = reply(
+            NodeMode::Hold,
+            FaultBits::from(Fault::NoMotion).with(Fault::LinkLost),
+        );
+        questions.on_reply(2, Some(&fault), &another);
+        assert_eq!(asked(&mut questions, 50).len(), 1);
+        questions.on_reply(2, Some(&another), &reply(NodeMode::Hold, FaultBits::NONE));
+        assert_eq!(asked(&mut questions, 50), []);
+    }
+
+    #[test]
+    fn a_board_that_starts_in_operation_or_comes_back_is_asked_why_but_not_at_first_sight() {
+        let mut questions = Questions::default();
+        questions.next_cycle = 100;
+        let (boot, idle) = (
+            reply(NodeMode::Boot, FaultBits::NONE),
+            reply(NodeMode::Idle, FaultBits::NONE),
+        );
+        questions.on_reply(4, None, &boot);
+        questions.on_reply(4, Some(&boot), &idle);
+        assert_eq!(asked(&mut questions, 50), [], "power-up");
+        questions.on_reply(4, Some(&idle), &boot);
+        assert_eq!(asked(&mut questions, 50).len(), 1, "started anew");
+        questions.lost(4);
+        assert_eq!(asked(&mut questions, 50), [], "nobody answers");
+        questions.on_reply(4, None, &idle);
+        assert_eq!(asked(&mut questions, 50).len(), 1, "back");
+    }
+}

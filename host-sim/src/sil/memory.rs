@@ -1,0 +1,196 @@
+//! The parameter memory of a board: two pages of flash that keep their contents
+//! without power, take their time, and stop where the power does.
+
+use wheeleg_node::hardware::ParameterStore;
+use wheeleg_node::store::{Flash, FlashError, PAGES, RECORDS_MAX, Store, WORDS};
+
+/// Erasure of a page, typical, ns (DATASHEET DS12589: 22.02 ms).
+const ERASE_NS: u64 = 22_020_000;
+/// Programming of a double word, typical, ns (DATASHEET DS12589: 81.69 µs).
+const PROGRAM_NS: u64 = 81_690;
+/// An erased word.
+const BLANK: Option<u64> = Some(u64::MAX);
+
+/// Two pages; a word that a power cut has torn cannot be read.
+#[derive(Debug, Clone)]
+struct Pages {
+    words: [[Option<u64>; WORDS]; PAGES],
+    /// Time that the operations so far have taken, ns.
+    took_ns: u64,
+    /// When the power fails, on the same clock.
+    fails_ns: u64,
+}
+
+impl Pages {
+    /// An operation of `ns`; false if the power fails in it.
+    fn completes(&mut self, ns: u64) -> bool {
+        self.took_ns = self.took_ns.saturating_add(ns);
+        self.took_ns <= self.fails_ns
+    }
+}
+
+impl Flash for &mut Pages {
+    fn read(&self, page: usize, word: usize) -> Option<u64> {
+        *self.words.get(page)?.get(word)?
+    }
+
+    fn erase(&mut self, page: usize) -> Result<(), FlashError> {
+        if self.took_ns > self.fails_ns {
+            return Err(FlashError);
+        }
+        let whole = self.completes(ERASE_NS);
+        let words = &mut self.words[page];
+        let end = if whole { WORDS } else { WORDS / 2 };
+        words[..end].fill(BLANK);
+        whole.then_some(()).ok_or(FlashError)
+    }
+
+    fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError> {
+        if self.took_ns > self.fails_ns || self.words[page][word] != BLANK {
+            return Err(FlashError);
+        }
+        let whole = self.completes(PROGRAM_NS);
+        self.words[page][word] = whole.then_some(value);
+        whole.then_some(()).ok_or(FlashError)
+    }
+}
+
+/// A save under way.
+#[derive(Debug, Clone)]
+struct Save {
+    begin_ns: u64,
+    records: Vec<(u16, i32)>,
+    before: Pages,
+}
+
+/// The memory of one board.
+#[derive(Debug, Clone)]
+pub(super) struct Memory {
+    pages: Pages,
+    save: Option<Save>,
+}
+
+impl Memory {
+    /// As commissioning left it; blank without records.
+    pub(super) fn new(records: &[(u16, i32)]) -> Self {
+        let pages = Pages {
+            words: [[BLANK; WORDS]; PAGES],
+            took_ns: 0,
+            fails_ns: u64::MAX,
+        };
+        let mut memory = Self { pages, save: None };
+        if !records.is_empty() {
+            memory.write(records, u64::MAX);
+        }
+        memory
+    }
+
+    /// The newest whole set, in the order in which it was stored.
+    pub(super) fn records(&self) -> Vec<(u16, i32)> {
+        let mut pages = self.pages.clone();
+        let store = Store::new(&mut pages);
+        let begin = [None; RECORDS_MAX];
+        let set = store.load((begin, 0_usize), |(records, count), record| {
+            records[*count] = Some((record.id, record.raw));
+            *count += 1;
+        });
+        let records = set.map(|((records, _), _)| records);
+        records.into_iter().flatten().flatten().collect()
+    }
+
+    /// Writes a set; the power fails after `left_ns`. Gives the time it took, ns.
+    fn write(&mut self, records: &[(u16, i32)], left_ns: u64) -> u64 {
+        self.pages.took_ns = 0;
+        self.pages.fails_ns = left_ns;
+        // Whether it went well is seen in the pages.
+        let _ = ParameterStore::save(&mut Store::new(&mut self.pages), records.iter().copied());
+        self.pages.took_ns
+    }
+
+    /// A save begins; the processor stands still until the time this gives, ns.
+    pub(super) fn begin(&mut self, records: Vec<(u16, i32)>, begin_ns: u64) -> u64 {
+        let before = self.pages.clone();
+        let took_ns = self.write(&records, u64::MAX);
+        self.save = Some(Save {
+            begin_ns,
+            records,
+            before,
+        });
+        begin_ns.saturating_add(took_ns)
+    }
+
+    /// The power fails at `now_ns`: a save under way gets no further.
+    pub(super) fn power_fails(&mut self, now_ns: u64) {
+        if let Some(save) = self.save.take() {
+            self.pages = save.before;
+            self.write(&save.records, now_ns.saturating_sub(save.begin_ns));
+        }
+    }
+
+    /// The save is over.
+    pub(super) fn end(&mut self) {
+        self.save = None;
+    }
+}
+
+/// Takes what a board stores, before the time for it has passed.
+#[derive(Debug, Default)]
+pub(super) struct Taken(pub(super) Option<Vec<(u16, i32)>>);
+
+impl ParameterStore for Taken {
+    fn save(
+        &mut self,
+        records: impl Iterator<Item = (u16, i32)>,
+    ) -> Result<(), wheeleg_node::hardware::StoreError> {
+        self.0 = Some(records.collect());
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(first: i32) -> Vec<(u16, i32)> {
+        (1..=20).map(|id| (id, first + i32::from(id))).collect()
+    }
+
+    #[test]
+    fn a_set_is_kept_and_a_blank_memory_has_none() {
+        assert!(Memory::new(&[]).records().is_empty());
+        assert_eq!(Memory::new(&set(7)).records(), set(7));
+        let mut memory = Memory::new(&set(7));
+        let end_ns = memory.begin(set(100), 5_000);
+        memory.end();
+        // One page, the head, the records, the checksum.
+        assert_eq!(end_ns, 5_000 + ERASE_NS + 22 * PROGRAM_NS);
+        memory.power_fails(end_ns + 1);
+        assert_eq!(memory.records(), set(100));
+    }
+
+    /// A cut in every unit and between all of them: the old set or the new one.
+    #[test]
+    fn a_power_cut_at_any_instant_leaves_the_old_set_or_the_new_one() {
+        let mut ends = vec![0, ERASE_NS / 2];
+        ends.extend((0..=22).flat_map(|n| {
+            let end = ERASE_NS + n * PROGRAM_NS;
+            [end - 1, end, end + PROGRAM_NS / 2]
+        }));
+        let mut news = 0;
+        for cut_ns in ends {
+            let mut memory = Memory::new(&set(7));
+            memory.begin(set(100), 0);
+            memory.power_fails(cut_ns);
+            let found = memory.records();
+            let new = found == set(100);
+            assert!(new || found == set(7), "after {cut_ns} ns: {found:?}");
+            assert_eq!(new, cut_ns >= ERASE_NS + 22 * PROGRAM_NS, "{cut_ns}");
+            news += u32::from(new);
+            // What the cut left behind does not spoil the next save.
+            memory.begin(set(300), 0);
+            memory.end();
+            assert_eq!(memory.records(), set(300), "after {cut_ns} ns");
+        }
+        assert!(news > 0);
+    }
+}

@@ -1,0 +1,227 @@
+//! What the master says, as a person reads it.
+
+use wheeleg_master::config::UniqueId;
+use wheeleg_master::dispatcher::Refusal;
+use wheeleg_master::event::{Event, HoldReason};
+use wheeleg_master::finding::Finding;
+use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
+use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord};
+
+/// An event of the master in words.
+pub(crate) fn describe(event: &Event) -> String {
+    let text = match *event {
+        Event::Done(ticket) => format!("{:?} done", ticket.code),
+        Event::Refused { ticket, reason } => {
+            format!("{:?} refused: {}", ticket.code, refusal(&reason))
+        }
+        Event::NodeReady(node) => format!("{} identified, interface matches", board(node)),
+        Event::SchemaMismatch {
+            node,
+            master,
+            theirs,
+        } => format!(
+            "{} has interface {theirs:016x}, the master has {master:016x}: will not arm. {}",
+            board(node),
+            Finding::OtherInterface
+        ),
+        Event::ForeignBoard {
+            node,
+            commissioned,
+            found,
+            belongs,
+        } => {
+            let belongs = belongs.map_or_else(
+                || "was commissioned nowhere".to_owned(),
+                |home| format!("belongs to {}", board(home)),
+            );
+            format!(
+                "at the address of {} stands the board {}, which {belongs}; commissioned is {}: will not arm. {}",
+                board(node),
+                hex(found),
+                hex(commissioned),
+                Finding::ForeignBoard
+            )
+        }
+        Event::Commissioned { node, unique_id } => {
+            format!("{} is the board {}", board(node), hex(unique_id))
+        }
+        Event::Found { node, finding } => match node {
+            Some(node) => format!("{}: {finding}", board(node)),
+            None => finding.to_string(),
+        },
+        Event::Diagnosis { node, record } => diagnosis(node, &record),
+        // Sample by sample in the log.
+        Event::Link { node, record } => {
+            format!("{} has heard {} sound frames", board(node), record.frames)
+        }
+        Event::Log { node, entry } => format!(
+            "{} logs at {:.6} s of its clock: {entry}",
+            board(node),
+            f64::from(entry.time_us) * 1e-6
+        ),
+        Event::LogLost { node, records } => {
+            format!("{records} records of the log of {} are lost", board(node))
+        }
+        Event::Parameter { node, id, raw } => {
+            format!(
+                "parameter {} of {} is {}",
+                parameter(node, id),
+                board(node),
+                value(node, id, raw)
+            )
+        }
+        Event::DuplicateAddress { node, unique_ids } => {
+            let [one, other] = unique_ids.map(hex);
+            let remedy = Fault::DuplicateAddress.remedy();
+            format!(
+                "two boards at the address of {}, unique ids {one} and {other}: will not arm. {remedy}",
+                board(node)
+            )
+        }
+        Event::WrongRole(node) => format!("{}: {}", board(node), Finding::WrongRole),
+        Event::NodeLost(node) => format!("{} is lost. {}", board(node), Finding::NodeLost),
+        Event::NodeBack(node) => format!("{} answers", board(node)),
+        Event::Armed => "all axes armed".to_owned(),
+        Event::Disarmed => "all axes disarmed".to_owned(),
+        Event::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
+        Event::Homed => "start pose reached".to_owned(),
+        Event::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
+        Event::GaitDone { steps } => format!("gait over after {steps} steps"),
+        Event::TrajectoryDone => "foot trajectory over".to_owned(),
+        Event::TouchDown { side, sector } => match sector {
+            Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
+            None => format!("{} foot stands flat", word(side)),
+        },
+        Event::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
+        Event::Position { joint, stroke_mm } => {
+            format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
+        }
+    };
+    format!("master: {text}")
+}
+
+/// Name of a side or sector inside a sentence.
+fn word(name: impl std::fmt::Debug) -> String {
+    format!("{name:?}").to_lowercase()
+}
+
+/// Name of a board by its bus address.
+fn board(address: u8) -> String {
+    Address::new(address).map_or_else(|| format!("address {address}"), |a| a.to_string())
+}
+
+fn hold_reason(reason: &HoldReason) -> String {
+    match *reason {
+        HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
+        HoldReason::NodeFault { node, faults } => {
+            let words: Vec<&str> = FaultBits::from_raw(faults)
+                .iter()
+                .map(|fault| fault.sentence())
+                .collect();
+            format!("{} reports: {}", board(node), words.join(" "))
+        }
+        HoldReason::NodeDisarmed(node) => {
+            format!("{} is no longer armed: it has restarted", board(node))
+        }
+        HoldReason::SupplyLost => "supply pressure lost".to_owned(),
+        HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
+        HoldReason::EmergencyStop => "E-stop".to_owned(),
+    }
+}
+
+/// Why a command is refused, with what to do about it.
+fn refusal(reason: &Refusal) -> String {
+    match *reason {
+        Refusal::NodeMissing { node } => {
+            format!(
+                "{} does not answer. {}",
+                board(node),
+                Finding::NodeLost.remedy()
+            )
+        }
+        Refusal::SchemaMismatch { node, .. } => {
+            format!("{}: {}", board(node), Finding::OtherInterface)
+        }
+        Refusal::WrongRole { node } => format!("{}: {}", board(node), Finding::WrongRole),
+        Refusal::ForeignBoard { node } => format!("{}: {}", board(node), Finding::ForeignBoard),
+        Refusal::DuplicateAddress { node } => {
+            format!("{}: {}", board(node), Fault::DuplicateAddress)
+        }
+        Refusal::NodeFault { node, faults } => {
+            let faults = FaultBits::from_raw(faults);
+            let words: Vec<String> = faults.iter().map(|fault| fault.to_string()).collect();
+            format!("{}: {}", board(node), words.join(" "))
+        }
+        Refusal::NodeReset { node } => format!(
+            "{} was reset meanwhile: do it again, and read back what it holds",
+            board(node)
+        ),
+        Refusal::NodeRefused { node, reason } => format!("{}: {}", board(node), reason.text()),
+        Refusal::NodeBusy { node } => format!("{} stays busy", board(node)),
+        Refusal::NoAnswer { node } => {
+            format!(
+                "{} does not answer. {}",
+                board(node),
+                Finding::NodeLost.remedy()
+            )
+        }
+        Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
+        ref other => format!("{other:?}"),
+    }
+}
+
+/// A unique id, hexadecimal, lowest byte first.
+pub(crate) fn hex(id: UniqueId) -> String {
+    id.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Why a board stopped or started, with the remedy of the tables.
+fn diagnosis(node: u8, record: &FaultRecord) -> String {
+    let mut parts = Vec::new();
+    if let Some(fault) = record.first_fault.fault() {
+        // Both clocks count microseconds modulo 2^32.
+        let at_us = record.first_time_us.wrapping_add(record.clock_offset_us);
+        let at_s = f64::from(at_us) * 1e-6;
+        parts.push(format!("first fault, {at_s:.3} s after power-up: {fault}"));
+    }
+    if record.disarm_reason == DisarmReason::Reset || record.reset_cause.is_fault() {
+        let cause = record.reset_cause;
+        parts.push(format!(
+            "it has started anew: {} {}",
+            cause.text(),
+            cause.remedy()
+        ));
+    }
+    if parts.is_empty() {
+        parts.push(format!(
+            "no fault of its own. {}",
+            record.disarm_reason.text()
+        ));
+    }
+    format!("{} says why: {}", board(node), parts.join(" "))
+}
+
+/// Row of a board's parameter.
+fn row(node: u8, id: u16) -> Option<&'static ParamInfo> {
+    let table = if node <= 6 {
+        JOINT_PARAMS
+    } else {
+        WHEEL_PARAMS
+    };
+    table.iter().find(|row| row.id == id)
+}
+
+fn parameter(node: u8, id: u16) -> String {
+    row(node, id).map_or_else(|| format!("0x{id:04X}"), |row| row.name.to_owned())
+}
+
+/// Value of a parameter in its unit.
+fn value(node: u8, id: u16, raw: i32) -> String {
+    row(node, id).map_or_else(
+        || raw.to_string(),
+        |row| {
+            let scale = f64::from(row.format.fraction_bits()).exp2();
+            format!("{} {}", f64::from(raw) / scale, row.unit)
+        },
+    )
+}

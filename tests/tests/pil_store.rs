@@ -1,0 +1,206 @@
+//! Parameters in the flash of the shipped joint image, on an emulated board: set and
+//! saved by requests on the bus, back after a loss of power, and whole after a power
+//! cut in any unit of the save. `cargo xtask pil` runs this.
+
+mod bench;
+
+use bench::power_up;
+use wheeleg_pil_link::{Hook, Inputs, Power, Ran, Reply, Request, Run};
+use wheeleg_protocol::param::JointParam;
+use wheeleg_protocol::{
+    Address, Decoder, Envelope, FaultRecord, FaultReport, MAX_ENCODED, Message, NackReason,
+    ParamGet, ParamSave, ParamSet, ResetCause,
+};
+use wheeleg_sim::pil::Line as _;
+use wheeleg_sim::pil::unicorn::{Unicorn, image};
+
+const ADDRESS: u8 = 2;
+const MS: u64 = 1_000_000;
+/// Start-up with its self-test of ten readings, ms.
+const START_MS: u64 = 40;
+/// A blank store is erased twice, 22 ms each, ms.
+const SAVE_MS: u64 = 60;
+const PARAMETER: JointParam = JointParam::FollowingError;
+
+/// An emulated joint board and its partner on the bus.
+struct Bench {
+    line: Unicorn,
+    now_ns: u64,
+    sequence: u16,
+    resets: u16,
+    sent: Vec<Message>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let line = Unicorn::start(&[image("joint").expect("an image")]).expect("the emulator");
+        let mut bench = Self {
+            line,
+            now_ns: 0,
+            sequence: 100,
+            resets: 0,
+            sent: Vec::new(),
+        };
+        bench.ran(&power_up(ADDRESS));
+        bench.ticks(START_MS, Power::Good);
+        bench
+    }
+
+    fn ask(&mut self, request: &Request) -> Reply {
+        self.line.queue(0, request).expect("queued");
+        self.line.flush().expect("sent");
+        self.line.receive().expect("a reply").1
+    }
+
+    fn ran(&mut self, request: &Request) -> Ran {
+        match self.ask(request) {
+            Reply::Ran(ran) => {
+                self.resets = ran.figures.resets;
+                assert_eq!(ran.outputs.valve_on_us, [0; 4], "never armed");
+                for sent in &ran.sent {
+                    let mut decoder = Decoder::new();
+                    decoder.push_slice(&sent.bytes, |frame| {
+                        let frame = frame.expect("a sound frame");
+                        self.sent.push(Message::parse(&frame).expect("a message"));
+                    });
+                }
+                ran
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn ticks(&mut self, ms: u64, power: Power) {
+        for _ in 0..ms {
+            self.now_ns += MS;
+            let inputs = Inputs {
+                adc: 30_000,
+                ..Inputs::default()
+            };
+            let run = Run {
+                until_ns: self.now_ns,
+                edge: Some(inputs),
+                power,
+                byte_ns: 10_000,
+                ..Run::default()
+            };
+            self.ran(&Request::Run(run));
+        }
+    }
+
+    /// Sends a request in the middle of a tick; gives the answer.
+    fn request(&mut self, message: Message) -> Message {
+        self.sequence += 1;
+        let envelope = Envelope {
+            source: Address::MASTER,
+            destination: Address::new(ADDRESS).expect("a joint"),
+            sequence: self.sequence,
+        };
+        let mut buffer = [0; MAX_ENCODED];
+        let bytes = message.emit(envelope, &mut buffer).expect("fits");
+        self.sent.clear();
+        let until_ns = self.now_ns + MS / 2;
+        self.ran(&Request::Run(Run {
+            until_ns,
+            received: heapless::Vec::from_slice(bytes).expect("fits"),
+            received_end_ns: until_ns,
+            byte_ns: 10_000,
+            ..Run::default()
+        }));
+        self.ticks(2, Power::Good);
+        *self.sent.first().expect("an answer")
+    }
+
+    fn set(&mut self, raw: i32) {
+        let id = PARAMETER.id();
+        let answer = self.request(ParamSet { id, value: raw }.into());
+        assert!(
+            matches!(answer, Message::ParamValue(value) if value.value == raw),
+            "{answer:?}"
+        );
+    }
+
+    fn get(&mut self) -> i32 {
+        let id = PARAMETER.id();
+        match self.request(ParamGet { id }.into()) {
+            Message::ParamValue(value) => value.value,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Asks for a save and waits for it.
+    fn save(&mut self) {
+        let answer = self.request(ParamSave {}.into());
+        assert!(
+            matches!(answer, Message::Nack(nack) if nack.reason == NackReason::Busy),
+            "{answer:?}"
+        );
+        self.ticks(SAVE_MS, Power::Good);
+    }
+
+    fn saved(&mut self) -> bool {
+        matches!(self.request(ParamSave {}.into()), Message::Ack(_))
+    }
+
+    /// Switches the supply off and on; gives why the board says that it started.
+    fn restart(&mut self) -> FaultRecord {
+        self.ticks(5, Power::BrownOut);
+        self.ticks(START_MS, Power::Good);
+        match self.request(FaultReport {}.into()) {
+            Message::FaultRecord(record) => record,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn parameters_that_were_saved_are_back_after_a_loss_of_power_and_others_are_not() {
+    let default = PARAMETER.info().default;
+    let mut bench = Bench::new();
+    assert_eq!(bench.get(), default);
+    bench.set(default + 1000);
+    let record = bench.restart();
+    assert_eq!(record.reset_cause, ResetCause::PowerUp);
+    assert_eq!(bench.get(), default, "set, but not saved");
+    for raw in [default + 2000, default + 3000] {
+        bench.set(raw);
+        let resets = bench.resets;
+        bench.save();
+        assert!(bench.saved());
+        assert_eq!(bench.resets, resets, "no watchdog, no fault");
+        let record = bench.restart();
+        assert!(record.active.is_empty(), "{record:?}");
+        assert_eq!(bench.get(), raw);
+    }
+}
+
+#[test]
+fn a_power_cut_in_any_unit_of_a_save_leaves_the_old_value_or_the_new_one_and_a_disarmed_board() {
+    // An erased page, the head, one record, the word with the checksum.
+    const UNITS: u16 = 4;
+    let default = PARAMETER.info().default;
+    let (old, new) = (default + 2000, default + 3000);
+    let mut found = Vec::new();
+    for after in 0..=UNITS {
+        let mut bench = Bench::new();
+        bench.set(old);
+        bench.save();
+        assert!(bench.saved());
+        bench.set(new);
+        let resets = bench.resets;
+        assert_eq!(
+            bench.ask(&Request::Hook(Hook::BrownOutInSave { after })),
+            Reply::Done
+        );
+        bench.save();
+        assert_eq!(bench.resets > resets, after < UNITS, "after {after} units");
+        let record = bench.restart();
+        assert!(record.active.is_empty(), "{record:?}");
+        found.push(bench.get());
+    }
+    println!("found after a cut in each of the {UNITS} units: {found:?}");
+    let expected: Vec<i32> = (0..=UNITS)
+        .map(|n| if n < UNITS { old } else { new })
+        .collect();
+    assert_eq!(found, expected, "the word with the checksum decides");
+}
