@@ -6,7 +6,7 @@
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::testing::wheeleg_2003_axis;
 use wheeleg_sim::bench::suite::{self, Factors, Rig, StartUp};
-use wheeleg_sim::bench::{Kind, Metrics, Motion, Trace, design, optimal, plant_check};
+use wheeleg_sim::bench::{Kind, Metrics, Motion, Trace, design, identify, optimal, plant_check};
 use wheeleg_sim::compare::{Figures, Move, RECOVERY_S, Scene, Sizes, Variation};
 use wheeleg_sim::config::AxisConfig;
 use wheeleg_units::{Duty, PositionMm};
@@ -193,6 +193,63 @@ fn two_hundred_combinations() {
         }
     }
     assert_eq!(tried, 200);
+}
+
+#[test]
+fn off_the_bench_axis_few_combinations_miss() {
+    // Of 200 on each axis 2, 0 and 2 were measured: reversals that had not died out, a
+    // rest beside the bar, a false alarm near the target.
+    for (name, count) in [
+        ("small-12x50", 60),
+        ("long-16x400", 30),
+        ("heavy-40x250", 60),
+    ] {
+        let sheet = AxisConfig::load(name).expect("built in").axis;
+        let mut missed = Vec::new();
+        for number in 0..count {
+            let variation = Variation::Combination(number);
+            let scene = Scene::new(name, &sheet, variation, 1).expect("runs");
+            let played = scene.play(Kind::Predictive, Move::Step100).expect("runs");
+            let f = Figures::of(Move::Step100, &played.expect("feasible"), None);
+            let holds = f.steady_error_mm.is_some_and(|mm| mm.abs() <= 0.5)
+                && f.overshoot_mm.is_some_and(|mm| mm <= 6.0)
+                && f.limit_cycle == Some(false)
+                && (f.faults.as_str(), f.stopped) == ("", Some(false));
+            if !holds {
+                missed.push((number, f));
+            }
+        }
+        assert!(missed.len() <= 2, "{name}: {missed:?}");
+    }
+}
+
+#[test]
+fn the_valve_delay_is_found_under_every_load() {
+    for name in ["bench-vq110u", "small-12x50"] {
+        let sheet = AxisConfig::load(name).expect("built in").axis;
+        for load_share in [-0.8, 0.0, 0.8] {
+            for bar in [4.0, 6.0, 7.0] {
+                for valve_delay in [0.5, 1.0, 2.0] {
+                    let factors = Factors {
+                        load_share,
+                        supply_pa: Some(bar * 1e5),
+                        valve_delay,
+                        ..Factors::NONE
+                    };
+                    let context = format!("{name}: {factors:?}");
+                    let found = identify(&factors.plant(&sheet), &sheet, 1)
+                        .expect("runs")
+                        .expect(&context);
+                    let excess_ms =
+                        (found.t_on_s - valve_delay * sheet.cylinder.fill_valve.t_on_s) * 1e3;
+                    assert!(
+                        (-0.15..=0.5).contains(&excess_ms),
+                        "{context}: {excess_ms} ms"
+                    );
+                }
+            }
+        }
+    }
 }
 
 #[test]

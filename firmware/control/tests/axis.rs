@@ -240,7 +240,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ("observe_stroke", 0.45 * two(16)),
         ("observe_speed", 67.5 * two(16)),
         ("observe_load", 3375.0),
-        ("stick_step", 4.0 * number(data.breakaway) * two(8)),
+        ("stick_step", 5.0 * number(data.breakaway) * two(8)),
     ]
 }
 

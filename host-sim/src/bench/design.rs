@@ -139,10 +139,30 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
         valve_off: micros(c.fill_valve.t_off_s.max(c.vent_valve.t_off_s)),
         margin: micros(0.1 * c.fill_valve.t_on_s.max(1e-3)),
         line_delay: micros(c.line_delay_s),
-        // Two and a half steps of the converter: below it, rest is noise.
-        band: mm((2.5 * lsb_m).max(2e-5)),
+        // Two and a half steps of the converter: below it, rest is noise. And no less than
+        // an eighth of what the smallest pulse does: below it, rest is luck.
+        band: mm((2.5 * lsb_m).max(0.13 * free_step_m(axis)).max(2e-5)),
         stroke: mm(c.stroke_m),
     }
+}
+
+/// How far a free piston is moved by the shortest opening of one valve, at mid stroke \[m\].
+fn free_step_m(axis: &AxisParams) -> f64 {
+    let c = &axis.cylinder;
+    let quarter_pi = std::f64::consts::FRAC_PI_4;
+    let area_a = quarter_pi * c.bore_m * c.bore_m;
+    let area_b = area_a - quarter_pi * c.rod_m * c.rod_m;
+    let volume = |dead_m3: f64, area: f64| dead_m3 + c.line_volume_m3 + 0.5 * area * c.stroke_m;
+    let volume_a = volume(c.dead_volume_a_m3, area_a);
+    let volume_b = volume(c.dead_volume_b_m3, area_b);
+    let open_s = c.fill_valve.t_off_s + 0.1 * c.fill_valve.t_on_s;
+    let flow = c.fill_valve.flow.conductance_m3_s_pa
+        * axis.gas.reference_density_kg_m3
+        * axis.gas.gas_constant_j_kg_k
+        * axis.gas.ambient_temperature_k;
+    // The exponent and the pressure appear in force and stiffness alike.
+    let force = flow * open_s * area_a / volume_a;
+    force / (area_a * area_a / volume_a + area_b * area_b / volume_b)
 }
 
 fn facts(axis: &AxisParams, data: &AxisData) -> Facts {

@@ -267,11 +267,11 @@ impl AxisModel {
                 tick_us.wrapping_mul(OBSERVER * OBSERVER * OBSERVER),
                 1_000_000,
             )),
-            // Four times the break-away force in a second, × 2^8.
+            // Five times the break-away force in a second, × 2^8.
             stick_step: number(ratio(
                 to_mn(data.breakaway)
                     .wrapping_mul(tick_us)
-                    .wrapping_mul(4 << 8),
+                    .wrapping_mul(5 << 8),
                 1_000_000,
             )),
             band: number(raw(data.band)),

@@ -30,6 +30,12 @@ pub struct Inertia {
     pub linear: i32,
     /// Load per innovation, mN/mm.
     pub load_gain: i32,
+    /// Speed from which the whole Coulomb friction acts, raw mm/s: not much less than
+    /// what it takes off in a tick, or the estimate of a light piston that stands
+    /// would jump from side to side for ever.
+    pub slides: i32,
+    /// Coulomb friction below it, mN per raw mm/s × 2^18.
+    pub grip: i32,
 }
 
 impl Inertia {
@@ -50,9 +56,14 @@ impl Inertia {
         let slope = scaled(model.slope, share, 16).max(1 << 8);
         // 2^32 / (2 slope²) with slope × 2^8: 2^47 / slope².
         let square = i64::from(slope).wrapping_mul(i64::from(slope));
+        let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
+        // Six tenths of it: a tick then turns at most two thirds of a speed round.
+        let slides = scaled(taken, 39_322, 16).max(STICK);
         Self {
             mass,
             per_force,
+            slides,
+            grip: quotient(i64::from(model.coulomb), i64::from(slides), 18),
             slope,
             damping: scaled(model.damping, share, 16),
             brake: scaled(model.brake, squared, 16),
@@ -154,8 +165,7 @@ impl Motion {
         self.friction = if self.stuck {
             drive
         } else {
-            // Coulomb over ±4 mm/s, raw: × coulomb / 2^18.
-            part(within(self.speed, STICK), model.coulomb, 18).saturating_add(scaled(
+            part(within(self.speed, inertia.slides), inertia.grip, 18).saturating_add(scaled(
                 self.speed,
                 model.viscous,
                 24,
@@ -195,7 +205,33 @@ impl Motion {
 
 #[cfg(test)]
 mod tests {
-    use super::cube_root;
+    use super::{Inertia, Motion, STICK, cube_root};
+    use crate::axis::{AxisData, AxisModel};
+    use wheeleg_units::Micros;
+
+    #[test]
+    fn a_light_piston_that_stands_is_seen_to_stand() {
+        let data = AxisData::default();
+        let model = AxisModel::new(&data, Micros(1000)).expect("the default");
+        for mass in [1 << 12, 1 << 14, 1 << 15, 1 << 16, 3 << 16] {
+            let inertia = Inertia::new(&model, mass);
+            for speed in [-40, -7, 7, 40] {
+                let place = 90 << 16;
+                let mut motion = Motion {
+                    stroke: place,
+                    speed: speed << 16,
+                    ..Motion::default()
+                };
+                for _ in 0..200 {
+                    motion.update(&model, &inertia, 0, place);
+                }
+                assert!(
+                    motion.stuck && motion.speed.abs() < STICK / 4,
+                    "{mass}: {motion:?}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn cube_roots() {

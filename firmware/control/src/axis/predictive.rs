@@ -19,7 +19,9 @@
 //! * **Rest.** Inside the band and slow, all valves shut, and stay shut until the
 //!   error has left three bands. A piston is also let to rest when friction alone
 //!   will stop it in the band. What does not come to rest near its target for
-//!   long may do so in a wider band, up to three times: no limit cycle lasts.
+//!   long may do so in a wider band, up to three times and 0.4 mm; and each time it
+//!   enters that band the law waits with the valves shut, to see where it comes to
+//!   rest, before it acts again: no limit cycle lasts.
 //! * **Announced moves.** With a move announced, the force is brought to the edge
 //!   of slipping in its direction: the counter chamber vents and the drive
 //!   chamber fills ahead of time, and the piston stands.

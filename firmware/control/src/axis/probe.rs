@@ -8,6 +8,11 @@
 //! exceeds t_on by a step or two. If neither chamber moves the piston, there is
 //! no result.
 //!
+//! Motion counts that follows a pulse at once and in its direction: under a load
+//! that has moved the piston until a shut chamber carries it, leakage lets it creep on
+//! by itself. Where that brings it to its end stop, the side is given up, its chamber
+//! vented, and the search begins anew from the other one.
+//!
 //! t_off does not show this way. Both delays of a valve come from one coil and
 //! one spring: it is taken to differ from its data sheet by the same factor.
 
@@ -26,6 +31,9 @@ const FINE: u16 = 50;
 const BACK: u16 = 3000;
 /// Longest pulse, µs: slower valves than 20 ms are not for this use.
 const LONGEST: u16 = 20_000;
+/// A side that takes pulses so much longer than the last one that moved it, µs, has
+/// come to its end stop.
+const BEYOND: u16 = 1000;
 /// Shortest pulse, µs.
 const SHORTEST: u16 = 200;
 /// Motion that counts, raw mm (0.2 mm: four steps of a 12-bit converter).
@@ -50,9 +58,14 @@ pub struct DelayProbe {
     /// Chamber B instead of A.
     rod_side: bool,
     pulse: u16,
+    /// Pulse at which this side is given up.
+    longest: u16,
     /// Ticks since the pulse began, or of the pause.
     at: u16,
+    /// Stroke at the start of the pause, or of the pulse before this one.
     base: Option<i32>,
+    /// Stroke at the start of this pulse.
+    begun: i32,
     rounds: u8,
     found: Option<u16>,
 }
@@ -72,8 +85,10 @@ impl DelayProbe {
             fine: false,
             rod_side: false,
             pulse: SHORTEST,
+            longest: LONGEST,
             at: 0,
             base: None,
+            begun: 0,
             rounds: 0,
             found: None,
         }
@@ -97,28 +112,40 @@ impl DelayProbe {
     pub fn tick(&mut self, measured: PositionMm) -> OnTimes {
         let position = measured.raw();
         let base = *self.base.get_or_insert(position);
-        let travel = position.saturating_sub(base).saturating_abs();
+        let travel = position.saturating_sub(base);
         match self.phase {
             Phase::Done => [0; 4],
             Phase::Pause => {
                 self.at = self.at.saturating_add(1);
-                if travel > MOVED >> 2 {
+                if travel.saturating_abs() > MOVED >> 2 {
                     self.base = None;
                     self.at = 0;
                 } else if self.at >= PAUSE {
                     self.at = 0;
+                    self.begun = position;
+                    self.base = Some(position);
                     self.phase = Phase::Pulses;
                 }
-                [0; 4]
+                // What the pulses to A have left there would hold the piston.
+                [0, if self.rod_side { 1000 } else { 0 }, 0, 0]
             }
-            Phase::Pulses if travel > MOVED => self.seen(),
             Phase::Pulses => {
+                let along = if self.rod_side {
+                    travel.saturating_neg()
+                } else {
+                    travel
+                };
+                if along > MOVED {
+                    return self.seen();
+                }
                 let on = self
                     .pulse
                     .saturating_sub(self.at.saturating_mul(1000))
                     .min(1000);
                 self.at = self.at.saturating_add(1);
                 if self.at >= PERIOD {
+                    self.base = Some(self.begun);
+                    self.begun = position;
                     self.next_pulse();
                 }
                 if self.rod_side {
@@ -138,30 +165,38 @@ impl DelayProbe {
             self.rounds = self.rounds.saturating_add(1);
         }
         self.fine = true;
-        self.base = None;
+        self.longest = self.pulse.saturating_add(BEYOND).min(LONGEST);
         self.pulse = self.pulse.saturating_sub(BACK).max(SHORTEST);
-        self.at = 0;
-        self.phase = if self.rounds >= ROUNDS {
-            Phase::Done
+        if self.rounds >= ROUNDS {
+            self.phase = Phase::Done;
         } else {
-            Phase::Pause
-        };
+            self.pause();
+        }
         [0; 4]
+    }
+
+    fn pause(&mut self) {
+        self.phase = Phase::Pause;
+        self.base = None;
+        self.at = 0;
     }
 
     fn next_pulse(&mut self) {
         self.at = 0;
         let step = if self.fine { FINE } else { COARSE };
         self.pulse = self.pulse.saturating_add(step);
-        if self.pulse <= LONGEST {
+        if self.pulse <= self.longest {
             return;
         }
-        if !self.fine && !self.rod_side {
+        if self.rod_side {
+            self.phase = Phase::Done;
+        } else {
             // Against an end stop, or the load: the other way.
             self.rod_side = true;
+            self.fine = false;
             self.pulse = SHORTEST;
-        } else {
-            self.phase = Phase::Done;
+            self.longest = LONGEST;
+            self.pause();
         }
     }
 }

@@ -63,12 +63,14 @@ pub(super) struct Push {
 }
 
 impl Push {
-    /// One tick with `missing` raw mm to a reference of `reference_speed`.
+    /// One tick at `speed` raw mm/s with `missing` raw mm to a reference of
+    /// `reference_speed`. What moves slower than it slides only gives way by the spring
+    /// of its friction: that takes nothing back.
     #[inline]
-    fn update(&mut self, model: &AxisModel, still: bool, missing: i32, reference_speed: i32) {
-        if !still {
+    fn update(&mut self, model: &AxisModel, speed: i32, missing: i32, reference_speed: i32) {
+        if speed > SLIDES {
             self.force = self.force.saturating_sub(self.force.wrapping_shr(3));
-        } else if reference_speed.wrapping_abs() <= REFERENCE_RESTS {
+        } else if speed < STILL && reference_speed.wrapping_abs() <= REFERENCE_RESTS {
             let step = if missing > 0 {
                 model.stick_step
             } else {
@@ -130,10 +132,10 @@ impl Wish<'_> {
         let limit = inertia.brake.saturating_mul(5) >> 1;
         let acceleration = within(pull.saturating_add(damp), limit);
 
-        let still = motion.speed.wrapping_abs() < STILL;
+        let speed_now = motion.speed.wrapping_abs();
         let missing = reference.saturating_sub(motion.stroke);
-        push.update(model, still, missing, reference_speed);
-        let grip = grip(if still {
+        push.update(model, speed_now, missing, reference_speed);
+        let grip = grip(if speed_now < STILL {
             model.breakaway
         } else {
             model.coulomb

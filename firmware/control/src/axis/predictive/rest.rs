@@ -1,5 +1,6 @@
 //! When the piston may rest, and when it must move again.
 
+use super::STILL;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::Motion;
 use crate::axis::part;
@@ -13,11 +14,22 @@ pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 const REST_TICKS: u16 = 30;
 /// Ticks near the target without coming to rest after which the band widens …
 const PATIENCE: u16 = 500;
-/// … by one band in so many ticks, up to three bands in all.
+/// … by one band in so many ticks, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 9;
-/// Ticks outside three bands before the end of rest.
-const RELEASE_TICKS: u16 = 4;
+/// … but never wider than this, raw mm (0.4 mm).
+const WIDEST: i32 = 26_214;
+/// A piston further from its target than this does not rest there, raw mm (0.45 mm).
+const LEFT: i32 = 29_491;
+/// Ticks outside before the end of rest.
+const RELEASE_TICKS: u16 = 20;
+/// Ticks for which the valves stay shut to see where the piston comes to rest: about
+/// one swing on the air of its chambers.
+const PAUSE: u8 = 150;
+/// Ticks of it that one counts for in which the piston stands beside the band.
+const PAUSE_SPENT: u8 = 8;
+/// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
+const GENTLE: i32 = 40 << 16;
 
 /// Rest at a target, and how long it has been tried.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,6 +38,10 @@ pub(super) struct Rest {
     held: u16,
     released: u16,
     near: u16,
+    /// What is left of the pause under way, ticks.
+    pause: u8,
+    /// In the band at the last tick.
+    inside: bool,
     settled: bool,
 }
 
@@ -39,11 +55,18 @@ impl Hash for Rest {
             held,
             released,
             near,
+            pause,
+            inside,
             settled,
         } = self;
         state.write_i32(*target);
         state.write_u32(u32::from(*held) | u32::from(*released).wrapping_shl(16));
-        state.write_u32(u32::from(*near) | u32::from(*settled).wrapping_shl(16));
+        state.write_u32(
+            u32::from(*near)
+                | u32::from(*settled).wrapping_shl(16)
+                | u32::from(*inside).wrapping_shl(17)
+                | u32::from(*pause).wrapping_shl(24),
+        );
     }
 }
 
@@ -58,6 +81,7 @@ impl Rest {
     pub(super) const fn release(&mut self, stroke: i32) {
         self.settled = false;
         self.held = 0;
+        self.pause = 0;
         self.target = stroke;
     }
 
@@ -68,6 +92,7 @@ impl Rest {
         if new {
             self.target = reference;
             self.near = 0;
+            self.pause = 0;
         }
         new
     }
@@ -91,10 +116,12 @@ impl Rest {
         let beyond = self.beyond().min(2 * PATIENCE_STEP);
         // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
         let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
-        let band = narrow.wrapping_add(extra(narrow));
+        let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
         let catch = CATCH.wrapping_add(extra(CATCH));
 
-        let slow = error < band && now.motion.speed.wrapping_abs() < catch;
+        let inside = error < band;
+        let waits = self.waits(steps, inside, now.motion.speed.wrapping_abs());
+        let slow = inside && now.motion.speed.wrapping_abs() < catch;
         let quiet = steps && (slow || now.stops_within(model, band));
         self.held = if quiet {
             self.held.saturating_add(1)
@@ -104,7 +131,10 @@ impl Rest {
         if self.held > REST_TICKS {
             self.settled = true;
         }
-        let release = narrow.saturating_mul(2).saturating_add(band);
+        let release = narrow
+            .saturating_mul(2)
+            .saturating_add(band)
+            .min(LEFT.max(band.saturating_add(narrow >> 1)));
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
         let outside = away > release;
         if self.settled && (outside || !steps) {
@@ -113,11 +143,35 @@ impl Rest {
                 self.settled = false;
                 self.held = 0;
                 self.released = 0;
+                self.near = self.near.max(PATIENCE);
             }
         } else {
             self.released = 0;
         }
-        self.settled || quiet
+        self.settled || quiet || waits
+    }
+
+    /// Act and wait. Where acting alone has not brought the piston to rest for long,
+    /// each gentle entry into the band is followed by a pause with the valves shut: a
+    /// piston that swings on its air, or on the bristles of its friction, comes to
+    /// rest by itself, and every pulse meant to help would keep it going.
+    #[inline]
+    fn waits(&mut self, steps: bool, inside: bool, speed: i32) -> bool {
+        let entered = inside && !self.inside;
+        self.inside = inside;
+        if !steps {
+            self.pause = 0;
+        } else if self.pause > 0 {
+            let spent = if inside || speed >= STILL {
+                1
+            } else {
+                PAUSE_SPENT
+            };
+            self.pause = self.pause.saturating_sub(spent);
+        } else if entered && self.beyond() > 0 && speed < GENTLE {
+            self.pause = PAUSE;
+        }
+        self.pause > 0
     }
 
     /// Ticks near the target beyond what patience allows.
