@@ -183,8 +183,8 @@ impl Rest {
     /// the piston does not come to rest, it fades.
     #[inline]
     pub(super) fn faded(&self, grip: i32) -> i32 {
-        let left = (2 * PATIENCE_STEP).saturating_sub(self.beyond()).max(0);
-        part(grip, left, PATIENCE_SHIFT.wrapping_add(1))
+        let left = PATIENCE_STEP.saturating_sub(self.beyond()).max(0);
+        part(grip, left, PATIENCE_SHIFT)
     }
 }
 
