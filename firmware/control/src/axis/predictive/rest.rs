@@ -183,8 +183,10 @@ impl Rest {
     /// the piston does not come to rest, it fades.
     #[inline]
     pub(super) fn faded(&self, grip: i32) -> i32 {
-        let left = PATIENCE_STEP.saturating_sub(self.beyond()).max(0);
-        part(grip, left, PATIENCE_SHIFT)
+        let left = (PATIENCE_STEP + PATIENCE_STEP / 4)
+            .saturating_sub(self.beyond())
+            .max(0);
+        part(grip, left.min(PATIENCE_STEP), PATIENCE_SHIFT)
     }
 }
 
