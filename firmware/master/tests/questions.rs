@@ -17,6 +17,12 @@ use wheeleg_protocol::{
 /// Cycles of a whole round of questions: link and log of eight boards.
 const ROUND: usize = 160;
 
+/// The master hears a broken frame.
+fn noise(rig: &mut Rig) {
+    let broken = [0, 5, 9, 9, 9, 9, 9, 0];
+    rig.master.on_bus_bytes(&broken, rig.now_us);
+}
+
 fn diagnoses(rig: &Rig) -> Vec<(u8, FaultRecord)> {
     let events = rig.events.iter();
     let diagnosis = |(_, event): &(u64, Event)| match *event {
@@ -102,9 +108,11 @@ fn a_restart_that_nobody_saw_shows_in_the_count_of_frames() {
     for node in &mut rig.nodes {
         node.link.frames = 5_000;
     }
+    noise(&mut rig);
     rig.run(2 * ROUND);
     assert_eq!(diagnoses(&rig), []);
     rig.node(4).link.frames = 120;
+    noise(&mut rig);
     rig.run(2 * ROUND);
     assert_eq!(
         diagnoses(&rig).iter().map(|(n, _)| *n).collect::<Vec<_>>(),
@@ -129,7 +137,8 @@ fn counters_and_logs_of_every_board_arrive_within_a_round_of_questions() {
         node.log = log;
     }
     rig.events.clear();
-    rig.run(ROUND + 10);
+    noise(&mut rig);
+    rig.run(2 * ROUND);
     for n in 1..=8_u8 {
         let count = |wanted: &dyn Fn(&Event) -> bool| {
             rig.events.iter().filter(|(_, event)| wanted(event)).count()

@@ -221,7 +221,7 @@ impl Line {
         let mut deaf = None;
         for (index, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
             // One that was reset since has counted anew: it tells nothing.
-            let grown = (*after)?.checked_sub((*before)?)?;
+            let grown = (*after)?.checked_sub(before.unwrap_or(0))?;
             if grown < HEARD_ERRORS {
                 if deaf.is_some() {
                     self.asks = false;

@@ -1,7 +1,9 @@
 //! Questions that the master asks by itself, in time that nobody else needs: why a
 //! board failed or started anew, what it has heard, what it has logged.
 //!
-//! They take one acyclic exchange in ten cycles, and one at once after a fault.
+//! They take one acyclic exchange in ten cycles, and one at once after a fault. What
+//! boards have heard is asked for while the master itself hears broken frames: on a
+//! sound line there is nothing to tell.
 
 use wheeleg_protocol::{Address, FaultReport, LinkReport, LogRead, Message, NodeMode, SlotReply};
 
@@ -32,6 +34,10 @@ pub struct Questions {
     nodes: [Open; NODES],
     turn: usize,
     next_cycle: u32,
+    /// Broken frames that the master had heard when the last round began.
+    errors: u32,
+    /// It has heard more of them since.
+    noisy: bool,
 }
 
 impl Questions {
@@ -92,10 +98,11 @@ impl Questions {
     }
 
     /// The next question in cycle `cycle` to a node that is `alive`; it is then taken
-    /// as asked.
+    /// as asked. `errors` are the broken frames that the master has heard.
     pub fn next(
         &mut self,
         cycle: u32,
+        errors: u32,
         alive: impl Fn(usize) -> bool,
     ) -> Option<(Address, Message)> {
         let mut open = Address::nodes().zip(&mut self.nodes).enumerate();
@@ -114,16 +121,29 @@ impl Questions {
             };
             Some((to, message))
         });
-        urgent.or_else(|| self.routine(cycle, alive))
+        urgent.or_else(|| self.routine(cycle, errors, alive))
     }
 
-    fn routine(&mut self, cycle: u32, alive: impl Fn(usize) -> bool) -> Option<(Address, Message)> {
+    fn routine(
+        &mut self,
+        cycle: u32,
+        errors: u32,
+        alive: impl Fn(usize) -> bool,
+    ) -> Option<(Address, Message)> {
         // Half the counter's range ahead means: due.
         if self.next_cycle.wrapping_sub(cycle) as i32 > 0 {
             return None;
         }
         self.next_cycle = cycle.wrapping_add(PERIOD_CYCLES);
-        let turn = self.turn;
+        if self.turn == 0 {
+            self.noisy = errors != self.errors;
+            self.errors = errors;
+        }
+        let turn = if self.noisy {
+            self.turn
+        } else {
+            self.turn.max(NODES)
+        };
         self.turn = if turn.saturating_add(1) < ROUND {
             turn.saturating_add(1)
         } else {
@@ -166,7 +186,7 @@ mod tests {
 
     /// Questions of the cycles 0 to `cycles`, at most one a cycle.
     fn asked(questions: &mut Questions, cycles: u32) -> Vec<(u8, Message)> {
-        let next = |cycle| questions.next(cycle, |_| true);
+        let next = |cycle| questions.next(cycle, 5, |_| true);
         let found: Vec<_> = (0..cycles).filter_map(next).collect();
         found.into_iter().map(|(to, m)| (to.raw(), m)).collect()
     }
@@ -180,8 +200,14 @@ mod tests {
             .chain((1..=8).map(|n| (n, read_log())))
             .collect();
         assert_eq!(round, expected);
-        for cycle in 0..320 {
-            let asked = questions.next(160 + cycle, |index| index == 3);
+        let quiet = asked(&mut questions, 240);
+        let logs = |m: &Message| matches!(m, Message::LogRead(_));
+        assert!(
+            quiet.len() == 8 && quiet.iter().all(|(_, m)| logs(m)),
+            "{quiet:?}"
+        );
+        for cycle in 80..320 {
+            let asked = questions.next(160 + cycle, 5, |index| index == 3);
             assert!(asked.is_none_or(|(to, _)| to.raw() == 4));
         }
     }

@@ -54,9 +54,10 @@ impl Layer0 {
             return Some(job);
         }
         let liveness = &self.liveness;
+        let errors = self.decoder.quality().errors();
         let question = self
             .questions
-            .next(self.cycle, |index| liveness.alive(index));
+            .next(self.cycle, errors, |index| liveness.alive(index));
         if let Some((to, message)) = question {
             return Some(Job {
                 to,
