@@ -393,6 +393,8 @@ parameters! {
             "Axis data: travel time of the pressure wave from a valve to its chamber.";
         RestBand = 0x0136, "rest_band", "mm", I16F16, "0.02" ..= "5", default "0.12", any_time,
             "Predictive law: at rest when the error is below this; awake again at three times it.";
+        MotionMargin = 0x0137, "motion_margin", "N", I16F16, "0" ..= "10000", default "0", disarmed,
+            "Force beyond what motions took at which a standing piston must move: above any load change; 0: half of the largest force.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

@@ -1,5 +1,6 @@
 //! The joint board: one pneumatic cylinder with four on/off valves.
 
+mod air;
 mod expectation;
 mod node;
 mod outputs;

@@ -45,8 +45,7 @@ pub struct JointSnapshot {
     pub limits: LimitBits,
     /// At rest with all valves shut.
     pub settled: bool,
-    /// Time since the board expects that the piston has moved by 2 mm, while it
-    /// has not; zero if it does not expect it.
+    /// For how long the board has been in doubt whether the piston follows its valves.
     pub motion_overdue: Micros,
 }
 

@@ -96,7 +96,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 reference: PositionMm::ZERO,
                 measured: PositionMm::ZERO,
                 following: Ticks::ZERO,
-                motion: MotionWatch::default(),
+                motion: MotionWatch::new(&settings.tick.motion, PositionMm::ZERO),
                 boot_ticks: Ticks::ZERO,
             },
             fixed_seals: PartSeals::new(),

@@ -1,6 +1,6 @@
 //! From the mode and the control law to the four valve outputs of a tick.
 
-use super::expectation::MotionWatch;
+use super::expectation::Driven;
 use super::node::JointNode;
 use super::reference::{Target, TickReference, advance};
 use crate::JOINT_TICK;
@@ -49,7 +49,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else {
             self.pwm.tick(&output.openings)
         };
-        self.expect_motion(&on_times, output.settled, now);
+        self.expect_motion(&on_times, output.velocity, now);
         // A motion that did not come is a fault of this tick, too.
         let on_times = if self.core.mode().may_drive() {
             on_times
@@ -68,14 +68,19 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     /// Whether the piston follows what the valves were told.
-    fn expect_motion(&mut self, on_times: &OnTimes, settled: bool, now: Micros) {
+    fn expect_motion(&mut self, on_times: &OnTimes, velocity: VelocityMmS, now: Micros) {
         let state = &mut self.state;
-        if settled || !self.core.mode().may_drive() {
-            state.motion = MotionWatch::closed(state.measured);
-        } else if state
-            .motion
-            .sample(on_times, state.measured, &self.settings.motion)
-        {
+        let model = &self.settings.motion;
+        if !self.core.mode().may_drive() {
+            state.motion.rest(on_times, state.measured, model);
+            return;
+        }
+        let driven = Driven {
+            reference: state.reference,
+            position: state.measured,
+            velocity,
+        };
+        if state.motion.sample(on_times, &driven, model) {
             self.axis_fault(Fault::NoMotion, now);
         }
     }
@@ -85,7 +90,6 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
         self.state.reference = self.state.measured;
         self.state.following = Ticks::ZERO;
-        self.state.motion = MotionWatch::closed(self.state.measured);
         self.target = Target::at(self.state.measured);
         let velocity = self.controller.observe(self.state.measured);
         let on_times = if self.core.mode() == Mode::Exhaust {
@@ -95,6 +99,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.pwm.shut()
         };
         self.controller.sent(on_times);
+        let state = &mut self.state;
+        state
+            .motion
+            .rest(&on_times, state.measured, &self.settings.motion);
         self.record(now, velocity, Duty::ZERO, on_times);
         self.snapshot.limits = LimitBits::NONE;
         self.snapshot.settled = false;
@@ -121,10 +129,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             pulses: on_times.map(|on| Micros(u32::from(on))),
             switches: self.switches.state(),
             faults: self.core.supervisor.faults().latched(),
-            motion_overdue: self
-                .state
-                .motion
-                .overdue(self.state.measured, &self.settings.motion),
+            motion_overdue: self.state.motion.overdue(),
             ..self.snapshot
         };
     }

@@ -1,5 +1,6 @@
 //! What a joint board does with SYNC and with its own requests.
 
+use super::expectation::MotionWatch;
 use super::node::JointNode;
 use super::reference::Target;
 use super::settings::JointSettings;
@@ -155,6 +156,12 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 // before the board may arm.
                 node.monitor = SensorMonitor::new();
                 node.controller.reset();
+            }
+            if settings.tick.sensor != node.settings.sensor
+                || settings.tick.motion != node.settings.motion
+            {
+                // Other units, other places: nothing that was learnt holds.
+                node.state.motion = MotionWatch::new(&settings.tick.motion, node.state.measured);
             }
             if settings.tick.correction != node.settings.correction {
                 node.controller.set_correction(settings.tick.correction);

@@ -1,5 +1,6 @@
 //! Parameters of a joint board as the application uses them.
 
+use super::expectation::MotionModel;
 use crate::JOINT_TICK;
 use crate::parameters::JointParameters;
 use crate::sensor::SensorConfig;
@@ -53,75 +54,6 @@ pub struct TickSettings {
     pub staged_exhaust: ValveOpenings,
     /// Openings of a valve that stays open.
     pub full_period: Micros,
-}
-
-/// When the piston is expected to have moved by 2 mm.
-///
-/// V / C is the time constant of both chambers together: volume of cylinder and
-/// lines over the sonic conductance of a valve. Within the stroke the bound is
-/// 6/16 of it, besides what the travel itself takes: more than twice the longest
-/// lead that fault-free runs show (0.16 s on the robot, with loads of up to 100 N
-/// on a cylinder of 158 N). At an end, where a chamber can stand at supply and
-/// has to be vented against a load, it is 18/16: longest lead 0.89 s.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct MotionModel {
-    /// Lead of the valves within the stroke, µs of full opening.
-    pub bound_us: i32,
-    /// Lead of the valves at an end of the stroke.
-    pub end_bound_us: i32,
-    /// Stroke below which the piston may stand against its lower end, mm.
-    pub low: PositionMm,
-    /// Stroke above which it may stand against its upper end, mm.
-    pub high: PositionMm,
-}
-
-impl MotionModel {
-    /// Travel that is expected, 2^-8 mm.
-    const TRAVEL: i64 = 2 << 8;
-    /// Way before an end of the stroke where the piston may stand, mm.
-    const NEAR_END: PositionMm = PositionMm::from_int(3);
-    /// Shares of the time constant, in 16ths: within the stroke and at its ends.
-    const SHARES: [i64; 2] = [6, 18];
-
-    #[inline(never)]
-    fn new(gains: &JointGains) -> Self {
-        let axis = &gains.axis;
-        // Lengths in 2^-8 mm, so that a volume has 2^-24 mm^3.
-        let length = |length: PositionMm| i64::from(length.raw()) >> 8;
-        let bore = length(axis.bore);
-        // π/4 × 2^16 = 51 472; the area is below 2^30.
-        let area = bore.wrapping_mul(bore).wrapping_mul(51_472) >> 16;
-        let swept = area.wrapping_mul(length(axis.stroke)).wrapping_div(1000);
-        let dead = i64::from(axis.dead_a.raw()).wrapping_add(i64::from(axis.dead_b.raw())) << 8;
-        let travelled = area.wrapping_mul(Self::TRAVEL).wrapping_div(1000);
-        let [bound_us, end_bound_us] = Self::SHARES.map(|share| {
-            let shared = dead.wrapping_add(swept).wrapping_mul(share) >> 4;
-            // cm^3 over dm^3/(s bar) is ms at 1 bar; below 2^50.
-            let time_us = shared
-                .wrapping_add(travelled)
-                .wrapping_mul(1000)
-                .checked_div(i64::from(axis.conductance.to_bits()));
-            i32::try_from(time_us.unwrap_or(0))
-                .unwrap_or(i32::MAX)
-                .min(i32::MAX / 2)
-        });
-        Self {
-            bound_us,
-            end_bound_us,
-            low: gains.stroke_min.saturating_add(Self::NEAR_END),
-            high: gains.stroke_max.saturating_sub(Self::NEAR_END),
-        }
-    }
-
-    /// Lead at which motion is expected at `position`, µs of full opening.
-    #[inline]
-    pub(super) const fn bound_us(&self, position: PositionMm) -> i32 {
-        if position.raw() < self.low.raw() || position.raw() > self.high.raw() {
-            self.end_bound_us
-        } else {
-            self.bound_us
-        }
-    }
 }
 
 impl JointSettings {
@@ -180,7 +112,7 @@ impl JointSettings {
                 slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
                 following_error: position(P::FollowingError),
                 following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
-                motion: MotionModel::new(&gains),
+                motion: MotionModel::new(&gains, position(P::MotionMargin))?,
                 staged_exhaust: ValveMode::Exhaust.openings(opening),
                 full_period: gains.pwm_period,
             },
@@ -262,33 +194,6 @@ mod tests {
     #[test]
     fn defaults_of_the_table_are_those_of_the_control_law() {
         assert_eq!(gains(&JointParameters::default()), JointGains::default());
-    }
-
-    #[test]
-    fn the_motion_model_is_the_filling_time_of_the_cylinder() {
-        let model = MotionModel::new(&gains(&JointParameters::default()));
-        // 20 mm bore, 180 mm, 2 × 15.1 cm^3, 0.085 dm^3/(s bar).
-        let area = core::f64::consts::PI / 4.0 * 400.0;
-        let (full, travel) = (area * 180.0 / 1000.0 + 30.2, area * 2.0 / 1000.0);
-        for (bound, share) in [(model.bound_us, 0.375), (model.end_bound_us, 1.125)] {
-            let expected = (full * share + travel) / 0.085 * 1000.0;
-            assert!(
-                (f64::from(bound) - expected).abs() < 20.0,
-                "{bound} {expected}"
-            );
-        }
-        // The extremes of the parameters are far from an overflow.
-        for (bore, conductance) in [(4, 20), (100, 20)] {
-            let gains = JointGains {
-                axis: AxisData {
-                    bore: PositionMm::from_int(bore),
-                    conductance: Gain::from_num(conductance),
-                    ..AxisData::default()
-                },
-                ..JointGains::default()
-            };
-            assert!(MotionModel::new(&gains).bound_us > 0);
-        }
     }
 
     #[test]
