@@ -1,7 +1,8 @@
 //! Permanent fault and limit numbers, with the sentence and the remedy of each.
 //!
 //! Numbers are wire values and are never used again for something else:
-//! 1–31 transport, 32–95 hard faults of a board, 96–127 limit indications.
+//! 1–31 transport, 32–95 hard faults of a board, 96–127 limit indications, 128–159
+//! warnings of the master, which never travel on the bus.
 //! Transport and hard faults are latched until an explicit clear and own one
 //! bit each of the 16-bit set in every cyclic reply. Limits are indications
 //! that come and go: they say which limit shaped the output in this tick, and
@@ -20,6 +21,8 @@ pub enum FaultClass {
     Hard,
     /// 96–127: a limit shaped the output. An indication, not latched.
     Limit,
+    /// 128–159: something is wrong that the motion does not depend on.
+    Warning,
 }
 
 impl FaultClass {
@@ -30,6 +33,7 @@ impl FaultClass {
             1..=31 => Some(Self::Transport),
             32..=95 => Some(Self::Hard),
             96..=127 => Some(Self::Limit),
+            128..=159 => Some(Self::Warning),
             _ => None,
         }
     }
@@ -190,6 +194,10 @@ pub struct FaultBits(#[serde(with = "le")] u16);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct LimitBits(u8);
 
+/// Set of warnings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct WarningBits(u8);
+
 fault_table!(
     /// A latched fault: transport (1–31) or hard (32–95).
     Fault, FAULTS, FaultBits: u16, {
@@ -246,6 +254,15 @@ fault_table!(
         "Expected in fast moves; otherwise raise the speed or acceleration parameter.";
     DriveInhibited = 103, bit 7, "The drive was blanked for a change of direction.",
         "Expected at direction changes of a wheel.";
+});
+
+fault_table!(
+    /// A warning of the master (128–159): the motion goes on.
+    Warning, WARNINGS, WarningBits: u8, {
+    SwitchStuckClosed = 128, bit 0, "A foot switch stays closed while the foot's other three open and close.",
+        "Clean the switch and check its wiring for a short circuit; until then the foot's contact is that of the other three.";
+    SwitchStuckOpen = 129, bit 1, "A foot switch stays open while the foot's other three open and close.",
+        "Clean the switch and check its wiring for a break; until then the foot's contact is that of the other three.";
 });
 
 impl Fault {

@@ -59,6 +59,7 @@ pub use address::{Address, NODES};
 pub use decoder::{Decoder, LinkQuality};
 pub use fault::{
     FAULTS, Fault, FaultBits, FaultClass, FaultCode, FaultSchema, LIMITS, Limit, LimitBits,
+    WARNINGS, Warning, WarningBits,
 };
 pub use fields::{
     Acceleration8p8, BoardKind, Correction, Count24, DisarmReason, InputBits, LogEvent, NackReason,

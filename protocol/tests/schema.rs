@@ -6,7 +6,7 @@ use wheeleg_protocol::param::{
 use wheeleg_protocol::{
     Address, BoardKind, EnumSchema, FAULTS, Fault, FaultBits, FaultClass, FaultSchema, INTERFACE,
     Interface, LIMITS, Limit, LimitBits, MESSAGES, MessageType, NackReason, SCHEMA_HASH,
-    ValueSchema,
+    ValueSchema, Warning,
 };
 
 fn text() -> String {
@@ -252,11 +252,16 @@ fn fault_numbers_keep_to_their_ranges_and_bits_are_unique() {
             .chain(LIMITS.windows(2))
             .all(|pair| pair[0].code < pair[1].code)
     );
+    for warning in Warning::ALL {
+        assert_eq!(FaultClass::of(warning.code()), Some(FaultClass::Warning));
+        assert_eq!(Warning::from_code(warning.code()), Some(*warning));
+        assert!(Fault::from_code(warning.code()).is_none());
+    }
     for code in [0, 4, 31, 45, 95, 128, 255] {
         assert_eq!(Fault::from_code(code), None);
     }
     assert_eq!(FaultClass::of(0), None);
-    assert_eq!(FaultClass::of(128), None);
+    assert_eq!(FaultClass::of(160), None);
 }
 
 /// Numbers on the wire never change: these are the ones given out so far.

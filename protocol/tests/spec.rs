@@ -18,7 +18,7 @@ use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
 use wheeleg_protocol::{
     Address, Decoder, Envelope, FAULTS, FaultSchema, FieldSchema, INTERFACE, LIMITS, MAX_DECODED,
     MAX_ENCODED, MAX_PAYLOAD, MESSAGES, Message, MessageSchema, MessageType, SCHEMA_HASH,
-    SYNC_SLOT_FIELDS, VERSION, encoded_len,
+    SYNC_SLOT_FIELDS, VERSION, WARNINGS, encoded_len,
 };
 
 const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/SPEC.md");
@@ -247,6 +247,7 @@ fn render(name: &str) -> String {
         }
         "faults" => fault_table(&mut out, FAULTS),
         "limit-bits" => fault_table(&mut out, LIMITS),
+        "warnings" => fault_table(&mut out, WARNINGS),
         "joint-parameters" => parameter_table(&mut out, JOINT_PARAMS),
         "wheel-parameters" => parameter_table(&mut out, WHEEL_PARAMS),
         other => panic!("no generated part named {other}"),
@@ -254,7 +255,7 @@ fn render(name: &str) -> String {
     out
 }
 
-const PARTS: [&str; 11] = [
+const PARTS: [&str; 12] = [
     "limits",
     "addresses",
     "timing",
@@ -264,6 +265,7 @@ const PARTS: [&str; 11] = [
     "enums",
     "faults",
     "limit-bits",
+    "warnings",
     "joint-parameters",
     "wheel-parameters",
 ];

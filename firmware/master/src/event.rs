@@ -1,7 +1,7 @@
 //! What the master reports to its user: a bounded queue of events.
 
 use heapless::Deque;
-use wheeleg_protocol::{FaultRecord, LinkRecord, LogEntry};
+use wheeleg_protocol::{FaultRecord, LinkRecord, LogEntry, Warning};
 use wheeleg_units::PositionMm;
 
 use crate::config::UniqueId;
@@ -186,6 +186,15 @@ pub enum Event {
         /// Which foot.
         Side,
     ),
+    /// A switch of a foot does not follow the other three.
+    FootSwitch {
+        /// Which foot.
+        side: Side,
+        /// Side of the foot it is on, in the robot's frame.
+        sector: Option<Sector>,
+        /// What is wrong with it.
+        warning: Warning,
+    },
     /// Answer to `TransmitPosition`.
     Position {
         /// 1..=6.

@@ -325,6 +325,7 @@ impl<'a> Operator<'a> {
             let kind = match event {
                 Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
                 Event::Hold(_)
+                | Event::FootSwitch { .. }
                 | Event::HomingFailed { .. }
                 | Event::SchemaMismatch { .. }
                 | Event::ForeignBoard { .. }
@@ -370,5 +371,84 @@ fn link_sample(record: &LinkRecord) -> LinkSample {
         address: record.address,
         unsent: record.unsent,
         drift_ppm: i32::from(record.drift_ppm),
+/// An event of the master in words.
+fn describe(event: &Event) -> String {
+    let text = match *event {
+        Event::Done(ticket) => format!("{:?} done", ticket.code),
+        Event::Refused { ticket, reason } => format!("{:?} refused: {reason:?}", ticket.code),
+        Event::NodeReady(node) => format!("{} identified, interface matches", board(node)),
+        Event::SchemaMismatch {
+            node,
+            master,
+            theirs,
+        } => format!(
+            "{} has interface {theirs:016x}, the master has {master:016x}: will not arm",
+            board(node)
+        ),
+        Event::DuplicateAddress { node, unique_ids } => {
+            let hex = |id: [u8; 12]| id.iter().map(|b| format!("{b:02x}")).collect::<String>();
+            let [one, other] = unique_ids.map(hex);
+            let remedy = Fault::DuplicateAddress.remedy();
+            format!(
+                "two boards at the address of {}, unique ids {one} and {other}: will not arm. {remedy}",
+                board(node)
+            )
+        }
+        Event::WrongRole(node) => format!("{} answers as another kind of board", board(node)),
+        Event::NodeLost(node) => format!("{} is lost", board(node)),
+        Event::NodeBack(node) => format!("{} answers", board(node)),
+        Event::Armed => "all axes armed".to_owned(),
+        Event::Disarmed => "all axes disarmed".to_owned(),
+        Event::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
+        Event::Homed => "start pose reached".to_owned(),
+        Event::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
+        Event::GaitDone { steps } => format!("gait over after {steps} steps"),
+        Event::TrajectoryDone => "foot trajectory over".to_owned(),
+        Event::TouchDown { side, sector } => match sector {
+            Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
+            None => format!("{} foot stands flat", word(side)),
+        },
+        Event::FootSwitch {
+            side,
+            sector,
+            warning,
+        } => {
+            let place = sector.map_or_else(String::new, word);
+            format!("{} foot, {place} switch: {warning}", word(side))
+        }
+        Event::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
+        Event::Position { joint, stroke_mm } => {
+            format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
+        }
+    };
+    format!("master: {text}")
+}
+
+/// Name of a side or sector inside a sentence.
+fn word(name: impl std::fmt::Debug) -> String {
+    format!("{name:?}").to_lowercase()
+}
+
+/// Name of a board by its bus address.
+fn board(address: u8) -> String {
+    Address::new(address).map_or_else(|| format!("address {address}"), |a| a.to_string())
+}
+
+fn hold_reason(reason: &HoldReason) -> String {
+    match *reason {
+        HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
+        HoldReason::NodeFault { node, faults } => {
+            let words: Vec<&str> = FaultBits::from_raw(faults)
+                .iter()
+                .map(|fault| fault.sentence())
+                .collect();
+            format!("{} reports: {}", board(node), words.join(" "))
+        }
+        HoldReason::NodeDisarmed(node) => {
+            format!("{} is no longer armed: it has restarted", board(node))
+        }
+        HoldReason::SupplyLost => "supply pressure lost".to_owned(),
+        HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
+        HoldReason::EmergencyStop => "E-stop".to_owned(),
     }
 }

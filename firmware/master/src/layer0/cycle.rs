@@ -4,7 +4,7 @@ use core::num::NonZeroU8;
 
 use wheeleg_protocol::{
     Address, Envelope, InputBits, JointSetpoint as WireJoint, LinkLossAction, MAX_ENCODED, Message,
-    NextReference, SlotReply, Sync, SyncFlags, SyncSlots,
+    NextReference, SlotReply, Sync, SyncFlags, SyncSlots, Warning,
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -214,6 +214,23 @@ impl Layer0 {
             let before = self.foot(side);
             if let Some(foot) = self.feet.get_mut(side.index()) {
                 *foot = Some(now);
+            }
+            let watch = self.foot_watches.get_mut(side.index());
+            if let Some(stuck) = watch.and_then(|watch| watch.sample(now)) {
+                let warning = if stuck.closed {
+                    Warning::SwitchStuckClosed
+                } else {
+                    Warning::SwitchStuckOpen
+                };
+                let sector = stuck.switch.sector(side);
+                events.push(
+                    now_us,
+                    Event::FootSwitch {
+                        side,
+                        sector,
+                        warning,
+                    },
+                );
             }
             match (before.is_some_and(FootSwitches::any), now.any()) {
                 (false, true) => {

@@ -12,6 +12,7 @@
 pub mod acyclic;
 mod commands;
 mod cycle;
+pub mod feet;
 pub mod line;
 pub mod liveness;
 pub mod nodes;
@@ -33,6 +34,7 @@ use crate::event::HoldReason;
 use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, TravelSetpoint, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
+use feet::FootWatch;
 use line::Line;
 use liveness::Liveness;
 use nodes::Nodes;
@@ -108,6 +110,7 @@ pub struct Layer0 {
     direct_travel: Option<TravelSetpoint>,
     direct_segment: u16,
     feet: [Option<FootSwitches>; WHEELS],
+    foot_watches: [FootWatch; WHEELS],
     slots: SyncSlots,
     counters: Counters,
 }
@@ -153,6 +156,7 @@ impl Layer0 {
             direct_travel: None,
             direct_segment: 0x8000,
             feet: [None; WHEELS],
+            foot_watches: [FootWatch::default(); WHEELS],
             slots: SyncSlots::NONE,
             counters: Counters::default(),
         }

@@ -27,6 +27,8 @@ const SUPPLY: i32 = 1 << 17;
 const MOST: i32 = 4 * SUPPLY;
 /// Largest motion and flow of a tick, raw mm (2 mm): keeps every product below 2^31.
 const STEP: i32 = 2 << 16;
+/// Polytropic exponent × 2^8 (ASSUMED: 1.2, usual for small cylinders).
+const EXPONENT: i32 = 307;
 /// Vented times count in 64 µs.
 const VENTED_SHIFT: u32 = 6;
 
@@ -48,8 +50,6 @@ pub(super) struct AirModel {
     b: Chamber,
     /// Full stroke, raw mm.
     stroke: i32,
-    /// Polytropic exponent × 2^8.
-    exponent: i32,
     /// Ambient pressure, in the unit of [`Air`].
     ambient: i32,
     /// 3/(1 − b), × 2^8.
@@ -64,11 +64,12 @@ impl AirModel {
     /// From the axis's coefficients.
     pub(super) fn new(axis: &AxisModel) -> Self {
         let clipped = |value: i64| i32::try_from(value).unwrap_or(i32::MAX);
-        // Exponent × 2^30; raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6.
+        // Raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6, which the exponent's 2^8 is.
         let chamber = |lead: i32, flow: i32, force: i32| Chamber {
             lead: lead >> 8,
             flow: clipped(
-                (i64::from(flow).wrapping_mul(i64::from(axis.exponent)) >> 22)
+                i64::from(flow)
+                    .wrapping_mul(i64::from(EXPONENT))
                     .wrapping_div(1_000_000),
             )
             .clamp(1, 1 << 19),
@@ -88,7 +89,6 @@ impl AirModel {
             a: chamber(axis.lead_a, axis.flow_a, axis.force_a),
             b: chamber(axis.lead_b, axis.flow_b, axis.force_b),
             stroke: axis.stroke,
-            exponent: axis.exponent >> 22,
             ambient: clipped(share.wrapping_div(i64::from(axis.supply.max(1)))),
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
             rod: axis.force_rod,
@@ -164,7 +164,7 @@ impl Air {
         } else {
             moved
         };
-        let grown = moved.wrapping_mul(model.exponent) >> 8;
+        let grown = moved.wrapping_mul(EXPONENT) >> 8;
         let [fill_a, vent_a, fill_b, vent_b] = *on;
         let length_a = (stroke >> 8).wrapping_add(model.a.lead);
         let length_b = (model.stroke.wrapping_sub(stroke) >> 8).wrapping_add(model.b.lead);
@@ -213,11 +213,11 @@ impl Air {
         opposing >= model.known
     }
 
-    /// Whether a chamber should hold more than half as much again as the supply: a
+    /// Whether a chamber should hold more than eleven eighths of the supply: a
     /// valve or a seal has let out what should be in it.
     #[inline]
     pub(super) fn is_impossible(&self) -> bool {
-        self.a.max(self.b) > SUPPLY + SUPPLY / 2
+        self.a.max(self.b) > SUPPLY + SUPPLY * 3 / 8
     }
 }
 

@@ -9,7 +9,7 @@
 //!    friction and the margin of the axis included, for 34 ms.
 //! 2. Nothing has been learnt from motions yet, but the force should be nine tenths of
 //!    the largest, with the opposing chamber known to be empty, for 200 ms.
-//! 3. A chamber should hold half as much again as the supply, for 34 ms. No load makes
+//! 3. A chamber should hold eleven eighths of the supply, for 34 ms. No load makes
 //!    that on an axis that the supply can move: the air has gone another way.
 //!
 //! The force that a motion takes is learnt whenever the piston slides, as the mean over

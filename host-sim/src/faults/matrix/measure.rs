@@ -104,7 +104,7 @@ impl Blind {
 pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measured {
     let r = &ran.recording;
     let at_s = ran.at_s;
-    let since_s = since(row, at_s, sound);
+    let since_s = since(row, at_s, r, sound);
     let ms = |t_s: f64| (t_s - since_s) * 1e3;
     let blind = Blind::of(&ran.faults);
     let axis = match row.expect {
@@ -155,7 +155,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
 }
 
 /// Instant from which the row counts.
-fn since(row: &Row, at_s: f64, sound: Option<&Recording>) -> f64 {
+fn since(row: &Row, at_s: f64, r: &Recording, sound: Option<&Recording>) -> f64 {
     let begin_s = if row.estop {
         at_s + super::run::ESTOP_S
     } else {
@@ -166,16 +166,26 @@ fn since(row: &Row, at_s: f64, sound: Option<&Recording>) -> f64 {
     };
     match (stop.since, sound) {
         (Since::Motion(joint), Some(sound)) => {
-            let rows = &sound.joints[usize::from(joint) - 1];
-            let mut after = rows.iter().skip_while(|r| r.t_s() < at_s - 1e-9);
-            let Some(begin) = after.next().map(|r| r.v.position_mm) else {
-                return begin_s;
-            };
-            let moved = after.find(|r| (r.v.position_mm - begin).abs() >= EXPECTED_MM);
-            moved.map_or(begin_s, Sample::t_s)
+            let joint = usize::from(joint) - 1;
+            missing_s(&r.joints[joint], &sound.joints[joint], at_s).unwrap_or(begin_s)
         }
         _ => begin_s,
     }
+}
+
+/// When the sensed stroke is first [`EXPECTED_MM`] from that of the run without the fault.
+fn missing_s(
+    rows: &[Sample<JointSample>],
+    sound: &[Sample<JointSample>],
+    at_s: f64,
+) -> Option<f64> {
+    let from_ns = (at_s * 1e9).round() as u64;
+    let both = rows.iter().zip(sound).filter(|(r, _)| r.t_ns >= from_ns);
+    let mut missing = both.filter(|(r, s)| {
+        debug_assert_eq!(r.t_ns, s.t_ns);
+        (r.v.sensed_mm - s.v.sensed_mm).abs() >= EXPECTED_MM
+    });
+    missing.next().map(|(r, _)| r.t_s())
 }
 
 /// Largest; `None` if any is unknown.
@@ -356,6 +366,22 @@ mod tests {
         assert!(close(until(&|ms| ms < 540 || ms == 700), 0.701));
         assert!(close(until(&|ms| ms < 300), 0.5));
         assert_eq!(until(&|_| true), None);
+    }
+
+    #[test]
+    fn expected_motion_is_what_the_sound_run_has_and_this_one_lacks() {
+        let moving = |speed: f64| -> Vec<Sample<JointSample>> {
+            let mut list = rows(|_| true);
+            for (ms, row) in list.iter_mut().enumerate() {
+                row.v.sensed_mm = speed * ms as f64;
+            }
+            list
+        };
+        // 0.1 mm each millisecond apart: 2 mm after 20 ms, but not before the fault.
+        let since = |at_s| missing_s(&moving(0.1), &moving(0.2), at_s).expect("apart");
+        assert!((since(0.0) - 0.020).abs() < 1e-9);
+        assert!((since(0.5) - 0.500).abs() < 1e-9);
+        assert_eq!(missing_s(&moving(0.1), &moving(0.1), 0.0), None);
     }
 
     #[test]

@@ -9,12 +9,16 @@ pub enum Phase {
     Stand,
     /// Up to 0.1 s before the foot is lifted for the second step.
     BeforeLift,
-    /// Up to 0.1 s before the foot reaches forward.
+    /// Up to 0.1 s before the foot reaches forward for the second step.
     BeforeReach,
+    /// The same before the first step: the axis has not moved since power-up.
+    FirstReach,
     /// Foot in the air, between reaching out and lowering.
     Flight,
     /// Up to 0.1 s before the foot is lowered.
     BeforeLower,
+    /// The same in the second step.
+    SecondLower,
     /// Wheels push the robot over the standing foot.
     Push,
     /// At the very start of the walk.
@@ -29,9 +33,11 @@ impl Phase {
             Self::PowerUp => "from power-up on",
             Self::Stand => "standing",
             Self::BeforeLift => "walking, before the lift",
-            Self::BeforeReach => "walking, before the reach",
+            Self::BeforeReach => "walking, before the second reach",
+            Self::FirstReach => "walking, before the first reach",
             Self::Flight => "walking, foot in the air",
             Self::BeforeLower => "walking, before the lowering",
+            Self::SecondLower => "walking, before the second lowering",
             Self::Push => "walking, wheels push",
             Self::Start => "walking, from the start on",
         }
@@ -93,8 +99,8 @@ pub struct Stop {
 pub enum Since {
     /// The begin of the fault.
     Fault,
-    /// The stroke of this joint has moved 2 mm in the same run without the fault: only
-    /// then can a reading that stands, or a valve that does nothing, be told from rest.
+    /// The stroke that the board of this joint reads is 2 mm from that of the same run
+    /// without the fault: before, motion that was expected has not failed to come.
     Motion(u8),
 }
 

@@ -220,9 +220,17 @@ fn instant_s(row: &Row, robot: &RobotConfig, seed: u64) -> f64 {
         Phase::PowerUp => return 0.0,
         Phase::Stand => (0.5, 0.6),
         Phase::Start => (0.1, 0.2),
-        Phase::BeforeReach => (gait.reach_s - 0.1, gait.reach_s),
+        Phase::FirstReach => (gait.reach_s - 0.1, gait.reach_s),
+        Phase::BeforeReach => {
+            let reach_s = gait.period_s + gait.reach_s;
+            (reach_s - 0.1, reach_s)
+        }
         Phase::Flight => (gait.reach_s + 0.1, gait.lower_s - 0.1),
         Phase::BeforeLower => (gait.lower_s - 0.1, gait.lower_s),
+        Phase::SecondLower => {
+            let lower_s = gait.period_s + gait.lower_s;
+            (lower_s - 0.1, lower_s)
+        }
         Phase::Push => (gait.push_s + 0.2, gait.push_s + 0.8),
         Phase::BeforeLift => (gait.period_s - 0.1, gait.period_s),
     };
