@@ -45,7 +45,8 @@ pub struct JointSnapshot {
     pub limits: LimitBits,
     /// At rest with all valves shut.
     pub settled: bool,
-    /// For how long the board has been in doubt whether the piston follows its valves.
+    /// Doubt whether the piston follows its valves, as the time that the strongest
+    /// doubt takes to it; zero if there is none.
     pub motion_overdue: Micros,
 }
 

@@ -79,17 +79,18 @@ impl AirModel {
         let time = |length: i32, flow: i32| {
             i64::from(length)
                 .wrapping_mul(1_000_000)
-                .wrapping_div(i64::from(flow.max(1)))
+                .checked_div(i64::from(flow))
+                .unwrap_or(i64::MAX)
         };
         // 18/16 of what both chambers take together.
         let both = time(axis.lead_a.saturating_add(axis.stroke), axis.flow_a)
             .saturating_add(time(axis.lead_b, axis.flow_b));
-        let known = both.wrapping_mul(18) >> (4_u32.wrapping_add(VENTED_SHIFT));
+        let known = both.saturating_mul(18) >> (4_u32.wrapping_add(VENTED_SHIFT));
         Self {
             a: chamber(axis.lead_a, axis.flow_a, axis.force_a),
             b: chamber(axis.lead_b, axis.flow_b, axis.force_b),
             stroke: axis.stroke,
-            ambient: clipped(share.wrapping_div(i64::from(axis.supply.max(1)))),
+            ambient: clipped(share.checked_div(i64::from(axis.supply)).unwrap_or(0)),
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
             rod: axis.force_rod,
             known: u16::try_from(known).unwrap_or(u16::MAX),

@@ -250,14 +250,10 @@ impl MotionWatch {
         self.learnt = self.learnt.saturating_add(change);
     }
 
-    /// How near the watch is to a fault: time for which there has been doubt, µs.
+    /// How near the watch is to a fault, as the time that the strongest doubt takes.
     #[inline]
     pub(super) const fn overdue(&self) -> Micros {
-        Micros(
-            (self.doubt as u32)
-                .wrapping_mul(1000)
-                .wrapping_div(STRONG as u32),
-        )
+        Micros((self.doubt as u32).wrapping_mul(const { 1000 / STRONG as u32 }))
     }
 }
 
