@@ -123,7 +123,8 @@ impl AirModel {
         let change = ((sum >> 8) as i32)
             .checked_div(length.max(256))
             .unwrap_or(0);
-        p.saturating_add(change).clamp(self.ambient >> 1, MOST)
+        // Not `clamp`: bounds in the wrong order would be a panic.
+        p.saturating_add(change).max(self.ambient >> 1).min(MOST)
     }
 }
 
