@@ -43,6 +43,36 @@ struct Chamber {
     force: i32,
 }
 
+impl Chamber {
+    /// Of a dead length in raw mm, a flow in raw mm/s and a force in mN per 1/256 Pa × 2^32.
+    #[inline(never)]
+    fn new(axis: &AxisModel, lead: i32, flow: i32, force: i32) -> Self {
+        // Raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6, which the exponent's 2^8 is.
+        let flow = i64::from(flow)
+            .wrapping_mul(i64::from(EXPONENT))
+            .wrapping_div(1_000_000);
+        Self {
+            lead: lead >> 8,
+            flow: clipped(flow).clamp(1, 1 << 19),
+            force: clipped(i64::from(axis.supply).wrapping_mul(i64::from(force)) >> 32),
+        }
+    }
+}
+
+/// As a coefficient, saturating.
+fn clipped(value: i64) -> i32 {
+    i32::try_from(value).unwrap_or(i32::MAX)
+}
+
+/// What a chamber of `length` takes at `flow`, µs.
+#[inline(never)]
+fn time(length: i32, flow: i32) -> i64 {
+    i64::from(length)
+        .wrapping_mul(1_000_000)
+        .checked_div(i64::from(flow))
+        .unwrap_or(i64::MAX)
+}
+
 /// What the air of an axis obeys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct AirModel {
@@ -62,33 +92,16 @@ pub(super) struct AirModel {
 
 impl AirModel {
     /// From the axis's coefficients.
+    #[inline(never)]
     pub(super) fn new(axis: &AxisModel) -> Self {
-        let clipped = |value: i64| i32::try_from(value).unwrap_or(i32::MAX);
-        // Raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6, which the exponent's 2^8 is.
-        let chamber = |lead: i32, flow: i32, force: i32| Chamber {
-            lead: lead >> 8,
-            flow: clipped(
-                i64::from(flow)
-                    .wrapping_mul(i64::from(EXPONENT))
-                    .wrapping_div(1_000_000),
-            )
-            .clamp(1, 1 << 19),
-            force: clipped(i64::from(axis.supply).wrapping_mul(i64::from(force)) >> 32),
-        };
         let share = i64::from(axis.ambient).wrapping_shl(17);
-        let time = |length: i32, flow: i32| {
-            i64::from(length)
-                .wrapping_mul(1_000_000)
-                .checked_div(i64::from(flow))
-                .unwrap_or(i64::MAX)
-        };
         // 18/16 of what both chambers take together.
         let both = time(axis.lead_a.saturating_add(axis.stroke), axis.flow_a)
             .saturating_add(time(axis.lead_b, axis.flow_b));
         let known = both.saturating_mul(18) >> (4_u32.wrapping_add(VENTED_SHIFT));
         Self {
-            a: chamber(axis.lead_a, axis.flow_a, axis.force_a),
-            b: chamber(axis.lead_b, axis.flow_b, axis.force_b),
+            a: Chamber::new(axis, axis.lead_a, axis.flow_a, axis.force_a),
+            b: Chamber::new(axis, axis.lead_b, axis.flow_b, axis.force_b),
             stroke: axis.stroke,
             ambient: clipped(share.checked_div(i64::from(axis.supply)).unwrap_or(0)),
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
@@ -108,7 +121,7 @@ impl AirModel {
 
     /// Pressure of a chamber of `length` (1/256 mm) after a tick with its valves open
     /// for `fill` and `vent` µs, in which its length grew by `growth` (raw mm).
-    #[inline(always)]
+    #[inline(never)]
     fn after(&self, p: i32, chamber: &Chamber, length: i32, on: [u16; 2], growth: i32) -> i32 {
         let [fill, vent] = on.map(|on| (i32::from(on).wrapping_mul(chamber.flow) >> 8).min(STEP));
         let chord = |drop: i32| drop.wrapping_mul(self.fall) >> 8;
@@ -151,7 +164,7 @@ impl Air {
     }
 
     /// A tick that ends at `position`, with these on-times.
-    #[inline]
+    #[inline(never)]
     pub(super) fn follow(&mut self, on: &OnTimes, position: PositionMm, model: &AirModel) {
         let stroke = position.raw();
         let moved = stroke.wrapping_sub(self.stroke);
@@ -186,7 +199,7 @@ impl Air {
     }
 
     /// Force of both pressures, mN, positive extends.
-    #[inline]
+    #[inline(never)]
     pub(super) fn force(&self, model: &AirModel) -> i32 {
         let part = |p: i32, force: i32| (i64::from(p).wrapping_mul(i64::from(force)) >> 17) as i32;
         part(self.a, model.a.force)

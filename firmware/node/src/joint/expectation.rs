@@ -135,7 +135,7 @@ impl MotionWatch {
 
     /// A tick in which the valves are not the law's: the air is followed, nothing is
     /// expected, and loads have to be learnt anew afterwards.
-    #[inline]
+    #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
         self.air.follow(on, position, &model.air);
         if *on == [0; 4] {
@@ -217,7 +217,7 @@ impl MotionWatch {
     }
 
     /// Takes in the force that a sliding piston needs, friction taken off.
-    #[inline]
+    #[inline(never)]
     fn learn(&mut self, speed: i32, position: PositionMm, model: &MotionModel) {
         let inside = position.raw() > CUSHION
             && position.raw()
