@@ -64,7 +64,7 @@ pub struct Decoder {
     owed: usize,
     /// Whether a byte came since the last delimiter.
     started: bool,
-    /// Whether the rest up to the delimiter is thrown away.
+    /// Whether there was no room for a byte: the frame is thrown away.
     discarding: bool,
     quality: LinkQuality,
 }
@@ -103,67 +103,60 @@ impl Decoder {
     ///
     /// Delimiters without anything between them are idle line and give `None`.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
-        if byte == DELIMITER {
-            return self.finish();
+        self.next(&mut [byte].as_slice())
+    }
+
+    /// Takes bytes from the front of `bytes`, which is shortened by what was taken, up
+    /// to the end of the next frame or error; `None` when they are used up. Any
+    /// chunking gives the same.
+    pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Result<Frame<'_>, FrameError>> {
+        // Kept in registers: on a board this loop takes every byte of the line.
+        let (mut len, mut owed, mut started) = (self.len, self.owed, self.started);
+        let mut ended = false;
+        let mut rest = bytes.iter();
+        for &byte in rest.by_ref() {
+            let data = if byte == DELIMITER {
+                if started {
+                    ended = true;
+                    break;
+                }
+                continue;
+            } else if owed > 0 {
+                owed = owed.saturating_sub(1);
+                byte
+            } else {
+                // A code byte. The zero it stands for belongs between two blocks. (Only
+                // a block of 254 bytes has none, and that is longer than any frame.)
+                owed = usize::from(byte).saturating_sub(1);
+                if !started {
+                    started = true;
+                    continue;
+                }
+                0
+            };
+            match self.buffer.get_mut(len) {
+                Some(place) => {
+                    *place = data;
+                    len = len.saturating_add(1);
+                }
+                None => self.discarding = true,
+            }
         }
-        if self.discarding {
-            return None;
-        }
-        if self.owed > 0 {
-            self.owed = self.owed.saturating_sub(1);
-            self.store(byte);
-            return None;
-        }
-        // A code byte. The zero it stands for belongs between two blocks. (Only a
-        // block of 254 bytes has none, and that is longer than any frame.)
-        if self.started {
-            self.store(0);
-        }
-        self.started = true;
-        self.owed = usize::from(byte).saturating_sub(1);
-        None
+        *bytes = rest.as_slice();
+        (self.len, self.owed, self.started) = (len, owed, started);
+        if ended { Some(self.finish()) } else { None }
     }
 
     /// Takes any number of bytes and shows every frame and error to `visit`, in
-    /// order. Same result as [`Self::push`] byte by byte, for any chunking.
+    /// order.
     pub fn push_slice(
         &mut self,
-        bytes: &[u8],
+        mut bytes: &[u8],
         mut visit: impl FnMut(Result<Frame<'_>, FrameError>),
     ) {
-        let mut rest = bytes;
-        loop {
-            let run = self.take_run(rest);
-            rest = rest.get(run..).unwrap_or_default();
-            let Some((&byte, tail)) = rest.split_first() else {
-                return;
-            };
-            rest = tail;
-            if let Some(result) = self.push(byte) {
-                visit(result);
-            }
+        while let Some(result) = self.next(&mut bytes) {
+            visit(result);
         }
-    }
-
-    /// Stores the data bytes of the present COBS block that come next, as far as
-    /// there is room; gives their number. What [`Self::push`] would do with
-    /// them, at once.
-    fn take_run(&mut self, bytes: &[u8]) -> usize {
-        if self.owed == 0 || self.discarding {
-            return 0;
-        }
-        let room = self.buffer.get_mut(self.len..).unwrap_or_default();
-        let mut run = 0_usize;
-        for (place, &byte) in room.iter_mut().zip(bytes).take(self.owed) {
-            if byte == DELIMITER {
-                break;
-            }
-            *place = byte;
-            run = run.saturating_add(1);
-        }
-        self.len = self.len.saturating_add(run);
-        self.owed = self.owed.saturating_sub(run);
-        run
     }
 
     /// Frames and errors seen so far.
@@ -185,22 +178,10 @@ impl Decoder {
         self.discarding = false;
     }
 
-    fn store(&mut self, byte: u8) {
-        match self.buffer.get_mut(self.len) {
-            Some(place) => {
-                *place = byte;
-                self.len = self.len.saturating_add(1);
-            }
-            None => self.discarding = true,
-        }
-    }
-
-    fn finish(&mut self) -> Option<Result<Frame<'_>, FrameError>> {
-        let (len, owed, started, discarding) = (self.len, self.owed, self.started, self.discarding);
+    /// The frame, or what is wrong with it, at the delimiter behind it.
+    fn finish(&mut self) -> Result<Frame<'_>, FrameError> {
+        let (len, owed, discarding) = (self.len, self.owed, self.discarding);
         self.reset();
-        if !started {
-            return None;
-        }
         let result = if discarding {
             Err(FrameError::Overflow)
         } else if owed > 0 {
@@ -209,6 +190,6 @@ impl Decoder {
             Frame::check(self.buffer.get(..len).unwrap_or_default())
         };
         self.quality.count(&result);
-        Some(result)
+        result
     }
 }

@@ -214,14 +214,11 @@ impl BoardCore {
 
 /// Takes bytes of the bus; the last of them ended at `t_end`.
 pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: Micros) {
-    let mut rest = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-    for byte in bytes {
-        rest = rest.saturating_sub(1);
-        let Some(incoming) = application.core().port.receive(*byte) else {
-            continue;
-        };
-        // The bytes behind this one came later: any chunking gives the same time.
-        let later = BYTE_US.wrapping_mul(rest);
+    let mut rest = bytes;
+    while let Some(incoming) = application.core().port.receive(&mut rest) {
+        // The bytes behind the frame came later: any chunking gives the same time.
+        let behind = u32::try_from(rest.len()).unwrap_or(u32::MAX);
+        let later = BYTE_US.wrapping_mul(behind);
         let at = Micros(t_end.get().wrapping_sub(later));
         match incoming {
             Incoming::Sync(sync) => take_sync(application, &sync, at),

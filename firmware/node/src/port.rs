@@ -44,9 +44,21 @@ impl BusPort {
         }
     }
 
-    /// Takes one byte; gives what a complete frame means to this board.
-    pub fn receive(&mut self, byte: u8) -> Option<Incoming> {
-        let frame = self.decoder.push(byte)?.ok()?;
+    /// Takes bytes from the front of `bytes`, which is shortened by what was taken, up
+    /// to the end of the next frame for this board; gives what that means to it.
+    pub fn receive(&mut self, bytes: &mut &[u8]) -> Option<Incoming> {
+        while !bytes.is_empty() {
+            let incoming = self.receive_one(bytes);
+            if incoming.is_some() {
+                return incoming;
+            }
+        }
+        None
+    }
+
+    /// As [`Self::receive`], up to the end of the next frame for whomever.
+    fn receive_one(&mut self, bytes: &mut &[u8]) -> Option<Incoming> {
+        let frame = self.decoder.next(bytes)?.ok()?;
         let envelope = Envelope::from(frame.header);
         if envelope.source == self.address {
             return Some(Incoming::Impostor);
