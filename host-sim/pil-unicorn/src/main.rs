@@ -16,15 +16,19 @@ mod soc;
 mod time;
 mod wiring;
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::io::{Read as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
+use std::rc::Rc;
 
 use wheeleg_pil_link::frame::MAX_FRAME;
 use wheeleg_pil_link::{Deframer, Reply, Request, encode, text};
 
 use crate::board::Board;
 use crate::image::Image;
+use crate::machine::blocks::Blocks;
 
 fn main() -> ExitCode {
     match serve() {
@@ -42,10 +46,7 @@ fn serve() -> Result<(), String> {
     if paths.is_empty() {
         return Err("give the ELF image of each board".to_owned());
     }
-    let mut boards = Vec::new();
-    for path in &paths {
-        boards.push(Board::new(Image::read(Path::new(path))?));
-    }
+    let mut boards = boards(&paths)?;
     let mut input = std::io::stdin().lock();
     let mut output = std::io::stdout().lock();
     let mut deframer = Deframer::new();
@@ -74,4 +75,21 @@ fn serve() -> Result<(), String> {
         output.flush().map_err(|e| e.to_string())?;
         replies.clear();
     }
+}
+
+/// A board for each path. Those of one image share what is known of it.
+fn boards(paths: &[OsString]) -> Result<Vec<Board>, String> {
+    let mut images = BTreeMap::new();
+    for path in paths {
+        if !images.contains_key(path) {
+            let image = Image::read(Path::new(path))?;
+            let blocks = Blocks::new(&image);
+            images.insert(path, (Rc::new(image), blocks));
+        }
+    }
+    let board = |path| images.get(path).cloned();
+    let boards = paths.iter().filter_map(board);
+    Ok(boards
+        .map(|(image, blocks)| Board::new(image, blocks))
+        .collect())
 }

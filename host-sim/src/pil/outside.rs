@@ -121,18 +121,12 @@ impl Outside {
     /// Spreads the byte-identical images over a few processes.
     fn start_pil(&mut self, nodes: &Nodes) -> Result<(), SimError> {
         let pil = (1..).zip(&nodes.0).filter(|(_, k)| **k == NodeKind::Pil);
-        let addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
-        for part in 0..processes() {
-            // Every second one, so that joints and wheels are spread evenly.
-            let mine: Vec<u8> = addresses
-                .iter()
-                .skip(part)
-                .step_by(processes())
-                .copied()
-                .collect();
-            if mine.is_empty() {
-                continue;
-            }
+        let mut addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
+        // The wheels side by side: their edges come twice as often as the joints' and
+        // at the same instant, and to wake two processes takes longer than their ticks.
+        addresses.rotate_right(addresses.iter().filter(|a| **a > 6).count());
+        let each = addresses.len().div_ceil(processes()).max(1);
+        for mine in addresses.chunks(each) {
             let images = mine
                 .iter()
                 .map(|a| unicorn::image(if *a <= 6 { "joint" } else { "wheel" }))
@@ -140,7 +134,7 @@ impl Outside {
             let line = self.lines.len();
             self.lines.push(Box::new(unicorn::Unicorn::start(&images)?));
             for (index, address) in (0..).zip(mine) {
-                self.adopt(address, line, index)?;
+                self.adopt(*address, line, index)?;
             }
         }
         Ok(())
@@ -462,7 +456,8 @@ impl Outside {
                 compared.of(b.address).total(),
             )
         };
-        let boards = self.boards.iter().map(&mut figures).collect();
+        let in_order = self.by_address.iter().flatten();
+        let boards = in_order.map(|n| figures(&self.boards[*n])).collect();
         let total = self.comparison.total();
         PilSummary {
             nodes: nodes.0.iter().map(ToString::to_string).collect(),

@@ -19,7 +19,8 @@ fn machine(code: &[u16], handlers: &[(usize, u32)]) -> Machine {
         flash[CODE + 2 * i..][..2].copy_from_slice(&half.to_le_bytes());
     }
     let soc = Soc::new(vec![0xFF; STORE_SIZE], [0; 12], true, 0);
-    Machine::new(&Image::bare(flash), soc).expect("a machine")
+    let image = Image::bare(flash);
+    Machine::new(&image, Blocks::new(&image), soc).expect("a machine")
 }
 
 /// Runs to `cycle` in stretches of `stretch` cycles.
@@ -40,7 +41,7 @@ fn every_instruction_is_counted_once_however_often_the_machine_stops() {
         let loops = machine.get(R::R0).expect("r0");
         assert_eq!(
             u64::from(loops),
-            machine.state().retired / 2,
+            machine.state().retired() / 2,
             "stretch {stretch}"
         );
         assert!((10_000..10_100).contains(&loops), "{loops}");
@@ -53,7 +54,7 @@ fn a_sleeping_processor_passes_time_without_instructions() {
     let mut machine = machine(&[0x3001, 0xBF30, 0xE7FC], &[]);
     run(&mut machine, 1_000_000, 1_000_000);
     assert_eq!(machine.get(R::R0), Ok(1));
-    assert_eq!(machine.state().retired, 2);
+    assert_eq!(machine.state().retired(), 2);
 }
 
 #[test]
@@ -91,26 +92,110 @@ fn an_exception_stacks_runs_and_returns_and_waits_for_primask() {
     assert!(!machine.state().nvic.in_handler());
 }
 
+/// What a read of an address and a write of the address to itself come to.
+fn accesses(address: u32) -> [String; 2] {
+    // r1 = address; ldr r0, [r1] or str r1, [r1]; b .
+    [0x6808, 0x6009].map(|access| {
+        let [low, high] = [address as u16, (address >> 16) as u16];
+        let mut machine = machine(&[0x4901, access, 0xE7FE, 0xBF00, low, high], &[]);
+        let ran = machine.run(10_000, Until::Cycle, true);
+        ran.expect_err(&format!("{access:#x} of {address:#010x} must be refused"))
+    })
+}
+
 #[test]
-fn an_unmodelled_register_ends_the_run_by_its_name() {
-    // r1 = 0x4000_0800 (TIM4); ldr r0, [r1]; b .
-    let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x0800, 0x4000];
+fn an_access_that_nothing_models_ends_the_run_by_its_name_on_every_bus() {
+    let (read, write) = ("read of", "write");
+    let places = [
+        // System memory: all but the unique id.
+        (0x1FFF_7500, "no peripheral at 0x1fff7500", read, write),
+        // APB1: TIM4. APB2: nothing is there. AHB1: DMA2.
+        (0x4000_0800, "no peripheral at 0x40000800", read, write),
+        (0x4001_2000, "no peripheral at 0x40012000", read, write),
+        (0x4002_0400, "no peripheral at 0x40020400", read, write),
+        // Within peripherals that are modelled: APB1, APB2, AHB1.
+        (0x4000_3010, "IWDG+0x010", read, write),
+        (0x4001_0400 + 0x3FC, "EXTI+0x3fc", read, write),
+        (0x4002_1028, "RCC+0x028", read, write),
+        // AHB2: GPIOD; behind the converters.
+        (0x4800_0C00, "no peripheral at 0x48000c00", read, write),
+        (0x5000_0400, "no peripheral at 0x50000400", read, write),
+        // With the clock off: APB1, APB2, AHB1, AHB2.
+        (0x4000_0000, "TIM2+0x000 with its clock off", read, write),
+        (0x4001_3800, "USART1+0x000 with its clock off", read, write),
+        (0x4002_0000, "DMA1+0x000 with its clock off", read, write),
+        (0x4800_0000, "GPIOA+0x000 with its clock off", read, write),
+        (0x5000_0000, "ADC1+0x000 with its clock off", read, write),
+        // The processor's own: the system timer, which no image uses.
+        (0xE000_E010, "PPB 0xe000e010", read, write),
+        // Between all regions, and where the regions of buses have holes.
+        (
+            0x6000_0000,
+            "at 0x60000000",
+            "READ_UNMAPPED",
+            "WRITE_UNMAPPED",
+        ),
+        (
+            0x4003_0000,
+            "at 0x40030000",
+            "READ_UNMAPPED",
+            "WRITE_UNMAPPED",
+        ),
+        (
+            0x2000_8000,
+            "at 0x20008000",
+            "READ_UNMAPPED",
+            "WRITE_UNMAPPED",
+        ),
+    ];
+    for (address, name, read, write) in places {
+        let told = accesses(address);
+        for (told, what) in told.iter().zip([read, write]) {
+            assert!(
+                told.contains(name) && told.contains(what),
+                "{address:#010x}: {told}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_program_in_flash_and_the_unique_id_are_read_and_never_written() {
+    for (address, told) in [
+        (FLASH_BASE + 0x100, "WRITE_PROT"),
+        (0x1FFF_7590, "write to no peripheral at 0x1fff7590"),
+        (
+            0x0801_F000,
+            "write to the flash memory at 0x0801f000 out of order",
+        ),
+    ] {
+        let [low, high] = [address as u16, (address >> 16) as u16];
+        // r1 = address; ldr r0, [r1]; str r0, [r1]; b .
+        let code = [0x4901, 0x6808, 0x6008, 0xE7FE, low, high];
+        let mut machine = machine(&code, &[]);
+        let error = machine
+            .run(10_000, Until::Cycle, true)
+            .expect_err("refused");
+        assert!(error.contains(told), "{address:#010x}: {error}");
+    }
+}
+
+#[test]
+fn an_unmodelled_register_is_refused_with_the_clock_on_too() {
+    let code = [
+        0x4903, // ldr r1, [pc, #12]
+        0x2201, // movs r2, #1
+        0x600A, // str r2, [r1]: the clock of port A
+        0x4903, // ldr r1, [pc, #12]
+        0x600A, // str r2, [r1]: the lock register
+        0xE7FE, // b .
+        0x0000, 0x0000, 0x104C, 0x4002, 0x001C, 0x4800,
+    ];
     let mut machine = machine(&code, &[]);
-    let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
-    assert!(error.contains("0x40000800"), "{error}");
-    // RCC_AHB1RSTR exists on the part and is not modelled.
-    let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x1028, 0x4002];
-    let mut machine = super::tests::machine(&code, &[]);
-    let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
-    assert!(error.contains("RCC+0x028"), "{error}");
-    // A port whose clock is off.
-    let code = [0x4901, 0x6808, 0xE7FE, 0xBF00, 0x0000, 0x4800];
-    let mut machine = super::tests::machine(&code, &[]);
-    let error = machine.run(1_000, Until::Cycle, true).expect_err("refused");
-    assert!(
-        error.contains("GPIOA") && error.contains("clock off"),
-        "{error}"
-    );
+    let error = machine
+        .run(10_000, Until::Cycle, true)
+        .expect_err("refused");
+    assert!(error.contains("GPIOA+0x01c"), "{error}");
 }
 
 #[test]

@@ -58,13 +58,11 @@ const TIM3: usize = 2;
 const TIM8: usize = 3;
 const TIM15: usize = 4;
 
-/// What has an event next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Source {
-    Timer(usize, Event),
-    Adc,
-    Usart,
-}
+/// What has events, in the order in which they are taken at one cycle: timers,
+/// converter, serial interface.
+const ADC: usize = 5;
+const USART: usize = 6;
+const SOURCES: usize = 7;
 
 /// A transfer that the machine carries out in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +103,13 @@ pub(crate) struct Soc {
     pub(crate) started: Option<(u64, u32, u32)>,
     burst_high: Option<(u64, u64)>,
     syscfg: [u32; 3],
+    /// Cycle of the next event of each source. Asked after every block, so it is
+    /// kept: whoever changes a source calls [`Self::plan`].
+    due: [u64; SOURCES],
+    /// The next event of each timer.
+    events: [Event; ADC],
+    /// Cycle at which the watchdog bites.
+    bites_at: u64,
 }
 
 impl Soc {
@@ -139,6 +144,9 @@ impl Soc {
             started: None,
             burst_high: None,
             syscfg: [0; 3],
+            due: [u64::MAX; SOURCES],
+            events: [Event::Update; ADC],
+            bites_at: u64::MAX,
         }
     }
 
@@ -166,42 +174,60 @@ impl Soc {
         }
     }
 
-    fn next(&self) -> Option<(u64, Source)> {
-        let mut next: Option<(u64, Source)> = None;
-        let mut offer = |at: Option<u64>, source: Source| {
-            if let Some(at) = at
-                && next.is_none_or(|n| (at, source) < n)
-            {
-                next = Some((at, source));
-            }
-        };
-        for (n, tim) in self.tim.iter().enumerate() {
-            if let Some((at, event)) = tim.next() {
-                offer(Some(at), Source::Timer(n, event));
-            }
+    /// When a source has its next event, after it was changed.
+    fn plan(&mut self, source: usize) {
+        self.due[source] = match source {
+            ADC => self.adc.next(),
+            USART => self.usart.next(),
+            _ => self.tim[source].next().map(|(at, event)| {
+                self.events[source] = event;
+                at
+            }),
         }
-        offer(self.adc.next(), Source::Adc);
-        offer(self.usart.next(), Source::Usart);
-        next
+        .unwrap_or(u64::MAX);
+    }
+
+    /// Cycle at which the watchdog bites.
+    pub(crate) fn bites_at(&self) -> u64 {
+        self.bites_at
+    }
+
+    /// When the watchdog bites, after it was changed or the clock was.
+    fn plan_bite(&mut self) {
+        let bite = self.watchdog.bites_at_ns();
+        self.bites_at = bite.map_or(u64::MAX, |ns| self.time.cycle_of(ns));
+    }
+
+    /// Cycle `cycle` is `ns` from now on.
+    pub(crate) fn align(&mut self, cycle: u64, ns: u64) {
+        let moved = self.time.align(cycle, ns);
+        self.watchdog.shift(moved);
+        self.plan_bite();
     }
 
     /// Cycle of the next event.
     pub(crate) fn next_at(&self) -> u64 {
-        self.next().map_or(u64::MAX, |(at, _)| at)
+        self.due.iter().copied().min().unwrap_or(u64::MAX)
     }
 
     /// Carries out the next event if it is due; gives its cycle.
     pub(crate) fn step(&mut self, cycle: u64) -> Option<u64> {
-        let (at, source) = self.next().filter(|(at, _)| *at <= cycle)?;
+        let at = self.next_at();
+        if at > cycle {
+            return None;
+        }
+        let source = self.due.iter().position(|due| *due == at)?;
         match source {
-            Source::Adc => self.adc.happen(),
-            Source::Usart => self.usart_event(at),
-            Source::Timer(n, event) => {
+            ADC => self.adc.happen(),
+            USART => self.usart_event(at),
+            n => {
+                let event = self.events[n];
                 self.tim[n].happen(at, event);
                 match (n, event) {
                     (TIM1, Event::Update) => self.edge_at(at),
                     (TIM2, Event::Match(0)) if self.tim[TIM2].triggers_on_match() => {
                         self.tim[TIM15].trigger(1, at);
+                        self.plan(TIM15);
                     }
                     (TIM2, Event::Match(3)) => self.started = self.frame().map(|f| (at, f.0, f.1)),
                     (TIM15, Event::Update) => self.driver_off(at),
@@ -209,7 +235,14 @@ impl Soc {
                 }
             }
         }
+        self.plan(source);
         Some(at)
+    }
+
+    /// A byte will have arrived at `cycle`.
+    pub(crate) fn expect(&mut self, cycle: u64, byte: u8) {
+        self.usart.expect(cycle, byte);
+        self.plan(USART);
     }
 
     fn edge_at(&mut self, at: u64) {
@@ -223,6 +256,8 @@ impl Soc {
                 0
             };
             self.adc.trigger(ADC_TIM1_TRGO, code, at);
+            self.plan(TIM2);
+            self.plan(ADC);
         }
     }
 
@@ -269,13 +304,15 @@ impl Soc {
     fn driver_off(&mut self, at: u64) {
         if self.usart.next().is_some_and(|next| next > at) && self.usart.burst.is_some() {
             self.usart.cut();
+            self.plan(USART);
             self.driver_timeouts += 1;
         }
     }
 
     /// The next transfer that DMA owes, and its bookkeeping.
     pub(crate) fn transfer(&mut self) -> Option<Transfer> {
-        if let Some(channel) = self.dma.serving(REQUEST_USART1_RX)
+        if self.usart.dma_waits()
+            && let Some(channel) = self.dma.serving(REQUEST_USART1_RX)
             && !self.dma.channels[channel].sends()
             && let Some(byte) = self.usart.dma_receive()
         {
@@ -505,9 +542,20 @@ impl Soc {
                 ));
             }
             self.time.clock(cycle, hz);
+            self.plan_bite();
         }
-        if name == "USART1" {
-            self.finish_burst();
+        match name {
+            "USART1" => {
+                self.finish_burst();
+                self.plan(USART);
+            }
+            "ADC1" => self.plan(ADC),
+            "IWDG" => self.plan_bite(),
+            _ => {
+                if let Some(n) = Self::timer_of(name) {
+                    self.plan(n);
+                }
+            }
         }
         Ok(())
     }

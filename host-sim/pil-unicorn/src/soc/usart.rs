@@ -135,14 +135,17 @@ impl Usart {
         under_way
     }
 
+    /// A received byte waits for DMA.
+    pub(crate) fn dma_waits(&self) -> bool {
+        self.cr3 & DMAR != 0 && self.isr & RXNE != 0
+    }
+
     /// DMA takes the received byte.
     pub(crate) fn dma_receive(&mut self) -> Option<u8> {
-        if self.cr3 & DMAR != 0 && self.isr & RXNE != 0 {
+        self.dma_waits().then(|| {
             self.isr &= !RXNE;
-            Some(self.rdr)
-        } else {
-            None
-        }
+            self.rdr
+        })
     }
 
     /// Whether DMA may hand over a byte to send.

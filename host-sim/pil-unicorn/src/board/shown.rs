@@ -1,0 +1,175 @@
+//! What a board shows: outputs, inputs as its program read them, transmissions,
+//! measurements.
+
+use wheeleg_pil_link::{Figures, Inputs, MAX_TRANSMISSIONS, Outputs, Ran, Sent, Switches};
+
+use super::Board;
+use crate::machine::Machine;
+use crate::wiring;
+
+/// Edges between two looks at the stack.
+const STACK_EVERY: u32 = 64;
+
+impl Board {
+    pub(super) fn period_us(&self) -> u64 {
+        self.machine.as_ref().map_or(0, |machine| {
+            let state = machine.state();
+            let tim = state.soc.tick_timer();
+            if tim.runs() && self.running {
+                tim.period_cycles() * 1_000_000 / state.soc.time.hz()
+            } else {
+                0
+            }
+        })
+    }
+
+    fn outputs(&self) -> Outputs {
+        let Some(machine) = &self.machine else {
+            return Outputs::default();
+        };
+        let soc = &machine.state().soc;
+        let hz = soc.time.hz();
+        let tick = soc.tick_timer();
+        let mut outputs = Outputs::default();
+        let valves = outputs.valve_on_us.iter_mut().zip(wiring::VALVES);
+        for (channel, (on_us, (pin, function))) in valves.enumerate() {
+            *on_us = if soc.ports[0].carries(pin, function) {
+                let (high, _) = tick.high_counts(channel);
+                tick.micros(high, hz) as u16
+            } else if soc.ports[0].drives_high(pin) {
+                1000
+            } else {
+                0
+            };
+        }
+        if soc.ports[2].carries(wiring::PULSE, wiring::PULSE_FUNCTION) {
+            let (high, period) = soc.bridge_timer().high_counts(0);
+            outputs.bridge_percent = (high * 100 / period.max(1)) as u8;
+        } else if soc.ports[2].drives_high(wiring::PULSE) {
+            outputs.bridge_percent = 100;
+        }
+        outputs.bridge_backward = soc.ports[1].drives_high(wiring::DIRECTION);
+        outputs.dump = soc.ports[1].drives_high(wiring::DUMP);
+        outputs
+    }
+
+    fn seen(&mut self) -> (Inputs, u64) {
+        let Some(machine) = &self.machine else {
+            return (Inputs::default(), 0);
+        };
+        let state = machine.state();
+        let seen = state.seen;
+        let foot = wiring::FOOT.map(|pin| seen.port_a >> pin & 1 != 0);
+        let supply = Switches::from_supply(seen.port_a >> wiring::SUPPLY & 1 != 0);
+        let inputs = Inputs {
+            adc: seen.adc,
+            switches: Switches(Switches::from_foot(foot).0 | supply.0),
+            encoder: i32::from(seen.count as u16 as i16),
+        };
+        (inputs, state.soc.time.ns_of(seen.edge))
+    }
+
+    /// What the board shows now: outputs, and the newest tick that was worked off.
+    pub(super) fn shown(&mut self) -> Ran {
+        let (seen, seen_at_ns) = self.seen();
+        let state = self.machine.as_ref().map(Machine::state);
+        Ran {
+            outputs: self.outputs(),
+            seen,
+            seen_at_ns,
+            figures: Figures {
+                tick_instructions: state.map_or(0, |state| state.tick_instructions as u32),
+                ..Figures::default()
+            },
+            ..Ran::default()
+        }
+    }
+
+    /// What the board has shown at an edge, and the rest of the reply as of now.
+    pub(super) fn reply(&mut self, shown: Ran) -> Result<Ran, String> {
+        let sent = self.sent()?;
+        let period_us = self.period_us() as u32;
+        self.measure()?;
+        let trip = self.trip;
+        if trip.is_some_and(|t| t.running_ns > 0) || !self.power_lost_in_save {
+            self.trip = self.trip.filter(|t| t.running_ns == 0);
+        }
+        Ok(Ran {
+            period_us,
+            sent,
+            figures: Figures {
+                tick_instructions: shown.figures.tick_instructions,
+                ..self.figures
+            },
+            trip,
+            ..shown
+        })
+    }
+
+    /// What stands ready to go out and has not been told yet. What has gone
+    /// out must be what was told.
+    fn sent(&mut self) -> Result<heapless::Vec<Sent, MAX_TRANSMISSIONS>, String> {
+        let mut sent = heapless::Vec::new();
+        let Some(machine) = &mut self.machine else {
+            return Ok(sent);
+        };
+        let time = machine.state().soc.time;
+        // Started since the last reply, or standing ready.
+        let cycle = machine.state().cycle;
+        let started = machine.state_mut().soc.started.take();
+        let armed = machine.state().soc.armed(cycle);
+        for (start, address, length) in started.into_iter().chain(armed) {
+            if self.announced.back().is_some_and(|told| told.0 == start) {
+                continue;
+            }
+            let mut bytes = vec![0; length as usize];
+            machine.memory(address, &mut bytes)?;
+            let copy = heapless::Vec::from_slice(&bytes)
+                .map_err(|_| format!("a transmission of {length} bytes"))?;
+            let frame = Sent {
+                start_ns: time.ns_of(start),
+                bytes: copy,
+            };
+            let _ = sent.push(frame);
+            self.announced.push_back((start, bytes));
+        }
+        for frame in std::mem::take(&mut machine.state_mut().soc.gone) {
+            // Told before it: replaced, or cut off by the driver's time limit.
+            while self.announced.front().is_some_and(|told| told.0 < frame.0) {
+                self.announced.pop_front();
+            }
+            let told = self.announced.front();
+            if told != Some(&frame) {
+                let text = |(start, bytes): &(u64, Vec<u8>)| {
+                    format!("{} bytes at {} ns", bytes.len(), time.ns_of(*start))
+                };
+                return Err(format!(
+                    "a frame left ({}) that did not stand ready in hardware like that ({})",
+                    text(&frame),
+                    told.map_or_else(|| "nothing".to_owned(), text)
+                ));
+            }
+        }
+        Ok(sent)
+    }
+
+    fn measure(&mut self) -> Result<(), String> {
+        let Some(machine) = &mut self.machine else {
+            return Ok(());
+        };
+        let state = machine.state();
+        let retired = state.retired();
+        self.figures.instructions = (retired - self.retired) as u32;
+        self.figures.longest_awake = state.longest_awake as u32;
+        self.figures.driver_timeouts = state.soc.driver_timeouts;
+        self.retired = retired;
+        if self.edges.is_multiple_of(STACK_EVERY) {
+            let top = self.image.word(0);
+            let bottom = self.image.stack_bottom;
+            let low = machine.watermark(bottom, top)?;
+            self.figures.stack_used = top - low;
+            self.figures.stack_size = top - bottom;
+        }
+        Ok(())
+    }
+}

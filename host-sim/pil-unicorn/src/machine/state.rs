@@ -1,0 +1,174 @@
+//! What the engine's hooks reach: peripherals, interrupts, and the count of time.
+
+use super::TRACE;
+use super::blocks::Blocks;
+use crate::nvic::Nvic;
+use crate::soc::Soc;
+
+/// Interrupts that begin a tick and those that only bring bytes.
+const TICK_LINES: [usize; 2] = [16 + 18, 16 + 28];
+
+/// One stretch between two sleeps.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Awake {
+    /// Instructions executed before it.
+    since: u64,
+    ticks: u32,
+    others: u32,
+}
+
+/// Inputs as the program read them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Seen {
+    /// Edge of the tick.
+    pub(crate) edge: u64,
+    /// Converter.
+    pub(crate) adc: u16,
+    /// Levels of port A.
+    pub(crate) port_a: u32,
+    /// Quadrature counter, 16 bits.
+    pub(crate) count: u32,
+}
+
+/// All that hooks reach.
+pub(crate) struct State {
+    pub(crate) soc: Soc,
+    pub(crate) nvic: Nvic,
+    pub(crate) cycle: u64,
+    pub(super) due: u64,
+    /// Cycles in which nothing was executed.
+    pub(super) idle: u64,
+    pub(super) refused: Option<String>,
+    pub(super) returns: bool,
+    pub(super) service_call: bool,
+    /// An exception of the engine that no handler here knows.
+    pub(super) fault: Option<u32>,
+    /// The last access that nothing answered.
+    pub(super) unanswered: String,
+    /// Faults have been injected: a hard fault is the program's to handle.
+    pub(crate) tolerant: bool,
+    /// What the program read in the last tick that was worked off.
+    pub(crate) seen: Seen,
+    /// Stop as soon as the tick timer runs.
+    pub(super) await_tick: bool,
+    pub(super) trace: [u32; TRACE],
+    pub(super) trace_at: usize,
+    pub(super) blocks: Blocks,
+    pub(super) awake: Awake,
+    /// Instructions of the newest tick that nothing interrupted: from waking at its
+    /// edge until the watchdog is fed.
+    pub(crate) tick_instructions: u64,
+    /// Longest stretch so far.
+    pub(crate) longest_awake: u64,
+    /// The main loop stands still.
+    pub(crate) stop_main_loop: bool,
+    /// The processor stands still.
+    pub(crate) stop_processor: bool,
+}
+
+impl State {
+    /// At power-up.
+    pub(super) fn new(soc: Soc, blocks: Blocks) -> Self {
+        Self {
+            soc,
+            nvic: Nvic::default(),
+            cycle: 0,
+            due: 0,
+            idle: 0,
+            refused: None,
+            returns: false,
+            service_call: false,
+            fault: None,
+            unanswered: String::new(),
+            tolerant: false,
+            seen: Seen::default(),
+            await_tick: false,
+            trace: [0; TRACE],
+            trace_at: 0,
+            blocks,
+            awake: Awake::default(),
+            tick_instructions: 0,
+            longest_awake: 0,
+            stop_main_loop: false,
+            stop_processor: false,
+        }
+    }
+
+    /// Peripherals, interrupts and all that was provoked start anew.
+    pub(super) fn reset(&mut self, soc: Soc) {
+        self.soc = soc;
+        self.nvic = Nvic::default();
+        self.stop_main_loop = false;
+        self.stop_processor = false;
+        self.awake = Awake {
+            since: self.retired(),
+            ..Awake::default()
+        };
+    }
+
+    /// Instructions executed since power-up.
+    pub(crate) fn retired(&self) -> u64 {
+        self.cycle - self.idle
+    }
+
+    /// Instructions since the processor woke.
+    fn awake_instructions(&self) -> u64 {
+        self.retired() - self.awake.since
+    }
+
+    /// Time passes without instructions.
+    pub(super) fn pass(&mut self, cycles: u64) {
+        self.cycle += cycles;
+        self.idle += cycles;
+    }
+
+    pub(super) fn refuse(&mut self, what: String) {
+        self.refused.get_or_insert(what);
+        self.due = 0;
+    }
+
+    /// After an access to a peripheral: what is due, and when.
+    pub(super) fn touched(&mut self) {
+        // Bytes may be worked off before the next sleep; they are no part of the tick.
+        if self.soc.watchdog.take_fed() && self.awake.ticks == 1 && self.awake.others == 0 {
+            self.tick_instructions = self.awake_instructions();
+        }
+        self.nvic.lines = self.soc.lines();
+        let attention = self.nvic.reset_request
+            || self.soc.flash.stall_ns > 0
+            || self.soc.flash.power_failed
+            || self.await_tick && self.soc.tick_timer().runs()
+            || self.nvic.next(false, 0).is_some();
+        self.due = if attention {
+            0
+        } else {
+            self.due.min(self.soc.next_at())
+        };
+    }
+
+    pub(super) fn sleep(&mut self) {
+        self.longest_awake = self.longest_awake.max(self.awake_instructions());
+        let since = self.retired();
+        let fresh = Awake {
+            since,
+            ..Awake::default()
+        };
+        let awake = std::mem::replace(&mut self.awake, fresh);
+        if awake.ticks > 0 {
+            self.seen = Seen {
+                edge: self.soc.edge.unwrap_or(0),
+                adc: self.soc.adc.read,
+                port_a: self.soc.ports[0].read,
+                count: self.soc.encoder_timer().counted,
+            };
+        }
+    }
+
+    pub(super) fn woken_by(&mut self, exception: usize) {
+        if TICK_LINES.contains(&exception) {
+            self.awake.ticks += 1;
+        } else {
+            self.awake.others += 1;
+        }
+    }
+}
