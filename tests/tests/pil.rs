@@ -2,7 +2,7 @@
 //! its supply, determinism. `cargo xtask pil` builds what they need and runs
 //! them; the bit-for-bit comparison of a whole run is a step of its own there.
 
-use wheeleg_pil_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, Straps};
+use wheeleg_pil_link::{Figures, Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, Straps};
 use wheeleg_sim::pil::Line as _;
 use wheeleg_sim::pil::unicorn::{Unicorn, image};
 
@@ -22,6 +22,10 @@ struct Bench {
 
 impl Bench {
     fn new(address: u8) -> Self {
+        Self::with_crystal(address, true)
+    }
+
+    fn with_crystal(address: u8, crystal: bool) -> Self {
         let image = image(if address <= 6 { "joint" } else { "wheel" }).expect("an image");
         let line = Unicorn::start(&[image]).expect("the emulator");
         let mut bench = Self {
@@ -32,7 +36,7 @@ impl Bench {
         let straps = Straps {
             address,
             unique_id: [address; 12],
-            crystal: true,
+            crystal,
         };
         let up = bench.ran(&Request::PowerUp(straps));
         assert_eq!(up.outputs, Outputs::default(), "off at power-up");
@@ -55,6 +59,10 @@ impl Bench {
     }
 
     fn tick(&mut self, power: Power) -> Ran {
+        self.tick_of(TICK_NS, power)
+    }
+
+    fn tick_of(&mut self, period_ns: u64, power: Power) -> Ran {
         let inputs = Inputs {
             adc: 30_000,
             ..Inputs::default()
@@ -66,7 +74,7 @@ impl Bench {
             byte_ns: 10_000,
             ..Run::default()
         };
-        self.now_ns += TICK_NS;
+        self.now_ns += period_ns;
         self.ran(&Request::Run(run))
     }
 
@@ -145,6 +153,49 @@ fn a_brown_out_resets_with_outputs_off_and_the_board_returns_with_the_supply() {
     let up = bench.tick(Power::Good);
     assert_eq!(up.period_us, 1000);
     assert_eq!(up.seen.adc, 30_000);
+}
+
+/// Polls before a board gives its crystal up (firmware/board/src/g431/clock.rs), each of
+/// some instructions.
+const CRYSTAL_POLLS: u32 = 40_000;
+
+#[test]
+fn without_its_crystal_a_board_runs_on_the_internal_oscillator_at_the_same_speed() {
+    for (address, period_us) in [(2, 1000), (8, 520)] {
+        let run = |crystal: bool| {
+            let mut bench = Bench::with_crystal(address, crystal);
+            for _ in 0..100 {
+                bench.tick_of(u64::from(period_us) * 1_000, Power::Good);
+            }
+            let start_up = match bench.replies.first() {
+                Some(Reply::Ran(ran)) => ran.figures.instructions,
+                other => panic!("{other:?}"),
+            };
+            // All but how long the code took: an instruction is a cycle at either clock.
+            let seen: Vec<Ran> = bench.replies.iter().map(without_figures).collect();
+            (start_up, seen)
+        };
+        let (with, without) = (run(true), run(false));
+        let longer = without.0.saturating_sub(with.0);
+        assert!(
+            (3 * CRYSTAL_POLLS..20 * CRYSTAL_POLLS).contains(&longer),
+            "the crystal is waited for and given up: {longer} instructions more"
+        );
+        assert_eq!(without.1, with.1, "and nothing else differs");
+        let last = without.1.last().expect("ticks");
+        assert_eq!(last.period_us, period_us);
+        assert!(last.seen_at_ns > 0, "ticks are worked off");
+    }
+}
+
+fn without_figures(reply: &Reply) -> Ran {
+    match reply {
+        Reply::Ran(ran) => Ran {
+            figures: Figures::default(),
+            ..ran.clone()
+        },
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Faults with the firmware images on emulated boards: the master dies, a program
-//! stops, the supply fails in mid-move and in mid-save, a bit of the state flips.
+//! stops, the supply fails in mid-move and in mid-save. (Flipped bits: `pil_flips.rs`.)
 //! Each ends in the safe state of ARCHITECTURE.md, seen on the commanded, the
 //! sensed and the physical side. `cargo xtask pil` runs this.
 
@@ -10,12 +10,12 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use bench::{closed_loop, power_up};
+use bench::pil::Board;
+use bench::power_up;
 use sil::{at, energised, gait, range, robot, window};
-use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run, text};
+use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
-use wheeleg_sim::pil::unicorn::{Unicorn, image};
-use wheeleg_sim::pil::{Line as _, NodeChoice, NodeKind, Nodes, PilSummary};
+use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_sim::telemetry::{JointSample, Recorder, Recording, Row};
 
 /// Valves commanded shut and wheel ramps begun within this, s.
@@ -231,146 +231,6 @@ fn a_brown_out_in_mid_move_turns_the_outputs_off_and_the_board_comes_back_disarm
     // The fault strikes within the tick of its instant; the next one has none.
     assert!(commanded <= 2.0 * TICK_S, "off after {commanded} s");
     assert_shut_after_one_reset("supply fails", &recording, &pil, t, commanded);
-}
-
-/// One emulated board by itself.
-struct Board(Unicorn);
-
-impl Board {
-    fn new(image: PathBuf) -> Self {
-        Self(Unicorn::start(&[image]).expect("the emulator"))
-    }
-
-    fn ask(&mut self, request: &Request) -> Reply {
-        self.0.queue(0, request).expect("queued");
-        self.0.flush().expect("sent");
-        self.0.receive().expect("a reply").1
-    }
-
-    fn ran(&mut self, request: &Request) -> Ran {
-        match self.ask(request) {
-            Reply::Ran(ran) => ran,
-            other => panic!("{other:?}"),
-        }
-    }
-}
-
-/// Numbers that look random and are the same every time.
-fn hash(number: u64) -> u64 {
-    let mut x = number.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ (x >> 31)
-}
-
-/// Instant of the flip: the cylinder moves to the second set-point, ms.
-const FLIP_MS: u64 = 330;
-/// End of a run with a flip, ms.
-const FLIPPED_MS: u64 = 480;
-/// Ticks in which a joint board looks at all seals of its configuration at most
-/// (`wheeleg_node::joint`, `PARTS`).
-const ROUND_TICKS: usize = 8;
-
-/// What a flip came to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Came {
-    /// The valves are shut from the second tick after it on.
-    Held,
-    /// They are shut once the seals of the configuration have all been looked at.
-    HeldInARound,
-    /// The board did exactly what it does without.
-    Nothing,
-    /// The processor was reset, and its valves are shut from then on.
-    Reset,
-    /// Anything else.
-    Changed,
-}
-
-/// On-times of all four valves from edge to edge.
-fn on_times(bit: Option<(u32, u8)>) -> (Vec<[u16; 4]>, bool) {
-    let mut board = Board::new(image("joint").expect("an image"));
-    let mut on_us = Vec::new();
-    let mut reset = false;
-    closed_loop(FLIPPED_MS, |request| {
-        let edge = match request {
-            Request::Run(run) => run.edge.is_some(),
-            _ => false,
-        };
-        if let (true, Some((offset, bit))) = (edge && on_us.len() as u64 == FLIP_MS, bit) {
-            let hook = Hook::FlipBit {
-                symbol: text("NODE"),
-                address: offset,
-                bit,
-            };
-            assert_eq!(board.ask(&Request::Hook(hook)), Reply::Done);
-        }
-        let reply = board.ask(request);
-        if let Reply::Ran(ran) = &reply {
-            reset |= ran.trip.is_some();
-            if edge {
-                on_us.push(ran.outputs.valve_on_us);
-            }
-        }
-        reply
-    });
-    (on_us, reset)
-}
-
-fn judge(sound: &[[u16; 4]], flipped: &[[u16; 4]], reset: bool) -> Came {
-    let at = FLIP_MS as usize;
-    assert_eq!(sound[..at], flipped[..at], "equal up to the flip");
-    // The edge after the flip still shows what was prepared before it.
-    let shut = |from: usize| flipped[from..].iter().all(|on_us| *on_us == [0; 4]);
-    match () {
-        () if flipped == sound => Came::Nothing,
-        () if reset && shut(at + 60) => Came::Reset,
-        () if shut(at + 2) => Came::Held,
-        () if shut(at + 1 + ROUND_TICKS) => Came::HeldInARound,
-        () => Came::Changed,
-    }
-}
-
-#[test]
-fn a_flipped_bit_of_the_state_is_found_or_does_nothing() {
-    let (sound, _) = on_times(None);
-    let moving = &sound[FLIP_MS as usize..];
-    assert!(
-        moving.iter().filter(|on_us| **on_us != [0; 4]).count() > 20,
-        "valves at work, or a flip could not show"
-    );
-    let size = object_size("NODE");
-    let mut counts = [0_u32; 5];
-    let mut changed = Vec::new();
-    const FLIPS: u64 = 160;
-    for number in 0..FLIPS {
-        let random = hash(number);
-        let place = ((random >> 8) as u32 % size, (random & 7) as u8);
-        let (flipped, reset) = on_times(Some(place));
-        let came = judge(&sound, &flipped, reset);
-        counts[came as usize] += 1;
-        if came == Came::Changed {
-            changed.push(place);
-        }
-    }
-    let [held, in_a_round, nothing, reset, other] = counts;
-    println!(
-        "{FLIPS} flips in {size} bytes: {held} held within 2 ticks, {in_a_round} within \
-         {ROUND_TICKS}, {nothing} without effect, {reset} reset, {other} other {changed:?}"
-    );
-    // The state is most of the application; what no seal covers is buffers and counters.
-    assert!(held > FLIPS as u32 / 4, "{held} held");
-    assert_eq!(other, 0, "neither found nor without effect: {changed:?}");
-}
-
-/// Size of a variable in the joint image, bytes.
-fn object_size(name: &str) -> u32 {
-    use object::{Object as _, ObjectSymbol as _};
-    let bytes = std::fs::read(image("joint").expect("an image")).expect("read");
-    let elf = object::File::parse(&*bytes).expect("ELF");
-    let found = elf
-        .symbols()
-        .find(|symbol| symbol.name().is_ok_and(|n| n.contains(name)) && symbol.size() > 500);
-    found.unwrap_or_else(|| panic!("no variable {name}")).size() as u32
 }
 
 /// A board that saves its parameters (firmware/board/src/bin/probe_store.rs).

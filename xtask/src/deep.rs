@@ -18,7 +18,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 6] = [
+const CHECKS: [Check; 7] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -43,6 +43,12 @@ const CHECKS: [Check; 6] = [
         "mutations of the code that decides safe states",
         30,
         mutations,
+    ),
+    Check(
+        "state-flips",
+        "flipped bits in the state of emulated boards, 20 times as many as in the suite",
+        10,
+        pil::state_flips,
     ),
     Check(
         "second-way",

@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -139,19 +140,41 @@ impl Images {
 
 /// The tests that need emulated boards.
 fn tests(emulator: &Path, images: &Images) -> StepResult {
+    let names = ["pil", "pil_faults", "pil_flips", "pil_store", "pil_mutants"];
+    run(&mut test_programs(emulator, images, &names))?;
+    Ok(())
+}
+
+/// The command that runs test programs on emulated boards.
+fn test_programs(emulator: &Path, images: &Images, names: &[&str]) -> Command {
     let mut test = cargo();
     // Optimised, as the program of the figures below is: one build serves both.
     test.args(["test", "--locked", "--release", "--no-fail-fast"]);
     test.args(["--package", "wheeleg-tests", "--features", "pil"]);
-    for name in ["pil", "pil_faults", "pil_store", "pil_mutants"] {
+    for name in names {
         test.args(["--test", name]);
     }
-    run(test
-        .env("WHEELEG_PIL", emulator)
+    test.env("WHEELEG_PIL", emulator)
         .env("WHEELEG_IMAGES", &images.folder)
         .env("WHEELEG_MUTANTS", &images.mutants)
-        .env("WHEELEG_PROBES", &images.probes))?;
-    Ok(())
+        .env("WHEELEG_PROBES", &images.probes);
+    test
+}
+
+/// Twenty times as many flipped bits as in the suite.
+pub(crate) fn state_flips() -> StepResult<String> {
+    tools()?;
+    let emulator = emulator()?;
+    let images = Images::build(set_up(firmware::TARGET)?, "firmware", false)?;
+    let mut test = test_programs(&emulator, &images, &["pil_flips"]);
+    test.args(["--", "--nocapture"])
+        .env("WHEELEG_FLIP_TIMES", "20");
+    let text = output(&mut test)?;
+    let found: Vec<&str> = text.lines().filter(|l| l.contains(" flips in ")).collect();
+    let [joint, wheel] = found.as_slice() else {
+        return Err(anyhow::anyhow!("a joint's and a wheel's line, not {found:?}").into());
+    };
+    Ok(format!("{joint}; {wheel}"))
 }
 
 /// The whole suite with images of the second way of building. It shares only
@@ -212,6 +235,20 @@ pub(crate) fn ensure_equal(pil: &Value) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The speeds of both runs against the target, judged by the worse one. A target missed
+/// does not fail the step: a busy machine is no defect. It is not shown as met, either.
+fn speed_verdict(speeds: [f64; 2]) -> String {
+    let [first, second] = speeds;
+    let verdict = if first.min(second) >= SPEED_LEAST {
+        "met"
+    } else {
+        "MISSED (KNOWN SHORTFALL on a busy machine; run it again on an idle one)"
+    };
+    format!(
+        "speed: {first:.2} and {second:.2} times real time, target at least {SPEED_LEAST:.1}: {verdict}"
+    )
+}
+
 /// Runs the paper's test twice on eight emulated boards: no bit may differ from
 /// the host, nor between the runs.
 fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
@@ -227,11 +264,14 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
             .max()
             .unwrap_or(0)
     };
+    let speeds = [&first, &second].map(|run| run["realtime_factor"].as_f64().unwrap_or(0.0));
+    let worse = speeds[0].min(speeds[1]);
     let mut figures = json!({
         "hash": first["hash"],
         "compared_bits": pil["compared_bits"],
         "differing_bits": pil["differing_bits"],
-        "realtime_factor": first["realtime_factor"],
+        "realtime_factors": speeds,
+        "realtime_factor": worse,
         "realtime_factor_least": SPEED_LEAST,
     });
     for image in ["joint", "wheel"] {
@@ -248,10 +288,24 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     let within_budget = sizes::check_run(images, &mut figures);
     figures["qemu"] = qemu::counts();
     println!("    {figures}");
+    println!("    {}", speed_verdict(speeds));
     ensure_equal(pil)?;
     if first["hash"] != second["hash"] {
         return Err(anyhow::anyhow!("two runs differ").into());
     }
     within_budget?;
     Ok(json!({ "pil": figures }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worse_of_two_runs_decides_about_the_speed() {
+        let verdict = speed_verdict([2.5, 1.98]);
+        assert!(verdict.contains("2.50 and 1.98") && verdict.contains("MISSED"));
+        assert!(speed_verdict([2.0, 3.0]).ends_with(": met"));
+        assert!(speed_verdict([1.2, 3.0]).contains("MISSED"));
+    }
 }

@@ -11,5 +11,5 @@ mod settings;
 #[cfg(test)]
 mod integrity_tests;
 
-pub use node::JointNode;
+pub use node::{JointNode, PARTS};
 pub use settings::{JointSettings, TickSettings};

@@ -124,7 +124,7 @@ impl Outside {
         let mut addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
         // The wheels side by side: their edges come twice as often as the joints' and
         // at the same instant, and to wake two processes takes longer than their ticks.
-        addresses.rotate_right(addresses.iter().filter(|a| **a > 6).count());
+        addresses.sort_by_key(|address| *address <= 6);
         let each = addresses.len().div_ceil(processes()).max(1);
         for mine in addresses.chunks(each) {
             let images = mine

@@ -7,6 +7,9 @@
 // Every test program uses another part of this module.
 #![allow(dead_code)]
 
+#[cfg(feature = "pil")]
+pub(crate) mod pil;
+
 use heapless::Vec as Short;
 use wheeleg_pil_link::{Figures, Inputs, Ran, Reply, Request, Run, Straps};
 use wheeleg_plant::axis::Axis;
@@ -55,7 +58,7 @@ pub(crate) fn closed_loop_natively() -> Trace {
     closed_loop(SCRIPT_MS, |request| session.answer(request, &mut NoTime))
 }
 
-fn frame(destination: Address, message: &Message) -> Vec<u8> {
+pub(crate) fn frame(destination: Address, message: &Message) -> Vec<u8> {
     let envelope = Envelope {
         source: Address::MASTER,
         destination,
@@ -95,7 +98,7 @@ fn sync(cycle: u64, script: &[(u64, f64)]) -> Vec<u8> {
 }
 
 /// Bytes that have come in by `until_ns`, without an edge.
-fn delivery(bytes: &[u8], until_ns: u64) -> Request {
+pub(crate) fn delivery(bytes: &[u8], until_ns: u64) -> Request {
     Request::Run(Run {
         until_ns,
         received: Short::from_slice(bytes).expect("fits"),

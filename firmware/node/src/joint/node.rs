@@ -25,7 +25,7 @@ use wheeleg_units::{Micros, PositionMm, Ticks};
 const OWN_PARTS: usize = 3;
 /// Parts in which the configuration is sealed. A tick looks at one of them, so a
 /// flipped bit of it is found within so many ticks.
-pub(super) const PARTS: usize = OWN_PARTS + JointConfig::PARTS;
+pub const PARTS: usize = OWN_PARTS + JointConfig::PARTS;
 const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 
 /// State that only a tick changes, sealed between two ticks.

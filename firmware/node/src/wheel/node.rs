@@ -23,7 +23,7 @@ const BOOT_TICKS: Ticks = Ticks(10);
 
 /// Parts in which the configuration is sealed: parameters, settings, times. A
 /// sample looks at one of them.
-pub(super) const PARTS: usize = 3;
+pub const PARTS: usize = 3;
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -1,0 +1,29 @@
+//! One image on an emulated board, alone.
+
+use std::path::PathBuf;
+
+use wheeleg_pil_link::{Ran, Reply, Request};
+use wheeleg_sim::pil::Line as _;
+use wheeleg_sim::pil::unicorn::Unicorn;
+
+/// One emulated board by itself.
+pub(crate) struct Board(Unicorn);
+
+impl Board {
+    pub(crate) fn new(image: PathBuf) -> Self {
+        Self(Unicorn::start(&[image]).expect("the emulator"))
+    }
+
+    pub(crate) fn ask(&mut self, request: &Request) -> Reply {
+        self.0.queue(0, request).expect("queued");
+        self.0.flush().expect("sent");
+        self.0.receive().expect("a reply").1
+    }
+
+    pub(crate) fn ran(&mut self, request: &Request) -> Ran {
+        match self.ask(request) {
+            Reply::Ran(ran) => ran,
+            other => panic!("{other:?}"),
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! Flipped bits in the state of the firmware images on emulated boards: what a flip
+//! changes is found within the ticks that the application promises, at whatever
+//! instant it strikes, on a joint and on a wheel. `cargo xtask pil` runs this,
+//! `cargo xtask deep state-flips` runs many more.
+
+mod bench;
+
+use std::ops::Range;
+
+use bench::pil::Board;
+use bench::{closed_loop, delivery, frame, power_up};
+use wheeleg_node::{joint, wheel};
+use wheeleg_pil_link::{Hook, Inputs, Outputs, Reply, Request, Run, text};
+use wheeleg_protocol::{
+    Address, Arm, Message, SCHEMA_HASH, Sync, SyncFlags, SyncSlots, WheelSetpoint,
+};
+use wheeleg_sim::pil::unicorn::image;
+use wheeleg_units::WheelCount;
+
+/// Times as many flips as in the suite.
+const TIMES_VARIABLE: &str = "WHEELEG_FLIP_TIMES";
+const BYTE_NS: u64 = 10_000;
+
+/// One board and what it does while it is struck.
+struct Subject {
+    /// Its image.
+    image: &'static str,
+    /// Runs it, with all requests through the function.
+    course: fn(&mut dyn FnMut(&Request) -> Reply),
+    /// Edges at which flips strike: from arming until there is too little left to see.
+    struck: Range<u64>,
+    /// Ticks in which all seals of its configuration are looked at once.
+    round: usize,
+    /// Ticks in which the watchdog resets it, with a margin.
+    reset: usize,
+    /// Flips in the suite.
+    flips: u64,
+}
+
+/// A joint that goes from one set-point to another, ticks of 1 ms.
+const JOINT: Subject = Subject {
+    image: "joint",
+    course: |ask| drop(closed_loop(480, ask)),
+    struck: 120..420,
+    round: joint::PARTS,
+    reset: 60,
+    flips: 200,
+};
+
+/// A wheel that follows a moving set-point, samples of 520 µs.
+const WHEEL: Subject = Subject {
+    image: "wheel",
+    course: follow,
+    struck: 240..680,
+    round: wheel::PARTS,
+    reset: 120,
+    flips: 80,
+};
+
+/// The second wheel: it has no dump valve, which acts at once.
+const WHEEL_ADDRESS: u8 = 8;
+const SAMPLE_NS: u64 = 520_000;
+/// Speed that the wheel is to have, counts/s.
+const SPEED: f64 = 5_000.0;
+/// Speed at full drive, counts/s, and the time in which it comes (ASSUMED: any motor
+/// that the loop can hold will do).
+const FULL_SPEED: f64 = 20_000.0;
+const MOTOR_S: f64 = 0.05;
+
+/// A wheel board with a motor of the first order: armed at 105 ms, set-points that move
+/// from 150 ms on, until 420 ms.
+fn follow(ask: &mut dyn FnMut(&Request) -> Reply) {
+    let address = Address::wheel(WHEEL_ADDRESS).expect("a wheel");
+    let arm = frame(
+        address,
+        &Message::Arm(Arm {
+            schema_hash: SCHEMA_HASH,
+        }),
+    );
+    let mut line: Vec<(u64, Vec<u8>)> = (0..42)
+        .map(|cycle| (cycle * 10_000_000, set_point(cycle, address)))
+        .chain([(105_000_000, arm)])
+        .collect();
+    line.sort();
+    let mut line = line.into_iter().peekable();
+    let (mut speed, mut angle) = (0.0_f64, 0.0_f64);
+    ask(&power_up(WHEEL_ADDRESS));
+    for edge_ns in (0..808).map(|sample| sample * SAMPLE_NS) {
+        let end = |(start, bytes): &(u64, Vec<u8>)| start + bytes.len() as u64 * BYTE_NS;
+        while let Some(sent) = line.next_if(|sent| end(sent) <= edge_ns) {
+            ask(&delivery(&sent.1, end(&sent)));
+        }
+        let edge = Run {
+            until_ns: edge_ns,
+            edge: Some(Inputs {
+                encoder: angle as i32,
+                ..Inputs::default()
+            }),
+            ..Run::default()
+        };
+        if let Reply::Ran(ran) = ask(&Request::Run(edge)) {
+            let drive = f64::from(ran.outputs.bridge_percent) / 100.0;
+            let sign = if ran.outputs.bridge_backward {
+                -1.0
+            } else {
+                1.0
+            };
+            let dt_s = SAMPLE_NS as f64 * 1e-9;
+            speed += (sign * drive * FULL_SPEED - speed) * dt_s / MOTOR_S;
+            angle += speed * dt_s;
+        }
+    }
+}
+
+/// The SYNC of a cycle.
+fn set_point(cycle: u64, address: Address) -> Vec<u8> {
+    let moving_s = (cycle as f64 * 0.01 - 0.150).max(0.0);
+    let per_sample = SPEED * SAMPLE_NS as f64 * 1e-9;
+    let velocity = if moving_s > 0.0 { per_sample } else { 0.0 };
+    let mut slots = SyncSlots::NONE;
+    let set = slots.set_wheel(
+        address,
+        WheelSetpoint {
+            reference: WheelCount::wrapping_new((SPEED * moving_s) as i32),
+            velocity_raw: (velocity * 16.0).round() as i16,
+            track: true,
+        },
+    );
+    assert!(set);
+    let sync = Message::Sync(Sync {
+        cycle: cycle as u16,
+        flags: SyncFlags::NONE,
+        master_time_us: (cycle * 10_000) as u32,
+        slots,
+    });
+    frame(Address::BROADCAST, &sync)
+}
+
+/// Numbers that look random and are the same every time.
+fn hash(number: u64) -> u64 {
+    let mut x = number.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
+
+/// A bit of the application's state and the edge before which it flips.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Flip {
+    edge: u64,
+    offset: u32,
+    bit: u8,
+}
+
+impl Flip {
+    fn new(number: u64, subject: &Subject, size: u32) -> Self {
+        let random = hash(number);
+        let instants = subject.struck.end - subject.struck.start;
+        Self {
+            edge: subject.struck.start + (random >> 40) % instants,
+            offset: (random >> 8) as u32 % size,
+            bit: (random & 7) as u8,
+        }
+    }
+}
+
+/// What a flip came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Came {
+    /// The outputs are off from the second tick after it on.
+    Held,
+    /// They are off once the seals of the configuration have all been looked at.
+    HeldInARound,
+    /// The board did exactly what it does without.
+    Nothing,
+    /// The processor was reset, and its outputs are off from then on.
+    Reset,
+    /// Anything else.
+    Changed,
+}
+
+/// What drives something; a bridge at zero has no direction.
+fn driven(outputs: &Outputs) -> [u16; 6] {
+    let [a, b, c, d] = outputs.valve_on_us;
+    let backward = outputs.bridge_backward && outputs.bridge_percent > 0;
+    [a, b, c, d, outputs.bridge_percent.into(), backward.into()]
+}
+
+const OFF: [u16; 6] = [0; 6];
+
+/// What the board drives from edge to edge, and whether it was reset.
+fn drives(subject: &Subject, flip: Option<Flip>) -> (Vec<[u16; 6]>, bool) {
+    let mut board = Board::new(image(subject.image).expect("an image"));
+    let mut driving = Vec::new();
+    let mut reset = false;
+    (subject.course)(&mut |request| {
+        let edge = match request {
+            Request::Run(run) => run.edge.is_some(),
+            _ => false,
+        };
+        if let (true, Some(flip)) = (edge, flip)
+            && driving.len() as u64 == flip.edge
+        {
+            let hook = Hook::FlipBit {
+                symbol: text("NODE"),
+                address: flip.offset,
+                bit: flip.bit,
+            };
+            assert_eq!(board.ask(&Request::Hook(hook)), Reply::Done);
+        }
+        let reply = board.ask(request);
+        if let Reply::Ran(ran) = &reply {
+            reset |= ran.trip.is_some();
+            if edge {
+                driving.push(driven(&ran.outputs));
+            }
+        }
+        reply
+    });
+    (driving, reset)
+}
+
+fn judge(subject: &Subject, sound: &[[u16; 6]], flip: Flip) -> Came {
+    let (flipped, reset) = drives(subject, Some(flip));
+    let at = flip.edge as usize;
+    assert_eq!(sound[..at], flipped[..at], "equal up to {flip:?}");
+    // The edge after the flip still shows what was prepared before it.
+    let off = |from: usize| flipped[from..].iter().all(|driving| *driving == OFF);
+    match () {
+        () if flipped == sound => Came::Nothing,
+        () if reset && off(at + subject.reset) => Came::Reset,
+        () if off(at + 2) => Came::Held,
+        () if off(at + 1 + subject.round) => Came::HeldInARound,
+        () => Came::Changed,
+    }
+}
+
+fn every_flip_is_found_or_does_nothing(subject: &Subject) {
+    let (sound, reset) = drives(subject, None);
+    assert!(!reset);
+    for part in [subject.struck.start as usize, subject.struck.end as usize] {
+        let busy = sound[part..].iter().filter(|driving| **driving != OFF);
+        assert!(
+            busy.count() > 20,
+            "at work after {part}, or no flip could show"
+        );
+    }
+    let times = std::env::var(TIMES_VARIABLE).map_or(1, |times| times.parse().expect("a number"));
+    let flips = subject.flips * times;
+    let size = object_size(subject.image, "NODE");
+    // Two boards at a time; which one takes a flip changes nothing.
+    let mut outcomes: Vec<(Flip, Came)> = std::thread::scope(|scope| {
+        let sound = &sound;
+        let halves: Vec<_> = (0..2)
+            .map(|half| {
+                scope.spawn(move || {
+                    let mine = (half..flips).step_by(2);
+                    let struck = mine.map(|number| Flip::new(number, subject, size));
+                    struck
+                        .map(|flip| (flip, judge(subject, sound, flip)))
+                        .collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        let joined = halves
+            .into_iter()
+            .flat_map(|half| half.join().expect("a half"));
+        joined.collect()
+    });
+    outcomes.sort_by_key(|(flip, _)| (flip.edge, flip.offset, flip.bit));
+    let count = |came: Came| outcomes.iter().filter(|(_, c)| *c == came).count() as u64;
+    let changed: Vec<Flip> = outcomes
+        .iter()
+        .filter(|(_, came)| *came == Came::Changed)
+        .map(|(flip, _)| *flip)
+        .collect();
+    let held = count(Came::Held);
+    println!(
+        "{}: {flips} flips in {size} bytes at edges {:?}: {held} held within 2 ticks, {} within \
+         {}, {} without effect, {} reset, {} other {changed:?}",
+        subject.image,
+        subject.struck,
+        count(Came::HeldInARound),
+        subject.round,
+        count(Came::Nothing),
+        count(Came::Reset),
+        changed.len()
+    );
+    // The state is most of the application; what no seal covers is buffers and counters.
+    assert!(held > flips / 5, "{held} of {flips} held");
+    assert_eq!(changed, [], "neither found nor without effect");
+}
+
+#[test]
+fn a_flipped_bit_in_a_joint_is_found_or_does_nothing() {
+    every_flip_is_found_or_does_nothing(&JOINT);
+}
+
+#[test]
+fn a_flipped_bit_in_a_wheel_is_found_or_does_nothing() {
+    every_flip_is_found_or_does_nothing(&WHEEL);
+}
+
+/// Size of a variable in an image, bytes.
+fn object_size(of: &str, name: &str) -> u32 {
+    use object::{Object as _, ObjectSymbol as _};
+    let bytes = std::fs::read(image(of).expect("an image")).expect("read");
+    let elf = object::File::parse(&*bytes).expect("ELF");
+    let found = elf
+        .symbols()
+        .find(|symbol| symbol.name().is_ok_and(|n| n.contains(name)) && symbol.size() > 500);
+    found.unwrap_or_else(|| panic!("no variable {name}")).size() as u32
+}
