@@ -172,11 +172,14 @@ pub fn older(bytes: Option<Micros>, tick: Option<Micros>) -> Option<Event> {
     }
 }
 
-/// Takes one event, or sleeps when there is none.
+/// Takes one event; without one, sends what waits, or sleeps. A frame is sent at once
+/// behind the bytes that asked for it, and looked for before every sleep, so not between
+/// waking and the tick.
 pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
     match board.next_event() {
         Some(Event::Bytes(_)) => {
             board.receive(|bytes, t_end| application.on_bus_bytes(bytes, t_end));
+            send(application, board);
         }
         Some(Event::Tick(at)) => {
             let report = application.tick(at);
@@ -192,13 +195,24 @@ pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
                 board.store(|memory| application.save(memory, at));
             }
         }
-        None => board.idle(),
+        None => {
+            if !send(application, board) {
+                board.idle();
+            }
+        }
     }
-    if board.transmitter_is_free()
-        && let Some(transmission) = application.take_transmission()
-    {
-        board.transmit(&transmission);
+}
+
+/// Sends the next frame if there is one and the transmitter is free; whether it did.
+fn send<A: Application, B: Board>(application: &mut A, board: &mut B) -> bool {
+    if !board.transmitter_is_free() {
+        return false;
     }
+    let Some(transmission) = application.take_transmission() else {
+        return false;
+    };
+    board.transmit(&transmission);
+    true
 }
 
 /// Runs a board for ever.
@@ -426,9 +440,10 @@ mod tests {
         };
         step(&mut application, &mut board);
         step(&mut application, &mut board);
-        assert_eq!(board.did, [Did::Idle, Did::Sent(50), Did::Idle]);
+        assert_eq!(board.did, [Did::Sent(50), Did::Idle]);
         board.sending = false;
         step(&mut application, &mut board);
-        assert_eq!(board.did[3..], [Did::Idle, Did::Sent(400)]);
+        step(&mut application, &mut board);
+        assert_eq!(board.did[2..], [Did::Sent(400), Did::Idle]);
     }
 }

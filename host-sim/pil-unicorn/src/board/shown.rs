@@ -10,6 +10,18 @@ use crate::wiring;
 /// Edges between two looks at the stack.
 const STACK_EVERY: u32 = 64;
 
+/// Most by which the boards' microsecond clock leads the tick: both are started by one
+/// store after the other (firmware/board/src/g431/tick.rs), ten cycles apart at most, as
+/// the compiler lays them out [ns].
+const LEAD_NS: u64 = 60;
+
+/// The microsecond that a start of the boards' clock means. One that is off by more than
+/// the lead stays as it is, and differs.
+fn on_grid(ns: u64) -> u64 {
+    let next = ns.next_multiple_of(1_000);
+    if next - ns <= LEAD_NS { next } else { ns }
+}
+
 impl Board {
     pub(super) fn period_us(&self) -> u64 {
         self.machine.as_ref().map_or(0, |machine| {
@@ -127,7 +139,7 @@ impl Board {
             let copy = heapless::Vec::from_slice(&bytes)
                 .map_err(|_| format!("a transmission of {length} bytes"))?;
             let frame = Sent {
-                start_ns: time.ns_of(start),
+                start_ns: on_grid(time.ns_of(start)),
                 bytes: copy,
             };
             let _ = sent.push(frame);
@@ -171,5 +183,19 @@ impl Board {
             self.figures.stack_size = top - bottom;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::on_grid;
+
+    #[test]
+    fn only_the_lead_of_the_clock_is_taken_off_a_start() {
+        assert_eq!(on_grid(2_979_988), 2_980_000, "two cycles early");
+        assert_eq!(on_grid(2_980_000), 2_980_000);
+        assert_eq!(on_grid(2_979_940), 2_980_000);
+        assert_eq!(on_grid(2_979_939), 2_979_939, "more than the lead");
+        assert_eq!(on_grid(2_980_006), 2_980_006, "late by a cycle");
     }
 }
