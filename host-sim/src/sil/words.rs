@@ -92,6 +92,14 @@ pub(crate) fn describe(event: &Event) -> String {
             Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
             None => format!("{} foot stands flat", word(side)),
         },
+        Event::FootSwitch {
+            side,
+            sector,
+            warning,
+        } => {
+            let place = sector.map_or_else(String::new, word);
+            format!("{} foot, {place} switch: {warning}", word(side))
+        }
         Event::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
         Event::Position { joint, stroke_mm } => {
             format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
