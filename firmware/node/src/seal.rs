@@ -85,7 +85,7 @@ pub struct Seal {
 impl Seal {
     /// Seal of `state`.
     #[inline(always)]
-    pub fn of(state: &impl Hash) -> Self {
+    pub fn of<T: Hash + ?Sized>(state: &T) -> Self {
         Self::made(|sum| state.hash(sum))
     }
 

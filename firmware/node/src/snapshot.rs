@@ -45,9 +45,6 @@ pub struct JointSnapshot {
     pub limits: LimitBits,
     /// At rest with all valves shut.
     pub settled: bool,
-    /// Time since the board expects that the piston has moved by 2 mm, while it
-    /// has not; zero if it does not expect it.
-    pub motion_overdue: Micros,
 }
 
 /// Internals of a wheel board after its last sample.
@@ -89,7 +86,6 @@ impl JointSnapshot {
             faults: FaultBits::NONE,
             limits: LimitBits::NONE,
             settled: false,
-            motion_overdue: Micros::ZERO,
         }
     }
 }

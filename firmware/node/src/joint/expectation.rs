@@ -60,7 +60,9 @@ impl MotionWatch {
         position: PositionMm,
         model: &MotionModel,
     ) -> bool {
-        let [fill_a, vent_a, fill_b, vent_b] = on.map(i32::from);
+        let [fill_a, vent_a, fill_b, vent_b] = *on;
+        let (fill_a, vent_a) = (i32::from(fill_a), i32::from(vent_a));
+        let (fill_b, vent_b) = (i32::from(fill_b), i32::from(vent_b));
         // Two on-times of at most a tick each way; a lead ends at the bound and
         // the grace, far below 2^31.
         let push = fill_a
