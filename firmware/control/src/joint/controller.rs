@@ -33,8 +33,9 @@ pub struct JointController {
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
     integral: i64,
-    /// u before the limit, × 2^30, of the last tick; none unless it tracked.
-    last_law: Option<i64>,
+    /// u before the limit, × 2^30, of the last tick, and whether it tracked.
+    last_law: i64,
+    tracked: bool,
     /// Set by a change of law: the next tick continues from `last_law`.
     changed: bool,
     /// What is still added to the law after a change, × 2^30, and its decay.
@@ -55,7 +56,8 @@ impl JointController {
             velocity: VelocityEstimator::new(),
             settle: Settle::new(),
             integral: 0,
-            last_law: None,
+            last_law: 0,
+            tracked: false,
             changed: false,
             fade: 0,
             fade_step: 0,
@@ -164,7 +166,7 @@ impl JointController {
         }
         self.settle = Settle::new();
         self.integral = 0;
-        self.last_law = None;
+        self.tracked = false;
         self.changed = false;
         self.fade = 0;
         self.velocity.update(&self.config.window, measured)
@@ -205,7 +207,8 @@ impl JointController {
 
         let law = self.law(error, error_rate, input.reference_velocity, &mut limits);
         let law = self.faded(law);
-        self.last_law = Some(law);
+        self.last_law = law;
+        self.tracked = true;
 
         let quiet = self
             .settle
@@ -298,7 +301,8 @@ impl JointController {
             if ticks == 0 {
                 self.fade = 0;
             } else {
-                let bump = self.last_law.unwrap_or(law).wrapping_sub(law);
+                let last = if self.tracked { self.last_law } else { law };
+                let bump = last.wrapping_sub(law);
                 self.fade = within(bump, FADE_LIMIT);
                 // Rounded up: the fade ends within the configured time.
                 let step = self.fade.wrapping_abs().checked_div(ticks).unwrap_or(0);
@@ -374,6 +378,7 @@ impl Hash for State<'_> {
             settle,
             integral,
             last_law,
+            tracked,
             changed,
             fade,
             fade_step,
@@ -382,7 +387,7 @@ impl Hash for State<'_> {
         } = self.0;
         let flags = u32::from(*changed)
             | (*correction as u32).wrapping_shl(8)
-            | u32::from(last_law.is_some()).wrapping_shl(16)
+            | u32::from(*tracked).wrapping_shl(16)
             | u32::from(predictive.is_some()).wrapping_shl(24);
         state.write_u32(flags);
         if let Some(law) = predictive {
@@ -395,7 +400,7 @@ impl Hash for State<'_> {
         velocity.hash(state);
         settle.hash(state);
         state.write_i64(*integral);
-        state.write_i64(last_law.unwrap_or_default());
+        state.write_i64(*last_law);
         state.write_i64(*fade);
         state.write_i64(*fade_step);
     }

@@ -74,7 +74,12 @@ impl MotionWatch {
         let mirror = |value: i32| if back { value.wrapping_neg() } else { value };
         let (lead, push) = (mirror(self.lead_us), mirror(push));
         let moved = mirror(position.saturating_sub(self.from).raw());
-        let bound = model.bound_us(position);
+        let (low, high) = (position < model.low, position > model.high);
+        let bound = if low || high {
+            model.end_bound_us
+        } else {
+            model.bound_us
+        };
         let lead = if lead < bound {
             lead.wrapping_add(push)
         } else if push < 0 {
@@ -82,11 +87,7 @@ impl MotionWatch {
         } else {
             lead.wrapping_add(JOINT_TICK.get() as i32)
         };
-        let against_end = if back {
-            position < model.low
-        } else {
-            position > model.high
-        };
+        let against_end = if back { low } else { high };
         if lead < 0 || against_end || moved >= SHOWN.raw() {
             *self = Self::closed(position);
             // What is left leads the other way.
