@@ -115,7 +115,8 @@ const fn mean_i32(numerator: i32, denominator: i32) -> i16 {
         numerator.saturating_add(half)
     };
     match biased.checked_div(denominator) {
-        Some(mean) => wheeleg_units::saturate_i16(mean as i64),
+        // A mean of numbers of 16 bits is one.
+        Some(mean) => mean as i16,
         None => 0,
     }
 }

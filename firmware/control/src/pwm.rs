@@ -131,13 +131,23 @@ impl PwmTiming {
     }
 }
 
-/// One valve: where it is in its period.
+/// Where a valve is in its period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+enum Phase {
+    /// In none: a pulse may begin.
+    #[default]
+    Idle,
+    /// The pulse has not ended yet.
+    Energised,
+    /// The pulse has ended, and a new one may not begin yet.
+    Ended,
+}
+
+/// One valve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Channel {
-    /// In a period: from the start of a pulse until a new one may begin.
-    running: bool,
-    /// The pulse has not ended yet.
-    energised: bool,
+    phase: Phase,
     /// Time since the pulse began, at the next tick edge.
     elapsed: u32,
     /// Length of the pulse that ended.
@@ -148,55 +158,40 @@ struct Channel {
 
 impl Channel {
     const IDLE: Self = Self {
-        running: false,
-        energised: false,
+        phase: Phase::Idle,
         elapsed: 0,
         ended_at: 0,
         pulses: 0,
     };
 
+    /// On-time of the next tick for a pulse of [`PwmTiming::pulse`].
     #[inline]
-    fn tick(&mut self, timing: &PwmTiming, opening: Micros) -> u16 {
-        if self.running && !self.energised {
-            if self.elapsed >= timing.period {
-                // A new pulse may begin once the valve has had the time to shut.
-                let off = self.elapsed.wrapping_sub(self.ended_at);
-                self.running = off < timing.shortest_gap;
-            }
-            if self.running {
+    fn tick(&mut self, timing: &PwmTiming, pulse: u32) -> u16 {
+        if self.phase == Phase::Ended {
+            // A new pulse may begin once the valve has had the time to shut.
+            let off = self.elapsed.wrapping_sub(self.ended_at);
+            if self.elapsed < timing.period || off < timing.shortest_gap {
                 self.elapsed = self.elapsed.wrapping_add(timing.tick);
                 return 0;
             }
+            self.phase = Phase::Idle;
         }
-        if !self.running && opening == Micros::ZERO {
-            // A valve with nothing to do.
-            return 0;
-        }
-        let target = timing.pulse(opening).get();
-        if !self.running {
-            if target == 0 {
+        if self.phase == Phase::Idle {
+            if pulse == 0 {
                 return 0;
             }
-            *self = Self {
-                running: true,
-                energised: true,
-                elapsed: 0,
-                ended_at: 0,
-                pulses: self.pulses.wrapping_add(1),
-            };
-        } else if self.elapsed >= timing.period && target > 0 {
+            self.phase = Phase::Energised;
+            self.elapsed = 0;
+            self.ended_at = 0;
+            self.pulses = self.pulses.wrapping_add(1);
+        } else if self.elapsed >= timing.period && pulse > 0 {
             // A full pulse goes on: the next period follows without a gap.
             self.elapsed = 0;
         }
-        let length = if target == 0 {
-            0
-        } else {
-            target.max(timing.shortest_pulse)
-        };
         // Below twice the period of at most a second.
-        let on = length.saturating_sub(self.elapsed).min(timing.tick);
+        let on = pulse.saturating_sub(self.elapsed).min(timing.tick);
         if on < timing.tick {
-            self.energised = false;
+            self.phase = Phase::Ended;
             self.ended_at = self.elapsed.wrapping_add(on);
         }
         self.elapsed = self.elapsed.wrapping_add(timing.tick);
@@ -208,18 +203,16 @@ impl Channel {
 impl Hash for Channel {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Both flags go
-        // into the word of the count: a flipped bit of either flips one of it.
+        // Taken apart, so that a new field cannot be forgotten here. The phase goes into
+        // the word of the time: a flipped bit of either flips one of it. The count
+        // shapes no output.
         let Self {
-            running,
-            energised,
+            phase,
             elapsed,
             ended_at,
-            pulses,
+            pulses: _,
         } = self;
-        let flags = u32::from(*running) | u32::from(*energised).wrapping_shl(8);
-        state.write_u32(pulses.rotate_left(16) ^ flags);
-        state.write_u32(*elapsed);
+        state.write_u32(elapsed ^ (*phase as u32).rotate_right(8));
         state.write_u32(*ended_at);
     }
 }
@@ -265,8 +258,18 @@ impl ValvePwm {
     #[must_use]
     pub fn tick(&mut self, openings: &ValveOpenings) -> OnTimes {
         let mut on = [0; VALVE_COUNT];
+        // Pulse of the last opening: two valves mostly open alike.
+        let (mut last, mut pulse) = (Micros::ZERO, 0);
         for ((on, channel), &opening) in on.iter_mut().zip(&mut self.channels).zip(&openings.0) {
-            *on = channel.tick(&self.timing, opening);
+            let pulse = if opening == Micros::ZERO {
+                0
+            } else {
+                if opening != last {
+                    (last, pulse) = (opening, self.timing.pulse(opening).get());
+                }
+                pulse
+            };
+            *on = channel.tick(&self.timing, pulse);
         }
         on
     }
@@ -285,20 +288,25 @@ impl ValvePwm {
         let tick = self.timing.tick;
         let mut sent = on;
         for (on, channel) in sent.iter_mut().zip(&mut self.channels) {
-            if *on == 0 && !channel.running {
+            if *on == 0 && channel.phase == Phase::Idle {
                 // A valve with nothing to do.
                 continue;
             }
             let time = u32::from(*on).min(tick);
             // At most the tick, 2000.
             *on = time as u16;
-            if time > 0 && !channel.energised {
+            if time > 0 && channel.phase != Phase::Energised {
                 channel.pulses = channel.pulses.wrapping_add(1);
                 channel.elapsed = 0;
             }
             channel.elapsed = channel.elapsed.wrapping_add(time);
-            channel.running = time > 0;
-            channel.energised = time == tick;
+            channel.phase = if time == tick {
+                Phase::Energised
+            } else if time > 0 {
+                Phase::Ended
+            } else {
+                Phase::Idle
+            };
             channel.ended_at = 0;
         }
         sent

@@ -8,7 +8,7 @@
 //! Mechatronics 22, 2012; the enumeration is DERIVED). Two more serve as
 //! commands: exhaust, and the literal blow-through.
 
-use wheeleg_units::{Duty, Micros, shift_right_round};
+use wheeleg_units::{Duty, Micros, shift_right_round_inner};
 
 /// Number of valves of one cylinder.
 pub const VALVE_COUNT: usize = 4;
@@ -110,7 +110,7 @@ impl ValveOpenings {
 pub const fn allocate(duty: Duty, period: Micros) -> ValveOpenings {
     let magnitude = duty.abs().raw() as i64;
     // |duty| <= 2^30 and period < 2^32: the product fits 62 bits.
-    let opening = shift_right_round(magnitude.wrapping_mul(period.get() as i64), 30);
+    let opening = shift_right_round_inner(magnitude.wrapping_mul(period.get() as i64), 30);
     let opening = Micros(opening as u32);
     if duty.raw() > 0 {
         ValveMode::Push.openings(opening)

@@ -26,7 +26,7 @@
 //!
 //! Not modelled: unequal sample spacing. A missed tick is a fault of the board.
 
-use wheeleg_units::{PositionMm, VelocityMmS, saturate_i32, shift_right_round};
+use wheeleg_units::{PositionMm, VelocityMmS};
 
 /// Largest window, in samples.
 pub const MAX_WINDOW: u8 = 64;
@@ -43,6 +43,8 @@ pub struct VelocityWindow {
     length: u8,
     scale: u32,
     shift: u32,
+    /// 2^(shift − 1), for rounding.
+    half: u32,
     /// Largest |sum| that still fits; beyond it the velocity saturates.
     sum_limit: i64,
 }
@@ -71,12 +73,14 @@ impl VelocityWindow {
         }
         let half = denominator.wrapping_shr(1);
         let scale = quotient(scaled.wrapping_add(half), denominator);
-        // |sum| × scale >> shift saturates at 2^31 = (2^31 << shift) / scale.
-        let limit = quotient((1_u64 << 31).wrapping_shl(shift), scale).wrapping_add(2);
+        // The largest sum whose velocity fits: sum × scale is below 2^31 << shift.
+        let largest = (i32::MAX as u64).wrapping_shl(shift);
+        let limit = quotient(largest, scale);
         Some(Self {
             length,
             scale: scale as u32,
             shift,
+            half: 1_u32.wrapping_shl(shift.wrapping_sub(1)),
             sum_limit: limit as i64,
         })
     }
@@ -90,9 +94,20 @@ impl VelocityWindow {
     /// Raw velocity of a regression sum, saturating.
     #[inline]
     fn velocity(&self, sum: i64) -> VelocityMmS {
-        let limited = sum.max(self.sum_limit.wrapping_neg()).min(self.sum_limit);
-        let product = limited.wrapping_mul(i64::from(self.scale));
-        VelocityMmS::from_raw(saturate_i32(shift_right_round(product, self.shift)))
+        let limit = self.sum_limit;
+        if sum.wrapping_add(limit).cast_unsigned() > limit.wrapping_mul(2).cast_unsigned() {
+            return if sum < 0 {
+                VelocityMmS::MIN
+            } else {
+                VelocityMmS::MAX
+            };
+        }
+        // To nearest, ties away from zero, as `shift_right_round`; the shift is below 32.
+        let product = sum.wrapping_mul(i64::from(self.scale));
+        let rounded = product
+            .wrapping_add(product >> 63)
+            .wrapping_add(i64::from(self.half));
+        VelocityMmS::from_raw((rounded >> (self.shift & 31)) as i32)
     }
 }
 
@@ -104,10 +119,13 @@ const fn quotient(dividend: u64, divisor: u64) -> u64 {
     }
 }
 
+/// Odd factor of the check sum (Knuth, 2^32 / golden ratio).
+const CHECK: u32 = 0x9E37_79B1;
+
 /// The last positions and their sums.
 ///
-/// Its `Hash` is for sealing memory: of the samples, those of the window count,
-/// up to the next multiple of four; the rest are never read.
+/// Its `Hash` is for sealing memory. The samples, of which one changes in a tick,
+/// have a check sum of their own: [`VelocityEstimator::is_sound`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VelocityEstimator {
     /// A ring in the first `length` places.
@@ -118,8 +136,13 @@ pub struct VelocityEstimator {
     oldest: u8,
     /// Σ y.
     total: i64,
-    /// Σ k y, k = 0 for the oldest.
-    moment: i64,
+    /// Σ (2k − (N − 1)) y, k = 0 for the oldest.
+    slope: i64,
+    /// Σ y f^p modulo 2^32 over the places p, with f = [`CHECK`]: it sees every flipped
+    /// bit, because all powers of an odd number are odd.
+    check: u32,
+    /// f^p of the oldest sample's place. A flipped bit of it shows in the sum.
+    weight: u32,
 }
 
 impl Default for VelocityEstimator {
@@ -137,8 +160,30 @@ impl VelocityEstimator {
             length: 0,
             oldest: 0,
             total: 0,
-            moment: 0,
+            slope: 0,
+            check: 0,
+            weight: 1,
         }
+    }
+
+    /// Whether all samples that are ever read are as they came.
+    // Not inlined: it would be compiled for size where it is called.
+    #[inline(never)]
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.check == self.sum_up()
+    }
+
+    /// The check sum of the window, up to the next multiple of four.
+    fn sum_up(&self) -> u32 {
+        let (fours, _) = self.samples.as_chunks::<4>();
+        let used = usize::from(self.length.wrapping_add(3).wrapping_shr(2));
+        let used = fours.get(..used).unwrap_or(fours);
+        used.iter().rev().fold(0, |sum: u32, [a, b, c, d]| {
+            [d, c, b, a].into_iter().fold(sum, |sum, sample| {
+                sum.wrapping_mul(CHECK).wrapping_add(sample.cast_unsigned())
+            })
+        })
     }
 
     /// Forgets everything: the next sample fills the window.
@@ -154,31 +199,38 @@ impl VelocityEstimator {
     pub fn update(&mut self, window: &VelocityWindow, position: PositionMm) -> VelocityMmS {
         let sample = position.raw();
         let newest = i64::from(sample);
-        let length = i64::from(window.length);
-        let last = length.wrapping_sub(1);
+        let length = window.length;
         if self.length == 0 {
-            self.length = window.length;
+            self.length = length;
             self.samples = [sample; CAPACITY];
-            self.total = newest.wrapping_mul(length);
-            self.moment = newest.wrapping_mul(length.wrapping_mul(last).wrapping_shr(1));
+            self.total = newest.wrapping_mul(i64::from(length));
+            self.slope = 0;
+            self.check = self.sum_up();
             return VelocityMmS::ZERO;
         }
         let place = self.samples.get_mut(usize::from(self.oldest));
-        let oldest = place.map_or(0, |place| i64::from(core::mem::replace(place, sample)));
+        let oldest = place.map_or(0, |place| core::mem::replace(place, sample));
+        let change = sample.wrapping_sub(oldest).cast_unsigned();
+        self.check = self.check.wrapping_add(change.wrapping_mul(self.weight));
         let next = self.oldest.wrapping_add(1);
-        self.oldest = if next < self.length { next } else { 0 };
-        // Every k falls by one, the oldest leaves with k = 0, the newest comes
-        // with k = N − 1. |total| < 2^37, |moment| < 2^43.
-        self.moment = self
-            .moment
-            .wrapping_sub(self.total.wrapping_sub(oldest))
-            .wrapping_add(newest.wrapping_mul(last));
-        self.total = self.total.wrapping_add(newest).wrapping_sub(oldest);
-        let sum = self
-            .moment
-            .wrapping_mul(2)
-            .wrapping_sub(self.total.wrapping_mul(last));
-        window.velocity(sum)
+        (self.oldest, self.weight) = if next < self.length {
+            (next, self.weight.wrapping_mul(CHECK))
+        } else {
+            (0, 1)
+        };
+        let oldest = i64::from(oldest);
+        // Every k falls by one, so that every sample that stays loses twice its value;
+        // the oldest leaves with −(N − 1), the newest comes with N − 1.
+        // |total| < 2^37, |slope| < 2^43.
+        let last = i64::from(i32::from(length).wrapping_sub(1));
+        let stay = self.total.wrapping_sub(oldest);
+        self.slope = self
+            .slope
+            .wrapping_add(last.wrapping_mul(oldest))
+            .wrapping_add(last.wrapping_mul(newest))
+            .wrapping_sub(stay.wrapping_mul(2));
+        self.total = stay.wrapping_add(newest);
+        window.velocity(self.slope)
     }
 }
 
@@ -187,22 +239,54 @@ impl core::hash::Hash for VelocityEstimator {
     fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
-            samples,
+            samples: _,
             length,
             oldest,
             total,
-            moment,
+            slope,
+            check,
+            weight: _,
         } = self;
-        let (fours, _) = samples.as_chunks::<4>();
-        let used = usize::from(length.wrapping_add(3).wrapping_shr(2));
-        for [a, b, c, d] in fours.iter().take(used) {
-            state.write_i32(*a);
-            state.write_i32(*b);
-            state.write_i32(*c);
-            state.write_i32(*d);
-        }
         state.write_u32(u32::from(*length) | u32::from(*oldest).wrapping_shl(8));
+        state.write_u32(*check);
         state.write_i64(*total);
-        state.write_i64(*moment);
+        state.write_i64(*slope);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flipped_bit_of_the_history_is_seen_before_it_counts() {
+        for length in [2, 5, 16, 64] {
+            let window = VelocityWindow::new(length, 1000).unwrap();
+            let mut sound = VelocityEstimator::new();
+            assert!(sound.is_sound());
+            for tick in 0..200_i32 {
+                let position = PositionMm::from_raw(tick.wrapping_mul(tick).wrapping_mul(7919));
+                sound.update(&window, position);
+                assert!(sound.is_sound(), "{length} {tick}");
+            }
+            for place in 0..usize::from(length) {
+                for bit in 0..32 {
+                    let mut flipped = sound;
+                    flipped.samples[place] ^= 1 << bit;
+                    assert!(!flipped.is_sound(), "{length}: sample {place}, bit {bit}");
+                }
+            }
+            for bit in 0..32 {
+                let mut flipped = sound;
+                flipped.check ^= 1 << bit;
+                assert!(!flipped.is_sound(), "{length}: sum, bit {bit}");
+                let mut flipped = sound;
+                flipped.weight ^= 1 << bit;
+                // A change by one shows it; it has no other effect.
+                let old = flipped.samples[usize::from(flipped.oldest)];
+                flipped.update(&window, PositionMm::from_raw(old.wrapping_add(1)));
+                assert!(!flipped.is_sound(), "{length}: weight, bit {bit}");
+            }
+        }
     }
 }

@@ -6,14 +6,19 @@ use wheeleg_units::Micros;
 /// It starts with the first instant, whatever the counter shows then.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
-    time_us: Option<u64>,
+    time_us: u64,
+    started: bool,
 }
 
 impl Clock {
     /// The unwrapped time of `now`.
     #[inline]
     pub fn unwrap(&mut self, now: Micros) -> u64 {
-        let newest = self.time_us.unwrap_or(u64::from(now.get()));
+        if !self.started {
+            self.started = true;
+            self.time_us = u64::from(now.get());
+        }
+        let newest = self.time_us;
         // Low word of the newest time; the shorter way round is taken, so an
         // instant slightly in the past is in the past.
         let low = (newest & 0xFFFF_FFFF) as u32;
@@ -22,7 +27,7 @@ impl Clock {
             return newest.saturating_sub(u64::from(step.wrapping_neg()));
         }
         let time = newest.wrapping_add(u64::from(step));
-        self.time_us = Some(time);
+        self.time_us = time;
         time
     }
 }

@@ -72,19 +72,15 @@ where
         self.fill_a.max_duty_cycle()
     }
 
+    #[inline(always)]
     fn write(&mut self, duty: [u16; 4]) -> Result<(), PinError> {
         let [fill_a, vent_a, fill_b, vent_b] = duty;
-        let results = [
-            self.fill_a.set_duty_cycle(fill_a).is_ok(),
-            self.vent_a.set_duty_cycle(vent_a).is_ok(),
-            self.fill_b.set_duty_cycle(fill_b).is_ok(),
-            self.vent_b.set_duty_cycle(vent_b).is_ok(),
-        ];
-        if results == [true; 4] {
-            Ok(())
-        } else {
-            Err(PinError)
-        }
+        // All four, whatever becomes of the others.
+        let sound = self.fill_a.set_duty_cycle(fill_a).is_ok()
+            & self.vent_a.set_duty_cycle(vent_a).is_ok()
+            & self.fill_b.set_duty_cycle(fill_b).is_ok()
+            & self.vent_b.set_duty_cycle(vent_b).is_ok();
+        if sound { Ok(()) } else { Err(PinError) }
     }
 }
 

@@ -60,10 +60,11 @@ impl<const N: usize> Parameters<N> {
         Ok(trial)
     }
 
-    /// The first or the second half of the values, for sealing them in two parts.
-    pub(crate) fn half(&self, half: usize) -> &[i32] {
-        let (first, second) = self.values.split_at(N / 2);
-        if half == 0 { first } else { second }
+    /// One of `PARTS` parts of the values of about equal size, for sealing them.
+    #[inline]
+    pub(crate) fn part<const PARTS: usize>(&self, part: usize) -> &[i32] {
+        let mut parts = self.values.chunks(const { N.div_ceil(PARTS) });
+        parts.nth(part).unwrap_or_default()
     }
 
     fn at(&self, index: usize) -> i32 {

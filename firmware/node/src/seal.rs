@@ -85,7 +85,7 @@ pub struct Seal {
 impl Seal {
     /// Seal of `state`.
     #[inline(always)]
-    pub fn of(state: &impl Hash) -> Self {
+    pub fn of<T: Hash + ?Sized>(state: &T) -> Self {
         Self::made(|sum| state.hash(sum))
     }
 
@@ -124,10 +124,10 @@ impl<const PARTS: usize> PartSeals<PARTS> {
     /// The part whose turn it is.
     #[inline]
     pub(crate) fn next(&mut self) -> usize {
-        let part = self.turn;
-        let next = part.wrapping_add(1);
-        self.turn = if usize::from(next) < PARTS { next } else { 0 };
-        usize::from(part)
+        let part = usize::from(self.turn);
+        // Below the number of parts, which are few; a power of two of them is cheapest.
+        self.turn = part.wrapping_add(1).checked_rem(PARTS).unwrap_or(0) as u8;
+        part
     }
 
     /// Whether a part is as it was. One that does not exist is damage, too.

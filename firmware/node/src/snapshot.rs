@@ -45,9 +45,6 @@ pub struct JointSnapshot {
     pub limits: LimitBits,
     /// At rest with all valves shut.
     pub settled: bool,
-    /// Doubt whether the piston follows its valves, as the time that the strongest
-    /// doubt takes to it; zero if there is none.
-    pub motion_overdue: Micros,
 }
 
 /// Internals of a wheel board after its last sample.
@@ -89,7 +86,6 @@ impl JointSnapshot {
             faults: FaultBits::NONE,
             limits: LimitBits::NONE,
             settled: false,
-            motion_overdue: Micros::ZERO,
         }
     }
 }

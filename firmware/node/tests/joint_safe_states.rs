@@ -224,7 +224,7 @@ fn joint_that_reads_like_one_at_rest_is_held_once_it_had_the_air_for_a_motion() 
         let (mut doubt_at, start) = (None, rig.now);
         while rig.node.mode() == Mode::Tracking {
             rig.run_cycles(1, Some(setpoint(end, Hold)));
-            if rig.node.snapshot().motion_overdue > Micros::ZERO {
+            if rig.node.motion_overdue() > Micros::ZERO {
                 doubt_at = doubt_at.or(Some(rig.now));
             }
         }

@@ -215,7 +215,7 @@ fn rest_ends_the_doubt_about_a_motion() {
     let mut rig = JointRig::tracking(Hold);
     for round in 0..3 {
         let mut cycles = 0;
-        while rig.node.snapshot().motion_overdue == Micros::ZERO {
+        while rig.node.motion_overdue() == Micros::ZERO {
             rig.run_cycles(1, Some(setpoint(140.0, Hold)));
             cycles += 1;
             assert!(
@@ -229,7 +229,7 @@ fn rest_ends_the_doubt_about_a_motion() {
         assert_eq!(rig.node.mode(), Mode::Tracking);
         rig.run_cycles(30, Some(setpoint(100.0, Hold)));
         assert!(rig.node.snapshot().settled);
-        assert_eq!(rig.node.snapshot().motion_overdue, Micros::ZERO);
+        assert_eq!(rig.node.motion_overdue(), Micros::ZERO);
     }
     assert!(rig.node.faults().is_empty());
 }

@@ -61,6 +61,8 @@ mod wheel;
 pub use adc::AdcCode;
 pub use duty::{Duty, WireDuty};
 pub use motion::{PositionMm, VelocityMmS, WirePosition, WireVelocity};
-pub use round::{saturate_i16, saturate_i32, shift_right_round, shift_right_round_i32};
+pub use round::{
+    saturate_i16, saturate_i32, shift_right_round, shift_right_round_i32, shift_right_round_inner,
+};
 pub use time::{Micros, Ticks};
 pub use wheel::WheelCount;

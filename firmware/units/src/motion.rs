@@ -88,7 +88,9 @@ macro_rules! motion_quantity {
             /// Magnitude; that of [`Self::MIN`] saturates to [`Self::MAX`].
             #[must_use]
             pub const fn saturating_abs(self) -> Self {
-                Self(self.0.saturating_abs())
+                // The larger of the value and its negative: one saturating instruction.
+                let (value, negative) = (self.raw(), 0_i32.saturating_sub(self.raw()));
+                Self::from_raw(if value > negative { value } else { negative })
             }
 
             /// The value limited to `low..=high`; `low` wins when the two are swapped.

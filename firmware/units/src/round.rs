@@ -6,6 +6,7 @@
 /// towards minus infinity and give a controller a bias of half a step.
 /// `bits` of 63 or more gives zero. Never panics.
 #[must_use]
+#[inline]
 pub const fn shift_right_round(value: i64, bits: u32) -> i64 {
     if bits == 0 {
         return value;
@@ -13,15 +14,24 @@ pub const fn shift_right_round(value: i64, bits: u32) -> i64 {
     if bits > 62 {
         return 0;
     }
-    let half = 1_u64.wrapping_shl(bits.wrapping_sub(1));
-    let magnitude = value.unsigned_abs().saturating_add(half);
-    // At most 2^63 + 2^61 before the shift by at least one: fits an `i64`.
-    let shifted = magnitude.wrapping_shr(bits) as i64;
-    if value < 0 {
-        shifted.wrapping_neg()
+    // The smallest number rounds as the one after it.
+    let value = if value == i64::MIN {
+        value.wrapping_add(1)
     } else {
-        shifted
-    }
+        value
+    };
+    shift_right_round_inner(value, bits)
+}
+
+/// [`shift_right_round`] of any number but `i64::MIN`, by 1 to 62 bits: a few
+/// instructions. Outside of that the result is wrong. Never panics.
+#[inline(always)]
+#[must_use]
+pub const fn shift_right_round_inner(value: i64, bits: u32) -> i64 {
+    // Ties go up, and those of negative numbers, one less, down.
+    let below = value.wrapping_add(value >> 63);
+    let half = below.wrapping_shr(bits.wrapping_sub(1)) & 1;
+    below.wrapping_shr(bits).wrapping_add(half)
 }
 
 /// [`shift_right_round`] of numbers of 32 bits, in a few instructions: `bits` of 1…30
@@ -39,32 +49,39 @@ pub const fn shift_right_round_i32(value: i32, bits: u32) -> i32 {
 }
 
 /// Narrows to `i32`, saturating at both ends. Never panics.
+#[inline]
 #[must_use]
 pub const fn saturate_i32(value: i64) -> i32 {
-    if value > i32::MAX as i64 {
-        i32::MAX
-    } else if value < i32::MIN as i64 {
+    let low = value as i32;
+    if low as i64 == value {
+        low
+    } else if value < 0 {
         i32::MIN
     } else {
-        value as i32
+        i32::MAX
     }
 }
 
 /// Narrows to `i16`, saturating at both ends. Never panics.
+#[inline]
 #[must_use]
 pub const fn saturate_i16(value: i64) -> i16 {
-    if value > i16::MAX as i64 {
+    let narrow = saturate_i32(value);
+    if narrow > i16::MAX as i32 {
         i16::MAX
-    } else if value < i16::MIN as i64 {
+    } else if narrow < i16::MIN as i32 {
         i16::MIN
     } else {
-        value as i16
+        narrow as i16
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{saturate_i16, saturate_i32, shift_right_round, shift_right_round_i32};
+    use super::{
+        saturate_i16, saturate_i32, shift_right_round, shift_right_round_i32,
+        shift_right_round_inner,
+    };
 
     #[test]
     fn the_short_form_rounds_as_the_long_one() {
@@ -104,6 +121,9 @@ mod tests {
                 expected,
                 "{value} >> {bits}"
             );
+            if bits > 0 {
+                assert_eq!(shift_right_round_inner(value, bits), expected);
+            }
         }
     }
 
@@ -123,6 +143,16 @@ mod tests {
         assert_eq!(saturate_i32(i64::from(i32::MIN) - 1), i32::MIN);
         assert_eq!(saturate_i32(i64::from(i32::MAX) - 1), i32::MAX - 1);
         assert_eq!(saturate_i32(i64::from(i32::MIN) + 1), i32::MIN + 1);
+        for far in [1 << 32, 1 << 40, i64::MAX] {
+            assert_eq!(
+                (saturate_i32(far), saturate_i32(-far)),
+                (i32::MAX, i32::MIN)
+            );
+            assert_eq!(
+                (saturate_i16(far), saturate_i16(-far)),
+                (i16::MAX, i16::MIN)
+            );
+        }
         assert_eq!(saturate_i16(32_768), i16::MAX);
         assert_eq!(saturate_i16(-32_769), i16::MIN);
         assert_eq!(saturate_i16(32_766), 32_766);

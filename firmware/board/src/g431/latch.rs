@@ -5,18 +5,30 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use wheeleg_node::hardware::{PinError, PositionSensor, SensorError, SwitchBank};
 use wheeleg_units::{AdcCode, Micros};
 
-/// Set by every handler, cleared by the main loop before it looks for work.
-static WAKE: AtomicBool = AtomicBool::new(false);
-static PENDING: AtomicBool = AtomicBool::new(false);
-/// Edge of the newest tick that was latched; none before the first one, at time 0.
-static EDGE: AtomicU32 = AtomicU32::new(u32::MAX);
-static SAMPLE: AtomicU32 = AtomicU32::new(0);
-static PORT_A: AtomicU32 = AtomicU32::new(0);
+/// All in one place, so that one address reaches it.
+struct Latch {
+    /// Set by every handler, cleared by the main loop before it looks for work.
+    wake: AtomicBool,
+    pending: AtomicBool,
+    /// Edge of the newest tick that was latched; none before the first one, at time 0.
+    edge: AtomicU32,
+    sample: AtomicU32,
+    port_a: AtomicU32,
+    /// Copies of the two above for the tick that runs, so that a tick that runs
+    /// into the next edge still sees one set of inputs.
+    running_sample: AtomicU32,
+    running_port_a: AtomicU32,
+}
 
-/// Copies of the three above for the tick that runs, so that a tick that runs
-/// into the next edge still sees one set of inputs.
-static RUNNING_SAMPLE: AtomicU32 = AtomicU32::new(0);
-static RUNNING_PORT_A: AtomicU32 = AtomicU32::new(0);
+static LATCH: Latch = Latch {
+    wake: AtomicBool::new(false),
+    pending: AtomicBool::new(false),
+    edge: AtomicU32::new(u32::MAX),
+    sample: AtomicU32::new(0),
+    port_a: AtomicU32::new(0),
+    running_sample: AtomicU32::new(0),
+    running_port_a: AtomicU32::new(0),
+};
 
 /// Bit of a sample that is valid; its low 16 bits are the value.
 const VALID: u32 = 1 << 16;
@@ -24,15 +36,15 @@ const VALID: u32 = 1 << 16;
 /// Work for the main loop.
 #[inline]
 pub fn wake() {
-    WAKE.announce(true);
+    LATCH.wake.announce(true);
 }
 
 /// Whether a handler has run since the last call.
 #[inline]
 pub fn take_wake() -> bool {
     // Called with interrupts masked: load and store are one.
-    let wake = WAKE.seen();
-    WAKE.store(false, Ordering::Relaxed);
+    let wake = LATCH.wake.seen();
+    LATCH.wake.store(false, Ordering::Relaxed);
     wake
 }
 
@@ -40,51 +52,58 @@ pub fn take_wake() -> bool {
 /// is lost, which the application sees as an overrun by the time of the next.
 #[inline]
 pub fn post(edge: u32, sample: Option<u16>, port_a: u32) {
-    EDGE.store(edge, Ordering::Relaxed);
-    SAMPLE.store(
+    LATCH.edge.store(edge, Ordering::Relaxed);
+    LATCH.sample.store(
         sample.map_or(0, |sample| VALID | u32::from(sample)),
         Ordering::Relaxed,
     );
-    PORT_A.store(port_a, Ordering::Relaxed);
-    PENDING.announce(true);
+    LATCH.port_a.store(port_a, Ordering::Relaxed);
+    LATCH.pending.announce(true);
     wake();
 }
 
 /// The edge of the tick that waits, if one does.
 #[inline]
 pub fn pending() -> Option<Micros> {
-    PENDING.seen().then(|| Micros(EDGE.load(Ordering::Relaxed)))
+    LATCH
+        .pending
+        .seen()
+        .then(|| Micros(LATCH.edge.load(Ordering::Relaxed)))
 }
 
 /// Whether an edge before `time` is still on its way: hardware has captured it at
 /// `captured`, and its inputs are being converted.
 #[inline]
 pub fn edge_under_way(captured: u32, time: Micros) -> bool {
-    captured != EDGE.seen() && time.get().wrapping_sub(captured) as i32 > 0
+    captured != LATCH.edge.seen() && time.get().wrapping_sub(captured) as i32 > 0
 }
 
 /// Takes the waiting tick; its inputs are now those of the sensors below.
 #[inline]
 pub fn take() -> Micros {
     cortex_m::interrupt::free(|_| {
-        PENDING.store(false, Ordering::Relaxed);
-        RUNNING_SAMPLE.store(SAMPLE.load(Ordering::Relaxed), Ordering::Relaxed);
-        RUNNING_PORT_A.store(PORT_A.load(Ordering::Relaxed), Ordering::Relaxed);
-        Micros(EDGE.load(Ordering::Relaxed))
+        LATCH.pending.store(false, Ordering::Relaxed);
+        LATCH
+            .running_sample
+            .store(LATCH.sample.load(Ordering::Relaxed), Ordering::Relaxed);
+        LATCH
+            .running_port_a
+            .store(LATCH.port_a.load(Ordering::Relaxed), Ordering::Relaxed);
+        Micros(LATCH.edge.load(Ordering::Relaxed))
     })
 }
 
 /// Low 16 bits of the running tick's sample, if there was one.
 #[inline]
 pub fn sample() -> Option<u16> {
-    let sample = RUNNING_SAMPLE.load(Ordering::Relaxed);
+    let sample = LATCH.running_sample.load(Ordering::Relaxed);
     (sample & VALID != 0).then_some(sample as u16)
 }
 
 /// Port A at the running tick's edge.
 #[inline]
 pub fn port_a() -> u32 {
-    RUNNING_PORT_A.load(Ordering::Relaxed)
+    LATCH.running_port_a.load(Ordering::Relaxed)
 }
 
 /// The potentiometer.

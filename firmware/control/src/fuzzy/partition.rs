@@ -333,11 +333,18 @@ impl<const N: usize> Partition<N> {
     #[inline]
     pub(super) fn pair(&self, input: i16) -> Pair {
         let input = self.limit(input);
-        // Inner vertices at or below the input. Bounds from `N` alone, so that the
-        // loop unrolls and the look-ups below need no check.
-        let mut index = 0_usize;
-        for &vertex in self.vertices.iter().take(N.saturating_sub(1)).skip(1) {
-            index = index.wrapping_add(usize::from(input >= vertex));
+        // Inner vertices at or below the input, by halves. Bounds from `N` alone, so
+        // that the loop unrolls and the look-ups below need no check.
+        let (mut index, mut rest) = (0_usize, N.saturating_sub(2));
+        while rest > 0 {
+            // Of `rest` vertices behind `index`: whether the middle one is below.
+            let half = rest.wrapping_add(1).wrapping_shr(1);
+            let middle = index.wrapping_add(half);
+            let vertex = self.vertices.get(middle).copied().unwrap_or(i16::MAX);
+            if input >= vertex {
+                index = middle;
+            }
+            rest = rest.wrapping_sub(half);
         }
         let index = index.min(N.saturating_sub(2));
         let next = index.wrapping_add(1);

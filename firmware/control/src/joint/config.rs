@@ -8,7 +8,7 @@ use crate::velocity::VelocityWindow;
 use core::hash::{Hash as _, Hasher};
 use fixed::FixedI32;
 use fixed::types::extra::U24;
-use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS};
+use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, saturate_i32};
 
 /// Gain format: I8F24, ±128, step 6.0e-8.
 pub type Gain = FixedI32<U24>;
@@ -207,9 +207,9 @@ pub struct JointConfig {
     pub(super) rules_pd: &'static JointRules,
     pub(super) rules_id: &'static JointRules,
     /// Fuzzy input per raw error, × 2^28.
-    pub(super) error_to_input: i64,
+    pub(super) error_to_input: i32,
     /// Fuzzy input per raw velocity, × 2^28.
-    pub(super) velocity_to_input: i64,
+    pub(super) velocity_to_input: i32,
     /// Fuzzy input per unit of the error sum, × 2^40.
     pub(super) integral_to_input: i64,
     /// Bound of the error sum: raw mm × ticks.
@@ -273,8 +273,8 @@ impl JointConfig {
             tick,
             rules_pd,
             rules_id,
-            error_to_input: factor(INPUT_SHIFT, i64::from(gains.error_scale.raw())),
-            velocity_to_input: factor(INPUT_SHIFT, i64::from(gains.velocity_scale.raw())),
+            error_to_input: input_factor(gains.error_scale.raw()),
+            velocity_to_input: input_factor(gains.velocity_scale.raw()),
             integral_to_input: factor(INTEGRAL_SHIFT, integral_limit),
             integral_limit,
             window,
@@ -300,7 +300,7 @@ impl JointConfig {
 
 impl JointConfig {
     /// Number of parts in which a board seals a configuration, one after another.
-    pub const PARTS: usize = 3;
+    pub const PARTS: usize = 4;
 
     /// Coefficients of the predictive law, when it is chosen.
     #[must_use]
@@ -329,9 +329,13 @@ impl JointConfig {
             axis,
         } = self;
         match part {
-            0 => gains.hash_without_axis(state),
+            0 => gains.hash_forces(state),
             1 => {
-                (&gains.axis, tick, window).hash(state);
+                gains.hash_rest(state);
+                window.hash(state);
+            }
+            2 => {
+                (&gains.axis, tick).hash(state);
                 core::ptr::hash(*rules_pd, state);
                 core::ptr::hash(*rules_id, state);
                 (error_to_input, velocity_to_input).hash(state);
@@ -352,10 +356,9 @@ impl core::hash::Hash for JointConfig {
 }
 
 impl JointGains {
-    /// All but the axis data.
+    /// The first half of all but the axis data.
     #[inline]
-    fn hash_without_axis<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
+    fn hash_forces<H: Hasher>(&self, state: &mut H) {
         let Self {
             proportional,
             correction_pd,
@@ -368,6 +371,32 @@ impl JointGains {
             duty_limit,
             dead_zone_duty,
             minimum_duty,
+            integral,
+            derivative,
+            ..
+        } = self;
+        (proportional, correction_pd, correction_id, feed_forward).hash(state);
+        (error_scale, velocity_scale, integral_scale, integral_zone).hash(state);
+        (duty_limit, dead_zone_duty, minimum_duty).hash(state);
+        (integral, derivative).hash(state);
+    }
+
+    /// The second half.
+    #[inline]
+    fn hash_rest<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            proportional: _,
+            correction_pd: _,
+            correction_id: _,
+            feed_forward: _,
+            error_scale: _,
+            velocity_scale: _,
+            integral_scale: _,
+            integral_zone: _,
+            duty_limit: _,
+            dead_zone_duty: _,
+            minimum_duty: _,
             settle_band,
             settle_velocity,
             settle_dwell,
@@ -378,19 +407,22 @@ impl JointGains {
             stroke_min,
             stroke_max,
             law,
-            integral,
-            derivative,
+            integral: _,
+            derivative: _,
             sliding_time,
             axis: _,
             pwm_period,
         } = self;
-        (proportional, correction_pd, correction_id, feed_forward).hash(state);
-        (error_scale, velocity_scale, integral_scale, integral_zone).hash(state);
-        (duty_limit, dead_zone_duty, minimum_duty, settle_band).hash(state);
-        (settle_velocity, settle_dwell, release_band, release_dwell).hash(state);
-        (bumpless_time, velocity_window, stroke_min, stroke_max).hash(state);
-        (law, integral, derivative, sliding_time, pwm_period).hash(state);
+        (settle_band, settle_velocity, settle_dwell).hash(state);
+        (release_band, release_dwell, bumpless_time).hash(state);
+        (velocity_window, stroke_min, stroke_max).hash(state);
+        (law, sliding_time, pwm_period).hash(state);
     }
+}
+
+/// Full scale / `scale`, × 2^28: below 2^30, because no scale is below 2^14.
+fn input_factor(scale: i32) -> i32 {
+    saturate_i32(factor(INPUT_SHIFT, i64::from(scale)))
 }
 
 /// Full scale / `scale`, × 2^bits.

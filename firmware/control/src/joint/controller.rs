@@ -9,7 +9,9 @@ use crate::pwm::OnTimes;
 use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
-use wheeleg_units::{Duty, PositionMm, VelocityMmS, saturate_i16, shift_right_round};
+use wheeleg_units::{
+    Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32, shift_right_round_inner,
+};
 
 /// From gain (24) × position or velocity (16) fractional bits to duty (30).
 const PHYSICAL_SHIFT: u32 = 24 + 16 - 30;
@@ -31,8 +33,9 @@ pub struct JointController {
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
     integral: i64,
-    /// u before the limit, × 2^30, of the last tick; none unless it tracked.
-    last_law: Option<i64>,
+    /// u before the limit, × 2^30, of the last tick, and whether it tracked.
+    last_law: i64,
+    tracked: bool,
     /// Set by a change of law: the next tick continues from `last_law`.
     changed: bool,
     /// What is still added to the law after a change, × 2^30, and its decay.
@@ -53,7 +56,8 @@ impl JointController {
             velocity: VelocityEstimator::new(),
             settle: Settle::new(),
             integral: 0,
-            last_law: None,
+            last_law: 0,
+            tracked: false,
             changed: false,
             fade: 0,
             fade_step: 0,
@@ -75,6 +79,15 @@ impl JointController {
     #[must_use]
     pub const fn state(&self) -> State<'_> {
         State(self)
+    }
+
+    /// Whether the history of the velocity, which [`JointController::state`] leaves
+    /// out, is as it was written.
+    #[inline]
+    #[must_use]
+    pub fn history_is_sound(&self) -> bool {
+        // The predictive law has none.
+        self.predictive.is_some() || self.velocity.is_sound()
     }
 
     /// The correction in use.
@@ -153,7 +166,7 @@ impl JointController {
         }
         self.settle = Settle::new();
         self.integral = 0;
-        self.last_law = None;
+        self.tracked = false;
         self.changed = false;
         self.fade = 0;
         self.velocity.update(&self.config.window, measured)
@@ -194,7 +207,8 @@ impl JointController {
 
         let law = self.law(error, error_rate, input.reference_velocity, &mut limits);
         let law = self.faded(law);
-        self.last_law = Some(law);
+        self.last_law = law;
+        self.tracked = true;
 
         let quiet = self
             .settle
@@ -266,7 +280,7 @@ impl JointController {
             Correction::Id => {
                 // |integral| <= bound, and bound × factor = 32 767 × 2^40 < 2^55.
                 let scaled = self.integral.wrapping_mul(config.integral_to_input);
-                let input = saturate_i16(shift_right_round(scaled, INTEGRAL_SHIFT));
+                let input = saturate_i16(shift_right_round_inner(scaled, INTEGRAL_SHIFT));
                 (gains.correction_id, config.rules_id.infer(input, rate))
             }
         };
@@ -274,8 +288,8 @@ impl JointController {
         let proportional = product(gains.proportional.to_bits(), error.raw());
         let feed_forward = product(gains.feed_forward.to_bits(), reference_velocity.raw());
         let correction = product(gain.to_bits(), i32::from(output));
-        shift_right_round(proportional.wrapping_add(feed_forward), PHYSICAL_SHIFT)
-            .wrapping_add(shift_right_round(correction, RULE_SHIFT))
+        shift_right_round_inner(proportional.wrapping_add(feed_forward), PHYSICAL_SHIFT)
+            .wrapping_add(shift_right_round_inner(correction, RULE_SHIFT))
     }
 
     /// Adds what is left of the last change of law.
@@ -287,7 +301,8 @@ impl JointController {
             if ticks == 0 {
                 self.fade = 0;
             } else {
-                let bump = self.last_law.unwrap_or(law).wrapping_sub(law);
+                let last = if self.tracked { self.last_law } else { law };
+                let bump = last.wrapping_sub(law);
                 self.fade = within(bump, FADE_LIMIT);
                 // Rounded up: the fade ends within the configured time.
                 let step = self.fade.wrapping_abs().checked_div(ticks).unwrap_or(0);
@@ -311,31 +326,34 @@ impl JointController {
         limits: &mut JointLimits,
     ) -> Duty {
         let gains = self.config.gains();
-        let magnitude = law.wrapping_abs();
+        // Beyond 32 bits it is cut to the limit, which is 2^30 at most, as it is at
+        // their end. The sum stays below 2^32, and no duty of the gains is negative.
+        let law = saturate_i32(law);
+        let magnitude = law.unsigned_abs();
         if magnitude == 0 {
             return Duty::ZERO;
         }
-        if magnitude < i64::from(gains.minimum_duty.raw()) {
+        if magnitude < gains.minimum_duty.raw().cast_unsigned() {
             limits.below_minimum = true;
             return Duty::ZERO;
         }
         let away = error.saturating_abs() > gains.settle_band && same_sign(law, error.raw());
         let bridged = if away || same_sign(law, reference_velocity.raw()) {
-            magnitude.wrapping_add(i64::from(gains.dead_zone_duty.raw()))
+            magnitude.wrapping_add(gains.dead_zone_duty.raw().cast_unsigned())
         } else {
             magnitude
         };
-        let limit = i64::from(gains.duty_limit.raw());
+        let limit = gains.duty_limit.raw().cast_unsigned();
         limits.duty = bridged > limit;
-        let cut = bridged.min(limit);
-        Duty::from_raw_wide(if law < 0 { cut.wrapping_neg() } else { cut })
+        let cut = bridged.min(limit) as i32;
+        Duty::from_raw(if law < 0 { cut.wrapping_neg() } else { cut })
     }
 
     /// Conditional, bounded integration; what it adds acts from the next tick on.
     #[inline]
     fn integrate(&mut self, error: PositionMm, duty: Duty, limits: &mut JointLimits) {
         let outside = error.saturating_abs() > self.config.gains().integral_zone;
-        let pushes = limits.duty && same_sign(i64::from(duty.raw()), error.raw());
+        let pushes = limits.duty && same_sign(duty.raw(), error.raw());
         limits.integral_frozen = outside || pushes;
         if !limits.integral_frozen {
             let sum = self.integral.wrapping_add(i64::from(error.raw()));
@@ -360,28 +378,29 @@ impl Hash for State<'_> {
             settle,
             integral,
             last_law,
+            tracked,
             changed,
             fade,
             fade_step,
             sent,
             predictive,
         } = self.0;
-        let [a, b, c, d] = *sent;
-        state.write_u32(u32::from(a) | u32::from(b).wrapping_shl(16));
-        state.write_u32(u32::from(c) | u32::from(d).wrapping_shl(16));
         let flags = u32::from(*changed)
             | (*correction as u32).wrapping_shl(8)
-            | u32::from(last_law.is_some()).wrapping_shl(16)
+            | u32::from(*tracked).wrapping_shl(16)
             | u32::from(predictive.is_some()).wrapping_shl(24);
         state.write_u32(flags);
         if let Some(law) = predictive {
-            // The other laws begin afresh after it.
+            // The other laws begin afresh after it, and do not read what was sent.
+            let [a, b, c, d] = *sent;
+            state.write_u32(u32::from(a) | u32::from(b).wrapping_shl(16));
+            state.write_u32(u32::from(c) | u32::from(d).wrapping_shl(16));
             return law.hash(state);
         }
         velocity.hash(state);
         settle.hash(state);
         state.write_i64(*integral);
-        state.write_i64(last_law.unwrap_or_default());
+        state.write_i64(*last_law);
         state.write_i64(*fade);
         state.write_i64(*fade_step);
     }
@@ -396,8 +415,8 @@ fn within(value: i64, bound: i64) -> i64 {
 
 /// Whether both are positive or both negative.
 #[inline]
-const fn same_sign(a: i64, b: i32) -> bool {
-    (a > 0 && b > 0) || (a < 0 && b < 0)
+const fn same_sign(a: i32, b: i32) -> bool {
+    a != 0 && b != 0 && (a ^ b) >= 0
 }
 
 /// Exact product of two raw numbers.
@@ -408,12 +427,10 @@ fn product(a: i32, b: i32) -> i64 {
 
 /// A raw error or velocity as fuzzy input, and whether it was cut to `scale`.
 #[inline]
-fn to_input(raw: i32, scale: i32, factor: i64) -> (i16, bool) {
+fn to_input(raw: i32, scale: i32, factor: i32) -> (i16, bool) {
     let cut = raw.max(scale.wrapping_neg()).min(scale);
-    // |cut| × factor <= 32 767 × 2^28 < 2^43.
-    let scaled = i64::from(cut).wrapping_mul(factor);
-    (
-        saturate_i16(shift_right_round(scaled, INPUT_SHIFT)),
-        cut != raw,
-    )
+    // |cut| × factor <= 32 767 × 2^28: the input is at most 32 767.
+    let scaled = i64::from(cut).wrapping_mul(i64::from(factor));
+    let input = shift_right_round_inner(scaled, INPUT_SHIFT) as i16;
+    (input, cut != raw)
 }

@@ -63,7 +63,7 @@ pub struct JointInput {
 }
 
 /// A reference known ahead of time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Announced {
     /// The reference to come.
     pub reference: PositionMm,

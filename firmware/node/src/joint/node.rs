@@ -20,9 +20,10 @@ use wheeleg_control::pwm::ValvePwm;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
 
-/// Parts of the configuration that the node keeps itself: parameters in two
-/// halves, settings.
-const OWN_PARTS: usize = 3;
+/// Parts in which the parameters are sealed.
+const PARAMETER_PARTS: usize = 3;
+/// Parts of the configuration that the node keeps itself: parameters, settings.
+const OWN_PARTS: usize = PARAMETER_PARTS + 1;
 /// Parts in which the configuration is sealed. A tick looks at one of them, so a
 /// flipped bit of it is found within so many ticks.
 pub const PARTS: usize = OWN_PARTS + JointConfig::PARTS;
@@ -152,6 +153,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
 
     /// One control tick that starts at `now`: latches the inputs, controls,
     /// writes all four outputs. They act from the next tick edge on.
+    #[inline(never)]
     pub fn tick(&mut self, now: Micros) -> TickReport {
         let reading = self.sensor.read();
         let switches = self.switch_pins.read();
@@ -175,14 +177,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.rest(now)
         };
         if self.write(on_times).is_err() {
-            // An output that does not obey: release all coils and give up.
-            self.core
-                .supervisor
-                .fault(Fault::StateCorrupt, Event::BoardFault, now);
-            let _ = self.write([0; 4]);
-            self.snapshot.mode = self.core.mode();
-            self.snapshot.faults = self.faults();
-            self.snapshot.pulses = [Micros::ZERO; 4];
+            self.give_up(now);
         }
         self.reseal();
         TickReport {
@@ -190,6 +185,19 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             faults: self.core.supervisor.faults().latched(),
             overran: self.core.supervisor.overrun().overruns() != overruns,
         }
+    }
+
+    /// An output that does not obey: releases all coils.
+    #[cold]
+    #[inline(never)]
+    fn give_up(&mut self, now: Micros) {
+        self.core
+            .supervisor
+            .fault(Fault::StateCorrupt, Event::BoardFault, now);
+        let _ = self.write([0; 4]);
+        self.snapshot.mode = self.core.mode();
+        self.snapshot.faults = self.faults();
+        self.snapshot.pulses = [Micros::ZERO; 4];
     }
 
     /// The tick's work ended at `end`; a tick longer than its period is a
@@ -226,6 +234,12 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         &self.snapshot
     }
 
+    /// Doubt whether the piston follows its valves, as the time that the strongest
+    /// doubt takes to it; zero if there is none.
+    pub const fn motion_overdue(&self) -> Micros {
+        self.state.motion.overdue()
+    }
+
     /// Present mode.
     pub const fn mode(&self) -> Mode {
         self.core.mode()
@@ -250,32 +264,45 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     #[inline(never)]
     fn fixed(&self, part: usize) -> Seal {
         match part {
-            0 => Seal::of(&self.parameters.half(0)),
-            1 => Seal::of(&self.parameters.half(1)),
-            2 => Seal::of(&(&self.settings, &self.core.times, self.pwm.timing())),
-            _ => {
+            PARAMETER_PARTS => Seal::of(&self.settings),
+            part if part < PARAMETER_PARTS => {
+                Seal::of(self.parameters.part::<PARAMETER_PARTS>(part))
+            }
+            part => {
                 let config = self.controller.config();
-                Seal::made(|sum| config.hash_part(part.wrapping_sub(OWN_PARTS), sum))
+                Seal::made(|sum| {
+                    config.hash_part(part.wrapping_sub(OWN_PARTS), sum);
+                    if part.wrapping_add(1) == PARTS {
+                        // With the smallest part.
+                        (&self.core.times, self.pwm.timing()).hash(sum);
+                    }
+                })
             }
         }
     }
 
-    /// What shapes the outputs of the next tick and is changed by every tick.
-    #[inline(always)]
-    fn moving(&self) -> impl Hash + '_ {
-        (
-            &self.state,
-            &self.monitor,
-            &self.target,
-            self.controller.state(),
-            self.pwm.state(),
-        )
+    /// Seal of what shapes the outputs of the next tick and is changed by every tick.
+    #[inline(never)]
+    fn moving(&self) -> Seal {
+        Seal::made(|sum| {
+            self.state.hash(sum);
+            self.monitor.hash(sum);
+            self.target.hash(sum);
+            self.controller.state().hash(sum);
+            self.pwm.state().hash(sum);
+        })
+    }
+
+    /// Whether all of the state is as the last tick or request left it.
+    #[inline]
+    fn state_holds(&self) -> bool {
+        self.seal == self.moving() && self.controller.history_is_sound()
     }
 
     /// Whether everything is as the last tick or request left it.
     #[inline(never)]
     fn is_intact(&self) -> bool {
-        self.seal.holds(&self.moving()) && self.fixed_seals.all_hold(|part| self.fixed(part))
+        self.state_holds() && self.fixed_seals.all_hold(|part| self.fixed(part))
     }
 
     /// As [`JointNode::is_intact`], for a tick: all of the state, and one part of
@@ -283,13 +310,12 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     #[inline]
     fn looks_intact(&mut self) -> bool {
         let part = self.fixed_seals.next();
-        self.fixed_seals.holds(part, self.fixed(part)) && self.seal.holds(&self.moving())
+        self.fixed_seals.holds(part, self.fixed(part)) && self.state_holds()
     }
 
     #[inline]
     pub(super) fn reseal(&mut self) {
-        let seal = Seal::of(&self.moving());
-        self.seal = seal;
+        self.seal = self.moving();
     }
 
     #[inline(never)]

@@ -6,7 +6,6 @@ use super::reference::{Target, TickReference, advance};
 use crate::JOINT_TICK;
 use crate::hardware::{PinError, PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Mode, ModeRules};
-use crate::snapshot::JointSnapshot;
 use crate::supervisor::ExhaustKind;
 use wheeleg_control::joint::{JointInput, JointLimits};
 use wheeleg_control::pwm::OnTimes;
@@ -47,7 +46,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else if output.settled {
             self.pwm.shut()
         } else {
-            self.pwm.tick(&output.openings)
+            // A copy, so that the rest of the output need not be in memory.
+            let openings = output.openings;
+            self.pwm.tick(&openings)
         };
         self.expect_motion(&on_times, output.velocity, now);
         // A motion that did not come is a fault of this tick, too.
@@ -117,38 +118,45 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
+    /// Notes the tick; limits and rest are noted by the caller.
+    #[inline]
     fn record(&mut self, now: Micros, velocity: VelocityMmS, duty: Duty, on_times: OnTimes) {
-        self.snapshot = JointSnapshot {
-            at: now,
-            mode: self.core.mode(),
-            measured: self.state.measured,
-            reference: self.state.reference,
-            commanded: self.target.reference(),
-            velocity,
-            duty,
-            pulses: on_times.map(|on| Micros(u32::from(on))),
-            switches: self.switches.state(),
-            faults: self.core.supervisor.faults().latched(),
-            motion_overdue: self.state.motion.overdue(),
-            ..self.snapshot
-        };
+        let micros = |on: u16| Micros(u32::from(on));
+        let [fill_a, vent_a, fill_b, vent_b] = on_times;
+        // Field by field: a whole one would be made elsewhere and copied.
+        let snapshot = &mut self.snapshot;
+        snapshot.at = now;
+        snapshot.mode = self.core.mode();
+        snapshot.measured = self.state.measured;
+        snapshot.reference = self.state.reference;
+        snapshot.commanded = self.target.reference();
+        snapshot.velocity = velocity;
+        snapshot.duty = duty;
+        snapshot.pulses = [
+            micros(fill_a),
+            micros(vent_a),
+            micros(fill_b),
+            micros(vent_b),
+        ];
+        snapshot.switches = self.switches.state();
+        snapshot.faults = self.core.supervisor.faults().latched();
     }
 
     /// Scales on-times in µs to the counts of the PWM channels and writes them.
+    #[inline(always)]
     pub(super) fn write(&mut self, on_times: OnTimes) -> Result<(), PinError> {
         let max = u32::from(self.valves.max_duty());
-        let mut duty = on_times;
-        if max != JOINT_TICK.get() {
-            for on in &mut duty {
-                // 16 bits each: below 2^32. At most `max`, because an on-time is at
-                // most one tick.
-                let scaled = u32::from(*on)
-                    .wrapping_mul(max)
-                    .checked_div(JOINT_TICK.get());
-                *on = scaled.unwrap_or(0).min(max) as u16;
-            }
+        if max == JOINT_TICK.get() {
+            return self.valves.write(on_times);
         }
-        self.valves.write(duty)
+        self.valves.write(on_times.map(|on| {
+            // 16 bits each: below 2^32. At most `max`, because an on-time is at
+            // most one tick.
+            let scaled = u32::from(on)
+                .wrapping_mul(max)
+                .checked_div(JOINT_TICK.get());
+            scaled.unwrap_or(0).min(max) as u16
+        }))
     }
 }
 

@@ -34,7 +34,9 @@ const _: () = assert!(1_000_000 % JOINT_TICK.get() == 0);
 pub(super) struct Target {
     reference: PositionMm,
     velocity: VelocityMmS,
-    next: Option<Announced>,
+    /// The next reference, if the slot has one; all zero otherwise.
+    next: Announced,
+    has_next: bool,
     age: u32,
 }
 
@@ -46,18 +48,18 @@ impl Hash for Target {
         let Self {
             reference,
             velocity,
-            next,
+            next: Announced {
+                reference: next,
+                after,
+            },
+            has_next,
             age,
         } = self;
-        let (present, next, after) = match next {
-            Some(next) => (1_u32, next.reference.raw(), next.after.get()),
-            None => (0, 0, 0),
-        };
         state.write_i32(reference.raw());
         state.write_i32(velocity.raw());
-        state.write_i32(next);
-        state.write_u32(after);
-        state.write_u32(age ^ present.rotate_right(1));
+        state.write_i32(next.raw());
+        state.write_u32(after.get());
+        state.write_u32(age ^ u32::from(*has_next).rotate_right(1));
     }
 }
 
@@ -72,13 +74,15 @@ impl Target {
 
     /// The set-point of a SYNC latched before this tick.
     pub(super) fn from_setpoint(setpoint: &JointSetpoint) -> Self {
+        let next = setpoint.next.map(|next| Announced {
+            reference: PositionMm::from_wire(next.reference),
+            after: Ticks(u32::from(next.cycles.get()).saturating_mul(CYCLE_TICKS)),
+        });
         Self {
             reference: setpoint.reference,
             velocity: setpoint.velocity_mm_s(),
-            next: setpoint.next.map(|next| Announced {
-                reference: PositionMm::from_wire(next.reference),
-                after: Ticks(u32::from(next.cycles.get()).saturating_mul(CYCLE_TICKS)),
-            }),
+            next: next.unwrap_or_default(),
+            has_next: next.is_some(),
             age: 0,
         }
     }
@@ -104,9 +108,9 @@ impl Target {
 
     /// The announced reference, counted from this tick.
     fn announced(&self) -> Option<Announced> {
-        self.next.map(|next| Announced {
-            reference: next.reference,
-            after: Ticks(next.after.get().saturating_sub(self.age)),
+        self.has_next.then(|| Announced {
+            reference: self.next.reference,
+            after: Ticks(self.next.after.get().saturating_sub(self.age)),
         })
     }
 }

@@ -155,7 +155,7 @@ fn sequence_numbers_wrap() {
     let page = &mut store.flash.pages[0];
     let header = page[0].unwrap() & 0xFFFF_FFFF | 0xFFFF_FFFF << 32;
     page[0] = Some(header);
-    let mut digest = CRC.digest();
+    let mut digest = Checksum::default();
     for word in &page[..4] {
         digest.update(&word.unwrap().to_le_bytes());
     }
