@@ -38,9 +38,10 @@ impl ParameterPages {
         )
     }
 
-    /// One operation. One copy in flash serves both kinds.
+    /// One operation. One copy in flash serves both kinds, without a call through a
+    /// pointer, whose stack would have no bound.
     #[inline(never)]
-    fn unlocked(change: &mut dyn FnMut()) -> Result<(), FlashError> {
+    fn change(change: Change) -> Result<(), FlashError> {
         let flash = pac::FLASH;
         wait();
         for key in KEYS {
@@ -48,11 +49,38 @@ impl ParameterPages {
         }
         // Flags of an earlier operation are cleared by writing them.
         flash.sr().write_value(flash.sr().read());
-        change();
+        match change {
+            Change::Erase { page } => {
+                flash.cr().write(|r| {
+                    r.set_per(true);
+                    r.set_pnb(page);
+                });
+                flash.cr().modify(|r| r.set_strt(true));
+            }
+            Change::Write { address, value } => {
+                flash.cr().write(|r| r.set_pg(true));
+                let (low, high) = (value as u32, (value >> 32) as u32);
+                // SAFETY: an aligned, erased double word of a page that holds no
+                // code; written as two words in the order that RM0440 §3.3.7 asks.
+                unsafe {
+                    core::ptr::write_volatile(address as *mut u32, low);
+                    cortex_m::asm::isb();
+                    core::ptr::write_volatile(address.wrapping_add(4) as *mut u32, high);
+                }
+            }
+        }
         let result = outcome();
         flash.cr().write(|r| r.set_lock(true));
         result
     }
+}
+
+/// What is done to the flash: a page erased, or a double word at an address of
+/// [`ParameterPages::address`] written.
+#[derive(Clone, Copy)]
+enum Change {
+    Erase { page: u8 },
+    Write { address: u32, value: u64 },
 }
 
 fn wait() {
@@ -84,28 +112,12 @@ impl Flash for ParameterPages {
         if page >= 2 {
             return Err(FlashError);
         }
-        Self::unlocked(&mut || {
-            pac::FLASH.cr().write(|r| {
-                r.set_per(true);
-                r.set_pnb(number as u8);
-            });
-            pac::FLASH.cr().modify(|r| r.set_strt(true));
-        })
+        Self::change(Change::Erase { page: number as u8 })
     }
 
     fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError> {
         let address = Self::address(page, word).ok_or(FlashError)?;
-        Self::unlocked(&mut || {
-            pac::FLASH.cr().write(|r| r.set_pg(true));
-            let (low, high) = (value as u32, (value >> 32) as u32);
-            // SAFETY: an aligned, erased double word of a page that holds no
-            // code; written as two words in the order that RM0440 §3.3.7 asks.
-            unsafe {
-                core::ptr::write_volatile(address as *mut u32, low);
-                cortex_m::asm::isb();
-                core::ptr::write_volatile(address.wrapping_add(4) as *mut u32, high);
-            }
-        })
+        Self::change(Change::Write { address, value })
     }
 }
 

@@ -214,8 +214,10 @@ mod tests {
 
     #[test]
     fn a_new_fault_is_asked_for_at_once_and_once() {
-        let mut questions = Questions::default();
-        questions.next_cycle = 100;
+        let mut questions = Questions {
+            next_cycle: 100,
+            ..Questions::default()
+        };
         let fault = reply(NodeMode::Hold, Fault::NoMotion.into());
         questions.on_reply(2, None, &fault);
         questions.on_reply(2, Some(&fault), &fault);
@@ -232,8 +234,10 @@ mod tests {
 
     #[test]
     fn a_board_that_starts_in_operation_or_comes_back_is_asked_why_but_not_at_first_sight() {
-        let mut questions = Questions::default();
-        questions.next_cycle = 100;
+        let mut questions = Questions {
+            next_cycle: 100,
+            ..Questions::default()
+        };
         let (boot, idle) = (
             reply(NodeMode::Boot, FaultBits::NONE),
             reply(NodeMode::Idle, FaultBits::NONE),

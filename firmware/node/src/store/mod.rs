@@ -148,7 +148,7 @@ impl<F: Flash> Store<F> {
         let other = 1_usize.saturating_sub(newest);
         [newest, other].into_iter().find_map(|page| {
             let mut set = defaults;
-            let whole = self.read(page, &mut |record| put(&mut set, record))?;
+            let whole = self.read(page, |record| put(&mut set, record))?;
             Some((set, whole.sequence))
         })
     }
@@ -214,13 +214,12 @@ impl<F: Flash> Store<F> {
 
     /// The set in a page, if it is whole.
     fn whole(&self, page: usize) -> Option<Whole> {
-        self.read(page, &mut |_| {})
+        self.read(page, |_| {})
     }
 
-    /// Hands the records of a page to `take`; gives the set if it was whole. One copy
-    /// in flash serves both callers.
-    #[inline(never)]
-    fn read(&self, page: usize, take: &mut dyn FnMut(Record)) -> Option<Whole> {
+    /// Hands the records of a page to `take`; gives the set if it was whole. A copy of
+    /// it for each caller: with a call through a pointer the stack has no bound.
+    fn read(&self, page: usize, mut take: impl FnMut(Record)) -> Option<Whole> {
         let header = self.flash.read(page, 0)?;
         let count = usize::from((header >> 16) as u16);
         if header as u16 != MAGIC || count > RECORDS_MAX {
