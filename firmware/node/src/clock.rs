@@ -7,6 +7,9 @@ use wheeleg_units::Micros;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
     time_us: u64,
+    /// Less the rounds of the counter in `time_us`: a flipped bit there would be hours.
+    /// One in the low word is harmless, the counter itself sets that right.
+    minus_rounds: u32,
     started: bool,
 }
 
@@ -28,7 +31,22 @@ impl Clock {
         }
         let time = newest.wrapping_add(u64::from(step));
         self.time_us = time;
+        // What was damaged before stays damaged.
+        let carry = ((time >> 32) as u32).wrapping_sub((newest >> 32) as u32);
+        self.minus_rounds = self.minus_rounds.wrapping_sub(carry);
         time
+    }
+
+    /// Takes the rounds as they are, after damage to them was reported.
+    #[cold]
+    pub const fn mend(&mut self) {
+        self.minus_rounds = ((self.time_us >> 32) as u32).wrapping_neg();
+    }
+
+    /// Whether no bit of the rounds has flipped.
+    #[inline]
+    pub const fn is_intact(&self) -> bool {
+        ((self.time_us >> 32) as u32).wrapping_add(self.minus_rounds) == 0
     }
 }
 
@@ -47,6 +65,22 @@ mod tests {
         }
         assert_eq!(clock.unwrap(Micros(u32::MAX)), (40 << 30) - 1);
         assert_eq!(clock.unwrap(Micros(5)), (40 << 30) + 5);
+    }
+
+    #[test]
+    fn a_flipped_bit_is_seen_or_set_right_at_the_next_instant() {
+        let mut clock = Clock::default();
+        clock.unwrap(Micros(u32::MAX));
+        let sound = clock.unwrap(Micros(1_000));
+        assert_eq!((sound >> 32, clock.is_intact()), (1, true));
+        for bit in 0..64 {
+            let mut flipped = clock;
+            flipped.time_us ^= 1 << bit;
+            let next = flipped.unwrap(Micros(2_000));
+            assert!(!flipped.is_intact() || next == sound + 1_000, "bit {bit}");
+            flipped.mend();
+            assert!(flipped.is_intact());
+        }
     }
 
     #[test]

@@ -306,7 +306,7 @@ impl Supervisor {
         if self.overrun.begin(now, times.tick) {
             self.fault(Fault::TickOverrun, Event::BoardFault, now);
         }
-        if !self.is_intact() {
+        if !(self.is_intact() && self.clock.is_intact()) {
             self.repair(now);
         }
         self.link.set_watchdog(times.watchdog);
@@ -339,6 +339,7 @@ impl Supervisor {
         // fault keeps the dump valve open meanwhile.
         self.emergency = false;
         self.check = !self.steering();
+        self.clock.mend();
         self.fault(Fault::StateCorrupt, Event::AxisFault, now);
     }
 
