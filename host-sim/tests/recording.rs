@@ -5,8 +5,8 @@ use std::path::Path;
 
 use mcap::read::Options;
 use wheeleg_sim::telemetry::{
-    BodySample, BusSample, EventKind, FootSample, JointSample, MasterSample, Recorder, Recording,
-    SupplySample, WheelSample, channels, write_csv,
+    BodySample, BusSample, EventKind, FootSample, JointSample, LinkSample, MasterSample, Recorder,
+    Recording, SupplySample, WheelSample, channels, write_csv,
 };
 
 /// Three seconds of made-up but lively samples on every channel.
@@ -42,6 +42,9 @@ fn fill(recorder: &mut Recorder, amplitude: f64) {
         }
         if ms == 1234 {
             recorder.event(t_ns, EventKind::Info, "a, \"quoted\" text");
+            for node in 0..8 {
+                recorder.link(t_ns, node, LinkSample::default());
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use sil::{command_to, gait, range, robot, run, stand, window};
 use wheeleg_protocol::link::{BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, GAP_US, TURNAROUND_US};
 use wheeleg_protocol::{Message, MessageType, NODES};
 use wheeleg_sim::config::LegChoice;
-use wheeleg_sim::telemetry::Recording;
+use wheeleg_sim::telemetry::{BusSample, Recording, Row};
 
 /// Per mille of the cycle in which the line is silent between the cyclic frames,
 /// because the budget keeps it free: the turnaround and a gap for each slot.
@@ -43,7 +43,8 @@ fn robot_and_protocol_mean_the_same_line() {
 
 #[test]
 fn cyclic_share_on_the_line_is_the_one_computed_at_compile_time() {
-    // Standing: the master asks for nothing, so all that is on the line is cyclic.
+    // Standing: what is not cyclic is the master's own questions about the logs, at
+    // most one of them and its answer in some cycles.
     let recording = run(&stand(2.0, &[]), &robot(), 1);
     assert_orderly(&recording);
     assert!(
@@ -53,8 +54,21 @@ fn cyclic_share_on_the_line_is_the_one_computed_at_compile_time() {
     let frames = Message::encoded_len(MessageType::Sync)
         + NODES * Message::encoded_len(MessageType::SlotReply);
     let budget = f64::from(CYCLIC_SHARE_PERMILLE);
-    for row in &recording.bus {
-        assert_eq!(row.v.bytes as usize, frames, "cycle {}", row.v.cycle);
+    let (cyclic, asking): (Vec<_>, Vec<_>) =
+        (recording.bus.iter()).partition(|row| row.v.bytes as usize == frames);
+    assert!(
+        (1..=20).contains(&asking.len()),
+        "{} of {}",
+        asking.len(),
+        recording.bus.len()
+    );
+    for row in &asking {
+        assert!(
+            row.v.bytes as usize > frames && row.v.load < 0.45,
+            "{row:?}"
+        );
+    }
+    for row in cyclic {
         let share = 1000.0 * row.v.load + silent_permille();
         assert!(
             (share - budget).abs() < 0.01 * budget,
@@ -89,9 +103,11 @@ fn requests_leave_thirty_per_cent_free() {
         .collect();
     let recording = run(&gait(LegChoice::Left, 2.0, &events), &robot(), 1);
     assert_orderly(&recording);
-    let quiet = range(window(&recording.bus, 0.1, 0.45), |s| s.load).1;
+    let mean =
+        |rows: &[Row<BusSample>]| rows.iter().map(|r| r.v.load).sum::<f64>() / rows.len() as f64;
+    let quiet = mean(window(&recording.bus, 0.1, 0.45));
     let busy = window(&recording.bus, 0.6, 1.4);
-    let mean = busy.iter().map(|r| r.v.load).sum::<f64>() / busy.len() as f64;
+    let mean = mean(busy);
     assert!(
         mean > quiet + 0.02,
         "requests cost line time: {mean} against {quiet}"

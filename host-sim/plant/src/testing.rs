@@ -162,8 +162,8 @@ pub fn wheeleg_2003_supply() -> SupplyParams {
             t_on_s: 0.020,                            // s ASSUMED
             t_off_s: 0.020,                           // s ASSUMED
         },
-        switch_on_pa: 551_325.0,  // Pa ASSUMED 4.5 bar g
-        switch_off_pa: 501_325.0, // Pa ASSUMED 4.0 bar g
+        switch_on_pa: 661_325.0,  // Pa ASSUMED 5.6 bar g
+        switch_off_pa: 641_325.0, // Pa ASSUMED 5.4 bar g
     }
 }
 

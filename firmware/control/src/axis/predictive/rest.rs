@@ -21,8 +21,10 @@ const PATIENCE_SHIFT: u32 = 9;
 const WIDEST: i32 = 26_214;
 /// A piston further from its target than this does not rest there, raw mm (0.45 mm).
 const LEFT: i32 = 29_491;
-/// Ticks outside before the end of rest.
+/// Ticks outside before the end of rest at the same target, …
 const RELEASE_TICKS: u16 = 20;
+/// … and with a new one.
+const START_TICKS: u16 = 4;
 /// Ticks for which the valves stay shut to see where the piston comes to rest: about
 /// one swing on the air of its chambers.
 const PAUSE: u8 = 150;
@@ -42,6 +44,8 @@ pub(super) struct Rest {
     pause: u8,
     /// In the band at the last tick.
     inside: bool,
+    /// The target has changed since the piston came to rest.
+    aimed: bool,
     settled: bool,
 }
 
@@ -57,6 +61,7 @@ impl Hash for Rest {
             near,
             pause,
             inside,
+            aimed,
             settled,
         } = self;
         state.write_i32(*target);
@@ -65,6 +70,7 @@ impl Hash for Rest {
             u32::from(*near)
                 | u32::from(*settled).wrapping_shl(16)
                 | u32::from(*inside).wrapping_shl(17)
+                | u32::from(*aimed).wrapping_shl(18)
                 | u32::from(*pause).wrapping_shl(24),
         );
     }
@@ -93,6 +99,7 @@ impl Rest {
             self.target = reference;
             self.near = 0;
             self.pause = 0;
+            self.aimed = true;
         }
         new
     }
@@ -128,8 +135,9 @@ impl Rest {
         } else {
             0
         };
-        if self.held > REST_TICKS {
+        if self.held > REST_TICKS && !self.settled {
             self.settled = true;
+            self.aimed = false;
         }
         let release = narrow
             .saturating_mul(2)
@@ -139,7 +147,12 @@ impl Rest {
         let outside = away > release;
         if self.settled && (outside || !steps) {
             self.released = self.released.saturating_add(1);
-            if self.released >= RELEASE_TICKS || !steps {
+            let ticks = if self.aimed {
+                START_TICKS
+            } else {
+                RELEASE_TICKS
+            };
+            if self.released >= ticks || !steps {
                 self.settled = false;
                 self.held = 0;
                 self.released = 0;
