@@ -156,14 +156,15 @@ impl<'p, B: Board<'p>> Session<'p, B> {
 
     /// The board leaves reset.
     fn start(&mut self, identity: NodeIdentity) -> Result<(), &'static str> {
-        let mut board =
-            B::new(identity, self.parameters.clone(), self.pins).map_err(|error| match error {
-                ConfigError::Address => "the address is none of this image's boards",
-                ConfigError::Parameters => "the stored parameters contradict each other",
-            })?;
+        let board = match B::new(identity, self.parameters.clone(), self.pins) {
+            Ok(board) => self.board.insert(board),
+            Err(ConfigError::Address) => return Err("the address is none of this image's boards"),
+            Err(ConfigError::Parameters) => {
+                return Err("the stored parameters contradict each other");
+            }
+        };
         // The only way in which this board starts: the supply comes up.
         board.started_by(ResetCause::PowerUp);
-        self.board = Some(board);
         self.active = Outputs::default();
         Ok(())
     }

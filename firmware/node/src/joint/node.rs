@@ -85,6 +85,22 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             return Err(ConfigError::Address);
         }
         let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
+        Ok(Self::with(
+            identity, parameters, &settings, valves, sensor, switches,
+        ))
+    }
+
+    /// With settings that follow from the parameters. Made in its place: each move on
+    /// the way would be kilobytes of stack.
+    #[inline(always)]
+    fn with(
+        identity: NodeIdentity,
+        parameters: JointParameters,
+        settings: &JointSettings,
+        valves: V,
+        sensor: S,
+        switches: W,
+    ) -> Self {
         let mut controller = JointController::new(settings.control);
         controller.set_correction(settings.tick.correction);
         let mut node = Self {
@@ -111,7 +127,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             switch_pins: switches,
         };
         node.reseal_all();
-        Ok(node)
+        node
     }
 
     /// A board with the parameters that its memory kept. Those that contradict each
@@ -120,6 +136,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     ///
     /// # Errors
     /// [`ConfigError::Address`], as [`Self::new`].
+    #[inline(always)]
     pub fn from_store(
         identity: NodeIdentity,
         stored: JointParameters,
@@ -127,13 +144,18 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         sensor: S,
         switches: W,
     ) -> Result<Self, ConfigError> {
+        if !identity.address.is_joint() {
+            return Err(ConfigError::Address);
+        }
+        // Looked at and made again: a copy less on the stack than to keep them.
         let sound = JointSettings::new(&stored).is_some();
         let parameters = if sound {
             stored
         } else {
             JointParameters::default()
         };
-        let mut node = Self::new(identity, parameters, valves, sensor, switches)?;
+        let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
+        let mut node = Self::with(identity, parameters, &settings, valves, sensor, switches);
         if !sound {
             node.axis_fault(Fault::ParameterCorrupt, Micros::ZERO);
         }
