@@ -121,7 +121,6 @@ fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
     let mut session = Session::<RemoteJoint<'_>>::new(&pins, "this process", 0);
     let here = run(&mut |request| session.answer(request, &mut NoTime));
     assert_same(&there, &here);
-    for at in (0..3_000).step_by(40) { println!("{at} {:.2}", here.stroke_mm[at]); }
     for (at, target_mm) in [(999, 170.0), (1_999, 10.0), (2_999, 100.0)] {
         let error_mm = here.stroke_mm[at] - target_mm;
         assert!(error_mm.abs() < 1.0, "at {at} ms: {error_mm:.2} mm");
