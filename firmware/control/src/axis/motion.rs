@@ -57,8 +57,8 @@ impl Inertia {
         // 2^32 / (2 slope²) with slope × 2^8: 2^47 / slope².
         let square = i64::from(slope).wrapping_mul(i64::from(slope));
         let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
-        // 0.56 of it: a tick then turns at most four fifths of a speed round.
-        let slides = scaled(taken, 36_700, 16).max(STICK);
+        // Six tenths of it: a tick then turns at most two thirds of a speed round.
+        let slides = scaled(taken, 39_322, 16).max(STICK);
         Self {
             mass,
             per_force,
