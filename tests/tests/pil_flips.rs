@@ -21,12 +21,15 @@ use wheeleg_units::WheelCount;
 const TIMES_VARIABLE: &str = "WHEELEG_FLIP_TIMES";
 const BYTE_NS: u64 = 10_000;
 
+/// Puts a request to the board.
+type Ask<'a> = dyn FnMut(&Request) -> Reply + 'a;
+
 /// One board and what it does while it is struck.
 struct Subject {
     /// Its image.
     image: &'static str,
     /// Runs it, with all requests through the function.
-    course: fn(&mut dyn FnMut(&Request) -> Reply),
+    course: fn(&mut Ask<'_>),
     /// Edges at which flips strike: from arming until there is too little left to see.
     struck: Range<u64>,
     /// Ticks in which all seals of its configuration are looked at once.
@@ -74,7 +77,7 @@ const MOTOR_S: f64 = 0.05;
 
 /// A wheel board with a motor of the first order: armed at 105 ms, set-points that move
 /// from 150 ms on, until 420 ms.
-fn follow(ask: &mut dyn FnMut(&Request) -> Reply) {
+fn follow(ask: &mut Ask<'_>) {
     let address = Address::wheel(WHEEL_ADDRESS).expect("a wheel");
     let arm = frame(
         address,
