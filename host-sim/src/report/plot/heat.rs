@@ -3,7 +3,8 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{FONT, Panel, colour, text, tick};
+use super::axes::Grid;
+use super::{Panel, colour, text};
 
 /// Cells of a map, from the lower left, row by row upwards.
 pub(crate) struct Heat {
@@ -39,19 +40,6 @@ impl Panel {
             );
             chart.draw_series(std::iter::once(cell)).map_err(text)?;
         }
-        let font = (FONT, 13 * scale).into_font().color(&colour::INK);
-        let mut mesh = chart.configure_mesh();
-        mesh.disable_mesh()
-            .axis_style(colour::INK.stroke_width(scale))
-            .label_style(font.clone())
-            .axis_desc_style(font)
-            .x_labels(11)
-            .y_labels((self.height / 28).clamp(3, 11) as usize)
-            .y_label_formatter(&|v| tick(*v))
-            .x_label_formatter(&|v| tick(*v));
-        if axis_px > 0 {
-            mesh.x_desc(heat.x_label.as_str());
-        }
-        mesh.draw().map_err(text)
+        self.draw_axes(&mut chart, scale, axis_px, &heat.x_label, Grid::Covered)
     }
 }

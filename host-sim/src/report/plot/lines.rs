@@ -3,7 +3,8 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{FONT, LEFT, Panel, WIDTH, colour, text, tick};
+use super::axes::Grid;
+use super::{LEFT, Panel, WIDTH, colour, text};
 
 /// One line.
 pub(crate) struct Series {
@@ -43,21 +44,7 @@ impl Panel {
     ) -> Result<(), String> {
         let ((x0, x1), (y0, y1)) = (self.x_range, lines.y_range);
         let mut chart = self.chart(body, scale, axis_px, (y0, y1))?;
-        let font = (FONT, 13 * scale).into_font().color(&colour::INK);
-        let mut mesh = chart.configure_mesh();
-        mesh.bold_line_style(colour::GRID.stroke_width(scale))
-            .light_line_style(TRANSPARENT)
-            .axis_style(colour::INK.stroke_width(scale))
-            .label_style(font.clone())
-            .axis_desc_style(font)
-            .x_labels(11)
-            .y_labels((self.height / 28).clamp(3, 11) as usize)
-            .y_label_formatter(&|v| tick(*v))
-            .x_label_formatter(&|v| tick(*v));
-        if axis_px > 0 {
-            mesh.x_desc(lines.x_label.as_str());
-        }
-        mesh.draw().map_err(text)?;
+        self.draw_axes(&mut chart, scale, axis_px, &lines.x_label, Grid::Both)?;
         let clamp = |y: f64| y.clamp(y0, y1);
         for limit in &lines.limits {
             let stroke = colour::LIMIT.mix(0.7).stroke_width(scale);

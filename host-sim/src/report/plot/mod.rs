@@ -1,5 +1,6 @@
 //! Drawing of figures: stacked panels of lines, rasters, maps and bars, to PNG and SVG.
 
+mod axes;
 mod bars;
 pub(crate) mod colour;
 mod heat;
@@ -10,7 +11,6 @@ use std::path::Path;
 use std::sync::Once;
 
 use plotters::coord::Shift;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
@@ -174,8 +174,6 @@ impl Figure {
     }
 }
 
-type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
 fn text<E: std::fmt::Display>(error: E) -> String {
     error.to_string()
 }
@@ -259,47 +257,6 @@ impl Panel {
         }
         Ok(())
     }
-
-    /// A chart over the panel's abscissa.
-    fn chart<'a, B: DrawingBackend>(
-        &self,
-        body: &'a DrawingArea<B, Shift>,
-        scale: u32,
-        axis_px: u32,
-        (y0, y1): (f64, f64),
-    ) -> Result<Chart<'a, B>, String> {
-        let (x0, x1) = self.x_range;
-        ChartBuilder::on(body)
-            .margin_right(14 * scale)
-            .margin_top(3 * scale)
-            .margin_bottom(5 * scale)
-            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
-            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
-            .build_cartesian_2d(x0..x1, y0..y1)
-            .map_err(text)
-    }
-
-    /// Marks the panel's times from `y0` to `y1`.
-    fn draw_marks<B: DrawingBackend>(
-        &self,
-        chart: &mut Chart<'_, B>,
-        scale: u32,
-        (y0, y1): (f64, f64),
-    ) -> Result<(), String> {
-        let (x0, x1) = self.x_range;
-        for mark in self.marks.iter().filter(|m| (x0..=x1).contains(*m)) {
-            let stroke = colour::LIMIT.stroke_width(scale);
-            let line = PathElement::new(vec![(*mark, y0), (*mark, y1)], stroke);
-            chart.draw_series(std::iter::once(line)).map_err(text)?;
-        }
-        Ok(())
-    }
-}
-
-fn tick(v: f64) -> String {
-    let rounded = (v * 1e6).round() / 1e6;
-    // No minus sign on zero.
-    format!("{}", rounded + 0.0).replace('-', "−")
 }
 
 /// Averages blocks of two by two pixels; `w` and `h` are those of the result.

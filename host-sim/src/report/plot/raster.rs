@@ -3,7 +3,8 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::{FONT, LEFT, Panel, TIME, colour, text, tick};
+use super::axes::Grid;
+use super::{FONT, LEFT, Panel, TIME, colour, text};
 
 /// One row of a raster: runs of (from, to, intensity 0..1).
 pub(crate) struct RasterRow {
@@ -28,20 +29,7 @@ impl Panel {
         let n = rows.len().max(1) as f64;
         let mut chart = self.chart(body, scale, axis_px, (0.0, n))?;
         let font = (FONT, 13 * scale).into_font().color(&colour::INK);
-        let mut mesh = chart.configure_mesh();
-        mesh.bold_line_style(colour::GRID.stroke_width(scale))
-            .light_line_style(TRANSPARENT)
-            .disable_y_mesh()
-            .axis_style(colour::INK.stroke_width(scale))
-            .label_style(font.clone())
-            .axis_desc_style(font.clone())
-            .x_labels(11)
-            .x_label_formatter(&|v| tick(*v))
-            .y_labels(0);
-        if axis_px > 0 {
-            mesh.x_desc(TIME);
-        }
-        mesh.draw().map_err(text)?;
+        self.draw_axes(&mut chart, scale, axis_px, TIME, Grid::Upright)?;
         for (i, row) in rows.iter().enumerate() {
             let top = n - i as f64 - 0.08;
             let bottom = n - i as f64 - 0.92;
