@@ -124,14 +124,35 @@ macro_rules! messages {
                 match self { $( Self::$name(_) => MessageType::$name ),* }
             }
 
-            fn write_payload<'a>(&self, out: &'a mut [u8]) -> postcard::Result<&'a mut [u8]> {
-                match self { $( Self::$name(message) => postcard::to_slice(message, out) ),* }
+            /// `FROM_NODE`: of a message that a node sends alone.
+            fn write_payload<'a, const FROM_NODE: bool>(
+                &self,
+                out: &'a mut [u8],
+            ) -> postcard::Result<&'a mut [u8]> {
+                match self { $(
+                    Self::$name(message) => {
+                        if FROM_NODE && const { !MessageType::$name.comes_from_nodes() } {
+                            return Err(postcard::Error::WontImplement);
+                        }
+                        postcard::to_slice(message, out)
+                    }
+                )* }
             }
 
-            fn read_payload(message_type: MessageType, payload: &[u8]) -> postcard::Result<(Self, &[u8])> {
+            /// `TO_NODE`: of a message that may go from the master to a node alone, so
+            /// that no other needs a place in the image of a board.
+            fn read_payload<const TO_NODE: bool>(
+                message_type: MessageType,
+                payload: &[u8],
+            ) -> postcard::Result<(Self, &[u8])> {
                 match message_type { $(
-                    MessageType::$name => postcard::take_from_bytes::<$name>(payload)
-                        .map(|(message, rest)| (Self::$name(message), rest)),
+                    MessageType::$name => {
+                        if TO_NODE && const { MessageType::$name.comes_from_nodes() } {
+                            return Err(postcard::Error::WontImplement);
+                        }
+                        postcard::take_from_bytes::<$name>(payload)
+                            .map(|(message, rest)| (Self::$name(message), rest))
+                    }
                 )* }
             }
         }
@@ -328,13 +349,21 @@ impl MessageType {
     /// node can command another, and requests are never broadcast.
     #[must_use]
     pub const fn may_go(self, source: Address, destination: Address) -> bool {
-        match (self, self.class()) {
-            (Self::Sync, _) => source.is_master() && destination.is_broadcast(),
-            (Self::SlotReply, _) | (_, Class::Answer) => {
-                source.is_node() && destination.is_master()
-            }
-            (_, Class::Request | Class::Cyclic) => source.is_master() && destination.is_node(),
+        if self.comes_from_nodes() {
+            return source.is_node() && destination.is_master();
         }
+        match self {
+            Self::Sync => source.is_master() && destination.is_broadcast(),
+            _ => source.is_master() && destination.is_node(),
+        }
+    }
+
+    /// Whether a node sends it; all others come from the master.
+    const fn comes_from_nodes(self) -> bool {
+        matches!(
+            (self, self.class()),
+            (Self::SlotReply, _) | (_, Class::Answer)
+        )
     }
 
     /// Whether the type keeps number and layout in every protocol version.
@@ -453,6 +482,19 @@ impl Message {
     /// [`ParseError`]: unknown type, wrong size, wrong way, or a value outside its
     /// range, in this order. Never panics, for any payload.
     pub fn parse(frame: &Frame<'_>) -> Result<Self, ParseError> {
+        Self::parse_for::<false>(frame)
+    }
+
+    /// As [`Self::parse`], for a board: a message that no node may receive is
+    /// [`ParseError::Route`], whoever sent it.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_to_node(frame: &Frame<'_>) -> Result<Self, ParseError> {
+        Self::parse_for::<true>(frame)
+    }
+
+    fn parse_for<const TO_NODE: bool>(frame: &Frame<'_>) -> Result<Self, ParseError> {
         let code = frame.header.message_type;
         let message_type = MessageType::from_code(code).ok_or(ParseError::UnknownType { code })?;
         if frame.payload.len() != message_type.payload_len() {
@@ -461,10 +503,11 @@ impl Message {
                 found: frame.payload.len(),
             });
         }
-        if !message_type.may_go(frame.header.source, frame.header.destination) {
+        let to_nobody = TO_NODE && message_type.comes_from_nodes();
+        if to_nobody || !message_type.may_go(frame.header.source, frame.header.destination) {
             return Err(ParseError::Route { message_type });
         }
-        match Self::read_payload(message_type, frame.payload) {
+        match Self::read_payload::<TO_NODE>(message_type, frame.payload) {
             Ok((message, [])) => Ok(message),
             _ => Err(ParseError::Value { message_type }),
         }
@@ -480,6 +523,21 @@ impl Message {
         self.emit_as(VERSION, envelope, out)
     }
 
+    /// As [`Self::emit`], for a board: a message that no node sends is refused.
+    ///
+    /// # Errors
+    /// As [`Self::emit`]; [`EncodeError::Source`] for a message of the master.
+    pub fn emit_from_node<'a>(
+        &self,
+        envelope: Envelope,
+        out: &'a mut [u8],
+    ) -> Result<&'a [u8], EncodeError> {
+        if !self.message_type().comes_from_nodes() {
+            return Err(EncodeError::Source);
+        }
+        self.emit_for::<true>(VERSION, envelope, out)
+    }
+
     /// As [`Self::emit`], with another protocol version in the header. For tests
     /// and tools that play a board of another version.
     ///
@@ -491,10 +549,19 @@ impl Message {
         envelope: Envelope,
         out: &'a mut [u8],
     ) -> Result<&'a [u8], EncodeError> {
+        self.emit_for::<false>(version, envelope, out)
+    }
+
+    fn emit_for<'a, const FROM_NODE: bool>(
+        &self,
+        version: u8,
+        envelope: Envelope,
+        out: &'a mut [u8],
+    ) -> Result<&'a [u8], EncodeError> {
         let mut scratch = [0_u8; MAX_PAYLOAD];
         // Every payload fits (const assertions above): the error cannot occur.
         let payload = self
-            .write_payload(&mut scratch)
+            .write_payload::<FROM_NODE>(&mut scratch)
             .map_err(|_| EncodeError::PayloadTooLong)?;
         let header = Header {
             version,

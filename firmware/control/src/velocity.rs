@@ -119,17 +119,36 @@ const fn quotient(dividend: u64, divisor: u64) -> u64 {
     }
 }
 
-/// Odd factor of the check sum (Knuth, 2^32 / golden ratio).
-const CHECK: u32 = 0x9E37_79B1;
+/// A position and its complement, so that a flipped bit of either shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Sample {
+    raw: i32,
+    complement: i32,
+}
+
+impl Sample {
+    #[inline]
+    const fn new(raw: i32) -> Self {
+        Self {
+            raw,
+            complement: !raw,
+        }
+    }
+
+    #[inline]
+    const fn is_sound(self) -> bool {
+        self.raw == !self.complement
+    }
+}
 
 /// The last positions and their sums.
 ///
-/// Its `Hash` is for sealing memory. The samples, of which one changes in a tick,
-/// have a check sum of their own: [`VelocityEstimator::is_sound`].
+/// Its `Hash` is for sealing memory. It leaves the samples out: each is read once,
+/// when it leaves the window, and looked at before: [`VelocityEstimator::is_sound`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VelocityEstimator {
     /// A ring in the first `length` places.
-    samples: [i32; CAPACITY],
+    samples: [Sample; CAPACITY],
     /// Samples of the window; 0 before the first sample.
     length: u8,
     /// Place of the oldest sample, which the next one takes.
@@ -138,11 +157,6 @@ pub struct VelocityEstimator {
     total: i64,
     /// Σ (2k − (N − 1)) y, k = 0 for the oldest.
     slope: i64,
-    /// Σ y f^p modulo 2^32 over the places p, with f = [`CHECK`]: it sees every flipped
-    /// bit, because all powers of an odd number are odd.
-    check: u32,
-    /// f^p of the oldest sample's place. A flipped bit of it shows in the sum.
-    weight: u32,
 }
 
 impl Default for VelocityEstimator {
@@ -156,34 +170,20 @@ impl VelocityEstimator {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            samples: [0; CAPACITY],
+            samples: [Sample::new(0); CAPACITY],
             length: 0,
             oldest: 0,
             total: 0,
             slope: 0,
-            check: 0,
-            weight: 1,
         }
     }
 
-    /// Whether all samples that are ever read are as they came.
-    // Not inlined: it would be compiled for size where it is called.
-    #[inline(never)]
+    /// Whether the sample that the next update reads is as it came.
+    #[inline]
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.check == self.sum_up()
-    }
-
-    /// The check sum of the window, up to the next multiple of four.
-    fn sum_up(&self) -> u32 {
-        let (fours, _) = self.samples.as_chunks::<4>();
-        let used = usize::from(self.length.wrapping_add(3).wrapping_shr(2));
-        let used = fours.get(..used).unwrap_or(fours);
-        used.iter().rev().fold(0, |sum: u32, [a, b, c, d]| {
-            [d, c, b, a].into_iter().fold(sum, |sum, sample| {
-                sum.wrapping_mul(CHECK).wrapping_add(sample.cast_unsigned())
-            })
-        })
+        let oldest = self.samples.get(usize::from(self.oldest));
+        oldest.is_some_and(|oldest| oldest.is_sound())
     }
 
     /// Forgets everything: the next sample fills the window.
@@ -202,22 +202,17 @@ impl VelocityEstimator {
         let length = window.length;
         if self.length == 0 {
             self.length = length;
-            self.samples = [sample; CAPACITY];
+            self.samples = [Sample::new(sample); CAPACITY];
             self.total = newest.wrapping_mul(i64::from(length));
             self.slope = 0;
-            self.check = self.sum_up();
             return VelocityMmS::ZERO;
         }
         let place = self.samples.get_mut(usize::from(self.oldest));
-        let oldest = place.map_or(0, |place| core::mem::replace(place, sample));
-        let change = sample.wrapping_sub(oldest).cast_unsigned();
-        self.check = self.check.wrapping_add(change.wrapping_mul(self.weight));
+        let oldest = place.map_or(0, |place| {
+            core::mem::replace(place, Sample::new(sample)).raw
+        });
         let next = self.oldest.wrapping_add(1);
-        (self.oldest, self.weight) = if next < self.length {
-            (next, self.weight.wrapping_mul(CHECK))
-        } else {
-            (0, 1)
-        };
+        self.oldest = if next < self.length { next } else { 0 };
         let oldest = i64::from(oldest);
         // Every k falls by one, so that every sample that stays loses twice its value;
         // the oldest leaves with −(N − 1), the newest comes with N − 1.
@@ -244,11 +239,8 @@ impl core::hash::Hash for VelocityEstimator {
             oldest,
             total,
             slope,
-            check,
-            weight: _,
         } = self;
         state.write_u32(u32::from(*length) | u32::from(*oldest).wrapping_shl(8));
-        state.write_u32(*check);
         state.write_i64(*total);
         state.write_i64(*slope);
     }
@@ -269,23 +261,23 @@ mod tests {
                 sound.update(&window, position);
                 assert!(sound.is_sound(), "{length} {tick}");
             }
-            for place in 0..usize::from(length) {
-                for bit in 0..32 {
+            for place in 0..length {
+                for bit in 0..64 {
                     let mut flipped = sound;
-                    flipped.samples[place] ^= 1 << bit;
+                    let sample = &mut flipped.samples[usize::from(place)];
+                    if bit < 32 {
+                        sample.raw ^= 1 << bit;
+                    } else {
+                        sample.complement ^= 1 << (bit - 32);
+                    }
+                    // Before the update that reads it, and not before.
+                    let turn = (length + place - flipped.oldest) % length;
+                    for tick in 0..turn {
+                        assert!(flipped.is_sound(), "{length}: {place}, bit {bit}, {tick}");
+                        flipped.update(&window, PositionMm::from_int(i16::from(tick)));
+                    }
                     assert!(!flipped.is_sound(), "{length}: sample {place}, bit {bit}");
                 }
-            }
-            for bit in 0..32 {
-                let mut flipped = sound;
-                flipped.check ^= 1 << bit;
-                assert!(!flipped.is_sound(), "{length}: sum, bit {bit}");
-                let mut flipped = sound;
-                flipped.weight ^= 1 << bit;
-                // A change by one shows it; it has no other effect.
-                let old = flipped.samples[usize::from(flipped.oldest)];
-                flipped.update(&window, PositionMm::from_raw(old.wrapping_add(1)));
-                assert!(!flipped.is_sound(), "{length}: weight, bit {bit}");
             }
         }
     }

@@ -63,7 +63,9 @@ impl<const N: usize> Parameters<N> {
     /// One of `PARTS` parts of the values of about equal size, for sealing them.
     #[inline]
     pub(crate) fn part<const PARTS: usize>(&self, part: usize) -> &[i32] {
-        let mut parts = self.values.chunks(const { N.div_ceil(PARTS) });
+        let mut parts = self
+            .values
+            .chunks(const { N.div_ceil(PARTS).next_multiple_of(4) });
         parts.nth(part).unwrap_or_default()
     }
 

@@ -68,7 +68,7 @@ impl BusPort {
             return None;
         }
         if envelope.destination == self.address {
-            let message = Message::parse(&frame);
+            let message = Message::parse_to_node(&frame);
             return Some(Incoming::Addressed(
                 envelope,
                 frame.header.message_type,
@@ -76,7 +76,7 @@ impl BusPort {
             ));
         }
         if envelope.destination == Address::BROADCAST
-            && let Ok(Message::Sync(sync)) = Message::parse(&frame)
+            && let Ok(Message::Sync(sync)) = Message::parse_to_node(&frame)
         {
             return Some(Incoming::Sync(sync));
         }
@@ -148,7 +148,10 @@ fn encode(
     let transmission = place.insert(Transmission { start_at, bytes });
     let bytes = &mut transmission.bytes;
     let room = bytes.resize_default(MAX_ENCODED);
-    match (room, message.emit(envelope, bytes).map(<[u8]>::len)) {
+    match (
+        room,
+        message.emit_from_node(envelope, bytes).map(<[u8]>::len),
+    ) {
         (Ok(()), Ok(length)) => bytes.truncate(length),
         _ => *place = None,
     }

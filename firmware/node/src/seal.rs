@@ -15,6 +15,21 @@ use core::hash::{Hash, Hasher};
 pub(crate) struct WordSum(u32);
 
 impl WordSum {
+    /// Takes words, four between two jumps.
+    #[inline(always)]
+    pub(crate) fn words(&mut self, words: &[i32]) {
+        let (fours, rest) = words.as_chunks::<4>();
+        for [a, b, c, d] in fours {
+            self.mix(a.cast_unsigned());
+            self.mix(b.cast_unsigned());
+            self.mix(c.cast_unsigned());
+            self.mix(d.cast_unsigned());
+        }
+        for word in rest {
+            self.mix(word.cast_unsigned());
+        }
+    }
+
     #[inline(always)]
     fn mix(&mut self, word: u32) {
         // Odd multiplier (Knuth, 2^32 / golden ratio): a bijection.

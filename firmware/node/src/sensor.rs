@@ -68,9 +68,11 @@ pub struct Reading {
 /// Checks and converts the readings of one position sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorMonitor {
-    last: Option<PositionMm>,
+    /// The last good position; zero without one.
+    last: PositionMm,
     rejected: u8,
     good_in_row: u8,
+    has_last: bool,
 }
 
 impl Hash for SensorMonitor {
@@ -82,12 +84,13 @@ impl Hash for SensorMonitor {
             last,
             rejected,
             good_in_row,
+            has_last,
         } = self;
         let small = u32::from(*rejected)
             | u32::from(*good_in_row).wrapping_shl(8)
-            | u32::from(last.is_some()).wrapping_shl(16);
+            | u32::from(*has_last).wrapping_shl(16);
         state.write_u32(small);
-        state.write_i32(last.unwrap_or(PositionMm::ZERO).raw());
+        state.write_i32(last.raw());
     }
 }
 
@@ -95,9 +98,10 @@ impl SensorMonitor {
     /// No reading yet.
     pub const fn new() -> Self {
         Self {
-            last: None,
+            last: PositionMm::ZERO,
             rejected: 0,
             good_in_row: 0,
+            has_last: false,
         }
     }
 
@@ -109,7 +113,8 @@ impl SensorMonitor {
     ) -> Reading {
         match self.check(reading, config) {
             Ok(position) => {
-                self.last = Some(position);
+                self.last = position;
+                self.has_last = true;
                 self.rejected = self.rejected.saturating_sub(1);
                 self.good_in_row = self.good_in_row.saturating_add(1);
                 Reading {
@@ -123,11 +128,12 @@ impl SensorMonitor {
                 let level = self.rejected.saturating_add(REJECTED_WEIGHT);
                 self.rejected = level.min(FAULT_LEVEL);
                 let fault = (level >= FAULT_LEVEL).then_some(rejection);
-                let position = self.last.unwrap_or(PositionMm::ZERO);
+                let position = self.last;
                 if fault.is_some() {
                     // Nothing to compare with any more: the wiper may have
                     // come back anywhere.
-                    self.last = None;
+                    self.last = PositionMm::ZERO;
+                    self.has_last = false;
                 }
                 Reading {
                     position,
@@ -156,12 +162,11 @@ impl SensorMonitor {
         if position < config.travel_min || position > config.travel_max {
             return Err(Rejection::Travel);
         }
-        match self.last {
-            Some(last) if position.saturating_sub(last).saturating_abs() > config.step_max => {
-                Err(Rejection::Rate)
-            }
-            _ => Ok(position),
+        let step = position.saturating_sub(self.last).saturating_abs();
+        if self.has_last && step > config.step_max {
+            return Err(Rejection::Rate);
         }
+        Ok(position)
     }
 }
 

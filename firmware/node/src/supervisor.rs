@@ -56,7 +56,7 @@ pub enum ExhaustKind {
 pub struct Supervisor {
     mode: Mode,
     /// Complement of what steers the outputs, to detect a flipped bit.
-    check: u16,
+    check: u32,
     entered_at: Micros,
     staged: bool,
     /// Whether the present Hold began while the outputs were driven.
@@ -128,14 +128,15 @@ impl Supervisor {
 
     /// What decides, with the mode, which outputs are driven and when: all in one word.
     #[inline(always)]
-    fn steering(&self) -> u16 {
-        let flag = |flag: bool, place: u32| u16::from(flag).wrapping_shl(place);
-        u16::from(self.mode as u8)
-            | u16::from(self.exhaust as u8).wrapping_shl(4)
-            | flag(self.staged, 8)
-            | flag(self.from_drive, 9)
-            | flag(self.exhaust_allowed, 10)
-            | flag(self.emergency, 11)
+    fn steering(&self) -> u32 {
+        let flag = |flag: bool, place: u32| u32::from(flag).wrapping_shl(place);
+        // Every byte whole, so that no shift has to cut one.
+        u32::from(self.mode as u8)
+            ^ u32::from(self.exhaust as u8).wrapping_shl(8)
+            ^ flag(self.staged, 16)
+            ^ flag(self.from_drive, 20)
+            ^ flag(self.exhaust_allowed, 24)
+            ^ flag(self.emergency, 28)
     }
 
     #[inline(always)]

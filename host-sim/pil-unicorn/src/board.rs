@@ -4,6 +4,7 @@ mod course;
 mod shown;
 
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::rc::Rc;
 
 use wheeleg_pil_link::{
@@ -13,7 +14,7 @@ use wheeleg_pil_link::{
 
 use crate::image::{Image, RAM_BASE, RAM_SIZE};
 use crate::machine::blocks::Blocks;
-use crate::machine::{Machine, Stop};
+use crate::machine::{Machine, Profile, Stop};
 use crate::soc::Soc;
 use crate::soc::flash::STORE_SIZE;
 use crate::soc::rcc::{BROWN_OUT_RESET, PIN_RESET};
@@ -22,6 +23,11 @@ use crate::wiring;
 /// Time for the start-up code before a board is taken for one that does not
 /// run its tick [ns].
 const START_UP_NS: u64 = 100_000_000;
+/// Environment variable with the folder for the profiles of the boards: for each one
+/// `IMAGE-ADDRESS.txt`, a line for each block of its worst tick, with address,
+/// instructions in one execution, and number of executions.
+const PROFILE: &str = "WHEELEG_PIL_PROFILE";
+
 /// A board of one image.
 pub(crate) struct Board {
     image: Rc<Image>,
@@ -43,6 +49,10 @@ pub(crate) struct Board {
     power_lost_in_save: bool,
     /// Received bytes are not worked off.
     owes: bool,
+    /// Address that the straps tell.
+    address: u8,
+    /// Where the profile of the worst tick goes.
+    profiles: Option<PathBuf>,
 }
 
 impl Board {
@@ -66,6 +76,8 @@ impl Board {
             trip: None,
             power_lost_in_save: false,
             owes: false,
+            address: 0,
+            profiles: std::env::var_os(PROFILE).map(PathBuf::from),
         }
     }
 
@@ -217,6 +229,10 @@ impl Board {
             | 1 << wiring::POWER_OK;
         soc.ports[0].outside = 1 << wiring::POWER_OK;
         self.machine = Some(Machine::new(&self.image, self.blocks.clone(), soc)?);
+        self.address = straps.address;
+        if self.profiles.is_some() {
+            self.machine()?.state_mut().profile = Some(Profile::default());
+        }
         self.running = false;
         let stop = self.start_up(START_UP_NS)?;
         if stop == Stop::TickStarted {

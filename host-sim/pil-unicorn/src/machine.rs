@@ -13,6 +13,7 @@ mod state;
 use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM as R, Unicorn, uc_error};
 
 use self::blocks::Blocks;
+pub(crate) use self::state::Profile;
 use self::state::State;
 use crate::image::{FLASH_BASE, FLASH_SIZE, Image, RAM_BASE, RAM_SIZE};
 use crate::nvic::{HARD_FAULT, SV_CALL};

@@ -100,6 +100,7 @@ pub enum AxisField {
 
 impl AxisData {
     /// Ranges of the data, as its fields say.
+    #[inline]
     pub(super) fn check(&self) -> Result<(), AxisField> {
         const fn raw(value: I16F16) -> i32 {
             value.to_bits()

@@ -53,13 +53,14 @@ impl Side {
     #[inline]
     fn level(self, distance: u32, levels: u32) -> u32 {
         // Past the side, its end: one value without a branch. There the fall is
-        // all of `levels`, because width × slope is levels × 2^16 within half a width.
+        // all of `levels` and never more, because width × slope is levels × 2^16 within
+        // half a width.
         let distance = distance.min(self.width);
         let fall = distance
             .wrapping_mul(self.slope)
             .wrapping_add(1 << 15)
             .wrapping_shr(16);
-        levels.saturating_sub(fall)
+        levels.wrapping_sub(fall)
     }
 }
 
@@ -332,7 +333,6 @@ impl<const N: usize> Partition<N> {
     /// The two sets around `input` in a fan of all `N` sets.
     #[inline]
     pub(super) fn pair(&self, input: i16) -> Pair {
-        let input = self.limit(input);
         // Inner vertices at or below the input, by halves. Bounds from `N` alone, so
         // that the loop unrolls and the look-ups below need no check.
         let (mut index, mut rest) = (0_usize, N.saturating_sub(2));
@@ -362,12 +362,11 @@ impl<const N: usize> Partition<N> {
                 upper: 0,
             };
         };
-        // low <= input <= high: both distances are non-negative.
-        let lower = fall.level(i32::from(input).wrapping_sub(i32::from(low)) as u32, levels);
-        let upper = rise.level(
-            i32::from(high).wrapping_sub(i32::from(input)) as u32,
-            levels,
-        );
+        // Beyond the domain one distance is negative and counts as none; the other is
+        // beyond the side, which reaches no further than to the neighbour.
+        let distance = |from: i16, to: i16| i32::from(to).wrapping_sub(i32::from(from)).max(0);
+        let lower = fall.level(distance(low, input) as u32, levels);
+        let upper = rise.level(distance(input, high) as u32, levels);
         Pair {
             index,
             lower,

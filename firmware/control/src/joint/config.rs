@@ -196,6 +196,14 @@ pub enum ConfigError {
     Inconsistent(JointParameter),
 }
 
+// What is done once, at start-up or for a request, is marked `#[inline]` here and where it
+// leads: it is then compiled in the crate that calls it, which on a joint board is
+// compiled for size, while what a tick does is compiled here, for speed.
+
+/// The shipped rule bases, in one place each.
+static RULES_PD: JointRules = rules::PD;
+static RULES_ID: JointRules = rules::ID;
+
 /// A validated configuration: raw coefficients for one tick length.
 ///
 /// Its `Hash` is for sealing memory: rule bases, which are constants, count by
@@ -235,8 +243,9 @@ impl JointConfig {
     ///
     /// # Errors
     /// [`ConfigError`] names the first parameter that is out of its range.
+    #[inline]
     pub fn new(gains: &JointGains, tick: Micros) -> Result<Self, ConfigError> {
-        Self::with_rules(gains, tick, &rules::PD, &rules::ID)
+        Self::with_rules(gains, tick, &RULES_PD, &RULES_ID)
     }
 
     /// As [`JointConfig::new`], with rule bases of the user's own. Their inputs
@@ -244,6 +253,7 @@ impl JointConfig {
     ///
     /// # Errors
     /// [`ConfigError`] names the first parameter that is out of its range.
+    #[inline]
     pub fn with_rules(
         gains: &JointGains,
         tick: Micros,
@@ -300,7 +310,7 @@ impl JointConfig {
 
 impl JointConfig {
     /// Number of parts in which a board seals a configuration, one after another.
-    pub const PARTS: usize = 4;
+    pub const PARTS: usize = 5;
 
     /// Coefficients of the predictive law, when it is chosen.
     #[must_use]
@@ -328,21 +338,25 @@ impl JointConfig {
             bumpless_ticks,
             axis,
         } = self;
+        if let (Some(axis), 0..=3) = (axis, part) {
+            axis.hash_quarter(part, state);
+        }
         match part {
-            0 => gains.hash_forces(state),
+            0 => (settle_ticks, release_ticks, bumpless_ticks, axis.is_some()).hash(state),
             1 => {
+                core::ptr::hash(*rules_pd, state);
+                core::ptr::hash(*rules_id, state);
+            }
+            2 => gains.hash_forces(state),
+            3 => {
                 gains.hash_rest(state);
                 window.hash(state);
             }
-            2 => {
+            _ => {
                 (&gains.axis, tick).hash(state);
-                core::ptr::hash(*rules_pd, state);
-                core::ptr::hash(*rules_id, state);
                 (error_to_input, velocity_to_input).hash(state);
                 (integral_to_input, integral_limit).hash(state);
-                (settle_ticks, release_ticks, bumpless_ticks).hash(state);
             }
-            _ => axis.hash(state),
         }
     }
 }
@@ -421,11 +435,13 @@ impl JointGains {
 }
 
 /// Full scale / `scale`, × 2^28: below 2^30, because no scale is below 2^14.
+#[inline]
 fn input_factor(scale: i32) -> i32 {
     saturate_i32(factor(INPUT_SHIFT, i64::from(scale)))
 }
 
 /// Full scale / `scale`, × 2^bits.
+#[inline]
 fn factor(bits: u32, scale: i64) -> i64 {
     FULL_SCALE
         .wrapping_shl(bits)
@@ -446,6 +462,7 @@ fn check<T: PartialOrd>(
     }
 }
 
+#[inline]
 fn check_ranges(gains: &JointGains) -> Result<(), ConfigError> {
     use JointParameter as P;
     let zero = Gain::ZERO;
@@ -545,6 +562,7 @@ fn check_ranges(gains: &JointGains) -> Result<(), ConfigError> {
     )
 }
 
+#[inline]
 fn check_relations(gains: &JointGains, tick: Micros) -> Result<(), ConfigError> {
     use JointParameter as P;
     let relations = [

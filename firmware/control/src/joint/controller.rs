@@ -49,6 +49,7 @@ pub struct JointController {
 
 impl JointController {
     /// A controller at rest with an empty history.
+    #[inline]
     #[must_use]
     pub fn new(config: JointConfig) -> Self {
         Self {
@@ -119,6 +120,7 @@ impl JointController {
     }
 
     /// Selects the correction, without a bump. The integral starts from zero.
+    #[inline]
     pub fn set_correction(&mut self, correction: Correction) {
         if correction != self.correction {
             self.correction = correction;
@@ -130,6 +132,7 @@ impl JointController {
     /// Changes the configuration, without a bump. The integral keeps its share
     /// of the new bound at most; the velocity window starts anew if its length
     /// or the tick differ.
+    #[inline]
     pub fn retune(&mut self, config: JointConfig) {
         if config.window != self.config.window {
             self.velocity.reset();
@@ -149,6 +152,7 @@ impl JointController {
 
     /// Forgets everything but configuration and correction: as after
     /// [`JointController::new`].
+    #[inline]
     pub fn reset(&mut self) {
         let correction = self.correction;
         *self = Self::new(self.config);
@@ -385,9 +389,10 @@ impl Hash for State<'_> {
             sent,
             predictive,
         } = self.0;
-        let flags = u32::from(*changed)
-            | (*correction as u32).wrapping_shl(8)
-            | u32::from(*tracked).wrapping_shl(16)
+        // In the order of memory: one look at it for all three.
+        let flags = *correction as u32
+            | u32::from(*tracked).wrapping_shl(8)
+            | u32::from(*changed).wrapping_shl(16)
             | u32::from(predictive.is_some()).wrapping_shl(24);
         state.write_u32(flags);
         if let Some(law) = predictive {

@@ -2,7 +2,7 @@
 //!
 //! A board has no pressure sensor, but it knows every on-time it has sent and every
 //! stroke it has read. [`Air`] follows both chambers with that, for supervision only,
-//! whatever law drives: cheap rather than exact. Volumes are lengths, volume over
+//! whatever law drives: cheap rather than exact, each chamber in every third tick. Volumes are lengths, volume over
 //! piston area, and with n = 1.2 a chamber of length L obeys
 //!
 //! ```text
@@ -17,6 +17,7 @@
 //! What was in the chambers at power-up nobody knows. It no longer matters once both
 //! have been vented for a while, so that is counted, too.
 
+use core::hash::{Hash, Hasher};
 use wheeleg_control::axis::AxisModel;
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_units::PositionMm;
@@ -25,8 +26,10 @@ use wheeleg_units::PositionMm;
 const SUPPLY: i32 = 1 << 17;
 /// Highest pressure that is followed: four times the supply.
 const MOST: i32 = 4 * SUPPLY;
-/// Largest motion and flow of a tick, raw mm (2 mm): keeps every product below 2^31.
-const STEP: i32 = 2 << 16;
+/// Ticks of a round: one for each chamber, one for what is made of them.
+pub(super) const ROUND: u16 = 3;
+/// Largest motion and flow of a round, raw mm (4 mm): keeps every product in its bounds.
+const STEP: i32 = 4 << 16;
 /// Polytropic exponent × 2^8 (ASSUMED: 1.2, usual for small cylinders).
 const EXPONENT: i32 = 307;
 /// Vented times count in 64 µs.
@@ -119,15 +122,18 @@ impl AirModel {
         ]
     }
 
-    /// Pressure of a chamber of `length` (1/256 mm) after a tick with its valves open
-    /// for `fill` and `vent` µs, in which its length grew by `growth` (raw mm).
-    #[inline(never)]
-    fn after(&self, p: i32, chamber: &Chamber, length: i32, on: [u16; 2], growth: i32) -> i32 {
-        let [fill, vent] = on.map(|on| (i32::from(on).wrapping_mul(chamber.flow) >> 8).min(STEP));
+    /// Pressure of a chamber of `length` (1/256 mm) after its valves were open for `fill`
+    /// and `vent` µs, in which its length grew by `growth` (raw mm).
+    #[inline]
+    fn after(&self, p: i32, chamber: &Chamber, length: i32, on: [u32; 2], growth: i32) -> i32 {
+        // A round at most, and flows of at most 2^19: below 2^31.
+        let flow = |on: u32| ((on as i32).wrapping_mul(chamber.flow) >> 8).min(STEP);
+        let [fill, vent] = on;
+        let (fill, vent) = (flow(fill), flow(vent));
         let chord = |drop: i32| drop.wrapping_mul(self.fall) >> 8;
         let filling = chord(SUPPLY.wrapping_sub(p)).min(SUPPLY);
         let venting = chord(p.wrapping_sub(self.ambient)).min(p);
-        // Pressures below 2^19, lengths of a tick below 2^18: sums below 2^39.
+        // Pressures below 2^19, lengths of a round up to 2^18: sums below 2^39.
         let sum = i64::from(filling)
             .wrapping_mul(i64::from(fill))
             .wrapping_sub(i64::from(venting).wrapping_mul(i64::from(vent)))
@@ -141,98 +147,156 @@ impl AirModel {
     }
 }
 
-/// Air in both chambers, in 2^-17 of the supply pressure, absolute.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Air {
-    a: i32,
-    b: i32,
-    /// Stroke for which the pressures stand, raw mm.
-    stroke: i32,
-    /// For how long each chamber has been vented since it was last unknown, in 64 µs.
-    vented: [u16; 2],
+/// Air in one chamber.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Content {
+    /// Pressure in 2^-17 of the supply pressure, absolute.
+    p: i32,
+    /// Length without the dead one for which it stands, raw mm.
+    length: i32,
+    /// For how long its valves have been open since, µs: fill, and vent × 2^16.
+    open: u32,
+    /// For how long it has been vented since it was last unknown, in 64 µs.
+    vented: u16,
 }
 
-impl Air {
-    /// At the atmosphere, for all the board knows.
-    pub(super) const fn unknown(model: &AirModel, position: PositionMm) -> Self {
+impl Hash for Content {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. A flipped bit of
+        // pressure or time flips one of the word.
+        let Self {
+            p,
+            length,
+            open,
+            vented,
+        } = self;
+        state.write_i32(*p ^ i32::from(*vented).wrapping_shl(16));
+        state.write_i32(*length);
+        state.write_u32(*open);
+    }
+}
+
+impl Content {
+    /// Nobody knows since when.
+    const fn at(p: i32, length: i32) -> Self {
         Self {
-            a: model.ambient,
-            b: model.ambient,
-            stroke: position.raw(),
-            vented: [0; 2],
+            p,
+            length,
+            open: 0,
+            vented: 0,
         }
     }
 
-    /// A tick that ends at `position`, with these on-times.
-    #[inline(never)]
-    pub(super) fn follow(&mut self, on: &OnTimes, position: PositionMm, model: &AirModel) {
-        let stroke = position.raw();
-        let moved = stroke.wrapping_sub(self.stroke);
+    /// A tick in which its valves are open for `fill` and `vent` µs.
+    #[inline]
+    fn opens(&mut self, fill: u16, vent: u16) {
+        // A round of ticks: each stays below 2^12.
+        let open = u32::from(fill) | u32::from(vent).wrapping_shl(16);
+        self.open = self.open.wrapping_add(open);
+    }
+
+    /// Its length is now `length`.
+    #[inline]
+    fn follow(&mut self, length: i32, chamber: &Chamber, model: &AirModel) {
+        let moved = length.wrapping_sub(self.length);
         // Noise of a reading at rest moves no air.
-        if *on == [0; 4] && moved.wrapping_abs() < 1 << 13 {
+        if self.open == 0 && moved.wrapping_abs() < 1 << 13 {
             return;
         }
-        self.stroke = stroke;
-        // No piston goes that far in a tick: another calibration, or the first reading.
+        self.length = length;
+        // No piston goes that far: another calibration, or the first reading.
         let moved = if moved.wrapping_abs() > STEP {
             0
         } else {
             moved
         };
-        let grown = moved.wrapping_mul(EXPONENT) >> 8;
+        let growth = moved.wrapping_mul(EXPONENT) >> 8;
+        let length = (length >> 8).wrapping_add(chamber.lead);
+        let (fill, vent) = (self.open & 0xFFFF, self.open.wrapping_shr(16));
+        self.open = 0;
+        self.p = model.after(self.p, chamber, length, [fill, vent], growth);
+        // Below 2^16.
+        self.vented = self.vented.saturating_add((vent >> VENTED_SHIFT) as u16);
+    }
+}
+
+/// Air in both chambers, followed in rounds of [`ROUND`] ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Air {
+    a: Content,
+    b: Content,
+    /// Tick of the round that comes next.
+    turn: u8,
+}
+
+impl Air {
+    /// At the atmosphere, for all the board knows.
+    pub(super) const fn unknown(model: &AirModel, position: PositionMm) -> Self {
+        let stroke = position.raw();
+        Self {
+            a: Content::at(model.ambient, stroke),
+            b: Content::at(model.ambient, model.stroke.wrapping_sub(stroke)),
+            turn: 0,
+        }
+    }
+
+    /// A tick that ends at `position`, with these on-times: A's pressure follows in the
+    /// first of a round, B's in the second. True in the third, which has room for what
+    /// is made of them.
+    #[inline]
+    pub(super) fn follow(&mut self, on: &OnTimes, position: PositionMm, model: &AirModel) -> bool {
         let [fill_a, vent_a, fill_b, vent_b] = *on;
-        let length_a = (stroke >> 8).wrapping_add(model.a.lead);
-        let length_b = (model.stroke.wrapping_sub(stroke) >> 8).wrapping_add(model.b.lead);
-        self.a = model.after(self.a, &model.a, length_a, [fill_a, vent_a], grown);
-        self.b = model.after(
-            self.b,
-            &model.b,
-            length_b,
-            [fill_b, vent_b],
-            grown.wrapping_neg(),
-        );
-        let [a, b] = self.vented;
-        self.vented = [
-            a.saturating_add(vent_a >> VENTED_SHIFT),
-            b.saturating_add(vent_b >> VENTED_SHIFT),
-        ];
+        self.a.opens(fill_a, vent_a);
+        self.b.opens(fill_b, vent_b);
+        let stroke = position.raw();
+        let (content, chamber, length) = match self.turn {
+            0 => (&mut self.a, &model.a, stroke),
+            1 => (&mut self.b, &model.b, model.stroke.wrapping_sub(stroke)),
+            _ => {
+                self.turn = 0;
+                return true;
+            }
+        };
+        content.follow(length, chamber, model);
+        self.turn = self.turn.wrapping_add(1);
+        false
     }
 
     /// Force of both pressures, mN, positive extends.
     #[inline(never)]
     pub(super) fn force(&self, model: &AirModel) -> i32 {
         let part = |p: i32, force: i32| (i64::from(p).wrapping_mul(i64::from(force)) >> 17) as i32;
-        part(self.a, model.a.force)
-            .saturating_sub(part(self.b, model.b.force))
+        part(self.a.p, model.a.force)
+            .saturating_sub(part(self.b.p, model.b.force))
             .saturating_sub(model.rod)
     }
 
     /// What is in the chambers is no longer known: air has had time to leak.
     pub(super) const fn forget(&mut self) {
-        self.vented = [0; 2];
+        self.a.vented = 0;
+        self.b.vented = 0;
     }
 
     /// Whether both chambers have been vented for long enough to compare forces with
     /// what was learnt: a quarter of the time after which they are known.
     #[inline]
     pub(super) fn is_comparable(&self, model: &AirModel) -> bool {
-        let [a, b] = self.vented;
-        a.min(b) >= model.known >> 2
+        self.a.vented.min(self.b.vented) >= model.known >> 2
     }
 
     /// Whether the chamber that opposes is known to have been emptied.
     #[inline]
     pub(super) fn is_known(&self, extends: bool, model: &AirModel) -> bool {
-        let [a, b] = self.vented;
-        let opposing = if extends { b } else { a };
-        opposing >= model.known
+        let opposing = if extends { &self.b } else { &self.a };
+        opposing.vented >= model.known
     }
 
     /// Whether a chamber should hold more than eleven eighths of the supply: a
     /// valve or a seal has let out what should be in it.
     #[inline]
     pub(super) fn is_impossible(&self) -> bool {
-        self.a.max(self.b) > SUPPLY + SUPPLY * 3 / 8
+        self.a.p.max(self.b.p) > SUPPLY + SUPPLY * 3 / 8
     }
 }
 
@@ -251,15 +315,16 @@ mod tests {
     /// Absolute pressures in bar after so many ticks with these on-times.
     fn after(ticks: u32, on: OnTimes, start: [f64; 2], model: &AirModel) -> [f64; 2] {
         let raw = |bar: f64| (bar / 7.01325 * f64::from(SUPPLY)) as i32;
-        let mut air = Air {
-            a: raw(start[0]),
-            b: raw(start[1]),
-            ..Air::unknown(model, MIDDLE)
-        };
+        let mut air = Air::unknown(model, MIDDLE);
+        [air.a.p, air.b.p] = start.map(raw);
+        // A round more, in which each chamber takes in what it has not yet.
         for _ in 0..ticks {
             air.follow(&on, MIDDLE, model);
         }
-        [air.a, air.b].map(|p| f64::from(p) / f64::from(SUPPLY) * 7.01325)
+        for _ in 0..ROUND {
+            air.follow(&[0; 4], MIDDLE, model);
+        }
+        [air.a.p, air.b.p].map(|p| f64::from(p) / f64::from(SUPPLY) * 7.01325)
     }
 
     #[test]
@@ -290,7 +355,7 @@ mod tests {
     fn a_piston_that_moves_squeezes_by_the_polytropic_law() {
         let model = model();
         let mut air = Air::unknown(&model, MIDDLE);
-        let (a, b) = (f64::from(air.a), f64::from(air.b));
+        let (a, b) = (f64::from(air.a.p), f64::from(air.b.p));
         for step in 0..=600 {
             let at = PositionMm::from_raw((90 << 16) + step * 6554);
             air.follow(&[0; 4], at, &model);
@@ -300,13 +365,13 @@ mod tests {
         let law = |from: f64, to: f64| (from / to).powf(1.2);
         let falls = law(length(lead_a, 90.0), length(lead_a, 150.0));
         let rises = law(length(lead_b, 90.0), length(lead_b, 30.0));
-        assert!((f64::from(air.a) / a / falls - 1.0).abs() < 0.02);
-        assert!((f64::from(air.b) / b / rises - 1.0).abs() < 0.02);
+        assert!((f64::from(air.a.p) / a / falls - 1.0).abs() < 0.02);
+        assert!((f64::from(air.b.p) / b / rises - 1.0).abs() < 0.02);
         // A new calibration moves no air, and noise none either.
         let before = air;
         air.follow(&[0; 4], MIDDLE, &model);
         air.follow(&[0; 4], PositionMm::from_raw((90 << 16) + 5000), &model);
-        assert_eq!((air.a, air.b), (before.a, before.b));
+        assert_eq!((air.a.p, air.b.p), (before.a.p, before.b.p));
     }
 
     #[test]
@@ -318,9 +383,9 @@ mod tests {
         assert!((back - 0.6 * (bore - rod)).abs() < 0.2, "{back}");
         let mut air = Air::unknown(&model, MIDDLE);
         assert!(air.force(&model).abs() < 100, "{}", air.force(&model));
-        air.a = SUPPLY;
+        air.a.p = SUPPLY;
         assert!((f64::from(air.force(&model)) / 1e3 - out).abs() < 0.2);
-        (air.a, air.b) = (model.ambient, SUPPLY);
+        (air.a.p, air.b.p) = (model.ambient, SUPPLY);
         assert!((f64::from(air.force(&model)) / 1e3 + back).abs() < 0.2);
     }
 
@@ -329,15 +394,21 @@ mod tests {
         let model = model();
         let mut air = Air::unknown(&model, MIDDLE);
         // 18/16 of 1.03 s.
-        let mut vent = |ticks, on| (0..ticks).for_each(|_| air.follow(&on, MIDDLE, &model));
+        let mut vent = |ticks, on| {
+            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model));
+        };
         vent(280, [0, 1000, 1000, 0]);
         vent(280, [1000, 0, 0, 1000]);
         assert!(!air.is_comparable(&model));
-        let mut vent = |ticks, on| (0..ticks).for_each(|_| air.follow(&on, MIDDLE, &model));
+        let mut vent = |ticks, on| {
+            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model));
+        };
         vent(30, [0, 1000, 1000, 0]);
         vent(30, [1000, 0, 0, 1000]);
         assert!(air.is_comparable(&model) && !air.is_known(true, &model));
-        let mut vent = |ticks, on| (0..ticks).for_each(|_| air.follow(&on, MIDDLE, &model));
+        let mut vent = |ticks, on| {
+            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model));
+        };
         vent(920, [1000, 0, 0, 1000]);
         assert!(air.is_known(true, &model) && !air.is_known(false, &model));
         air.forget();
@@ -365,7 +436,7 @@ mod tests {
                 let at = PositionMm::from_raw((90 << 16) + (tick % 2) as i32 * STEP);
                 air.follow(&on, at, &model);
                 let bounds = (model.ambient >> 1)..=MOST;
-                assert!(bounds.contains(&air.a) && bounds.contains(&air.b));
+                assert!(bounds.contains(&air.a.p) && bounds.contains(&air.b.p));
             }
         }
     }

@@ -20,8 +20,9 @@
 //! runs of the bench, loads, friction, delays and supplies off by the factors of
 //! `wheeleg compare`, the worst stays doubtful for 31 of the 34 ms with that half.
 
-use super::air::{Air, AirModel};
+use super::air::{Air, AirModel, ROUND};
 use crate::JOINT_TICK;
+use core::hash::{Hash, Hasher};
 use wheeleg_control::axis::AxisModel;
 use wheeleg_control::joint::JointGains;
 use wheeleg_control::pwm::OnTimes;
@@ -32,18 +33,20 @@ const SHOWN: i32 = 1 << 15;
 /// Error below which no motion is expected, raw mm (4 mm): what the worst of the
 /// laws leaves where its pulses become too short for the valves.
 const ERROR: i32 = 4 << 16;
-/// Ticks of standing still from which on doubts count.
-const STANDING: u16 = 30;
+/// Rounds of standing still from which on doubts count.
+const STANDING: u16 = 30 / ROUND;
+/// Rounds of standing still after which nothing is known of the air any more.
+const MINUTE: u16 = u16::MAX / ROUND;
 /// Doubt that is a fault …
 const FAULT: u16 = 200;
-/// … what a tick adds that cannot be on a sound axis …
-const STRONG: u16 = 6;
+/// … what a round adds that cannot be on a sound axis …
+const STRONG: u16 = 6 * ROUND;
 /// … and one with the largest force.
-const WEAK: u16 = 1;
-/// Ticks of sliding over which the force is averaged …
-const MEMORY: u16 = 400;
+const WEAK: u16 = ROUND;
+/// Rounds of sliding over which the force is averaged …
+const MEMORY: u16 = 400 / ROUND;
 /// … and below which nothing is known.
-const LEARNT: u16 = 100;
+const LEARNT: u16 = 100 / ROUND;
 /// A piston slides that is faster, raw mm/s (20 mm/s).
 const SLIDES: i32 = 20 << 16;
 /// One that is slower stands, raw mm/s (10 mm/s); one that turns back does not.
@@ -60,7 +63,7 @@ pub struct MotionModel {
     /// Force beyond the learnt one at which a piston must move, mN.
     margin: i32,
     /// Nine tenths of the largest forces, extending and retracting, mN.
-    nearly_all: [i32; 2],
+    nearly_all: (i32, i32),
     /// Coulomb friction, mN.
     coulomb: i32,
     /// Viscous friction, mN per mm/s × 2^8.
@@ -87,7 +90,7 @@ impl MotionModel {
         Some(Self {
             air,
             margin: told.saturating_add(axis.breakaway),
-            nearly_all: [most(out), most(back)],
+            nearly_all: (most(out), most(back)),
             coulomb: axis.coulomb,
             viscous: axis.viscous,
             low: gains.stroke_min.saturating_add(NEAR_END),
@@ -105,19 +108,40 @@ pub(super) struct Driven {
 }
 
 /// The watch over one cylinder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct MotionWatch {
     air: Air,
     /// Stroke about which the piston stands, raw mm.
     from: i32,
     /// Force that the last motions took without friction, mN.
     learnt: i32,
-    /// Ticks of sliding that it was learnt from, at most [`MEMORY`].
+    /// Rounds of sliding that it was learnt from, at most [`MEMORY`].
     slid: u16,
     /// Doubt.
     doubt: u16,
-    /// Ticks that the piston stands.
+    /// Rounds that the piston stands.
     stands: u16,
+}
+
+impl Hash for MotionWatch {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here; small ones in
+        // one word.
+        let Self {
+            air,
+            from,
+            learnt,
+            slid,
+            doubt,
+            stands,
+        } = self;
+        air.hash(state);
+        state.write_i32(*from);
+        state.write_i32(*learnt);
+        state.write_u32(u32::from(*slid) | u32::from(*doubt).wrapping_shl(16));
+        state.write_u32(u32::from(*stands));
+    }
 }
 
 impl MotionWatch {
@@ -137,7 +161,7 @@ impl MotionWatch {
     /// expected, and loads have to be learnt anew afterwards.
     #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
-        self.air.follow(on, position, &model.air);
+        let _ = self.air.follow(on, position, &model.air);
         if *on == [0; 4] {
             self.air.forget();
         }
@@ -147,15 +171,21 @@ impl MotionWatch {
         self.from = position.raw();
     }
 
-    /// A tick under control, which sends `on`; true when a motion is overdue.
+    /// A tick under control, which sends `on`; true when a motion is overdue. The air
+    /// takes two ticks of a round, what it says of the piston the third.
     #[inline]
     pub(super) fn sample(&mut self, on: &OnTimes, driven: &Driven, model: &MotionModel) -> bool {
+        self.air.follow(on, driven.position, &model.air) && self.judge(on, driven, model)
+    }
+
+    /// Whether a motion is overdue, once a round.
+    #[inline]
+    fn judge(&mut self, on: &OnTimes, driven: &Driven, model: &MotionModel) -> bool {
         let &Driven {
             reference,
             position,
             velocity,
         } = driven;
-        self.air.follow(on, position, &model.air);
         let speed = velocity.raw();
         let stroke = position.raw();
         if speed.wrapping_abs() >= SLIDES {
@@ -169,7 +199,7 @@ impl MotionWatch {
             return false;
         }
         self.stands = self.stands.saturating_add(1);
-        if self.stands == u16::MAX && *on == [0; 4] {
+        if self.stands >= MINUTE && *on == [0; 4] {
             // A minute at rest: seals leak.
             self.slid = 0;
             self.air.forget();
@@ -183,7 +213,7 @@ impl MotionWatch {
         self.doubt >= FAULT && self.stands >= STANDING
     }
 
-    /// How much this tick of an axis that stands adds to the doubt.
+    /// How much this round of an axis that stands adds to the doubt.
     #[inline]
     fn doubts(&self, reference: PositionMm, position: PositionMm, model: &MotionModel) -> u16 {
         if self.air.is_impossible() {
@@ -204,7 +234,7 @@ impl MotionWatch {
         }
         let towards = |force: i32| if extends { force } else { force.wrapping_neg() };
         let force = self.air.force(&model.air);
-        let [out, back] = model.nearly_all;
+        let (out, back) = model.nearly_all;
         if self.slid >= LEARNT && towards(force.saturating_sub(self.learnt)) > model.margin {
             STRONG
         } else if towards(force) > if extends { out } else { back }
@@ -217,7 +247,7 @@ impl MotionWatch {
     }
 
     /// Takes in the force that a sliding piston needs, friction taken off.
-    #[inline(never)]
+    #[inline]
     fn learn(&mut self, speed: i32, position: PositionMm, model: &MotionModel) {
         let inside = position.raw() > CUSHION
             && position.raw()
@@ -242,7 +272,7 @@ impl MotionWatch {
             .saturating_sub(viscous)
             .saturating_sub(coulomb);
         self.slid = self.slid.saturating_add(1).min(MEMORY);
-        let share = i32::from(self.slid.max(20));
+        let share = i32::from(self.slid.max(20 / ROUND));
         let change = taken
             .saturating_sub(self.learnt)
             .checked_div(share)
@@ -253,7 +283,7 @@ impl MotionWatch {
     /// How near the watch is to a fault, as the time that the strongest doubt takes.
     #[inline]
     pub(super) const fn overdue(&self) -> Micros {
-        Micros((self.doubt as u32).wrapping_mul(const { 1000 / STRONG as u32 }))
+        Micros((self.doubt as u32).wrapping_mul(const { 1000 * ROUND as u32 / STRONG as u32 }))
     }
 }
 
@@ -373,9 +403,9 @@ mod tests {
     fn without_knowledge_it_takes_the_largest_force_for_200_ms() {
         let model = model(50);
         let watch = MotionWatch::new(&model, PositionMm::from_int(90));
-        // B is known to be empty after 1.2 s.
+        // B is known to be empty after 1.17 s.
         let (tick, _) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
-        assert!((1380..1440).contains(&tick), "{tick}");
+        assert!((1360..1400).contains(&tick), "{tick}");
         // One open valve of two leaves the other chamber unknown.
         let one = fault(watch, [1000, 0, 0, 0], driven(120, 90), &model);
         assert_eq!(one, None);
@@ -390,7 +420,7 @@ mod tests {
                 watch.rest(&SHUT, PositionMm::from_int(90), &model);
             }
             let (tick, _) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
-            assert!((1380..1440).contains(&tick), "{minute} {tick}");
+            assert!((1360..1400).contains(&tick), "{minute} {tick}");
         }
     }
 

@@ -22,11 +22,9 @@ use wheeleg_units::{Micros, PositionMm, Ticks};
 
 /// Parts in which the parameters are sealed.
 const PARAMETER_PARTS: usize = 3;
-/// Parts of the configuration that the node keeps itself: parameters, settings.
-const OWN_PARTS: usize = PARAMETER_PARTS + 1;
 /// Parts in which the configuration is sealed. A tick looks at one of them, so a
 /// flipped bit of it is found within so many ticks.
-pub const PARTS: usize = OWN_PARTS + JointConfig::PARTS;
+pub const PARTS: usize = PARAMETER_PARTS + JointConfig::PARTS;
 const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 
 /// State that only a tick changes, sealed between two ticks.
@@ -285,22 +283,20 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Seal of one part of what shapes the outputs and is changed by requests alone.
     #[inline(never)]
     fn fixed(&self, part: usize) -> Seal {
-        match part {
-            PARAMETER_PARTS => Seal::of(&self.settings),
-            part if part < PARAMETER_PARTS => {
-                Seal::of(self.parameters.part::<PARAMETER_PARTS>(part))
+        let Some(part) = part.checked_sub(PARAMETER_PARTS) else {
+            let values = self.parameters.part::<PARAMETER_PARTS>(part);
+            return Seal::made(|sum| sum.words(values));
+        };
+        Seal::made(|sum| {
+            self.controller.config().hash_part(part, sum);
+            // With each part of the configuration another part of the rest.
+            match part {
+                0 => self.settings.hash_own(sum),
+                1 => self.settings.motion.hash(sum),
+                2 => (&self.core.times, self.pwm.timing()).hash(sum),
+                _ => {}
             }
-            part => {
-                let config = self.controller.config();
-                Seal::made(|sum| {
-                    config.hash_part(part.wrapping_sub(OWN_PARTS), sum);
-                    if part.wrapping_add(1) == PARTS {
-                        // With the smallest part.
-                        (&self.core.times, self.pwm.timing()).hash(sum);
-                    }
-                })
-            }
-        }
+        })
     }
 
     /// Seal of what shapes the outputs of the next tick and is changed by every tick.

@@ -181,8 +181,27 @@ impl Board {
             let low = machine.watermark(bottom, top)?;
             self.figures.stack_used = top - low;
             self.figures.stack_size = top - bottom;
+            self.write_profile()?;
         }
         Ok(())
+    }
+
+    /// Writes where the worst tick spent its instructions, if somebody wants to know and
+    /// there has been a worse one.
+    fn write_profile(&mut self) -> Result<(), String> {
+        let name = format!("{}-{}.txt", self.image.name, self.address);
+        let (Some(folder), Some(machine)) = (&self.profiles, &mut self.machine) else {
+            return Ok(());
+        };
+        let Some(blocks) = machine.state_mut().worst_tick() else {
+            return Ok(());
+        };
+        let line = |(address, (instructions, times)): (&u32, &(u64, u32))| {
+            format!("{address:#010x} {instructions} {times}\n")
+        };
+        let lines: String = blocks.iter().map(line).collect();
+        let path = folder.join(name);
+        std::fs::write(&path, lines).map_err(|e| format!("{}: {e}", path.display()))
     }
 }
 

@@ -111,6 +111,9 @@ impl Machine {
             state.cycle += state.blocks.instructions(address as u32, size);
             state.trace[state.trace_at % TRACE] = address as u32;
             state.trace_at = state.trace_at.wrapping_add(1);
+            if let Some(profile) = &mut state.profile {
+                profile.course.push((address as u32, size));
+            }
         })?;
         // Around RAM: where a hook of memory stands, every store takes the slow way.
         let ram_end = u64::from(RAM_BASE + RAM_SIZE);

@@ -1,5 +1,7 @@
 //! What the engine's hooks reach: peripherals, interrupts, and the count of time.
 
+use std::collections::BTreeMap;
+
 use super::TRACE;
 use super::blocks::Blocks;
 use crate::nvic::Nvic;
@@ -28,6 +30,29 @@ pub(crate) struct Seen {
     pub(crate) port_a: u32,
     /// Quadrature counter, 16 bits.
     pub(crate) count: u32,
+}
+
+/// The blocks of the tick that took the most instructions.
+#[derive(Debug, Default)]
+pub(crate) struct Profile {
+    /// Address and size of each block since the processor woke.
+    pub(super) course: Vec<(u32, u32)>,
+    /// The same of the worst tick.
+    worst: Vec<(u32, u32)>,
+    /// Its instructions.
+    instructions: u64,
+    /// Nobody has taken it yet.
+    fresh: bool,
+}
+
+impl Profile {
+    fn tick(&mut self, instructions: u64) {
+        if instructions > self.instructions {
+            self.instructions = instructions;
+            self.worst.clone_from(&self.course);
+            self.fresh = true;
+        }
+    }
 }
 
 /// All that hooks reach.
@@ -60,6 +85,8 @@ pub(crate) struct State {
     pub(crate) tick_instructions: u64,
     /// Longest stretch so far.
     pub(crate) longest_awake: u64,
+    /// Kept if somebody asks for it.
+    pub(crate) profile: Option<Profile>,
     /// The main loop stands still.
     pub(crate) stop_main_loop: bool,
     /// The processor stands still.
@@ -89,6 +116,7 @@ impl State {
             awake: Awake::default(),
             tick_instructions: 0,
             longest_awake: 0,
+            profile: None,
             stop_main_loop: false,
             stop_processor: false,
         }
@@ -109,6 +137,21 @@ impl State {
     /// Instructions executed since power-up.
     pub(crate) fn retired(&self) -> u64 {
         self.cycle - self.idle
+    }
+
+    /// Address, instructions in one execution and number of executions of every block
+    /// of the worst tick, by address; `None` if profiles are off or it is no news.
+    pub(crate) fn worst_tick(&mut self) -> Option<BTreeMap<u32, (u64, u32)>> {
+        let profile = self.profile.as_mut()?;
+        if !std::mem::take(&mut profile.fresh) {
+            return None;
+        }
+        let mut counts = BTreeMap::new();
+        for (address, size) in &profile.worst {
+            let instructions = self.blocks.instructions(*address, *size);
+            counts.entry(*address).or_insert((instructions, 0)).1 += 1;
+        }
+        Some(counts)
     }
 
     /// Instructions since the processor woke.
@@ -132,6 +175,9 @@ impl State {
         // Bytes may be worked off before the next sleep; they are no part of the tick.
         if self.soc.watchdog.take_fed() && self.awake.ticks == 1 && self.awake.others == 0 {
             self.tick_instructions = self.awake_instructions();
+            if let Some(profile) = &mut self.profile {
+                profile.tick(self.tick_instructions);
+            }
         }
         self.nvic.lines = self.soc.lines();
         let attention = self.nvic.reset_request
@@ -148,6 +194,9 @@ impl State {
 
     pub(super) fn sleep(&mut self) {
         self.longest_awake = self.longest_awake.max(self.awake_instructions());
+        if let Some(profile) = &mut self.profile {
+            profile.course.clear();
+        }
         let since = self.retired();
         let fresh = Awake {
             since,
