@@ -23,8 +23,8 @@
 //! delimiter is delivered; frames do not depend on how the bytes were chunked.
 
 use crate::address::Address;
+pub use crate::checksum::{Checksum, checksum};
 use crate::message::MessageType;
-use crc::{CRC_32_ISCSI, Crc, Table};
 
 /// Protocol version in byte 0 of the header.
 ///
@@ -53,55 +53,6 @@ const _: () = assert!(MAX_DECODED < 254);
 #[must_use]
 pub const fn encoded_len(payload_len: usize) -> usize {
     payload_len.saturating_add(HEADER_LEN + CRC_LEN + 3)
-}
-
-/// Tables of the CRC-32C. One 256-entry table is 1 KiB of flash and one look-up
-/// per byte.
-///
-/// The crate offers no table (eight steps per byte: too slow for a 1 MBd line on
-/// a small core), one, or sixteen (16 KiB: a third of a joint image, but sixteen
-/// bytes at a time: for a host, feature `wide-crc`).
-#[cfg(not(feature = "wide-crc"))]
-type Tables = Table<1>;
-#[cfg(feature = "wide-crc")]
-type Tables = Table<16>;
-
-static CRC: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISCSI);
-
-/// CRC-32C piece by piece, with the tables that frames use.
-#[derive(Clone)]
-pub struct Checksum(crc::Digest<'static, u32, Tables>);
-
-impl Default for Checksum {
-    fn default() -> Self {
-        Self(CRC.digest())
-    }
-}
-
-impl core::fmt::Debug for Checksum {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("Checksum")
-    }
-}
-
-impl Checksum {
-    /// Takes the next bytes.
-    #[inline(never)]
-    pub fn update(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
-    }
-
-    /// The checksum of all bytes so far.
-    #[must_use]
-    pub fn finalize(self) -> u32 {
-        self.0.finalize()
-    }
-}
-
-/// CRC-32C of a byte string.
-#[must_use]
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
 }
 
 /// What the header says, without the length.

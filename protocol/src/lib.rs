@@ -43,6 +43,7 @@
 )]
 
 pub mod address;
+mod checksum;
 pub mod decoder;
 pub mod fault;
 pub mod fields;

@@ -124,6 +124,18 @@ macro_rules! messages {
                 match self { $( Self::$name(_) => MessageType::$name ),* }
             }
 
+            /// Whether both are the same request, field by field; what is no request is
+            /// none. A board compares nothing else, and needs no code for more.
+            pub(crate) fn is_same_request(&self, other: &Self) -> bool {
+                match (self, other) {
+                    $( (Self::$name(own), Self::$name(other)) => {
+                        let is_request = const { MessageType::$name.answer().is_some() };
+                        is_request && own == other
+                    } )*
+                    _ => false,
+                }
+            }
+
             /// `FROM_NODE`: of a message that a node sends alone.
             fn write_payload<'a, const FROM_NODE: bool>(
                 &self,

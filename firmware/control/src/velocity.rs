@@ -26,7 +26,7 @@
 //!
 //! Not modelled: unequal sample spacing. A missed tick is a fault of the board.
 
-use wheeleg_units::{PositionMm, VelocityMmS};
+use wheeleg_units::{PositionMm, VelocityMmS, divide};
 
 /// Largest window, in samples.
 pub const MAX_WINDOW: u8 = 64;
@@ -67,15 +67,15 @@ impl VelocityWindow {
         // so the shift ends at 30 or less and no product passes 2^62.
         let mut shift = 0_u32;
         let mut scaled = numerator;
-        while quotient(scaled, denominator) < (1 << (SCALE_BITS - 1)) && shift < 31 {
+        while divide(scaled, denominator) < (1 << (SCALE_BITS - 1)) && shift < 31 {
             scaled = scaled.wrapping_shl(1);
             shift = shift.wrapping_add(1);
         }
         let half = denominator.wrapping_shr(1);
-        let scale = quotient(scaled.wrapping_add(half), denominator);
+        let scale = divide(scaled.wrapping_add(half), denominator);
         // The largest sum whose velocity fits: sum × scale is below 2^31 << shift.
         let largest = (i32::MAX as u64).wrapping_shl(shift);
-        let limit = quotient(largest, scale);
+        let limit = divide(largest, scale);
         Some(Self {
             length,
             scale: scale as u32,
@@ -108,14 +108,6 @@ impl VelocityWindow {
             .wrapping_add(product >> 63)
             .wrapping_add(i64::from(self.half));
         VelocityMmS::from_raw((rounded >> (self.shift & 31)) as i32)
-    }
-}
-
-/// Quotient, rounded down; 0 for a divisor of 0.
-const fn quotient(dividend: u64, divisor: u64) -> u64 {
-    match dividend.checked_div(divisor) {
-        Some(quotient) => quotient,
-        None => 0,
     }
 }
 
@@ -195,14 +187,17 @@ impl VelocityEstimator {
     ///
     /// `window` must be the same from call to call; after another one, call
     /// [`VelocityEstimator::reset`]. Never panics.
-    #[inline]
+    // One copy, compiled for speed: inlined, it would be where it is called.
+    #[inline(never)]
     pub fn update(&mut self, window: &VelocityWindow, position: PositionMm) -> VelocityMmS {
         let sample = position.raw();
         let newest = i64::from(sample);
         let length = window.length;
         if self.length == 0 {
             self.length = length;
-            self.samples = [Sample::new(sample); CAPACITY];
+            for place in self.samples.iter_mut().take(usize::from(length)) {
+                *place = Sample::new(sample);
+            }
             self.total = newest.wrapping_mul(i64::from(length));
             self.slope = 0;
             return VelocityMmS::ZERO;

@@ -7,7 +7,7 @@
 use crate::overrun::elapsed;
 use wheeleg_protocol::MessageType;
 use wheeleg_protocol::link::SlotTiming;
-use wheeleg_units::Micros;
+use wheeleg_units::{Micros, divide_signed};
 
 /// Time from the master's stamp to the latch: SYNC on the line, µs.
 const SYNC_US: u32 = SlotTiming::DEFAULT.frame_us(MessageType::Sync);
@@ -52,10 +52,10 @@ impl TimeSync {
             return false;
         }
         self.start = Some((at, self.offset_us));
-        let ppm = i64::from(moved)
-            .saturating_mul(i64::from(WINDOW.get()))
-            .checked_div(i64::from(took))
-            .unwrap_or(0);
+        let ppm = divide_signed(
+            i64::from(moved).saturating_mul(i64::from(WINDOW.get())),
+            i64::from(took),
+        );
         let limit = |ppm: i16| i32::from(ppm / DRIFT_LIMIT_PPM).signum();
         let before = limit(self.drift_ppm);
         self.drift_ppm = i16::try_from(ppm).unwrap_or(if ppm < 0 { i16::MIN } else { i16::MAX });

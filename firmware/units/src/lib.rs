@@ -52,6 +52,7 @@
 )]
 
 mod adc;
+mod divide;
 mod duty;
 mod motion;
 mod round;
@@ -59,6 +60,7 @@ mod time;
 mod wheel;
 
 pub use adc::AdcCode;
+pub use divide::{divide, divide_signed};
 pub use duty::{Duty, WireDuty};
 pub use motion::{PositionMm, VelocityMmS, WirePosition, WireVelocity};
 pub use round::{

@@ -55,7 +55,7 @@ impl DuplicateFilter {
                     && last.sequence == envelope.sequence
                     && now_us.saturating_sub(last.at_us) <= DUPLICATE_WINDOW_US =>
             {
-                if last.request == *request {
+                if last.request.is_same_request(request) {
                     Verdict::Resend(last.answer)
                 } else {
                     Verdict::Refuse(Message::Nack(Nack {

@@ -90,7 +90,8 @@ impl Air {
 
     /// Pressures after the valves were `open` and the piston moved at `speed` for
     /// `span` µs. Flows are those at the present pressures.
-    #[inline]
+    // One copy, compiled for speed: inlined, it would be where it is called.
+    #[inline(never)]
     fn after(
         &mut self,
         model: &AxisModel,

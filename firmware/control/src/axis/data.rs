@@ -105,60 +105,34 @@ impl AxisData {
         const fn raw(value: I16F16) -> i32 {
             value.to_bits()
         }
-        let rows = [
-            (self.bore.raw(), 4 << 16, 100 << 16, AxisField::Bore),
-            (
-                self.dead_a.raw(),
-                raw(const { I16F16::lit("0.05") }),
-                500 << 16,
-                AxisField::DeadVolume,
-            ),
-            (
-                self.dead_b.raw(),
-                raw(const { I16F16::lit("0.05") }),
-                500 << 16,
-                AxisField::DeadVolume,
-            ),
-            (
-                self.conductance.to_bits(),
-                const { Gain::lit("0.005").to_bits() },
-                20 << 24,
-                AxisField::Conductance,
-            ),
-            (
-                self.critical_ratio.to_bits(),
-                0,
-                const { Gain::lit("0.9").to_bits() },
-                AxisField::CriticalRatio,
-            ),
-            (self.supply.raw(), 200 << 16, 1700 << 16, AxisField::Supply),
-            (
-                self.mass.raw(),
-                raw(const { I16F16::lit("0.02") }),
-                200 << 16,
-                AxisField::Mass,
-            ),
-            (self.coulomb.raw(), 0, 500 << 16, AxisField::Friction),
-            (
-                self.breakaway.raw(),
-                self.coulomb.raw(),
-                500 << 16,
-                AxisField::Friction,
-            ),
-            (self.viscous.raw(), 0, 1000 << 16, AxisField::Friction),
-            (
-                self.band.raw(),
-                raw(const { I16F16::lit("0.02") }),
-                5 << 16,
-                AxisField::Band,
-            ),
-            (self.stroke.raw(), 1 << 16, 1000 << 16, AxisField::Stroke),
-        ];
-        for (value, low, high, field) in rows {
-            if value < low || value > high {
+        let within = |value: i32, low: i32, high: i32, field: AxisField| {
+            // One comparison for both bounds.
+            let above = value.wrapping_sub(low).cast_unsigned();
+            if above > high.wrapping_sub(low).cast_unsigned() {
                 return Err(field);
             }
-        }
+            Ok(())
+        };
+        let least_volume = raw(const { I16F16::lit("0.05") });
+        let least_conductance = const { Gain::lit("0.005").to_bits() };
+        let highest_ratio = const { Gain::lit("0.9").to_bits() };
+        let least = raw(const { I16F16::lit("0.02") });
+        use AxisField as F;
+        within(self.bore.raw(), 4 << 16, 100 << 16, F::Bore)?;
+        within(self.dead_a.raw(), least_volume, 500 << 16, F::DeadVolume)?;
+        within(self.dead_b.raw(), least_volume, 500 << 16, F::DeadVolume)?;
+        let conductance = self.conductance.to_bits();
+        within(conductance, least_conductance, 20 << 24, F::Conductance)?;
+        let ratio = self.critical_ratio.to_bits();
+        within(ratio, 0, highest_ratio, F::CriticalRatio)?;
+        within(self.supply.raw(), 200 << 16, 1700 << 16, F::Supply)?;
+        within(self.mass.raw(), least, 200 << 16, F::Mass)?;
+        let coulomb = self.coulomb.raw();
+        within(coulomb, 0, 500 << 16, F::Friction)?;
+        within(self.breakaway.raw(), coulomb, 500 << 16, F::Friction)?;
+        within(self.viscous.raw(), 0, 1000 << 16, F::Friction)?;
+        within(self.band.raw(), least, 5 << 16, F::Band)?;
+        within(self.stroke.raw(), 1 << 16, 1000 << 16, F::Stroke)?;
         // At most nine tenths of the bore.
         let bore_tenths = i64::from(self.bore.raw()).wrapping_mul(9);
         if self.rod.raw() < 0 || i64::from(self.rod.raw()).wrapping_mul(10) > bore_tenths {

@@ -4,7 +4,7 @@ use super::data::{AxisData, AxisField};
 use super::gas::FlowCurve;
 use super::valves::ValveTimes;
 use core::hash::{Hash, Hasher};
-use wheeleg_units::{Micros, PositionMm};
+use wheeleg_units::{Micros, PositionMm, divide};
 
 /// Coefficients for one control tick. Stroke and speed in raw I16F16,
 /// pressures in 1/256 Pa, forces in mN.
@@ -222,7 +222,7 @@ impl AxisModel {
         };
         let area_a_16 = circle_16(data.bore);
         let area_rod_16 = circle_16(data.rod);
-        let area_b_16 = area_a_16.saturating_sub(area_rod_16);
+        let area_b_16 = less(area_a_16, area_rod_16);
         // 2^29 × 2^20 × 2^8.
         let flow_24 =
             u64::from(data.conductance.to_bits().unsigned_abs()).wrapping_mul(CHOKED_MM3_S);
@@ -244,12 +244,11 @@ impl AxisModel {
         let force_32 = |area_16: u64| ratio(area_16.wrapping_mul(256), 1000);
         let force = |pa_8: u64, area_16: u64| pa_8.wrapping_mul(force_32(area_16)).wrapping_shr(32);
         let rod = force(ambient_8, area_rod_16);
-        let force_out = force(high_8, area_a_16)
-            .saturating_sub(force(low_8, area_b_16))
-            .saturating_sub(rod);
-        let force_in = force(high_8, area_b_16)
-            .wrapping_add(rod)
-            .saturating_sub(force(low_8, area_a_16));
+        let force_out = less(less(force(high_8, area_a_16), force(low_8, area_b_16)), rod);
+        let force_in = less(
+            force(high_8, area_b_16).wrapping_add(rod),
+            force(low_8, area_a_16),
+        );
 
         // Speed law. The larger piston side is the slower outlet, of choked speed
         // C ρ0 R T / area.
@@ -306,7 +305,7 @@ impl AxisModel {
             times,
             curve: FlowCurve {
                 critical: critical.wrapping_shr(9) as u32,
-                stretch: ratio(1 << 39, (1_u64 << 24).saturating_sub(critical)) as u32,
+                stretch: ratio(1 << 39, less(1 << 24, critical)) as u32,
             },
             supply: number(supply_8),
             ambient: number(ambient_8),
@@ -360,16 +359,21 @@ impl AxisModel {
     }
 }
 
-/// `a / b`, rounded down; 0 where there is no quotient. One copy of the long
-/// division's call.
-#[inline(never)]
+/// `a / b`, rounded down; 0 where there is no quotient.
 fn ratio(a: u64, b: u64) -> u64 {
-    a.checked_div(b).unwrap_or(0)
+    divide(a, b)
 }
 
 /// `value × percents / 100`, to one in a hundred thousand.
+#[inline(never)]
 fn percent(value: u64, percents: u64) -> u64 {
     ratio(value.wrapping_mul(percents), 100)
+}
+
+/// `a − b`, at least zero.
+#[inline(never)]
+fn less(a: u64, b: u64) -> u64 {
+    a.saturating_sub(b)
 }
 
 /// As a coefficient, saturating.

@@ -66,9 +66,16 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
         }
     }
 
-    /// The four rules around the point.
+    /// Whether at most four rules fire anywhere.
+    #[must_use]
+    pub const fn is_fan(&self) -> bool {
+        self.fan
+    }
+
+    /// As [`Self::infer`], of a base that [is a fan](Self::is_fan): the four rules
+    /// around the point.
     #[inline]
-    fn infer_fan(&self, first: i16, second: i16) -> i16 {
+    pub(crate) fn infer_fan(&self, first: i16, second: i16) -> i16 {
         let a = self.first.pair(first);
         let b = self.second.pair(second);
         let rows = (

@@ -8,7 +8,7 @@ use crate::velocity::VelocityWindow;
 use core::hash::{Hash as _, Hasher};
 use fixed::FixedI32;
 use fixed::types::extra::U24;
-use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, saturate_i32};
+use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, divide_signed, saturate_i32};
 
 /// Gain format: I8F24, ±128, step 6.0e-8.
 pub type Gain = FixedI32<U24>;
@@ -180,6 +180,8 @@ pub enum JointParameter {
     Derivative,
     /// [`JointGains::sliding_time`].
     SlidingTime,
+    /// A rule base given to the builder.
+    Rules,
     /// [`JointGains::axis`].
     Axis(AxisField),
 }
@@ -249,7 +251,8 @@ impl JointConfig {
     }
 
     /// As [`JointConfig::new`], with rule bases of the user's own. Their inputs
-    /// and outputs have full scale ±32 767.
+    /// and outputs have full scale ±32 767, and at most two neighbouring sets of an
+    /// input may overlap: a tick has time for four rules.
     ///
     /// # Errors
     /// [`ConfigError`] names the first parameter that is out of its range.
@@ -264,6 +267,9 @@ impl JointConfig {
         check(P::Tick, tick.get(), 100, 2000)?;
         let window = VelocityWindow::new(gains.velocity_window, tick.get())
             .ok_or(ConfigError::OutOfRange(P::VelocityWindow))?;
+        if !(rules_pd.is_fan() && rules_id.is_fan()) {
+            return Err(ConfigError::OutOfRange(P::Rules));
+        }
         check_ranges(gains)?;
         check_relations(gains, tick)?;
 
@@ -274,10 +280,10 @@ impl JointConfig {
             ),
             _ => None,
         };
-        let integral_limit = i64::from(gains.integral_scale.raw())
-            .saturating_mul(1_000_000)
-            .checked_div(i64::from(tick.get()))
-            .unwrap_or(1);
+        let integral_limit = divide_signed(
+            i64::from(gains.integral_scale.raw()).saturating_mul(1_000_000),
+            i64::from(tick.get()),
+        );
         Ok(Self {
             gains: *gains,
             tick,
@@ -443,10 +449,7 @@ fn input_factor(scale: i32) -> i32 {
 /// Full scale / `scale`, × 2^bits.
 #[inline]
 fn factor(bits: u32, scale: i64) -> i64 {
-    FULL_SCALE
-        .wrapping_shl(bits)
-        .checked_div(scale)
-        .unwrap_or(0)
+    divide_signed(FULL_SCALE.wrapping_shl(bits), scale)
 }
 
 fn check<T: PartialOrd>(

@@ -10,7 +10,8 @@ use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{
-    Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32, shift_right_round_inner,
+    Duty, PositionMm, VelocityMmS, divide_signed, saturate_i16, saturate_i32,
+    shift_right_round_inner,
 };
 
 /// From gain (24) × position or velocity (16) fractional bits to duty (30).
@@ -138,7 +139,10 @@ impl JointController {
             self.velocity.reset();
         }
         self.integral = within(self.integral, config.integral_limit);
-        if config.axis != self.config.axis {
+        // What the coefficients are made of: fewer than they are.
+        let made_of =
+            |config: &JointConfig| (config.axis.is_some(), config.tick(), config.gains().axis);
+        if made_of(&config) != made_of(&self.config) {
             // The state of the law that is left was not watched while another was in
             // use.
             let sent = self.sent;
@@ -152,7 +156,6 @@ impl JointController {
 
     /// Forgets everything but configuration and correction: as after
     /// [`JointController::new`].
-    #[inline]
     pub fn reset(&mut self) {
         let correction = self.correction;
         *self = Self::new(self.config);
@@ -279,13 +282,13 @@ impl JointController {
                 let (input, limited) =
                     to_input(error.raw(), gains.error_scale.raw(), config.error_to_input);
                 limits.error = limited;
-                (gains.correction_pd, config.rules_pd.infer(input, rate))
+                (gains.correction_pd, config.rules_pd.infer_fan(input, rate))
             }
             Correction::Id => {
                 // |integral| <= bound, and bound × factor = 32 767 × 2^40 < 2^55.
                 let scaled = self.integral.wrapping_mul(config.integral_to_input);
                 let input = saturate_i16(shift_right_round_inner(scaled, INTEGRAL_SHIFT));
-                (gains.correction_id, config.rules_id.infer(input, rate))
+                (gains.correction_id, config.rules_id.infer_fan(input, rate))
             }
         };
         // |gain| <= 4 × 2^24 and |raw| <= 2^31: products stay below 2^58.
@@ -309,7 +312,7 @@ impl JointController {
                 let bump = last.wrapping_sub(law);
                 self.fade = within(bump, FADE_LIMIT);
                 // Rounded up: the fade ends within the configured time.
-                let step = self.fade.wrapping_abs().checked_div(ticks).unwrap_or(0);
+                let step = divide_signed(self.fade.wrapping_abs(), ticks);
                 self.fade_step = step.wrapping_add(1);
             }
         } else if self.fade > 0 {

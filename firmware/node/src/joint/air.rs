@@ -20,7 +20,7 @@
 use core::hash::{Hash, Hasher};
 use wheeleg_control::axis::AxisModel;
 use wheeleg_control::pwm::OnTimes;
-use wheeleg_units::PositionMm;
+use wheeleg_units::{PositionMm, divide_signed};
 
 /// Supply pressure in the unit of [`Air`].
 const SUPPLY: i32 = 1 << 17;
@@ -51,9 +51,8 @@ impl Chamber {
     #[inline(never)]
     fn new(axis: &AxisModel, lead: i32, flow: i32, force: i32) -> Self {
         // Raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6, which the exponent's 2^8 is.
-        let flow = i64::from(flow)
-            .wrapping_mul(i64::from(EXPONENT))
-            .wrapping_div(1_000_000);
+        let flow = i64::from(flow).wrapping_mul(i64::from(EXPONENT));
+        let flow = divide_signed(flow, 1_000_000);
         Self {
             lead: lead >> 8,
             flow: clipped(flow).clamp(1, 1 << 19),
@@ -70,10 +69,10 @@ fn clipped(value: i64) -> i32 {
 /// What a chamber of `length` takes at `flow`, µs.
 #[inline(never)]
 fn time(length: i32, flow: i32) -> i64 {
-    i64::from(length)
-        .wrapping_mul(1_000_000)
-        .checked_div(i64::from(flow))
-        .unwrap_or(i64::MAX)
+    if flow == 0 {
+        return i64::MAX;
+    }
+    divide_signed(i64::from(length).wrapping_mul(1_000_000), i64::from(flow))
 }
 
 /// What the air of an axis obeys.
@@ -106,7 +105,7 @@ impl AirModel {
             a: Chamber::new(axis, axis.lead_a, axis.flow_a, axis.force_a),
             b: Chamber::new(axis, axis.lead_b, axis.flow_b, axis.force_b),
             stroke: axis.stroke,
-            ambient: clipped(share.checked_div(i64::from(axis.supply)).unwrap_or(0)),
+            ambient: clipped(divide_signed(share, i64::from(axis.supply))),
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
             rod: axis.force_rod,
             known: u16::try_from(known).unwrap_or(u16::MAX),
@@ -197,7 +196,7 @@ impl Content {
     }
 
     /// Its length is now `length`.
-    #[inline]
+    #[inline(never)]
     fn follow(&mut self, length: i32, chamber: &Chamber, model: &AirModel) {
         let moved = length.wrapping_sub(self.length);
         // Noise of a reading at rest moves no air.

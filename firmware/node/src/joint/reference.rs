@@ -20,7 +20,7 @@ use core::hash::{Hash, Hasher};
 use wheeleg_control::joint::Announced;
 use wheeleg_protocol::JointSetpoint;
 use wheeleg_protocol::link::CYCLE_US;
-use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
+use wheeleg_units::{PositionMm, Ticks, VelocityMmS, divide_signed};
 
 /// Ticks of one bus cycle.
 const CYCLE_TICKS: u32 = CYCLE_US / JOINT_TICK.get();
@@ -126,8 +126,8 @@ fn travel(velocity: i32, ticks: u32) -> i32 {
         return product / TICKS_PER_SECOND;
     }
     let product = i64::from(velocity).saturating_mul(i64::from(ticks));
-    let travel = product.checked_div(i64::from(TICKS_PER_SECOND));
-    i32::try_from(travel.unwrap_or(0)).unwrap_or(0)
+    let travel = divide_signed(product, i64::from(TICKS_PER_SECOND));
+    i32::try_from(travel).unwrap_or(0)
 }
 
 /// Reference of one tick.

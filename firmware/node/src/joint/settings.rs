@@ -12,7 +12,7 @@ use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains, Law};
 use wheeleg_control::pwm::PwmTiming;
 use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
 use wheeleg_protocol::param::JointParam;
-use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS};
+use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS, divide_signed};
 
 /// Margin by which a valve pulse must exceed the switching delay, µs (ASSUMED:
 /// a tenth of the VQ110's 3.5 ms).
@@ -207,7 +207,7 @@ fn gains(parameters: &JointParameters) -> JointGains {
 /// A rate in raw mm/s as raw mm per joint tick, rounded down, at least one step.
 fn per_tick(rate_raw: i32) -> PositionMm {
     let product = i64::from(rate_raw).saturating_mul(i64::from(JOINT_TICK.get()));
-    let step = product.checked_div(1_000_000).unwrap_or(0);
+    let step = divide_signed(product, 1_000_000);
     PositionMm::from_raw(i32::try_from(step).unwrap_or(i32::MAX).max(1))
 }
 
