@@ -27,7 +27,8 @@ impl WatchdogCycles {
     }
 
     const fn timeout_us(self) -> u64 {
-        (self.0 as u64).saturating_mul(CYCLE_US as u64)
+        // Eight bits by 14.
+        (self.0 as u64).wrapping_mul(CYCLE_US as u64)
     }
 }
 
@@ -178,9 +179,10 @@ impl LinkSupervisor {
         self.watchdog = watchdog;
     }
 
+    /// The end of the time does not wrap; that of a damaged instant does, and is past.
     fn is_fresh(&self, now_us: u64) -> bool {
         self.advanced_at_us
-            .is_some_and(|at| now_us.saturating_sub(at) <= self.watchdog.timeout_us())
+            .is_some_and(|at| now_us <= at.wrapping_add(self.watchdog.timeout_us()))
     }
 }
 

@@ -21,9 +21,9 @@ use wheeleg_units::{Micros, Ticks, WheelCount};
 /// Samples in Boot: long enough for the switch to be debounced.
 const BOOT_TICKS: Ticks = Ticks(10);
 
-/// Parts in which the configuration is sealed: parameters, settings, times. A
+/// Parts in which the configuration is sealed: parameters, two of settings, times. A
 /// sample looks at one of them.
-pub const PARTS: usize = 3;
+pub const PARTS: usize = 4;
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -297,7 +297,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     fn fixed(&self, part: usize) -> Seal {
         match part {
             0 => Seal::of(&self.parameters),
-            1 => Seal::of(&self.settings),
+            1 | 2 => Seal::made(|sum| self.settings.hash_half(part == 2, sum)),
             _ => Seal::of(&(&self.core.times, self.control_mode)),
         }
     }
