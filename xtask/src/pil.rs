@@ -17,6 +17,8 @@ use crate::report::{Report, StepError, StepResult};
 use crate::sizes;
 use crate::tools::{apt_install, have, may_apt};
 
+mod profile;
+
 const PACKAGE: &str = "wheeleg-pil-unicorn";
 /// What building the Unicorn engine takes, as Debian packages.
 const PACKAGES: [&str; 3] = ["cmake", "pkg-config", "libclang-dev"];
@@ -33,6 +35,10 @@ pub(crate) struct Options {
     /// Print the figures as one line of JSON at the end.
     #[arg(long)]
     json: bool,
+    /// Only print, by function, where the instructions of the worst tick of three steps
+    /// went; of other runs: `WHEELEG_PIL_PROFILE=FOLDER wheeleg run SCENARIO --nodes pil`.
+    #[arg(long)]
+    profile: bool,
 }
 
 /// `cargo xtask pil`.
@@ -46,12 +52,19 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let Some(emulator) = report.step("emulated STM32G431", emulator) else {
         return;
     };
+    let only_images = options.build || options.profile;
     let images = report.step("images for the emulated boards", || {
-        Images::build(set_up(firmware::TARGET)?, "firmware", !options.build)
+        Images::build(set_up(firmware::TARGET)?, "firmware", !only_images)
     });
     let Some(images) = images else {
         return;
     };
+    if options.profile {
+        report.step("instructions of the worst tick, by function", || {
+            profile(&emulator, &images.folder)
+        });
+        return;
+    }
     if options.build {
         return;
     }
@@ -295,6 +308,21 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     }
     within_budget?;
     Ok(json!({ "pil": figures }))
+}
+
+/// Runs the paper's test on emulated boards and prints the profiles of their worst ticks.
+fn profile(emulator: &Path, images: &Path) -> StepResult {
+    let folder = target_dir().join("pil-run").join("profile");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let environment = [
+        ("WHEELEG_PIL", emulator),
+        ("WHEELEG_IMAGES", images),
+        ("WHEELEG_PIL_PROFILE", &folder),
+    ];
+    three_steps("pil", "pil-run/profiled", &environment, &[])?;
+    profile::print(&folder, images)?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -111,6 +111,9 @@ impl VelocityWindow {
     }
 }
 
+/// Ticks within which every sample of the window has been looked at.
+const ROUND: usize = 8;
+
 /// A position and its complement, so that a flipped bit of either shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Sample {
@@ -136,7 +139,8 @@ impl Sample {
 /// The last positions and their sums.
 ///
 /// Its `Hash` is for sealing memory. It leaves the samples out: each is read once,
-/// when it leaves the window, and looked at before: [`VelocityEstimator::is_sound`].
+/// when it leaves the window, and looked at before, and every eight ticks:
+/// [`VelocityEstimator::is_sound`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VelocityEstimator {
     /// A ring in the first `length` places.
@@ -170,12 +174,27 @@ impl VelocityEstimator {
         }
     }
 
-    /// Whether the sample that the next update reads is as it came.
+    /// Whether the sample that the next update reads, and every [`ROUND`]th behind it,
+    /// is as it came.
     #[inline]
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let oldest = self.samples.get(usize::from(self.oldest));
-        oldest.is_some_and(|oldest| oldest.is_sound())
+        let length = usize::from(self.length);
+        let mut place = usize::from(self.oldest);
+        let mut age = 0_usize;
+        loop {
+            if !self.samples.get(place).is_some_and(|s| s.is_sound()) {
+                return false;
+            }
+            age = age.wrapping_add(ROUND);
+            if age >= length {
+                return true;
+            }
+            place = place.wrapping_add(ROUND);
+            if place >= length {
+                place = place.wrapping_sub(length);
+            }
+        }
     }
 
     /// Forgets everything: the next sample fills the window.
@@ -265,8 +284,8 @@ mod tests {
                     } else {
                         sample.complement ^= 1 << (bit - 32);
                     }
-                    // Before the update that reads it, and not before.
-                    let turn = (length + place - flipped.oldest) % length;
+                    // In its turn, and at the latest before the update that reads it.
+                    let turn = (length + place - flipped.oldest) % length % 8;
                     for tick in 0..turn {
                         assert!(flipped.is_sound(), "{length}: {place}, bit {bit}, {tick}");
                         flipped.update(&window, PositionMm::from_int(i16::from(tick)));

@@ -142,6 +142,12 @@ impl Elf {
         Ok(())
     }
 
+    /// Name of the function that holds an address.
+    pub(crate) fn function_name(&self, address: u32) -> Option<String> {
+        let (_, function) = self.functions.range(..=address).next_back()?;
+        Some(format!("{:#}", rustc_demangle::demangle(&function.name)))
+    }
+
     /// Bytes that go into flash.
     pub(crate) fn flash_bytes(&self) -> u64 {
         self.segments

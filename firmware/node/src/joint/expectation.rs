@@ -6,10 +6,10 @@
 //! then not be on a sound axis that stands still:
 //!
 //! 1. Towards its reference, it is pushed by more than its motions take, break-away
-//!    friction and the margin of the axis included, for 34 ms.
+//!    friction and the margin of the axis included, for 36 ms.
 //! 2. Nothing has been learnt from motions yet, but the force should be nine tenths of
 //!    the largest, with the opposing chamber known to be empty, for 200 ms.
-//! 3. A chamber should hold eleven eighths of the supply, for 34 ms. No load makes
+//! 3. A chamber should hold eleven eighths of the supply, for 36 ms. No load makes
 //!    that on an axis that the supply can move: the air has gone another way.
 //!
 //! The force that a motion takes is learnt whenever the piston slides, as the mean over
@@ -18,7 +18,8 @@
 //! that changes while the axis stands: a parameter, because only who knows the machine
 //! knows its loads; half of the largest force where none is told. Of 1436 fault-free
 //! runs of the bench, loads, friction, delays and supplies off by the factors of
-//! `wheeleg compare`, the worst stays doubtful for 31 of the 34 ms with that half.
+//! `wheeleg compare`, the worst stayed doubtful for 31 ms with that half (judged in every
+//! tick; now in every third, which is when the air of both chambers is known).
 
 use super::air::{Air, AirModel, ROUND};
 use crate::JOINT_TICK;
