@@ -2,9 +2,11 @@
 //! its supply, determinism. `cargo xtask pil` builds what they need and runs
 //! them; the bit-for-bit comparison of a whole run is a step of its own there.
 
-use wheeleg_pil_link::{Figures, Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, Straps};
-use wheeleg_sim::pil::Line as _;
-use wheeleg_sim::pil::unicorn::{Unicorn, image};
+mod bench;
+
+use bench::pil::{Board, edge};
+use wheeleg_pil_link::{Figures, Hook, Outputs, Power, Ran, Reply, Request, Straps};
+use wheeleg_sim::pil::unicorn::image;
 
 /// RCC_CSR: the independent watchdog has bitten.
 const WATCHDOG: u32 = 1 << 29;
@@ -14,7 +16,7 @@ const TICK_NS: u64 = 1_000_000;
 
 /// One emulated joint board, alone on its bus.
 struct Bench {
-    line: Unicorn,
+    board: Board,
     now_ns: u64,
     /// Every reply so far, to compare sessions.
     replies: Vec<Reply>,
@@ -27,9 +29,8 @@ impl Bench {
 
     fn with_crystal(address: u8, crystal: bool) -> Self {
         let image = image(if address <= 6 { "joint" } else { "wheel" }).expect("an image");
-        let line = Unicorn::start(&[image]).expect("the emulator");
         let mut bench = Self {
-            line,
+            board: Board::new(image),
             now_ns: 0,
             replies: Vec::new(),
         };
@@ -44,9 +45,7 @@ impl Bench {
     }
 
     fn ask(&mut self, request: &Request) -> Reply {
-        self.line.queue(0, request).expect("queued");
-        self.line.flush().expect("sent");
-        let (_, reply) = self.line.receive().expect("a reply");
+        let reply = self.board.ask(request);
         self.replies.push(reply.clone());
         reply
     }
@@ -63,19 +62,9 @@ impl Bench {
     }
 
     fn tick_of(&mut self, period_ns: u64, power: Power) -> Ran {
-        let inputs = Inputs {
-            adc: 30_000,
-            ..Inputs::default()
-        };
-        let run = Run {
-            until_ns: self.now_ns,
-            edge: Some(inputs),
-            power,
-            byte_ns: 10_000,
-            ..Run::default()
-        };
+        let edge = edge(self.now_ns, power);
         self.now_ns += period_ns;
-        self.ran(&Request::Run(run))
+        self.ran(&edge)
     }
 
     /// Ticks until the board tells of a reset; gives it with the time of the
@@ -200,19 +189,13 @@ fn without_figures(reply: &Reply) -> Ran {
 
 #[test]
 fn straps_of_another_kind_of_board_leave_it_silent() {
-    let image = image("joint").expect("an image");
-    let mut line = Unicorn::start(&[image]).expect("the emulator");
+    let mut board = Board::new(image("joint").expect("an image"));
     let straps = Straps {
         address: 7,
         unique_id: [7; 12],
         crystal: true,
     };
-    line.queue(0, &Request::PowerUp(straps)).expect("queued");
-    line.flush().expect("sent");
-    let (_, reply) = line.receive().expect("a reply");
-    let Reply::Ran(ran) = reply else {
-        panic!("{reply:?}");
-    };
+    let ran = board.ran(&Request::PowerUp(straps));
     assert_eq!((ran.period_us, ran.outputs), (0, Outputs::default()));
     assert!(ran.sent.is_empty());
 }

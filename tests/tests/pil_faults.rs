@@ -1,7 +1,8 @@
 //! Faults with the firmware images on emulated boards: the master dies, a program
 //! stops, the supply fails in mid-move and in mid-save. (Flipped bits: `pil_flips.rs`.)
 //! Each ends in the safe state of ARCHITECTURE.md, seen on the commanded, the
-//! sensed and the physical side. `cargo xtask pil` runs this.
+//! sensed and the physical side. And a disturbed line, of which every board must hear
+//! what its native application hears. `cargo xtask pil` runs this.
 
 mod bench;
 mod sil;
@@ -125,6 +126,28 @@ fn the_master_dies_and_every_image_goes_to_its_safe_state() {
         println!(
             "master dies at {t} s: shut by command after {:.0} ms, physically after {:.0} ms",
             worst_ms[0], worst_ms[1]
+        );
+    }
+}
+
+#[test]
+fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
+    // From before the first round of questions on; the master asks for the counters
+    // while it hears broken frames itself.
+    let mut scenario = gait(LegChoice::Left, 2.5, &[]);
+    scenario.faults = vec!["bit-errors=1e-4@0s..1.5s".parse().expect("a fault")];
+    let (recording, pil) = run(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+    assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
+    for (board, rows) in pil.boards.iter().zip(&recording.links) {
+        assert_eq!(board.late_frames, 0, "{}", board.node);
+        let counted = &rows.last().expect("an answer of every board").v;
+        // Eight frames a cycle, but for what was broken.
+        let broken = counted.truncated + counted.short + counted.crc;
+        assert!(
+            counted.frames > 1_000 && broken > 3,
+            "{}: {} sound, {broken} broken",
+            board.node,
+            counted.frames
         );
     }
 }

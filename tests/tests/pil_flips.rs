@@ -8,13 +8,14 @@ mod bench;
 use std::ops::Range;
 
 use bench::pil::Board;
-use bench::{closed_loop, delivery, frame, power_up};
+use bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
 use wheeleg_node::{joint, wheel};
-use wheeleg_pil_link::{Hook, Inputs, Outputs, Reply, Request, Run, text};
+use wheeleg_pil_link::{Hook, Inputs, Outputs, Ran, Reply, Request, Run, text};
 use wheeleg_protocol::{
-    Address, Arm, Message, SCHEMA_HASH, Sync, SyncFlags, SyncSlots, WheelSetpoint,
+    Address, Arm, Decoder, LinkRecord, LinkReport, Message, SCHEMA_HASH, SyncSlots, WheelSetpoint,
 };
 use wheeleg_sim::pil::unicorn::image;
+use wheeleg_tests::{STEP, mix};
 use wheeleg_units::WheelCount;
 
 /// Times as many flips as in the suite.
@@ -28,6 +29,7 @@ type Ask<'a> = dyn FnMut(&Request) -> Reply + 'a;
 struct Subject {
     /// Its image.
     image: &'static str,
+    address: u8,
     /// Runs it, with all requests through the function.
     course: fn(&mut Ask<'_>),
     /// Edges at which flips strike: from arming until there is too little left to see.
@@ -46,6 +48,7 @@ struct Subject {
 /// A joint that goes from one set-point to another, ticks of 1 ms.
 const JOINT: Subject = Subject {
     image: "joint",
+    address: bench::ADDRESS,
     course: |ask| drop(closed_loop(480, ask)),
     struck: 120..330,
     round: joint::PARTS,
@@ -57,6 +60,7 @@ const JOINT: Subject = Subject {
 /// A wheel that follows a moving set-point, samples of 520 µs.
 const WHEEL: Subject = Subject {
     image: "wheel",
+    address: WHEEL_ADDRESS,
     course: follow,
     struck: 240..680,
     round: wheel::PARTS,
@@ -135,21 +139,7 @@ fn set_point(cycle: u64, address: Address) -> Vec<u8> {
         },
     );
     assert!(set);
-    let sync = Message::Sync(Sync {
-        cycle: cycle as u16,
-        flags: SyncFlags::NONE,
-        master_time_us: (cycle * 10_000) as u32,
-        slots,
-    });
-    frame(Address::BROADCAST, &sync)
-}
-
-/// Numbers that look random and are the same every time.
-fn hash(number: u64) -> u64 {
-    let mut x = number.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ (x >> 31)
+    sync_frame(cycle, slots)
 }
 
 /// A bit of the application's state and the edge before which it flips.
@@ -162,7 +152,7 @@ struct Flip {
 
 impl Flip {
     fn new(number: u64, subject: &Subject, size: u32) -> Self {
-        let random = hash(number);
+        let random = mix(number.wrapping_add(1).wrapping_mul(STEP));
         let instants = subject.struck.end - subject.struck.start;
         Self {
             edge: subject.struck.start + (random >> 40) % instants,
@@ -183,6 +173,9 @@ enum Came {
     Nothing,
     /// The processor was reset, and its outputs are off from then on.
     Reset,
+    /// It struck the decoder of the bus: the board does exactly what it does when the
+    /// next frame is lost on the line, and has counted that frame as a broken one.
+    FrameLost,
     /// Anything else.
     Changed,
 }
@@ -196,18 +189,52 @@ fn driven(outputs: &Outputs) -> [u16; 6] {
 
 const OFF: [u16; 6] = [0; 6];
 
-/// What the board drives from edge to edge, and whether it was reset.
-fn drives(subject: &Subject, flip: Option<Flip>) -> (Vec<[u16; 6]>, bool) {
+/// What happens to a board on its course.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Incident {
+    None,
+    Flip(Flip),
+    /// The delivery with this number, from 0, gets lost on the line.
+    Lost(usize),
+}
+
+/// What a board did.
+#[derive(Debug, Clone, PartialEq)]
+struct Course {
+    /// What it drove from edge to edge.
+    driving: Vec<[u16; 6]>,
+    /// Edges before each delivery.
+    delivered: Vec<usize>,
+    reset: bool,
+    /// Sound frames and broken ones that it says it has heard.
+    heard: Option<[u32; 2]>,
+}
+
+fn course(subject: &Subject, incident: Incident) -> Course {
     let mut board = Board::new(image(subject.image).expect("an image"));
-    let mut driving = Vec::new();
-    let mut reset = false;
+    let mut did = Course {
+        driving: Vec::new(),
+        delivered: Vec::new(),
+        reset: false,
+        heard: None,
+    };
+    let mut now_ns = 0;
     (subject.course)(&mut |request| {
         let edge = match request {
-            Request::Run(run) => run.edge.is_some(),
+            Request::Run(run) => {
+                now_ns = run.until_ns;
+                if run.edge.is_none() {
+                    did.delivered.push(did.driving.len());
+                    if incident == Incident::Lost(did.delivered.len() - 1) {
+                        return Reply::Ran(Ran::default());
+                    }
+                }
+                run.edge.is_some()
+            }
             _ => false,
         };
-        if let (true, Some(flip)) = (edge, flip)
-            && driving.len() as u64 == flip.edge
+        if let (true, Incident::Flip(flip)) = (edge, incident)
+            && did.driving.len() as u64 == flip.edge
         {
             let hook = Hook::FlipBit {
                 symbol: text("NODE"),
@@ -218,36 +245,94 @@ fn drives(subject: &Subject, flip: Option<Flip>) -> (Vec<[u16; 6]>, bool) {
         }
         let reply = board.ask(request);
         if let Reply::Ran(ran) = &reply {
-            reset |= ran.trip.is_some();
+            did.reset |= ran.trip.is_some();
             if edge {
-                driving.push(driven(&ran.outputs));
+                did.driving.push(driven(&ran.outputs));
             }
         }
         reply
     });
-    (driving, reset)
+    did.heard = link_record(&mut board, subject.address, now_ns + SAMPLE_NS / 2)
+        .map(|link| [link.frames, broken(&link)]);
+    did
 }
 
-fn judge(subject: &Subject, sound: &[[u16; 6]], flip: Flip) -> Came {
-    let (flipped, reset) = drives(subject, Some(flip));
+/// What the board answers when it is asked what it has heard.
+fn link_record(board: &mut Board, address: u8, until_ns: u64) -> Option<LinkRecord> {
+    let address = Address::new(address).expect("a board");
+    let request = numbered(2, address, &LinkReport {}.into());
+    let Reply::Ran(ran) = board.ask(&delivery(&request, until_ns)) else {
+        return None;
+    };
+    let mut record = None;
+    for sent in &ran.sent {
+        Decoder::new().push_slice(&sent.bytes, |frame| {
+            if let Ok(Message::LinkRecord(link)) = Message::parse(&frame.expect("sound")) {
+                record = Some(link);
+            }
+        });
+    }
+    record
+}
+
+fn broken(link: &LinkRecord) -> u32 {
+    let kinds = [
+        link.overflow,
+        link.truncated,
+        link.short,
+        link.crc,
+        link.version,
+        link.length,
+        link.address,
+    ];
+    kinds.into_iter().map(u32::from).sum()
+}
+
+/// Whether the board did what it does when the first frame after the flip is lost, and
+/// counted that frame as broken.
+fn lost_one_frame(subject: &Subject, sound: &Course, flip: Flip, flipped: &Course) -> bool {
+    let next = sound
+        .delivered
+        .iter()
+        .position(|edges| *edges > flip.edge as usize);
+    let Some((next, [frames, errors])) = next.zip(sound.heard) else {
+        return false;
+    };
+    flipped.heard == Some([frames - 1, errors + 1])
+        && course(subject, Incident::Lost(next)).driving == flipped.driving
+}
+
+fn judge(subject: &Subject, sound: &Course, flip: Flip) -> Came {
+    let flipped = course(subject, Incident::Flip(flip));
     let at = flip.edge as usize;
-    assert_eq!(sound[..at], flipped[..at], "equal up to {flip:?}");
+    assert_eq!(
+        sound.driving[..at],
+        flipped.driving[..at],
+        "equal up to {flip:?}"
+    );
+    // An emulator that has stopped says nothing about the rest.
+    let whole = flipped.driving.len() == sound.driving.len();
     // The edge after the flip still shows what was prepared before it.
-    let off = |from: usize| flipped[from..].iter().all(|driving| *driving == OFF);
+    let off = |from: usize| whole && flipped.driving[from..].iter().all(|d| *d == OFF);
     match () {
-        () if flipped == sound => Came::Nothing,
-        () if reset && off(at + subject.reset) => Came::Reset,
+        () if flipped.driving == sound.driving => Came::Nothing,
+        () if flipped.reset && off(at + subject.reset) => Came::Reset,
         () if off(at + 2) => Came::Held,
         () if off(at + 1 + subject.round) => Came::HeldInARound,
+        () if lost_one_frame(subject, sound, flip, &flipped) => Came::FrameLost,
         () => Came::Changed,
     }
 }
 
 fn every_flip_is_found_or_does_nothing(subject: &Subject) {
-    let (sound, reset) = drives(subject, None);
-    assert!(!reset);
+    let sound = course(subject, Incident::None);
+    assert!(!sound.reset);
+    let [frames, errors] = sound.heard.expect("an answer");
+    assert_eq!((frames as usize, errors), (sound.delivered.len() + 1, 0));
     for part in [subject.struck.start as usize, subject.struck.end as usize] {
-        let busy = sound[part..].iter().filter(|driving| **driving != OFF);
+        let busy = sound.driving[part..]
+            .iter()
+            .filter(|driving| **driving != OFF);
         assert!(
             busy.count() > 20,
             "at work after {part}, or no flip could show"
@@ -285,13 +370,14 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
     let held = count(Came::Held);
     println!(
         "{}: {flips} flips in {size} bytes at edges {:?}: {held} held within 2 ticks, {} within \
-         {}, {} without effect, {} reset, {} other {changed:?}",
+         {}, {} without effect, {} reset, {} lost a frame and counted it, {} other {changed:?}",
         subject.image,
         subject.struck,
         count(Came::HeldInARound),
         subject.round,
         count(Came::Nothing),
         count(Came::Reset),
+        count(Came::FrameLost),
         changed.len()
     );
     assert!(held > flips / subject.sealed, "{held} of {flips} held");

@@ -4,15 +4,15 @@
 
 mod bench;
 
-use bench::power_up;
-use wheeleg_pil_link::{Hook, Inputs, Power, Ran, Reply, Request, Run};
+use bench::pil::{Board, edge};
+use bench::{delivery, numbered, power_up};
+use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
-    Address, Decoder, Envelope, FaultRecord, FaultReport, MAX_ENCODED, Message, NackReason,
-    ParamGet, ParamSave, ParamSet, ResetCause,
+    Address, Decoder, FaultRecord, FaultReport, Message, NackReason, ParamGet, ParamSave, ParamSet,
+    ResetCause,
 };
-use wheeleg_sim::pil::Line as _;
-use wheeleg_sim::pil::unicorn::{Unicorn, image};
+use wheeleg_sim::pil::unicorn::image;
 
 const ADDRESS: u8 = 2;
 const MS: u64 = 1_000_000;
@@ -24,7 +24,7 @@ const PARAMETER: JointParam = JointParam::FollowingError;
 
 /// An emulated joint board and its partner on the bus.
 struct Bench {
-    line: Unicorn,
+    board: Board,
     now_ns: u64,
     sequence: u16,
     resets: u16,
@@ -33,9 +33,8 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let line = Unicorn::start(&[image("joint").expect("an image")]).expect("the emulator");
         let mut bench = Self {
-            line,
+            board: Board::new(image("joint").expect("an image")),
             now_ns: 0,
             sequence: 100,
             resets: 0,
@@ -46,67 +45,35 @@ impl Bench {
         bench
     }
 
-    fn ask(&mut self, request: &Request) -> Reply {
-        self.line.queue(0, request).expect("queued");
-        self.line.flush().expect("sent");
-        self.line.receive().expect("a reply").1
-    }
-
     fn ran(&mut self, request: &Request) -> Ran {
-        match self.ask(request) {
-            Reply::Ran(ran) => {
-                self.resets = ran.figures.resets;
-                assert_eq!(ran.outputs.valve_on_us, [0; 4], "never armed");
-                for sent in &ran.sent {
-                    let mut decoder = Decoder::new();
-                    decoder.push_slice(&sent.bytes, |frame| {
-                        let frame = frame.expect("a sound frame");
-                        self.sent.push(Message::parse(&frame).expect("a message"));
-                    });
-                }
-                ran
-            }
-            other => panic!("{other:?}"),
+        let ran = self.board.ran(request);
+        self.resets = ran.figures.resets;
+        assert_eq!(ran.outputs.valve_on_us, [0; 4], "never armed");
+        for sent in &ran.sent {
+            let mut decoder = Decoder::new();
+            decoder.push_slice(&sent.bytes, |frame| {
+                let frame = frame.expect("a sound frame");
+                self.sent.push(Message::parse(&frame).expect("a message"));
+            });
         }
+        ran
     }
 
     fn ticks(&mut self, ms: u64, power: Power) {
         for _ in 0..ms {
             self.now_ns += MS;
-            let inputs = Inputs {
-                adc: 30_000,
-                ..Inputs::default()
-            };
-            let run = Run {
-                until_ns: self.now_ns,
-                edge: Some(inputs),
-                power,
-                byte_ns: 10_000,
-                ..Run::default()
-            };
-            self.ran(&Request::Run(run));
+            self.ran(&edge(self.now_ns, power));
         }
     }
 
     /// Sends a request in the middle of a tick; gives the answer.
     fn request(&mut self, message: Message) -> Message {
         self.sequence += 1;
-        let envelope = Envelope {
-            source: Address::MASTER,
-            destination: Address::new(ADDRESS).expect("a joint"),
-            sequence: self.sequence,
-        };
-        let mut buffer = [0; MAX_ENCODED];
-        let bytes = message.emit(envelope, &mut buffer).expect("fits");
+        let address = Address::new(ADDRESS).expect("a joint");
+        let bytes = numbered(self.sequence, address, &message);
         self.sent.clear();
         let until_ns = self.now_ns + MS / 2;
-        self.ran(&Request::Run(Run {
-            until_ns,
-            received: heapless::Vec::from_slice(bytes).expect("fits"),
-            received_end_ns: until_ns,
-            byte_ns: 10_000,
-            ..Run::default()
-        }));
+        self.ran(&delivery(&bytes, until_ns));
         self.ticks(2, Power::Good);
         *self.sent.first().expect("an answer")
     }
@@ -189,7 +156,9 @@ fn a_power_cut_in_any_unit_of_a_save_leaves_the_old_value_or_the_new_one_and_a_d
         bench.set(new);
         let resets = bench.resets;
         assert_eq!(
-            bench.ask(&Request::Hook(Hook::BrownOutInSave { after })),
+            bench
+                .board
+                .ask(&Request::Hook(Hook::BrownOutInSave { after })),
             Reply::Done
         );
         bench.save();

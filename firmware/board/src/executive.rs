@@ -27,6 +27,8 @@ pub trait Application {
     fn take_transmission(&mut self) -> Option<Transmission>;
     /// Time from this tick's edge to the next.
     fn period(&self) -> Micros;
+    /// Whether nothing has damaged that.
+    fn period_is_sound(&self) -> bool;
     /// Whether the parameters are to be stored.
     fn save_is_due(&self) -> bool;
     /// Stores the parameters.
@@ -54,6 +56,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
 
     fn period(&self) -> Micros {
         JOINT_TICK
+    }
+
+    fn period_is_sound(&self) -> bool {
+        true
     }
 
     fn save_is_due(&self) -> bool {
@@ -88,6 +94,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
 
     fn period(&self) -> Micros {
         Micros(self.tick_period_us())
+    }
+
+    fn period_is_sound(&self) -> bool {
+        self.is_intact()
     }
 
     fn save_is_due(&self) -> bool {
@@ -126,8 +136,13 @@ pub trait Board {
     fn now(&self) -> Micros;
 
     /// A tick is over: the watchdog is fed and the next tick edge is one period
-    /// after the edge of this one.
-    fn tick_finished(&mut self, report: &TickReport, period: Micros);
+    /// after the edge of this one. A period that is new is taken over if `confirmed`.
+    fn tick_finished(
+        &mut self,
+        report: &TickReport,
+        period: Micros,
+        confirmed: impl FnOnce() -> bool,
+    );
 
     /// Whether a transmission may be handed over.
     fn transmitter_is_free(&self) -> bool;
@@ -184,7 +199,8 @@ pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
         Some(Event::Tick(at)) => {
             let report = application.tick(at);
             application.tick_done(board.now());
-            board.tick_finished(&report, application.period());
+            let period = application.period();
+            board.tick_finished(&report, period, || application.period_is_sound());
             if !board.transmitter_is_free() {
                 if board.take_cut_off() {
                     application.driver_cut_off(at);
@@ -281,7 +297,12 @@ mod tests {
             Micros(777)
         }
 
-        fn tick_finished(&mut self, _: &TickReport, period: Micros) {
+        fn tick_finished(
+            &mut self,
+            _: &TickReport,
+            period: Micros,
+            _: impl FnOnce() -> bool,
+        ) {
             self.did.push(Did::Finished(period.get()));
         }
 
@@ -346,6 +367,10 @@ mod tests {
 
         fn period(&self) -> Micros {
             Micros(520)
+        }
+
+        fn period_is_sound(&self) -> bool {
+            true
         }
 
         fn save_is_due(&self) -> bool {

@@ -42,9 +42,14 @@
     )
 )]
 
+#[cfg(all(unix, feature = "wait"))]
+extern crate std;
+
 pub mod frame;
 mod reply;
 mod request;
+#[cfg(all(unix, feature = "wait"))]
+pub mod wait;
 
 pub use frame::{Deframer, FrameError, encode};
 pub use reply::{Figures, Halt, Hello, Image, Outputs, Ran, Reply, Sent, Trip, WATCHDOG_RESET};

@@ -230,10 +230,13 @@ impl Machine {
         Ok((bottom + free as u32) & !3)
     }
 
-    /// Whether the processor sleeps, or was stopped for good.
+    /// Whether the processor sleeps with nothing under way that it waits for, or was
+    /// stopped for good. (A tick begins when its inputs are converted; what was received
+    /// behind its edge waits until then.)
     pub(crate) fn rests(&self) -> bool {
         let state = self.state();
-        self.asleep || state.stop_processor || state.stop_main_loop
+        let waits = state.soc.converts();
+        self.asleep && !waits || state.stop_processor || state.stop_main_loop
     }
 
     /// Runs to `ns`. Unless `started`, stops as soon as the tick timer runs.
@@ -265,7 +268,7 @@ impl Machine {
             let idle = self.asleep
                 || state.stop_processor
                 || state.stop_main_loop && !state.nvic.in_handler();
-            let limit = if idle { target } else { until };
+            let limit = if idle && self.rests() { target } else { until };
             if state.cycle >= limit {
                 return Ok(Stop::Time);
             }

@@ -1,12 +1,13 @@
 //! Emulated STM32G431 boards, as a program of its own (GPL-2.0-only, see
 //! `LICENSE.md`).
 //!
-//!     wheeleg-pil-unicorn IMAGE.elf…
+//!     wheeleg-pil-unicorn [--awake] IMAGE.elf…
 //!
 //! hosts one board per image, numbered from 0, and answers the requests of the
 //! simulator (crate `wheeleg-pil-link`) that come on standard input on standard
 //! output, in order. Nothing here reads a clock or a random number: equal
-//! requests get equal replies.
+//! requests get equal replies. `--awake` is for a process with a processor core of
+//! its own: it does not sleep between requests that follow each other closely.
 
 mod board;
 mod image;
@@ -24,6 +25,8 @@ use std::process::ExitCode;
 use std::rc::Rc;
 
 use wheeleg_pil_link::frame::MAX_FRAME;
+#[cfg(unix)]
+use wheeleg_pil_link::wait::Watch;
 use wheeleg_pil_link::{Deframer, Reply, Request, encode, text};
 
 use crate::board::Board;
@@ -42,7 +45,13 @@ fn main() -> ExitCode {
 
 /// Answers requests until the input ends or every board has said good-bye.
 fn serve() -> Result<(), String> {
-    let paths: Vec<_> = std::env::args_os().skip(1).collect();
+    let mut paths: Vec<_> = std::env::args_os().skip(1).collect();
+    let awake = paths.first().is_some_and(|first| first == "--awake");
+    if awake {
+        paths.remove(0);
+    }
+    #[cfg(unix)]
+    let mut watch = awake.then(Watch::default);
     if paths.is_empty() {
         return Err("give the ELF image of each board".to_owned());
     }
@@ -53,6 +62,11 @@ fn serve() -> Result<(), String> {
     let mut chunk = vec![0; 64 << 10];
     let mut replies = Vec::new();
     loop {
+        // (Standard input holds nothing back: a chunk is longer than its buffer.)
+        #[cfg(unix)]
+        if let Some(watch) = &mut watch {
+            watch.wait(&input);
+        }
         let length = input.read(&mut chunk).map_err(|e| e.to_string())?;
         if length == 0 {
             return Ok(());

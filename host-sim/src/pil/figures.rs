@@ -37,6 +37,8 @@ pub struct BoardFigures {
     pub resets: u16,
     /// Bytes that came late to the emulator.
     pub late_bytes: u32,
+    /// Frames that the emulator told of after their first byte.
+    pub late_frames: u32,
 }
 
 impl BoardFigures {
@@ -45,6 +47,7 @@ impl BoardFigures {
         hello: &Hello,
         figures: &Figures,
         ticks: &[u32],
+        late_frames: u32,
         compared: Count,
     ) -> Self {
         let mut sorted = ticks.to_vec();
@@ -69,6 +72,7 @@ impl BoardFigures {
             stack_size_bytes: figures.stack_size,
             resets: figures.resets,
             late_bytes: figures.late_bytes,
+            late_frames,
         }
     }
 }

@@ -3,6 +3,7 @@
 mod channel;
 pub mod choice;
 mod compare;
+mod cores;
 mod figures;
 mod line;
 mod outside;

@@ -5,6 +5,7 @@
 //! compared with at every tick and for every frame. What moves the plant and
 //! what goes on the line comes from the board outside.
 
+use std::cmp::Reverse;
 use std::collections::VecDeque;
 
 use wheeleg_pil_link::{
@@ -14,11 +15,13 @@ use wheeleg_pil_link::{
 
 use super::choice::{NODE_NAMES, NodeKind, Nodes};
 use super::compare::Comparison;
+use super::cores::Cores;
 use super::figures::{BoardFigures, PilSummary};
 use super::line::Line;
 use super::partner::unexpected;
 use super::qemu::{Qemu, QemuOptions};
-use super::{store, unicorn};
+use super::store;
+use super::unicorn::{self, Place};
 use crate::SimError;
 use crate::config::RobotConfig;
 use crate::hil::{self, HilOptions};
@@ -48,6 +51,8 @@ struct Board {
     tripped: Option<Trip>,
     power: Power,
     tick_instructions: Vec<u32>,
+    /// Frames that were told when others should have heard some of them.
+    late_frames: u32,
 }
 
 /// All boards outside.
@@ -60,13 +65,12 @@ pub(crate) struct Outside {
     requests: Vec<usize>,
     /// The first difference has been told.
     told: bool,
+    /// Where boards run on cores of their own.
+    cores: Option<Cores>,
 }
 
-/// Processes over which the emulated boards are spread. The result does not
-/// depend on it.
-fn processes() -> usize {
-    std::thread::available_parallelism().map_or(1, |n| n.get().min(2))
-}
+/// Of eight boards, those that run on the simulator's core: it has enough to do itself.
+const NEAR: usize = 4;
 
 impl Outside {
     /// Starts the boards that do not run here, and powers them up. `None` when
@@ -86,6 +90,7 @@ impl Outside {
             comparison: Comparison::default(),
             requests: Vec::new(),
             told: false,
+            cores: None,
         };
         outside.start_pil(nodes)?;
         for (address, kind) in (1..).zip(&nodes.0) {
@@ -118,21 +123,36 @@ impl Outside {
         Ok(Some(outside))
     }
 
-    /// Spreads the byte-identical images over a few processes.
+    /// Spreads the byte-identical images over two cores, where there are two.
     fn start_pil(&mut self, nodes: &Nodes) -> Result<(), SimError> {
         let pil = (1..).zip(&nodes.0).filter(|(_, k)| **k == NodeKind::Pil);
         let mut addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
-        // The wheels side by side: their edges come twice as often as the joints' and
-        // at the same instant, and to wake two processes takes longer than their ticks.
+        // The wheels are near: their edges come twice as often as the joints' and at
+        // the same instant, when nobody else has anything to do.
         addresses.sort_by_key(|address| *address <= 6);
-        let each = addresses.len().div_ceil(processes()).max(1);
-        for mine in addresses.chunks(each) {
+        if addresses.len() > NEAR {
+            self.cores = Cores::choose();
+        }
+        let near = match &self.cores {
+            Some(_) => addresses.len() * NEAR / nodes.0.len(),
+            None => addresses.len(),
+        };
+        let (near, far) = addresses.split_at(near);
+        for (mine, place) in [(far, Place::Far), (near, Place::Near)] {
+            if mine.is_empty() {
+                continue;
+            }
             let images = mine
                 .iter()
                 .map(|a| unicorn::image(if *a <= 6 { "joint" } else { "wheel" }))
                 .collect::<Result<Vec<_>, _>>()?;
+            let start = || unicorn::Unicorn::start(&images, place);
+            let started = match (&self.cores, place) {
+                (Some(cores), Place::Far) => cores.far(start),
+                _ => start(),
+            };
             let line = self.lines.len();
-            self.lines.push(Box::new(unicorn::Unicorn::start(&images)?));
+            self.lines.push(Box::new(started?));
             for (index, address) in (0..).zip(mine) {
                 self.adopt(*address, line, index)?;
             }
@@ -180,6 +200,7 @@ impl Outside {
             tripped: None,
             power: Power::Good,
             tick_instructions: Vec::new(),
+            late_frames: 0,
         });
         Ok(())
     }
@@ -343,11 +364,15 @@ impl Outside {
         for line in &mut self.lines {
             line.flush()?;
         }
-        for number in std::mem::take(&mut self.requests) {
+        let mut asked = std::mem::take(&mut self.requests);
+        // The far boards are at work while the near ones answer.
+        asked.sort_by_key(|number| Reverse(self.boards[*number].line));
+        for number in asked.drain(..) {
             let line = self.boards[number].line;
             let (_, reply) = self.lines[line].receive()?;
             self.take(number, reply)?;
         }
+        self.requests = asked;
         if let (Some(first), false) = (&self.comparison.first, self.told) {
             self.told = true;
             // Told at once: the run may end before its summary.
@@ -362,6 +387,7 @@ impl Outside {
             return Err(unexpected(&board.name, &reply));
         };
         for sent in &ran.sent {
+            board.late_frames += u32::from(sent.start_ns < board.heard_ns);
             board.there.push_back((sent.start_ns, sent.bytes.to_vec()));
         }
         if let Some(trip) = ran.trip {
@@ -453,6 +479,7 @@ impl Outside {
                 &b.hello,
                 &b.ran.figures,
                 &b.tick_instructions,
+                b.late_frames,
                 compared.of(b.address).total(),
             )
         };

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use wheeleg_pil_link::frame::MAX_FRAME;
+#[cfg(unix)]
+use wheeleg_pil_link::wait::Watch;
 use wheeleg_pil_link::{Deframer, Reply, Request, encode};
 
 use super::line::Line;
@@ -86,6 +88,15 @@ pub fn image(name: &str) -> Result<PathBuf, SimError> {
         })
 }
 
+/// Where a process of emulated boards runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// On the simulator's core, or anywhere: whoever waits sleeps.
+    Near,
+    /// On a core of its own: who waits for the other stays awake for a while.
+    Far,
+}
+
 /// A running emulator with several boards.
 #[derive(Debug)]
 pub struct Unicorn {
@@ -96,6 +107,9 @@ pub struct Unicorn {
     outgoing: Vec<u8>,
     buffer: Vec<u8>,
     unread: std::ops::Range<usize>,
+    /// How to wait for boards on a core of their own.
+    #[cfg(unix)]
+    watch: Option<Watch>,
 }
 
 impl Unicorn {
@@ -103,12 +117,14 @@ impl Unicorn {
     ///
     /// # Errors
     /// [`SimError::Simulation`] when it cannot be started.
-    pub fn start(images: &[PathBuf]) -> Result<Self, SimError> {
+    pub fn start(images: &[PathBuf], place: Place) -> Result<Self, SimError> {
         let program = program()?;
         let cannot = |e: &dyn std::fmt::Display| {
             SimError::simulation(format!("cannot start {}: {e}", program.display()), BUILD)
         };
+        let awake = (place == Place::Far).then_some("--awake");
         let mut child = Command::new(&program)
+            .args(awake)
             .args(images)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -125,6 +141,8 @@ impl Unicorn {
             outgoing: Vec::new(),
             buffer: vec![0; 16 << 10],
             unread: 0..0,
+            #[cfg(unix)]
+            watch: (place == Place::Far).then(Watch::default),
         })
     }
 
@@ -167,11 +185,17 @@ impl Line for Unicorn {
             self.unread.start += before - input.len();
             match found {
                 Ok(Some(reply)) => return Ok(reply),
-                Ok(None) => match self.stdout.read(&mut self.buffer) {
-                    Ok(count) if count > 0 => self.unread = 0..count,
-                    Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
-                    _ => return Err(self.gone()),
-                },
+                Ok(None) => {
+                    #[cfg(unix)]
+                    if let Some(watch) = &mut self.watch {
+                        watch.wait(&self.stdout);
+                    }
+                    match self.stdout.read(&mut self.buffer) {
+                        Ok(count) if count > 0 => self.unread = 0..count,
+                        Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                        _ => return Err(self.gone()),
+                    }
+                }
                 Err(e) => {
                     return Err(SimError::simulation(
                         format!("the emulated boards send what is no message: {e}"),

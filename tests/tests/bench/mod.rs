@@ -59,10 +59,15 @@ pub(crate) fn closed_loop_natively() -> Trace {
 }
 
 pub(crate) fn frame(destination: Address, message: &Message) -> Vec<u8> {
+    numbered(1, destination, message)
+}
+
+/// A frame of the master with a number of its own: a board answers each once.
+pub(crate) fn numbered(sequence: u16, destination: Address, message: &Message) -> Vec<u8> {
     let envelope = Envelope {
         source: Address::MASTER,
         destination,
-        sequence: 1,
+        sequence,
     };
     let mut buffer = [0; MAX_ENCODED];
     message.emit(envelope, &mut buffer).expect("fits").to_vec()
@@ -88,10 +93,15 @@ fn sync(cycle: u64, script: &[(u64, f64)]) -> Vec<u8> {
         },
     );
     assert!(set);
+    sync_frame(cycle, slots)
+}
+
+/// The SYNC of a cycle of 10 ms.
+pub(crate) fn sync_frame(cycle: u64, slots: SyncSlots) -> Vec<u8> {
     let message = Message::Sync(Sync {
         cycle: cycle as u16,
         flags: SyncFlags::NONE,
-        master_time_us: (now_ms * 1_000) as u32,
+        master_time_us: (cycle * 10_000) as u32,
         slots,
     });
     frame(Address::BROADCAST, &message)

@@ -2,16 +2,16 @@
 
 use std::path::PathBuf;
 
-use wheeleg_pil_link::{Ran, Reply, Request};
+use wheeleg_pil_link::{Inputs, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::pil::Line as _;
-use wheeleg_sim::pil::unicorn::Unicorn;
+use wheeleg_sim::pil::unicorn::{Place, Unicorn};
 
 /// One emulated board by itself.
 pub(crate) struct Board(Unicorn);
 
 impl Board {
     pub(crate) fn new(image: PathBuf) -> Self {
-        Self(Unicorn::start(&[image]).expect("the emulator"))
+        Self(Unicorn::start(&[image], Place::Near).expect("the emulator"))
     }
 
     pub(crate) fn ask(&mut self, request: &Request) -> Reply {
@@ -26,4 +26,18 @@ impl Board {
             other => panic!("{other:?}"),
         }
     }
+}
+
+/// A tick edge with the potentiometer near the middle of its stroke.
+pub(crate) fn edge(until_ns: u64, power: Power) -> Request {
+    Request::Run(Run {
+        until_ns,
+        edge: Some(Inputs {
+            adc: 30_000,
+            ..Inputs::default()
+        }),
+        power,
+        byte_ns: 10_000,
+        ..Run::default()
+    })
 }

@@ -131,10 +131,18 @@ impl<const WHEEL: bool> Board for G431<WHEEL> {
     }
 
     #[inline]
-    fn tick_finished(&mut self, report: &TickReport, period: Micros) {
+    fn tick_finished(
+        &mut self,
+        report: &TickReport,
+        period: Micros,
+        confirmed: impl FnOnce() -> bool,
+    ) {
         watchdog::feed();
         if WHEEL {
-            tick::set_period(period);
+            // A damaged period would stop the ticks before one of them could find it.
+            if !tick::runs_at(period) && confirmed() {
+                tick::set_period(period);
+            }
             bridge::permit();
         } else {
             super::valves::permit();

@@ -34,18 +34,17 @@ pub(super) fn configure(period: Micros) {
     tim1.cr2().modify(|r| r.set_mms(Mms::UPDATE));
 }
 
-/// Period of the tick in µs, 2…65 536; without preload: the running period ends
-/// with it.
+/// Whether the tick has this period.
 #[inline]
-pub(super) fn set_period(period: Micros) {
+pub(super) fn runs_at(period: Micros) -> bool {
     let present = u32::from(pac::TIM1.arr().read().arr()).wrapping_add(1);
-    if present != period.get() {
-        change_period(period);
-    }
+    present == period.get()
 }
 
+/// Period of the tick in µs, 2…65 536; without preload: the running period ends
+/// with it.
 #[inline(never)]
-fn change_period(period: Micros) {
+pub(super) fn set_period(period: Micros) {
     let last = u16::try_from(period.get().saturating_sub(1)).unwrap_or(u16::MAX);
     pac::TIM1.arr().write(|r| r.set_arr(last));
     // A counter that is already beyond the new end would run to its own end.

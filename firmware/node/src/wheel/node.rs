@@ -308,9 +308,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         (&self.state, &self.target, &self.controller)
     }
 
-    /// Whether everything is as the last sample or request left it.
+    /// Whether everything is as the last sample or request left it: looks at all seals,
+    /// where a sample looks at some.
     #[inline(never)]
-    fn is_intact(&self) -> bool {
+    pub fn is_intact(&self) -> bool {
         self.seal.holds(&self.moving()) && self.fixed_seals.all_hold(|part| self.fixed(part))
     }
 

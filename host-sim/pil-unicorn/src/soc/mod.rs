@@ -160,6 +160,11 @@ impl Soc {
         &self.tim[TIM8]
     }
 
+    /// Whether a conversion is under way.
+    pub(crate) fn converts(&self) -> bool {
+        self.adc.next().is_some()
+    }
+
     /// The quadrature counter.
     pub(crate) fn encoder_timer(&mut self) -> &mut Tim {
         &mut self.tim[TIM3]
