@@ -112,6 +112,11 @@ impl Decoder {
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Result<Frame<'_>, FrameError>> {
         // Kept in registers: on a board this loop takes every byte of the line.
         let (mut len, mut owed, mut started) = (self.len, self.owed, self.started);
+        if !started {
+            // Between two frames nothing is owed. A flipped bit could say so, and every
+            // delimiter would be taken for idle line from then on.
+            (len, owed) = (0, 0);
+        }
         let mut ended = false;
         let mut rest = bytes.iter();
         for &byte in rest.by_ref() {

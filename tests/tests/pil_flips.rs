@@ -7,12 +7,13 @@ mod bench;
 
 use std::ops::Range;
 
-use bench::pil::Board;
+use bench::pil::{Board, edge};
 use bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
 use wheeleg_node::{joint, wheel};
-use wheeleg_pil_link::{Hook, Inputs, Outputs, Ran, Reply, Request, Run, text};
+use wheeleg_pil_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, text};
 use wheeleg_protocol::{
-    Address, Arm, Decoder, LinkRecord, LinkReport, Message, SCHEMA_HASH, SyncSlots, WheelSetpoint,
+    Address, Arm, Decoder, Fault, FaultReport, LinkRecord, LinkReport, Message, SCHEMA_HASH,
+    SyncSlots, WheelSetpoint,
 };
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_tests::{STEP, mix};
@@ -36,6 +37,10 @@ struct Subject {
     struck: Range<u64>,
     /// Ticks in which all seals of its configuration are looked at once.
     round: usize,
+    /// Its tick, ns.
+    period_ns: u64,
+    /// Ticks of a bus cycle, rounded up.
+    cycle: usize,
     /// Ticks in which the watchdog resets it, with a margin.
     reset: usize,
     /// Flips in the suite.
@@ -52,6 +57,8 @@ const JOINT: Subject = Subject {
     course: |ask| drop(closed_loop(480, ask)),
     struck: 120..330,
     round: joint::PARTS,
+    period_ns: 1_000_000,
+    cycle: 10,
     reset: 60,
     flips: 200,
     sealed: 4,
@@ -64,6 +71,8 @@ const WHEEL: Subject = Subject {
     course: follow,
     struck: 240..680,
     round: wheel::PARTS,
+    period_ns: SAMPLE_NS,
+    cycle: 20,
     reset: 120,
     flips: 80,
     sealed: 10,
@@ -169,10 +178,15 @@ enum Came {
     Held,
     /// They are off once the seals of the configuration have all been looked at.
     HeldInARound,
+    /// They are off in the second tick after the next SYNC, which did not fit.
+    HeldBySync,
     /// The board did exactly what it does without.
     Nothing,
     /// The processor was reset, and its outputs are off from then on.
     Reset,
+    /// The board took the link for lost within two ticks, says so, and does what it does
+    /// then: a wheel's drive falls, and turns nowhere.
+    LinkLost,
     /// It struck the decoder of the bus: the board does exactly what it does when the
     /// next frame is lost on the line, and has counted that frame as a broken one.
     FrameLost,
@@ -208,6 +222,8 @@ struct Course {
     reset: bool,
     /// Sound frames and broken ones that it says it has heard.
     heard: Option<[u32; 2]>,
+    /// The first fault that it tells of, and when it was found, ns.
+    fault: Option<(Fault, u64)>,
 }
 
 fn course(subject: &Subject, incident: Incident) -> Course {
@@ -217,10 +233,11 @@ fn course(subject: &Subject, incident: Incident) -> Course {
         delivered: Vec::new(),
         reset: false,
         heard: None,
+        fault: None,
     };
     let mut now_ns = 0;
     (subject.course)(&mut |request| {
-        let edge = match request {
+        let ticks = match request {
             Request::Run(run) => {
                 now_ns = run.until_ns;
                 if run.edge.is_none() {
@@ -233,7 +250,7 @@ fn course(subject: &Subject, incident: Incident) -> Course {
             }
             _ => false,
         };
-        if let (true, Incident::Flip(flip)) = (edge, incident)
+        if let (true, Incident::Flip(flip)) = (ticks, incident)
             && did.driving.len() as u64 == flip.edge
         {
             let hook = Hook::FlipBit {
@@ -246,33 +263,48 @@ fn course(subject: &Subject, incident: Incident) -> Course {
         let reply = board.ask(request);
         if let Reply::Ran(ran) = &reply {
             did.reset |= ran.trip.is_some();
-            if edge {
+            if ticks {
                 did.driving.push(driven(&ran.outputs));
             }
         }
         reply
     });
-    did.heard = link_record(&mut board, subject.address, now_ns + SAMPLE_NS / 2)
-        .map(|link| [link.frames, broken(&link)]);
+    for answer in ask_both(&mut board, subject, now_ns) {
+        match answer {
+            Message::LinkRecord(link) => did.heard = Some([link.frames, broken(&link)]),
+            Message::FaultRecord(record) => {
+                let first = record.first_fault.fault();
+                did.fault = first.map(|fault| (fault, 1_000 * u64::from(record.first_time_us)));
+            }
+            _ => {}
+        }
+    }
     did
 }
 
-/// What the board answers when it is asked what it has heard.
-fn link_record(board: &mut Board, address: u8, until_ns: u64) -> Option<LinkRecord> {
-    let address = Address::new(address).expect("a board");
-    let request = numbered(2, address, &LinkReport {}.into());
-    let Reply::Ran(ran) = board.ask(&delivery(&request, until_ns)) else {
-        return None;
-    };
-    let mut record = None;
-    for sent in &ran.sent {
-        Decoder::new().push_slice(&sent.bytes, |frame| {
-            if let Ok(Message::LinkRecord(link)) = Message::parse(&frame.expect("sound")) {
-                record = Some(link);
+/// What the board answers after its last edge when it is asked what it has heard and
+/// what is wrong.
+fn ask_both(board: &mut Board, subject: &Subject, mut edge_ns: u64) -> Vec<Message> {
+    let address = Address::new(subject.address).expect("a board");
+    let mut answers = Vec::new();
+    let questions: [Message; 2] = [LinkReport {}.into(), FaultReport {}.into()];
+    for (number, question) in (2..).zip(&questions) {
+        let request = numbered(number, address, question);
+        let reply = board.ask(&delivery(&request, edge_ns + subject.period_ns / 2));
+        if let Reply::Ran(ran) = reply {
+            for sent in &ran.sent {
+                Decoder::new().push_slice(&sent.bytes, |frame| {
+                    answers.extend(Message::parse(&frame.expect("sound")));
+                });
             }
-        });
+        }
+        // Until the answer is out.
+        for _ in 0..2 {
+            edge_ns += subject.period_ns;
+            board.ask(&edge(edge_ns, Power::Good));
+        }
     }
-    record
+    answers
 }
 
 fn broken(link: &LinkRecord) -> u32 {
@@ -286,6 +318,22 @@ fn broken(link: &LinkRecord) -> u32 {
         link.address,
     ];
     kinds.into_iter().map(u32::from).sum()
+}
+
+/// Whether the board took the link for lost at once and let its drive fall.
+fn took_the_link_for_lost(subject: &Subject, flip: Flip, flipped: &Course) -> bool {
+    let at = flip.edge as usize;
+    let within = (flip.edge * subject.period_ns..=(flip.edge + 2) * subject.period_ns)
+        .contains(&flipped.fault.map_or(0, |(_, at_ns)| at_ns));
+    let named = matches!(
+        flipped.fault,
+        Some((Fault::LinkLost | Fault::StaleMaster, _))
+    );
+    let falls = |pair: &[[u16; 6]]| {
+        let ([.., before, was], [.., after, is]) = (pair[0], pair[1]);
+        after <= before && (is == was || after == 0)
+    };
+    within && named && flipped.driving[at + 2..].windows(2).all(falls)
 }
 
 /// Whether the board did what it does when the first frame after the flip is lost, and
@@ -319,6 +367,8 @@ fn judge(subject: &Subject, sound: &Course, flip: Flip) -> Came {
         () if flipped.reset && off(at + subject.reset) => Came::Reset,
         () if off(at + 2) => Came::Held,
         () if off(at + 1 + subject.round) => Came::HeldInARound,
+        () if off(at + 2 + subject.cycle) => Came::HeldBySync,
+        () if whole && took_the_link_for_lost(subject, flip, &flipped) => Came::LinkLost,
         () if lost_one_frame(subject, sound, flip, &flipped) => Came::FrameLost,
         () => Came::Changed,
     }
@@ -370,13 +420,16 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
     let held = count(Came::Held);
     println!(
         "{}: {flips} flips in {size} bytes at edges {:?}: {held} held within 2 ticks, {} within \
-         {}, {} without effect, {} reset, {} lost a frame and counted it, {} other {changed:?}",
+         {}, {} by the next SYNC, {} without effect, {} reset, {} took the link for lost, {} lost a frame and counted it, \
+         {} other {changed:?}",
         subject.image,
         subject.struck,
         count(Came::HeldInARound),
         subject.round,
+        count(Came::HeldBySync),
         count(Came::Nothing),
         count(Came::Reset),
+        count(Came::LinkLost),
         count(Came::FrameLost),
         changed.len()
     );

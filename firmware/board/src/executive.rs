@@ -297,12 +297,7 @@ mod tests {
             Micros(777)
         }
 
-        fn tick_finished(
-            &mut self,
-            _: &TickReport,
-            period: Micros,
-            _: impl FnOnce() -> bool,
-        ) {
+        fn tick_finished(&mut self, _: &TickReport, period: Micros, _: impl FnOnce() -> bool) {
             self.did.push(Did::Finished(period.get()));
         }
 

@@ -234,6 +234,11 @@ pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: 
 /// answered too, so that the master sees who still listens.
 fn take_sync<A: Application>(application: &mut A, sync: &Sync, at: Micros) {
     let core = application.core();
+    // Kept twice: a damaged counter would make the next ones stale, a damaged address
+    // would take the set-points of another board.
+    if !core.supervisor.agrees(core.cycle) || core.port.address() != core.identity.address {
+        core.axis_fault(Fault::StateCorrupt, at);
+    }
     let emergency = sync.flags.contains(SyncFlags::ESTOP);
     if core.supervisor.sync(sync.cycle, emergency, at) {
         core.cycle = sync.cycle;

@@ -30,8 +30,10 @@ pub trait PositionSensor {
 
 /// Quadrature encoder of a wheel.
 pub trait Encoder {
-    /// The 24-bit count latched at the start of this tick; never waits.
-    fn count(&mut self) -> WheelCount;
+    /// The 24-bit count latched at the start of this tick; never waits. `before` is that
+    /// of the tick before, within 32 767 counts: what a shorter counter is extended from,
+    /// so that no state is needed that nobody seals.
+    fn count(&mut self, before: WheelCount) -> WheelCount;
 }
 
 /// Four valve outputs in the order `[fill A, vent A, fill B, vent B]`.

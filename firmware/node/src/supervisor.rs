@@ -277,6 +277,11 @@ impl Supervisor {
         let _ = self.apply(event, at);
     }
 
+    /// Whether the newest fresh SYNC had this counter, as far as that is certain.
+    pub fn agrees(&self, newest: u16) -> bool {
+        self.link.agrees(newest)
+    }
+
     /// Takes the header of a SYNC latched at `at`. True when it is fresh, so
     /// that its slot may be used.
     pub fn sync(&mut self, counter: u16, emergency: bool, at: Micros) -> bool {

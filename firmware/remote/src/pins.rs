@@ -105,7 +105,7 @@ impl PositionSensor for Potentiometer<'_> {
 pub struct Quadrature<'p>(pub &'p Cell<i32>);
 
 impl Encoder for Quadrature<'_> {
-    fn count(&mut self) -> WheelCount {
+    fn count(&mut self, _: WheelCount) -> WheelCount {
         WheelCount::wrapping_new(self.0.get())
     }
 }

@@ -134,7 +134,7 @@ impl CounterInput {
 }
 
 impl Encoder for CounterInput {
-    fn count(&mut self) -> WheelCount {
+    fn count(&mut self, _: WheelCount) -> WheelCount {
         self.0.get()
     }
 }

@@ -174,6 +174,14 @@ impl LinkSupervisor {
         self.state
     }
 
+    /// Whether `newest` is the counter of the newest SYNC, as far as that is certain:
+    /// while the link is up and nothing stale came since.
+    #[must_use]
+    pub fn agrees(&self, newest: u16) -> bool {
+        let certain = self.state == LinkState::Up && !self.stale_since_advance;
+        !certain || self.counter == Some(newest)
+    }
+
     /// Changes the watchdog time.
     pub fn set_watchdog(&mut self, watchdog: WatchdogCycles) {
         self.watchdog = watchdog;

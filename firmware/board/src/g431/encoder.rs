@@ -22,7 +22,7 @@ pub(super) fn start() -> WheelEncoder {
     tim.smcr().write(|r| r.set_sms(Sms::ENCODER_MODE_3));
     tim.cnt().write(|r| r.set_cnt(0));
     tim.cr1().modify(|r| r.set_cen(true));
-    WheelEncoder { last: 0, total: 0 }
+    WheelEncoder
 }
 
 /// The counter at a tick edge.
@@ -34,18 +34,15 @@ pub(super) fn raw() -> u16 {
 /// The wheel's 24-bit count. A sample must bring fewer than 32 768 counts; at
 /// full speed it brings about 150.
 #[derive(Debug)]
-pub struct WheelEncoder {
-    last: u16,
-    total: i32,
-}
+pub struct WheelEncoder;
 
 impl Encoder for WheelEncoder {
-    fn count(&mut self) -> WheelCount {
-        if let Some(raw) = latch::sample() {
-            let counts = raw.wrapping_sub(self.last) as i16;
-            self.last = raw;
-            self.total = self.total.wrapping_add(i32::from(counts));
-        }
-        WheelCount::wrapping_new(self.total)
+    fn count(&mut self, before: WheelCount) -> WheelCount {
+        // Both began at 0: the low 16 bits of the count are the counter's.
+        let Some(raw) = latch::sample() else {
+            return before;
+        };
+        let counts = raw.wrapping_sub(before.get() as u16) as i16;
+        WheelCount::wrapping_new(before.get().wrapping_add(i32::from(counts)))
     }
 }

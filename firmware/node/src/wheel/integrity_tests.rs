@@ -27,7 +27,7 @@ impl MotorDrive for Motor {
 struct Still;
 
 impl Encoder for Still {
-    fn count(&mut self) -> WheelCount {
+    fn count(&mut self, _: WheelCount) -> WheelCount {
         WheelCount::ZERO
     }
 }

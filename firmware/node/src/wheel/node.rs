@@ -163,7 +163,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     /// One sample that starts at `now`: latches the inputs, controls, writes
     /// the outputs. They act from the next tick edge on.
     pub fn tick(&mut self, now: Micros) -> TickReport {
-        let actual = self.encoder.count();
+        let actual = self.encoder.count(self.state.actual);
         let switches = self.switch_pins.read();
         let overruns = self.core.supervisor.overrun().overruns();
 

@@ -122,7 +122,7 @@ impl PositionSensor for Sensor {
 pub struct Counter(pub Rc<Cell<i32>>);
 
 impl Encoder for Counter {
-    fn count(&mut self) -> WheelCount {
+    fn count(&mut self, _: WheelCount) -> WheelCount {
         WheelCount::wrapping_new(self.0.get())
     }
 }
