@@ -43,8 +43,9 @@ impl Board {
         self.deliver(run)?;
         self.supply(run.power)?;
         // Only behind a delimiter is there anything to work off; before one, the
-        // next byte of the frame would come late.
-        self.owes |= run.received.last() == Some(&DELIMITER);
+        // next byte of the frame would come late. What comes with an edge nobody answers
+        // before the next run: to wait for it would make the next bytes late.
+        self.owes |= run.edge.is_none() && run.received.last() == Some(&DELIMITER);
         if let Some(inputs) = run.edge {
             self.edge_ns = run.until_ns;
             if let Some(before) = run.until_ns.checked_sub(6) {
