@@ -301,10 +301,15 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     let within_budget = sizes::check_run(images, &mut figures);
     figures["qemu"] = qemu::counts();
     println!("    {figures}");
-    println!("    {}", speed_verdict(speeds));
+    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    println!("    {} (load: {})", speed_verdict(speeds), load.trim());
     ensure_equal(pil)?;
     if first["hash"] != second["hash"] {
         return Err(anyhow::anyhow!("two runs differ").into());
+    }
+    let (bytes, frames) = (most("late_bytes", "joint"), most("late_frames", "joint"));
+    if bytes + frames > 0 {
+        return Err(anyhow::anyhow!("{bytes} bytes and {frames} frames came late").into());
     }
     within_budget?;
     Ok(json!({ "pil": figures }))
