@@ -350,6 +350,25 @@ messages! {
     }
 }
 
+impl LinkRecord {
+    /// Frames that were not taken for what was wrong with them, of every kind.
+    #[must_use]
+    pub fn errors(&self) -> u32 {
+        [
+            self.overflow,
+            self.truncated,
+            self.short,
+            self.crc,
+            self.version,
+            self.length,
+            self.address,
+        ]
+        .map(u32::from)
+        .iter()
+        .sum()
+    }
+}
+
 impl MessageType {
     /// The number in the header.
     #[must_use]

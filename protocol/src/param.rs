@@ -445,4 +445,14 @@ const fn is_sound(table: &[ParamInfo]) -> bool {
 }
 
 // Ascending unique numbers, non-empty ranges, defaults inside them.
+/// Parameters of the board at a bus address: a joint's up to 6, else a wheel's.
+#[must_use]
+pub const fn params_at(address: u8) -> &'static [ParamInfo] {
+    if address <= 6 {
+        JOINT_PARAMS
+    } else {
+        WHEEL_PARAMS
+    }
+}
+
 const _: () = assert!(is_sound(JOINT_PARAMS) && is_sound(WHEEL_PARAMS));

@@ -412,6 +412,23 @@ mod tests {
         own
     }
 
+    /// Only a fresh SYNC takes an E-stop back; a repeated one proves nothing.
+    #[test]
+    fn a_stale_sync_does_not_take_an_emergency_stop_back() {
+        let mut own = held();
+        for (cycle, at) in [(1, 2000), (2, 12_000)] {
+            own.sync(cycle, false, Micros(at));
+        }
+        assert!(own.sync(3, true, Micros(22_000)));
+        for (cycle, fresh) in [(3, false), (2, false), (4, true)] {
+            assert!(own.emergency);
+            let cause = own.clear(true, Micros(22_000));
+            assert_eq!(cause, Err(Refusal::CausePresent));
+            assert_eq!(own.sync(cycle, false, Micros(32_000)), fresh);
+        }
+        assert!(!own.emergency && own.emergency_stop());
+    }
+
     #[test]
     fn a_flipped_bit_of_what_steers_the_outputs_is_held() {
         let flips: [fn(&mut Supervisor); 7] = [
@@ -438,6 +455,7 @@ mod tests {
                 );
                 assert_eq!((own.mode(), own.staged), (Mode::Hold, false));
                 assert_eq!(own.exhaust(), ExhaustKind::Staged);
+                assert!(own.is_intact(), "{index}");
                 // Nothing is staged by a program whose state was wrong.
                 for tick in 3..2000 {
                     own.begin_tick(Micros(tick * 1000), &TIMES);

@@ -17,6 +17,7 @@ mod suggest;
 pub use axis::AxisConfig;
 pub use error::{ConfigError, Problem};
 pub use node::NodeParams;
+pub(crate) use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use robot::{

@@ -1,6 +1,6 @@
 //! Board parameters set by a robot file, by the names of the protocol's tables.
 
-use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
+use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
 use super::params::ParameterInfo;
 use super::quantity::pretty;
@@ -55,11 +55,8 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
 /// the parameter's unit.
 pub(super) fn choice(r: &mut Reader, entry: &Entry, board: Option<u8>) -> Option<ParameterChoice> {
     entry.get("parameter")?;
-    let table = match board {
-        Some(7..) => WHEEL_PARAMS,
-        _ => JOINT_PARAMS,
-    };
-    let names: Vec<(&str, &'static ParamInfo)> = table.iter().map(|p| (p.name, p)).collect();
+    let table = params_at(board.unwrap_or(1)).iter();
+    let names: Vec<(&str, &'static ParamInfo)> = table.map(|p| (p.name, p)).collect();
     let info = r.choice(entry, "parameter", &names)?;
     let raw = entry.get("value").and_then(|(span, item)| {
         let value = item.as_float().or(item.as_integer().map(|n| n as f64));
@@ -69,9 +66,14 @@ pub(super) fn choice(r: &mut Reader, entry: &Entry, board: Option<u8>) -> Option
             return None;
         };
         // What is beyond its limits is refused by the board, which is there to do it.
-        Some((value * scale(info.format)).round() as i32)
+        Some(raw_of(info, value))
     });
     Some(ParameterChoice { id: info.id, raw })
+}
+
+/// A value in the parameter's unit as the raw number of its format.
+pub(crate) fn raw_of(info: &ParamInfo, value: f64) -> i32 {
+    (value * scale(info.format)).round() as i32
 }
 
 /// A raw number in its unit without the tail of its binary fraction.

@@ -4,7 +4,7 @@
 
 use wheeleg_node::Transmission;
 use wheeleg_protocol::frame::{VERSION, encode};
-use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
+use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{
     Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, NackReason, ParamGet,
     ParamSet, ParamValue, ResetCause,
@@ -176,11 +176,7 @@ struct Service {
 
 impl Service {
     fn new(to: Address) -> Self {
-        let table = if to.is_joint() {
-            JOINT_PARAMS
-        } else {
-            WHEEL_PARAMS
-        };
+        let table = params_at(to.raw());
         // One that may be set at any time, so that nothing but its limit refuses it.
         let fits = |p: &&ParamInfo| !p.disarmed_only && p.max < i32::MAX;
         Self {

@@ -4,7 +4,7 @@ use wheeleg_master::config::UniqueId;
 use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::finding::Finding;
-use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
+use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord};
 
 /// An event of the master in words.
@@ -140,7 +140,7 @@ fn hold_reason(reason: &HoldReason) -> String {
 /// Why a command is refused, with what to do about it.
 fn refusal(reason: &Refusal) -> String {
     match *reason {
-        Refusal::NodeMissing { node } => {
+        Refusal::NodeMissing { node } | Refusal::NoAnswer { node } => {
             format!(
                 "{} does not answer. {}",
                 board(node),
@@ -166,13 +166,6 @@ fn refusal(reason: &Refusal) -> String {
         ),
         Refusal::NodeRefused { node, reason } => format!("{}: {}", board(node), reason.text()),
         Refusal::NodeBusy { node } => format!("{} stays busy", board(node)),
-        Refusal::NoAnswer { node } => {
-            format!(
-                "{} does not answer. {}",
-                board(node),
-                Finding::NodeLost.remedy()
-            )
-        }
         Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
         ref other => format!("{other:?}"),
     }
@@ -211,12 +204,7 @@ fn diagnosis(node: u8, record: &FaultRecord) -> String {
 
 /// Row of a board's parameter.
 fn row(node: u8, id: u16) -> Option<&'static ParamInfo> {
-    let table = if node <= 6 {
-        JOINT_PARAMS
-    } else {
-        WHEEL_PARAMS
-    };
-    table.iter().find(|row| row.id == id)
+    params_at(node).iter().find(|row| row.id == id)
 }
 
 fn parameter(node: u8, id: u16) -> String {

@@ -197,8 +197,10 @@ impl World {
             down: [Down::No; 8],
             outside,
             memories: std::array::from_fn(|i| {
-                let joints = stored.joints.iter().chain(&stored.wheels);
-                Memory::new(joints.into_iter().nth(i).map_or(&[], Vec::as_slice))
+                // Joints first, then wheels, as on the bus.
+                let wheel = || stored.wheels.get(i - stored.joints.len());
+                let kept = stored.joints.get(i).or_else(wheel);
+                Memory::new(kept.map_or(&[], Vec::as_slice))
             }),
             stored: stored.clone(),
         })

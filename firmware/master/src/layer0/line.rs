@@ -193,18 +193,7 @@ impl Line {
     /// Takes what node index 0..8 has heard. Gives the board that babbled, once, when
     /// all others have counted rubbish since the babble began and it has not.
     pub fn heard(&mut self, index: usize, record: &LinkRecord) -> Option<Address> {
-        let errors = [
-            record.overflow,
-            record.truncated,
-            record.short,
-            record.crc,
-            record.version,
-            record.length,
-            record.address,
-        ];
-        let errors = errors
-            .iter()
-            .fold(0_u32, |sum, count| sum.saturating_add(u32::from(*count)));
+        let errors = record.errors();
         if self.babble.told {
             // Not over, or just so: neither from before nor from after.
             return None;

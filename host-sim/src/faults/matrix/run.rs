@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
-use wheeleg_protocol::param::JOINT_PARAMS;
+use wheeleg_protocol::param::params_at;
 
 use super::judge::{Outcome, judge};
 use super::measure::{Measured, measure};
@@ -13,7 +13,7 @@ use super::rows::ROWS;
 use crate::SimError;
 use crate::config::{
     EventAction, LegChoice, Motion, ParameterChoice, RobotConfig, Scenario, ScenarioEvent,
-    TargetSet, builtin,
+    TargetSet, builtin, raw_of,
 };
 use crate::faults::{FaultSpec, check};
 use crate::run::DEFAULT_SCENARIO;
@@ -152,17 +152,21 @@ impl Robots {
 }
 
 fn command(name: &str) -> EventAction {
+    of_board(name, None, None)
+}
+
+fn of_board(name: &str, board: Option<u8>, parameter: Option<ParameterChoice>) -> EventAction {
     EventAction::Command {
         name: name.to_owned(),
         joint: None,
         stroke_m: None,
         travel_m: None,
-        board: None,
-        parameter: None,
+        board,
+        parameter,
     }
 }
 
-/// What a user asks of a joint's parameters.
+/// What a user asks of a board's parameters.
 fn asked(ask: &Ask) -> EventAction {
     let (name, node, of) = match *ask {
         Ask::Disarm => return command("Disarm"),
@@ -171,24 +175,13 @@ fn asked(ask: &Ask) -> EventAction {
         Ask::Write(node, of, value) => ("WriteParameter", node, Some((of, Some(value)))),
     };
     let chosen = of.and_then(|(of, value)| {
-        let info = JOINT_PARAMS.iter().find(|info| info.name == of)?;
-        let scale = f64::from(info.format.fraction_bits()).exp2();
+        let info = params_at(node).iter().find(|info| info.name == of)?;
         Some(ParameterChoice {
             id: info.id,
-            raw: value.map(|value: f64| (value * scale).round() as i32),
+            raw: value.map(|value| raw_of(info, value)),
         })
     });
-    match command(name) {
-        EventAction::Command { name, .. } => EventAction::Command {
-            name,
-            joint: None,
-            stroke_m: None,
-            travel_m: None,
-            board: Some(node),
-            parameter: chosen,
-        },
-        other => other,
-    }
+    of_board(name, Some(node), chosen)
 }
 
 fn stands(phase: Phase) -> bool {
