@@ -112,6 +112,8 @@ impl<'p> Board<'p> for RemoteJoint<'p> {
         parameters.with(id, raw, true)
     }
 
+    // Made where it is kept: each move on the way would be kilobytes of stack.
+    #[inline(always)]
     fn new(
         identity: NodeIdentity,
         parameters: JointParameters,
