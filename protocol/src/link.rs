@@ -16,5 +16,5 @@ pub use supervisor::{
 };
 pub use timing::{
     BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, DISCOVERY_SLOTS, DUPLICATE_WINDOW_US, GAP_US,
-    MAX_DEADLINE_CYCLES, SlotTiming, TURNAROUND_US, deadline_is_live,
+    MAX_DEADLINE_CYCLES, SETTING_US, SlotTiming, TURNAROUND_US, deadline_is_live,
 };

@@ -444,7 +444,6 @@ const fn is_sound(table: &[ParamInfo]) -> bool {
     true
 }
 
-// Ascending unique numbers, non-empty ranges, defaults inside them.
 /// Parameters of the board at a bus address: a joint's up to 6, else a wheel's.
 #[must_use]
 pub const fn params_at(address: u8) -> &'static [ParamInfo] {
@@ -455,4 +454,5 @@ pub const fn params_at(address: u8) -> &'static [ParamInfo] {
     }
 }
 
+// Ascending unique numbers, non-empty ranges, defaults inside them.
 const _: () = assert!(is_sound(JOINT_PARAMS) && is_sound(WHEEL_PARAMS));

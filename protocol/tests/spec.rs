@@ -12,7 +12,7 @@ use common::{envelope_text, hex, unhex, vectors};
 use std::fmt::Write;
 use wheeleg_protocol::link::{
     BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, DUPLICATE_WINDOW_US, GAP_US, MAX_DEADLINE_CYCLES,
-    SlotTiming, TURNAROUND_US,
+    SETTING_US, SlotTiming, TURNAROUND_US,
 };
 use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
 use wheeleg_protocol::{
@@ -166,6 +166,7 @@ fn render(name: &str) -> String {
                 timing.frame_us(MessageType::SlotReply)
             );
             let _ = writeln!(out, "| turnaround | {TURNAROUND_US} µs |");
+            let _ = writeln!(out, "| turnaround of ParamSet | {SETTING_US} µs |");
             let _ = writeln!(out, "| gap between slots | {GAP_US} µs |");
             let _ = writeln!(
                 out,

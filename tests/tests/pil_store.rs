@@ -1,18 +1,26 @@
 //! Parameters in the flash of the shipped joint image, on an emulated board: set and
 //! saved by requests on the bus, back after a loss of power, and whole after a power
-//! cut in any unit of the save. `cargo xtask pil` runs this.
+//! cut in any unit of the save; and set and saved in a whole run, equal to the host to the bit.
+//! `cargo xtask pil` runs this.
 
 mod bench;
+mod sil;
+
+use std::ops::ControlFlow;
 
 use bench::pil::{Board, edge};
 use bench::{delivery, numbered, power_up};
+use sil::{command, robot, stand};
 use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request};
-use wheeleg_protocol::param::JointParam;
+use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{
     Address, Decoder, FaultRecord, FaultReport, Message, NackReason, ParamGet, ParamSave, ParamSet,
     ResetCause,
 };
+use wheeleg_sim::config::{EventAction, ParameterChoice};
 use wheeleg_sim::pil::unicorn::image;
+use wheeleg_sim::pil::{NodeKind, Nodes};
+use wheeleg_sim::telemetry::Recorder;
 
 const ADDRESS: u8 = 2;
 const MS: u64 = 1_000_000;
@@ -172,4 +180,55 @@ fn a_power_cut_in_any_unit_of_a_save_leaves_the_old_value_or_the_new_one_and_a_d
         .map(|n| if n < UNITS { old } else { new })
         .collect();
     assert_eq!(found, expected, "the word with the checksum decides");
+}
+
+/// A command about a board, and a parameter of it.
+fn about(name: &str, board: u8, parameter: Option<(u16, Option<i32>)>) -> EventAction {
+    let EventAction::Command { name, joint, .. } = command(name) else {
+        unreachable!("a command");
+    };
+    EventAction::Command {
+        name,
+        joint,
+        stroke_m: None,
+        travel_m: None,
+        board: Some(board),
+        parameter: parameter.map(|(id, raw)| ParameterChoice { id, raw }),
+    }
+}
+
+#[test]
+fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
+    // The law that takes longest to set up, and one value of a wheel.
+    let (law, error) = (JointParam::Law.id(), WheelParam::FollowingError.id());
+    let events = [
+        (0.2, command("Disarm")),
+        (0.4, about("WriteParameter", 3, Some((law, Some(5))))),
+        (0.6, about("WriteParameter", 8, Some((error, Some(12_345))))),
+        (0.8, about("SaveParameters", 3, None)),
+        (1.0, about("SaveParameters", 8, None)),
+        (1.2, about("WriteParameter", 3, Some((law, Some(1))))),
+        (1.4, about("ReadParameter", 3, Some((law, None)))),
+        (1.6, about("ReadParameter", 8, Some((error, None)))),
+    ];
+    let scenario = stand(1.8, &events);
+    let nodes = Nodes::new(&NodeKind::Pil, &[]);
+    let mut recorder = Recorder::in_memory();
+    let go_on = &mut |_| ControlFlow::Continue(());
+    let outcome = wheeleg_sim::sil::run_with(&scenario, &robot(), 1, &nodes, &mut recorder, go_on)
+        .expect("the run gets to its end");
+    let pil = outcome.pil.expect("boards outside");
+    assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
+    let recording = recorder.finish().expect("nothing is written to a file");
+    let events = recording.events.iter().map(|row| row.v.text.as_str());
+    let said: Vec<&str> = events.filter(|text| text.contains("parameter ")).collect();
+    let values: Vec<&str> = said
+        .iter()
+        .filter_map(|text| text.split(" is ").nth(1))
+        .collect();
+    assert_eq!(
+        values,
+        ["5 1", "12345 counts", "1 1", "1 1", "12345 counts"],
+        "{said:?}"
+    );
 }

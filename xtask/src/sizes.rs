@@ -55,8 +55,8 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
 }
 
 /// Holds what runs on emulated boards have measured (`tick_instructions_worst` and
-/// `stack_used_bytes` of each image in `figures`) against budget and static bound,
-/// and puts those beside it.
+/// `stack_used_bytes` of each image in `figures`) and the images themselves against budget
+/// and static bound, and puts those beside it.
 pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
     let mut breaches = Vec::new();
     for name in SHIPPED {
@@ -68,7 +68,8 @@ pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
             tick_instructions: number("tick_instructions_worst"),
             stack_used_bytes: number("stack_used_bytes"),
         };
-        let found = row.budget.breaches_of_run(&run, &row.figures);
+        let mut found = row.budget.breaches(&row.figures);
+        found.extend(row.budget.breaches_of_run(&run, &row.figures));
         breaches.extend(found.into_iter().map(|text| format!("{name}: {text}")));
         let bound = row.figures.stack_bound_bytes;
         println!(

@@ -302,7 +302,8 @@ fn take_request<A: Application>(
         Ok(Message::Discover(_)) => {
             SlotTiming::DEFAULT.discovery_us(&core.identity.unique_id, core.cycle)
         }
-        _ => TURNAROUND_US,
+        Ok(request) => SlotTiming::turnaround_us(request.message_type()),
+        Err(_) => TURNAROUND_US,
     };
     let start_at = Micros(at.get().wrapping_add(delay));
     core.port.queue_answer(&answer, envelope, start_at);

@@ -130,13 +130,13 @@ impl Supervisor {
     #[inline(always)]
     fn steering(&self) -> u32 {
         let flag = |flag: bool, place: u32| u32::from(flag).wrapping_shl(place);
-        // Every byte whole, so that no shift has to cut one.
+        // Every byte whole.
         u32::from(self.mode as u8)
             ^ u32::from(self.exhaust as u8).wrapping_shl(8)
             ^ flag(self.staged, 16)
             ^ flag(self.from_drive, 20)
             ^ flag(self.exhaust_allowed, 24)
-            ^ flag(self.emergency, 28)
+            ^ u32::from(self.emergency).rotate_left(28)
     }
 
     #[inline(always)]

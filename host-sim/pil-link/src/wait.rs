@@ -7,8 +7,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// Looks before a read that sleeps: some hundred microseconds.
 const MOST: u32 = 1_500;
-/// As few as that, where looking was in vain: on a busy machine the time is better left
-/// to others.
+/// Fewest looks, after looking was in vain: on a busy machine the time is better left to
+/// others.
 const LEAST: u32 = 100;
 
 /// Looks for something to read before the read sleeps.

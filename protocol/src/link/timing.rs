@@ -17,6 +17,9 @@ pub const CYCLE_US: u32 = 10_000;
 /// 20 µs after a tick edge: the conversion of that edge (23 µs), its tick and
 /// the SYNC itself come first, then the answer must stand ready in hardware.
 pub const TURNAROUND_US: u32 = 100;
+/// The same to the answer to [`MessageType::ParamSet`], µs: the board first works out
+/// anew what follows from its parameters, which takes up to a third of it.
+pub const SETTING_US: u32 = 1000;
 /// Idle line between slots, µs.
 pub const GAP_US: u32 = 20;
 /// Largest share of the cycle for cyclic traffic, per mille.
@@ -125,6 +128,16 @@ impl SlotTiming {
         TURNAROUND_US.saturating_add(pitch.saturating_mul(slot))
     }
 
+    /// From the end of a request to the start of the answer to it, µs, but for
+    /// [`MessageType::Discover`] ([`Self::discovery_us`]).
+    #[must_use]
+    pub const fn turnaround_us(request: MessageType) -> u32 {
+        match request {
+            MessageType::ParamSet => SETTING_US,
+            _ => TURNAROUND_US,
+        }
+    }
+
     /// Time that a request and its longest answer occupy the line, turnaround and
     /// gap included, µs; `None` if the type is no request.
     #[must_use]
@@ -144,7 +157,7 @@ impl SlotTiming {
         };
         Some(
             self.frame_us(request)
-                .saturating_add(TURNAROUND_US)
+                .saturating_add(Self::turnaround_us(request))
                 .saturating_add(longest)
                 .saturating_add(GAP_US),
         )
@@ -248,6 +261,12 @@ mod tests {
         assert!(timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange));
         assert!(!timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange + 1));
         assert!(!timing.exchange_fits(MessageType::Sync, start));
+        // A parameter takes longer to set than to read; the answer is the same.
+        let [get, set] = [MessageType::ParamGet, MessageType::ParamSet]
+            .map(|request| timing.exchange_us(request).expect("a request"));
+        let longer =
+            timing.frame_us(MessageType::ParamSet) - timing.frame_us(MessageType::ParamGet);
+        assert_eq!(set - get, longer + 900);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Parameters of a wheel board as the application uses them.
 
-use core::hash::{Hash, Hasher};
 use crate::parameters::WheelParameters;
 use crate::supervisor::{SupervisionTimes, watchdog};
+use core::hash::{Hash, Hasher};
 use wheeleg_control::wheel::{LeadFilter, SampleTimer, WheelAcceleration, WheelMode};
 use wheeleg_protocol::WheelControlMode;
 use wheeleg_protocol::link::CYCLE_US;

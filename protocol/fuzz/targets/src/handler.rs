@@ -366,7 +366,10 @@ impl<B: Board> Play<'_, B> {
                             let late = start - TURNAROUND_US;
                             assert!(late.is_multiple_of(pitch) && late < 8 * pitch, "{start}");
                         } else {
-                            assert_eq!(start, TURNAROUND_US);
+                            let due = request.as_ref().map_or(TURNAROUND_US, |request| {
+                                SlotTiming::turnaround_us(request.message_type())
+                            });
+                            assert_eq!(start, due);
                         }
                         assert_eq!(envelope.sequence, sound.sequence);
                         assert!(!matches!(answer, Message::SlotReply(_)));
