@@ -13,6 +13,8 @@ const WATCHDOG: u32 = 1 << 29;
 /// RCC_CSR: brown-out or power-on.
 const BROWN_OUT: u32 = 1 << 27;
 const TICK_NS: u64 = 1_000_000;
+/// Sample of a wheel.
+const SAMPLE_NS: u64 = 520_000;
 
 /// One emulated joint board, alone on its bus.
 struct Bench {
@@ -100,6 +102,29 @@ fn a_board_comes_up_ticks_and_sees_what_is_latched() {
         (1..figures.stack_size).contains(&figures.stack_used),
         "{figures:?}"
     );
+}
+
+#[test]
+fn outputs_are_driven_low_within_the_first_instructions_after_every_reset() {
+    for (address, period_ns) in [(2, TICK_NS), (7, SAMPLE_NS)] {
+        let mut bench = Bench::new(address);
+        let low_after = |bench: &mut Bench| {
+            let last = (0..50)
+                .map(|_| bench.tick_of(period_ns, Power::Good))
+                .last();
+            last.expect("a reply").figures.outputs_low_after
+        };
+        // Before memory is set up, which takes thousands; two clocks and three ports
+        // take about forty.
+        let at_power_up = low_after(&mut bench);
+        assert!((10..=64).contains(&at_power_up), "{at_power_up}");
+        bench.tick_of(period_ns, Power::BrownOut);
+        assert_eq!(low_after(&mut bench), at_power_up, "after a brown-out");
+        assert_eq!(bench.ask(&Request::Hook(Hook::StopProcessor)), Reply::Done);
+        let bitten = (0..150).any(|_| bench.tick_of(period_ns, Power::Good).trip.is_some());
+        assert!(bitten);
+        assert_eq!(low_after(&mut bench), at_power_up, "after a watchdog reset");
+    }
 }
 
 #[test]

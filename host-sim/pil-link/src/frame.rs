@@ -173,6 +173,7 @@ mod tests {
             resets: u16::MAX,
             driver_timeouts: u16::MAX,
             late_bytes: u32::MAX,
+            outputs_low_after: u32::MAX,
         };
         let trip = Trip {
             at_ns: u64::MAX,

@@ -121,6 +121,9 @@ pub struct Figures {
     /// Bytes that came after the processor had already run past their end; the
     /// time stamps of their frames are late by up to 50 µs.
     pub late_bytes: u32,
+    /// Instructions from the newest reset until every pin that drives a valve, the motor
+    /// or the dump was an output at low; 0 until then.
+    pub outputs_low_after: u32,
 }
 
 /// Reset flag of the independent watchdog in [`Trip::cause`] (RM0440, RCC_CSR).

@@ -158,6 +158,7 @@ mod tests {
                     stack_size_bytes: 24_576,
                     resets: 0,
                     late_bytes: 0,
+                    late_frames: 0,
                 }],
             });
             let (r, a) = (&recording, &analysis);

@@ -158,12 +158,12 @@ mod tests {
         let input = CounterInput::default();
         let mut application = input.clone();
         input.latch(8_388_607);
-        assert_eq!(application.count().get(), 8_388_607);
+        assert_eq!(application.count(WheelCount::ZERO).get(), 8_388_607);
         input.latch(8_388_608);
-        assert_eq!(application.count().get(), -8_388_608);
+        assert_eq!(application.count(WheelCount::ZERO).get(), -8_388_608);
         input.latch(-1);
-        assert_eq!(application.count().get(), -1);
+        assert_eq!(application.count(WheelCount::ZERO).get(), -1);
         input.latch((1 << 40) + 5);
-        assert_eq!(application.count().get(), 5);
+        assert_eq!(application.count(WheelCount::ZERO).get(), 5);
     }
 }

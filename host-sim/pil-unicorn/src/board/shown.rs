@@ -173,6 +173,7 @@ impl Board {
         let retired = state.retired();
         self.figures.instructions = (retired - self.retired) as u32;
         self.figures.longest_awake = state.longest_awake as u32;
+        self.figures.outputs_low_after = state.outputs_low_after.unwrap_or(0) as u32;
         self.figures.driver_timeouts = state.soc.driver_timeouts;
         self.retired = retired;
         if self.edges.is_multiple_of(STACK_EVERY) {

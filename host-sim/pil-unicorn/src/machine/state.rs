@@ -85,6 +85,10 @@ pub(crate) struct State {
     pub(crate) tick_instructions: u64,
     /// Longest stretch so far.
     pub(crate) longest_awake: u64,
+    /// Instructions from the newest reset until all outputs were driven low.
+    pub(crate) outputs_low_after: Option<u64>,
+    /// Instructions at the newest reset.
+    reset_at: u64,
     /// Kept if somebody asks for it.
     pub(crate) profile: Option<Profile>,
     /// The main loop stands still.
@@ -116,6 +120,8 @@ impl State {
             awake: Awake::default(),
             tick_instructions: 0,
             longest_awake: 0,
+            outputs_low_after: None,
+            reset_at: 0,
             profile: None,
             stop_main_loop: false,
             stop_processor: false,
@@ -128,6 +134,8 @@ impl State {
         self.nvic = Nvic::default();
         self.stop_main_loop = false;
         self.stop_processor = false;
+        self.reset_at = self.retired();
+        self.outputs_low_after = None;
         self.awake = Awake {
             since: self.retired(),
             ..Awake::default()
@@ -172,6 +180,9 @@ impl State {
 
     /// After an access to a peripheral: what is due, and when.
     pub(super) fn touched(&mut self) {
+        if self.outputs_low_after.is_none() && self.soc.outputs_are_low() {
+            self.outputs_low_after = Some(self.retired() - self.reset_at);
+        }
         // Bytes may be worked off before the next sleep; they are no part of the tick.
         if self.soc.watchdog.take_fed() && self.awake.ticks == 1 && self.awake.others == 0 {
             self.tick_instructions = self.awake_instructions();

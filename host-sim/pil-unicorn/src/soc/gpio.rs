@@ -43,6 +43,11 @@ impl Port {
         self.mode(pin) == 1 && self.odr >> pin & 1 != 0
     }
 
+    /// Whether a pin is an output that the program drives low.
+    pub(crate) fn drives_low(&self, pin: u32) -> bool {
+        self.mode(pin) == 1 && self.odr >> pin & 1 == 0
+    }
+
     /// Whether a pin is analogue.
     pub(crate) fn is_analogue(&self, pin: u32) -> bool {
         self.mode(pin) == 3
@@ -120,9 +125,9 @@ mod tests {
         assert_eq!(port.read(0x10), Ok(1), "strap to ground");
         port.write(0x00, 1 << 4).expect("modelled");
         port.write(0x18, 4).expect("modelled");
-        assert!(port.drives_high(2) && !port.carries(2, 0));
+        assert!(port.drives_high(2) && !port.drives_low(2) && !port.carries(2, 0));
         port.write(0x18, 4 << 16).expect("modelled");
-        assert!(!port.drives_high(2));
+        assert!(!port.drives_high(2) && port.drives_low(2) && !port.drives_low(1));
     }
 
     #[test]

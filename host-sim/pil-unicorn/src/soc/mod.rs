@@ -113,6 +113,15 @@ pub(crate) struct Soc {
 }
 
 impl Soc {
+    /// Whether every pin that drives a valve, the motor or the dump is an output at low.
+    pub(crate) fn outputs_are_low(&self) -> bool {
+        let [a, b, c, _] = &self.ports;
+        wiring::VALVES.iter().all(|(pin, _)| a.drives_low(*pin))
+            && b.drives_low(wiring::DIRECTION)
+            && b.drives_low(wiring::DUMP)
+            && c.drives_low(wiring::PULSE)
+    }
+
     pub(crate) fn new(store: Vec<u8>, unique_id: [u8; 12], crystal: bool, cause: u32) -> Self {
         Self {
             rcc: Rcc::new(crystal, cause),
