@@ -3,7 +3,8 @@
     check_mcap.py RUN_DIR
 
 Every channel must have a topic, a schema (name, encoding `jsonschema`, one
-property per field, each with a type and a unit) and at least one message.
+property per field, each with a type and a unit) and at least one message; only a
+channel that is written on change may be empty, but for those of events.
 Every message must be JSON that fits its schema, and the time of a channel must
 never run backwards. Ends with 0 if all of that holds, with 1 and one line per defect if
 not, with 2 if there is no log to check.
@@ -19,6 +20,9 @@ from mcap.reader import make_reader
 
 # Defects shown per log; a broken writer makes the same one a thousand times.
 SHOWN = 40
+
+# Written on change, and never empty.
+EVENTS = ("/events", "/run")
 
 JSON_TYPES = {
     "number": lambda v: isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v),
@@ -129,7 +133,8 @@ def check(path):
     rows = []
     for channel in summary.channels.values():
         schema = summary.schemas.get(channel.schema_id)
-        if counts[channel.id] == 0:
+        on_change = channel.metadata.get("rate_hz") == "on change" and channel.topic not in EVENTS
+        if counts[channel.id] == 0 and not on_change:
             defects.append(f"{channel.topic}: no message")
         rows.append((channel.topic, schema.name if schema else "-", counts[channel.id]))
     return defects, sorted(rows)
