@@ -8,16 +8,15 @@ mod bench;
 mod sil;
 
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use bench::pil::Board;
 use bench::power_up;
-use sil::{at, energised, gait, range, robot, window};
+use sil::{at, energised, gait, range, robot, run_with, window};
 use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
 use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
-use wheeleg_sim::telemetry::{JointSample, Recorder, Recording, Row};
+use wheeleg_sim::telemetry::{JointSample, Recording, Row};
 
 /// Valves commanded shut and wheel ramps begun within this, s.
 const REACTION_S: f64 = 0.060;
@@ -31,18 +30,6 @@ const WATCHDOG_S: [f64; 2] = [0.0480, 0.0505];
 
 const HOLD: u8 = 4;
 const EXHAUST: u8 = 5;
-
-/// A run with some nodes as images.
-fn run(scenario: &Scenario, nodes: &Nodes) -> (Recording, PilSummary) {
-    let mut recorder = Recorder::in_memory();
-    let outcome =
-        wheeleg_sim::sil::run_with(scenario, &robot(), 1, nodes, &mut recorder, &mut |_| {
-            ControlFlow::Continue(())
-        })
-        .expect("the run gets to its end");
-    let recording = recorder.finish().expect("nothing is written to a file");
-    (recording, outcome.pil.expect("boards outside"))
-}
 
 fn one(choice: &str) -> Nodes {
     let choice: NodeChoice = choice.parse().expect("a node");
@@ -87,7 +74,7 @@ fn the_master_dies_and_every_image_goes_to_its_safe_state() {
     // The wheels push; the foot is in the air.
     for t in [1.0, 2.1] {
         let scenario = gait(LegChoice::Left, t + 1.0, &[(t, EventAction::KillMaster)]);
-        let (recording, pil) = run(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+        let (recording, pil) = run_with(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
         assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
         let mut worst_ms = [0.0_f64; 2];
         for (joint, rows) in recording.joints.iter().enumerate() {
@@ -136,7 +123,7 @@ fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
     // while it hears broken frames itself.
     let mut scenario = gait(LegChoice::Left, 2.5, &[]);
     scenario.faults = vec!["bit-errors=1e-4@0s..1.5s".parse().expect("a fault")];
-    let (recording, pil) = run(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+    let (recording, pil) = run_with(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     for (board, rows) in pil.boards.iter().zip(&recording.links) {
         assert_eq!(board.late_frames, 0, "{}", board.node);
@@ -217,10 +204,10 @@ fn assert_shut_after_one_reset(
 
 #[test]
 fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
-    let (sound, _) = run(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
+    let (sound, _) = run_with(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
     let t = busy(&sound.joints[1]);
     let scenario = gait_with(&format!("node-hang:joint2@{t:.3}s"), t + 1.0);
-    let (recording, pil) = run(&scenario, &one("joint2=pil"));
+    let (recording, pil) = run_with(&scenario, &one("joint2=pil"));
     let rows = &recording.joints[1];
     // The hardware goes on with what it was told last.
     let hung = window(rows, t + 2.0 * TICK_S, t + 0.040);
@@ -245,10 +232,10 @@ fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
 
 #[test]
 fn a_brown_out_in_mid_move_turns_the_outputs_off_and_the_board_comes_back_disarmed() {
-    let (sound, _) = run(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
+    let (sound, _) = run_with(&gait(LegChoice::Left, 2.5, &[]), &one("joint2=pil"));
     let t = busy(&sound.joints[1]);
     let scenario = gait_with(&format!("brown-out:joint2=30@{t:.3}s"), t + 1.0);
-    let (recording, pil) = run(&scenario, &one("joint2=pil"));
+    let (recording, pil) = run_with(&scenario, &one("joint2=pil"));
     let rows = &recording.joints[1];
     let commanded = last(rows, t, energised);
     // The fault strikes within the tick of its instant; the next one has none.

@@ -6,21 +6,17 @@
 mod bench;
 mod sil;
 
-use std::ops::ControlFlow;
-
 use bench::pil::{Board, edge};
 use bench::{delivery, numbered, power_up};
-use sil::{command, robot, stand};
+use sil::{command, command_about, run_with, stand};
 use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request};
 use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{
     Address, Decoder, FaultRecord, FaultReport, Message, NackReason, ParamGet, ParamSave, ParamSet,
     ResetCause,
 };
-use wheeleg_sim::config::{EventAction, ParameterChoice};
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_sim::pil::{NodeKind, Nodes};
-use wheeleg_sim::telemetry::Recorder;
 
 const ADDRESS: u8 = 2;
 const MS: u64 = 1_000_000;
@@ -182,44 +178,33 @@ fn a_power_cut_in_any_unit_of_a_save_leaves_the_old_value_or_the_new_one_and_a_d
     assert_eq!(found, expected, "the word with the checksum decides");
 }
 
-/// A command about a board, and a parameter of it.
-fn about(name: &str, board: u8, parameter: Option<(u16, Option<i32>)>) -> EventAction {
-    let EventAction::Command { name, joint, .. } = command(name) else {
-        unreachable!("a command");
-    };
-    EventAction::Command {
-        name,
-        joint,
-        stroke_m: None,
-        travel_m: None,
-        board: Some(board),
-        parameter: parameter.map(|(id, raw)| ParameterChoice { id, raw }),
-    }
-}
-
 #[test]
 fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
     // The law that takes longest to set up, and one value of a wheel.
     let (law, error) = (JointParam::Law.id(), WheelParam::FollowingError.id());
     let events = [
         (0.2, command("Disarm")),
-        (0.4, about("WriteParameter", 3, Some((law, Some(5))))),
-        (0.6, about("WriteParameter", 8, Some((error, Some(12_345))))),
-        (0.8, about("SaveParameters", 3, None)),
-        (1.0, about("SaveParameters", 8, None)),
-        (1.2, about("WriteParameter", 3, Some((law, Some(1))))),
-        (1.4, about("ReadParameter", 3, Some((law, None)))),
-        (1.6, about("ReadParameter", 8, Some((error, None)))),
+        (
+            0.4,
+            command_about("WriteParameter", 3, Some((law, Some(5)))),
+        ),
+        (
+            0.6,
+            command_about("WriteParameter", 8, Some((error, Some(12_345)))),
+        ),
+        (0.8, command_about("SaveParameters", 3, None)),
+        (1.0, command_about("SaveParameters", 8, None)),
+        (
+            1.2,
+            command_about("WriteParameter", 3, Some((law, Some(1)))),
+        ),
+        (1.4, command_about("ReadParameter", 3, Some((law, None)))),
+        (1.6, command_about("ReadParameter", 8, Some((error, None)))),
     ];
     let scenario = stand(1.8, &events);
     let nodes = Nodes::new(&NodeKind::Pil, &[]);
-    let mut recorder = Recorder::in_memory();
-    let go_on = &mut |_| ControlFlow::Continue(());
-    let outcome = wheeleg_sim::sil::run_with(&scenario, &robot(), 1, &nodes, &mut recorder, go_on)
-        .expect("the run gets to its end");
-    let pil = outcome.pil.expect("boards outside");
+    let (recording, pil) = run_with(&scenario, &nodes);
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
-    let recording = recorder.finish().expect("nothing is written to a file");
     let events = recording.events.iter().map(|row| row.v.text.as_str());
     let said: Vec<&str> = events.filter(|text| text.contains("parameter ")).collect();
     let values: Vec<&str> = said

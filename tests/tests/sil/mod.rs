@@ -6,8 +6,10 @@
 use std::ops::ControlFlow;
 
 use wheeleg_sim::config::{
-    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
+    EventAction, LegChoice, Motion, ParameterChoice, RobotConfig, Scenario, ScenarioEvent,
+    TargetSet, builtin,
 };
+use wheeleg_sim::pil::{Nodes, PilSummary};
 use wheeleg_sim::telemetry::{FootSample, JointSample, Recorder, Recording, Row};
 
 /// The one robot.
@@ -69,6 +71,34 @@ pub(crate) fn command_to(name: &str, joint: u8) -> EventAction {
         board: None,
         parameter: None,
     }
+}
+
+/// A user command about one board, and perhaps a parameter of it, by number and raw value.
+pub(crate) fn command_about(
+    name: &str,
+    board: u8,
+    parameter: Option<(u16, Option<i32>)>,
+) -> EventAction {
+    EventAction::Command {
+        name: name.to_owned(),
+        joint: None,
+        stroke_m: None,
+        travel_m: None,
+        board: Some(board),
+        parameter: parameter.map(|(id, raw)| ParameterChoice { id, raw }),
+    }
+}
+
+/// Simulates a scenario to its end, with some nodes outside.
+pub(crate) fn run_with(scenario: &Scenario, nodes: &Nodes) -> (Recording, PilSummary) {
+    let mut recorder = Recorder::in_memory();
+    let outcome =
+        wheeleg_sim::sil::run_with(scenario, &robot(), 1, nodes, &mut recorder, &mut |_| {
+            ControlFlow::Continue(())
+        })
+        .expect("the run gets to its end");
+    let recording = recorder.finish().expect("nothing is written to a file");
+    (recording, outcome.pil.expect("boards outside"))
 }
 
 /// Simulates a scenario to its end.

@@ -226,22 +226,22 @@ impl AxisModel {
         // 2^29 × 2^20 × 2^8.
         let flow_24 =
             u64::from(data.conductance.to_bits().unsigned_abs()).wrapping_mul(CHOKED_MM3_S);
-        let flow_a_16 = ratio(flow_24.wrapping_shl(8), area_a_16);
-        let flow_b_16 = ratio(flow_24.wrapping_shl(8), area_b_16);
+        let flow_a_16 = divide(flow_24.wrapping_shl(8), area_a_16);
+        let flow_b_16 = divide(flow_24.wrapping_shl(8), area_b_16);
         let tick_us = micros(tick);
         let horizon_us = tick_us
             .wrapping_add(micros(data.valve_on))
             .wrapping_add(micros(data.line_delay));
-        let seconds_32 = |us: u64| ratio(us.wrapping_shl(32), 1_000_000);
+        let seconds_32 = |us: u64| divide(us.wrapping_shl(32), 1_000_000);
 
         let ambient_8 = AMBIENT_PA << 8;
         // kPa × 2^16 to Pa × 2^8: × 1000 / 256.
         let supply_8 = raw(data.supply).wrapping_mul(1000).wrapping_shr(8);
         let low_8 = percent(ambient_8, 103);
-        let high_8 = ratio(supply_8.wrapping_mul(985), 1000);
+        let high_8 = divide(supply_8.wrapping_mul(985), 1000);
         let mean_8 = ambient_8.wrapping_add(supply_8).wrapping_shr(1);
         // mN per 1/256 Pa × 2^32: 2^24 / 1000 × mm².
-        let force_32 = |area_16: u64| ratio(area_16.wrapping_mul(256), 1000);
+        let force_32 = |area_16: u64| divide(area_16.wrapping_mul(256), 1000);
         let force = |pa_8: u64, area_16: u64| pa_8.wrapping_mul(force_32(area_16)).wrapping_shr(32);
         let rod = force(ambient_8, area_rod_16);
         let force_out = less(less(force(high_8, area_a_16), force(low_8, area_b_16)), rod);
@@ -254,10 +254,10 @@ impl AxisModel {
         // C ρ0 R T / area.
         let slower_16 = flow_b_16.min(flow_a_16.wrapping_mul(3).wrapping_shr(1));
         let top_16 = percent(slower_16, TOP_PERCENT);
-        let per_horizon_8 = |percents: u64| ratio(percents.wrapping_mul(2_560_000), horizon_us);
+        let per_horizon_8 = |percents: u64| divide(percents.wrapping_mul(2_560_000), horizon_us);
         let slope_8 = per_horizon_8(SLOPE_PERCENT);
         // × 2^14: 2^25 × 2^37.
-        let slope_14 = ratio((SLOPE_PERCENT * 10_000) << 14, horizon_us);
+        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, horizon_us);
         let brake = percent(
             slope_14.wrapping_mul(top_16).wrapping_shr(30),
             BRAKE_PERCENT,
@@ -270,7 +270,7 @@ impl AxisModel {
         };
         let stiffness_8 = |pa_8: u64, area_16: u64, dead: PositionMm| {
             // 2^29 × 2^29, Pa/mm.
-            ratio(pa_8.wrapping_mul(area_16), volume_8(dead, area_16)).wrapping_shr(8)
+            divide(pa_8.wrapping_mul(area_16), volume_8(dead, area_16)).wrapping_shr(8)
         };
         let both_8 = percent(stiffness_8(supply_8, area_a_16, data.dead_a), 90)
             .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b));
@@ -279,18 +279,18 @@ impl AxisModel {
             .wrapping_shr(20)
             .wrapping_mul(both_8)
             .wrapping_shr(13);
-        let slew = ratio(slew.wrapping_mul(EXPONENT_PERCENT), 100_000);
+        let slew = divide(slew.wrapping_mul(EXPONENT_PERCENT), 100_000);
         // kg = mN/s over mm/s³. 2^37 × 2^24.
-        let nimble_16 = ratio(
+        let nimble_16 = divide(
             percent(slew, 90).wrapping_shl(24),
             brake.wrapping_mul(slope_8),
         );
 
         let to_mn = |newton: PositionMm| raw(newton).wrapping_mul(1000).wrapping_shr(16);
         // 1/256 Pa per mN for an area in mm²: 256 000/area, × 2^12.
-        let per_force_12 = |area_16: u64| ratio((256_000 << 12) << 16, area_16);
+        let per_force_12 = |area_16: u64| divide((256_000 << 12) << 16, area_16);
         let lead_16 = |dead: PositionMm, area_16: u64| {
-            ratio(raw(dead).wrapping_mul(1000).wrapping_shl(16), area_16)
+            divide(raw(dead).wrapping_mul(1000).wrapping_shl(16), area_16)
         };
         let critical = u64::from(data.critical_ratio.to_bits().unsigned_abs());
         let times = ValveTimes {
@@ -305,7 +305,7 @@ impl AxisModel {
             times,
             curve: FlowCurve {
                 critical: critical.wrapping_shr(9) as u32,
-                stretch: ratio(1 << 39, less(1 << 24, critical)) as u32,
+                stretch: divide(1 << 39, less(1 << 24, critical)) as u32,
             },
             supply: number(supply_8),
             ambient: number(ambient_8),
@@ -319,7 +319,7 @@ impl AxisModel {
             force_b: number(force_32(area_b_16)),
             force_rod: number(rod),
             half_pressure_a: number(per_force_12(area_a_16.wrapping_shl(1))),
-            area_ratio: number(ratio(area_a_16.wrapping_shl(24), area_b_16)),
+            area_ratio: number(divide(area_a_16.wrapping_shl(24), area_b_16)),
             pressure_b: number(per_force_12(area_b_16)),
             pressure_a: number(per_force_12(area_a_16)),
             mean: number(mean_8),
@@ -343,12 +343,12 @@ impl AxisModel {
             observe_speed: number(
                 seconds_32(tick_us.wrapping_mul(3 * OBSERVER * OBSERVER)).wrapping_shr(16),
             ),
-            observe_load: number(ratio(
+            observe_load: number(divide(
                 tick_us.wrapping_mul(OBSERVER * OBSERVER * OBSERVER),
                 1_000_000,
             )),
             // Five times the break-away force in a second, × 2^8.
-            stick_step: number(ratio(
+            stick_step: number(divide(
                 to_mn(data.breakaway)
                     .wrapping_mul(tick_us)
                     .wrapping_mul(5 << 8),
@@ -359,15 +359,10 @@ impl AxisModel {
     }
 }
 
-/// `a / b`, rounded down; 0 where there is no quotient.
-fn ratio(a: u64, b: u64) -> u64 {
-    divide(a, b)
-}
-
 /// `value × percents / 100`, to one in a hundred thousand.
 #[inline(never)]
 fn percent(value: u64, percents: u64) -> u64 {
-    ratio(value.wrapping_mul(percents), 100)
+    divide(value.wrapping_mul(percents), 100)
 }
 
 /// `a − b`, at least zero.

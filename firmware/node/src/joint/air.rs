@@ -2,8 +2,9 @@
 //!
 //! A board has no pressure sensor, but it knows every on-time it has sent and every
 //! stroke it has read. [`Air`] follows both chambers with that, for supervision only,
-//! whatever law drives: cheap rather than exact, each chamber in every third tick. Volumes are lengths, volume over
-//! piston area, and with n = 1.2 a chamber of length L obeys
+//! whatever law drives: cheap rather than exact, each chamber in every third tick.
+//! Volumes are lengths, volume over piston area, and with n = 1.2 a chamber of length L
+//! obeys
 //!
 //! ```text
 //! Δp = n (C' t_fill ψ_s − C' t_vent ψ_v p − p Δx) / L        C' = C ρ0 R T / area
