@@ -1,6 +1,7 @@
 //! What a board knows about itself after a tick, for telemetry and the simulator.
 
 use crate::mode::Mode;
+use wheeleg_control::pwm::OnTimes;
 use wheeleg_control::wheel::WheelOutput;
 use wheeleg_protocol::{FaultBits, LimitBits};
 use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, WheelCount};
@@ -36,7 +37,7 @@ pub struct JointSnapshot {
     pub duty: Duty,
     /// Energised time of each coil in the tick that follows, µs; order
     /// `[fill A, vent A, fill B, vent B]`.
-    pub pulses: [Micros; 4],
+    pub pulses: OnTimes,
     /// Debounced switches, one bit each.
     pub switches: u8,
     /// Latched faults.
@@ -81,7 +82,7 @@ impl JointSnapshot {
             commanded: PositionMm::ZERO,
             velocity: VelocityMmS::ZERO,
             duty: Duty::ZERO,
-            pulses: [Micros::ZERO; 4],
+            pulses: [0; 4],
             switches: 0,
             faults: FaultBits::NONE,
             limits: LimitBits::NONE,

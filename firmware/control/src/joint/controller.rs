@@ -10,7 +10,7 @@ use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{
-    Duty, PositionMm, VelocityMmS, divide_signed, saturate_i16, saturate_i32,
+    Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32,
     shift_right_round_inner,
 };
 
@@ -18,8 +18,6 @@ use wheeleg_units::{
 const PHYSICAL_SHIFT: u32 = 24 + 16 - 30;
 /// From gain (24) × rule output (15) fractional bits to duty (30).
 const RULE_SHIFT: u32 = 24 + 15 - 30;
-/// The fade offset is at most ±4, so that its arithmetic can not overflow.
-const FADE_LIMIT: i64 = 4 << 30;
 
 /// Controller of one joint: configuration and state.
 ///
@@ -34,14 +32,14 @@ pub struct JointController {
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
     integral: i64,
-    /// u before the limit, × 2^30, of the last tick, and whether it tracked.
-    last_law: i64,
+    /// u before the limit, × 2^30 and within ±2, of the last tick, and whether it tracked.
+    last_law: i32,
     tracked: bool,
     /// Set by a change of law: the next tick continues from `last_law`.
     changed: bool,
     /// What is still added to the law after a change, × 2^30, and its decay.
-    fade: i64,
-    fade_step: i64,
+    fade: i32,
+    fade_step: i32,
     /// On-times that were last sent, whoever chose them.
     sent: OnTimes,
     /// The predictive law, when it is chosen.
@@ -213,7 +211,8 @@ impl JointController {
         let error_rate = input.reference_velocity.saturating_sub(velocity);
 
         let law = self.law(error, error_rate, input.reference_velocity, &mut limits);
-        let law = self.faded(law);
+        // What is beyond ±2 is cut to a duty of ±1 in any case.
+        let law = self.faded(saturate_i32(law));
         self.last_law = law;
         self.tracked = true;
 
@@ -299,43 +298,40 @@ impl JointController {
             .wrapping_add(shift_right_round_inner(correction, RULE_SHIFT))
     }
 
-    /// Adds what is left of the last change of law.
+    /// Adds what is left of the last change of law; a bump of more than 2, from one
+    /// end of the duty beyond the other, is faded by that much.
     #[inline]
-    fn faded(&mut self, law: i64) -> i64 {
+    fn faded(&mut self, law: i32) -> i32 {
         if self.changed {
             self.changed = false;
-            let ticks = i64::from(self.config.bumpless_ticks);
-            if ticks == 0 {
-                self.fade = 0;
-            } else {
-                let last = if self.tracked { self.last_law } else { law };
-                let bump = last.wrapping_sub(law);
-                self.fade = within(bump, FADE_LIMIT);
-                // Rounded up: the fade ends within the configured time.
-                let step = divide_signed(self.fade.wrapping_abs(), ticks);
-                self.fade_step = step.wrapping_add(1);
+            let last = if self.tracked { self.last_law } else { law };
+            // Symmetric, so that its magnitude is a number, too.
+            self.fade = last.saturating_sub(law).max(-i32::MAX);
+            // Rounded up: the fade ends within the configured time.
+            match self.fade.unsigned_abs().checked_div(self.config.bumpless_ticks) {
+                // Below 2^31.
+                Some(step) => self.fade_step = (step as i32).saturating_add(1),
+                None => self.fade = 0,
             }
         } else if self.fade > 0 {
             self.fade = self.fade.wrapping_sub(self.fade_step).max(0);
         } else {
             self.fade = self.fade.wrapping_add(self.fade_step).min(0);
         }
-        law.wrapping_add(self.fade)
+        law.saturating_add(self.fade)
     }
 
     /// Minimum, dead-zone compensation and limit.
     #[inline]
     fn shaped(
         &self,
-        law: i64,
+        law: i32,
         error: PositionMm,
         reference_velocity: VelocityMmS,
         limits: &mut JointLimits,
     ) -> Duty {
         let gains = self.config.gains();
-        // Beyond 32 bits it is cut to the limit, which is 2^30 at most, as it is at
-        // their end. The sum stays below 2^32, and no duty of the gains is negative.
-        let law = saturate_i32(law);
+        // At most 2^31: the sum stays below 2^32, and no duty of the gains is negative.
         let magnitude = law.unsigned_abs();
         if magnitude == 0 {
             return Duty::ZERO;
@@ -408,9 +404,9 @@ impl Hash for State<'_> {
         velocity.hash(state);
         settle.hash(state);
         state.write_i64(*integral);
-        state.write_i64(*last_law);
-        state.write_i64(*fade);
-        state.write_i64(*fade_step);
+        state.write_i32(*last_law);
+        state.write_i32(*fade);
+        state.write_i32(*fade_step);
     }
 }
 

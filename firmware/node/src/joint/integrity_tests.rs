@@ -72,7 +72,7 @@ fn ticks_to_hold(mut node: Node, most: u32, damage: impl FnOnce(&mut Node)) -> O
     (1..=most).find(|tick| {
         node.tick(Micros(20_000 + tick * 1000));
         let held = node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt);
-        held && node.snapshot().pulses == [Micros::ZERO; 4]
+        held && node.snapshot().pulses == [0; 4]
     })
 }
 
@@ -134,7 +134,7 @@ fn found_in_turn(damage: impl Fn(&mut Node)) {
             node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt)
         });
         latest = latest.max(found.expect("found within one round"));
-        assert_eq!(node.snapshot().pulses, [Micros::ZERO; 4]);
+        assert_eq!(node.snapshot().pulses, [0; 4]);
     }
     assert_eq!(latest, PARTS as u32, "each part is looked at once a round");
 }

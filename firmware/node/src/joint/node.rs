@@ -217,7 +217,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let _ = self.write([0; 4]);
         self.snapshot.mode = self.core.mode();
         self.snapshot.faults = self.faults();
-        self.snapshot.pulses = [Micros::ZERO; 4];
+        self.snapshot.pulses = [0; 4];
     }
 
     /// The tick's work ended at `end`; a tick longer than its period is a

@@ -121,8 +121,6 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Notes the tick; limits and rest are noted by the caller.
     #[inline]
     fn record(&mut self, now: Micros, velocity: VelocityMmS, duty: Duty, on_times: OnTimes) {
-        let micros = |on: u16| Micros(u32::from(on));
-        let [fill_a, vent_a, fill_b, vent_b] = on_times;
         // Field by field: a whole one would be made elsewhere and copied.
         let snapshot = &mut self.snapshot;
         snapshot.at = now;
@@ -132,12 +130,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         snapshot.commanded = self.target.reference();
         snapshot.velocity = velocity;
         snapshot.duty = duty;
-        snapshot.pulses = [
-            micros(fill_a),
-            micros(vent_a),
-            micros(fill_b),
-            micros(vent_b),
-        ];
+        snapshot.pulses = on_times;
         snapshot.switches = self.switches.state();
         snapshot.faults = self.core.supervisor.faults().latched();
     }
