@@ -7,6 +7,7 @@ mod sil;
 use sil::{at, command, energised, gait, range, robot, run, story, window};
 use wheeleg_sim::config::{EventAction, LegChoice};
 use wheeleg_sim::telemetry::{JointSample, Recording, Row};
+use wheeleg_tests::{STEP, mix};
 
 /// Valves commanded shut and wheel ramps begun within this, s.
 const REACTION_S: f64 = 0.060;
@@ -26,9 +27,8 @@ const VENTS: u8 = 0b1010;
 /// Instant `k` of `n` spread over the three steps, at random within its part (the
 /// same every time: a hash of the number).
 fn spread(k: u64, n: u64) -> f64 {
-    let mut x = k.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let share = (x >> 40) as f64 / (1_u64 << 24) as f64;
+    let random = mix(k.wrapping_add(1).wrapping_mul(STEP));
+    let share = (random >> 40) as f64 / (1_u64 << 24) as f64;
     // On the grid of the samples.
     ((0.1 + (k as f64 + share) * 9.8 / n as f64) * 1e3).round() * 1e-3
 }

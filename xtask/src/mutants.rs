@@ -15,7 +15,7 @@ const VERSION: &str = "27.1.0";
 
 /// Files whose mistakes could leave an axis energised, and the packages whose
 /// tests must notice. What stands together is built and tested together.
-const GROUPS: [(&[&str], &[&str]); 2] = [
+const GROUPS: [(&[&str], &[&str]); 3] = [
     (
         &[
             "firmware/node/src/mode.rs",
@@ -24,6 +24,9 @@ const GROUPS: [(&[&str], &[&str]); 2] = [
             "firmware/node/src/overrun.rs",
             "firmware/node/src/sensor.rs",
             "firmware/node/src/supervisor.rs",
+            "firmware/node/src/store/mod.rs",
+            "firmware/node/src/joint/air.rs",
+            "firmware/node/src/joint/expectation.rs",
             "firmware/node/src/joint/outputs.rs",
             "firmware/node/src/wheel/outputs.rs",
         ],
@@ -32,6 +35,14 @@ const GROUPS: [(&[&str], &[&str]); 2] = [
     (
         &["protocol/src/link/supervisor.rs"],
         &["wheeleg-protocol", "wheeleg-node"],
+    ),
+    (
+        &[
+            "firmware/master/src/layer0/line.rs",
+            "firmware/master/src/layer0/nodes.rs",
+            "firmware/master/src/layer0/questions.rs",
+        ],
+        &["wheeleg-master"],
     ),
 ];
 

@@ -64,6 +64,34 @@ pub enum EventAction {
     },
 }
 
+impl EventAction {
+    /// A user command without arguments.
+    #[must_use]
+    pub fn command(name: &str) -> Self {
+        Self::Command {
+            name: name.to_owned(),
+            joint: None,
+            stroke_m: None,
+            travel_m: None,
+            board: None,
+            parameter: None,
+        }
+    }
+
+    /// A user command about board 1 to 8, and perhaps a parameter of it.
+    #[must_use]
+    pub fn about(name: &str, board: u8, parameter: Option<ParameterChoice>) -> Self {
+        Self::Command {
+            name: name.to_owned(),
+            joint: None,
+            stroke_m: None,
+            travel_m: None,
+            board: Some(board),
+            parameter,
+        }
+    }
+}
+
 /// A parameter of a board, and a value for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ParameterChoice {

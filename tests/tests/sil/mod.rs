@@ -51,14 +51,7 @@ fn with_events(motion: Motion, duration_s: f64, events: &[(f64, EventAction)]) -
 
 /// A user command without arguments.
 pub(crate) fn command(name: &str) -> EventAction {
-    EventAction::Command {
-        name: name.to_owned(),
-        joint: None,
-        stroke_m: None,
-        travel_m: None,
-        board: None,
-        parameter: None,
-    }
+    EventAction::command(name)
 }
 
 /// A user command to one joint.
@@ -79,14 +72,8 @@ pub(crate) fn command_about(
     board: u8,
     parameter: Option<(u16, Option<i32>)>,
 ) -> EventAction {
-    EventAction::Command {
-        name: name.to_owned(),
-        joint: None,
-        stroke_m: None,
-        travel_m: None,
-        board: Some(board),
-        parameter: parameter.map(|(id, raw)| ParameterChoice { id, raw }),
-    }
+    let parameter = parameter.map(|(id, raw)| ParameterChoice { id, raw });
+    EventAction::about(name, board, parameter)
 }
 
 /// Simulates a scenario to its end, with some nodes outside.

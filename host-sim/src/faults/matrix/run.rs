@@ -134,7 +134,7 @@ impl Robots {
         if arming_asked {
             scenario
                 .events
-                .push(event(duration_s - ARM_S, command("Arm")));
+                .push(event(duration_s - ARM_S, EventAction::command("Arm")));
         }
         check(&scenario)?;
         let (recording, line, error) = simulate(&scenario, robot, self.seed);
@@ -151,25 +151,10 @@ impl Robots {
     }
 }
 
-fn command(name: &str) -> EventAction {
-    of_board(name, None, None)
-}
-
-fn of_board(name: &str, board: Option<u8>, parameter: Option<ParameterChoice>) -> EventAction {
-    EventAction::Command {
-        name: name.to_owned(),
-        joint: None,
-        stroke_m: None,
-        travel_m: None,
-        board,
-        parameter,
-    }
-}
-
 /// What a user asks of a board's parameters.
 fn asked(ask: &Ask) -> EventAction {
     let (name, node, of) = match *ask {
-        Ask::Disarm => return command("Disarm"),
+        Ask::Disarm => return EventAction::command("Disarm"),
         Ask::Save(node) => ("SaveParameters", node, None),
         Ask::Read(node, of) => ("ReadParameter", node, Some((of, None))),
         Ask::Write(node, of, value) => ("WriteParameter", node, Some((of, Some(value)))),
@@ -181,7 +166,7 @@ fn asked(ask: &Ask) -> EventAction {
             raw: value.map(|value| raw_of(info, value)),
         })
     });
-    of_board(name, Some(node), chosen)
+    EventAction::about(name, node, chosen)
 }
 
 fn stands(phase: Phase) -> bool {
