@@ -41,7 +41,7 @@ const CHECKS: [Check; 7] = [
     Check(
         "mutants",
         "mutations of the code that decides safe states",
-        30,
+        90,
         mutations,
     ),
     Check(

@@ -116,7 +116,7 @@ fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> 
         .arg("--output")
         .arg(&out)
         .env("CARGO_TARGET_DIR", folder.join("build"))
-        // Short builds: there are some two hundred of them.
+        // Short builds: there are some five hundred of them.
         .env("CARGO_PROFILE_TEST_OPT_LEVEL", "1")
         .env("CARGO_PROFILE_TEST_DEBUG", "false")
         .env("CARGO_PROFILE_DEV_DEBUG", "false")
