@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::firmware;
 use crate::no_std::{self, Way, set_up};
-use crate::process::{cargo, command, output, run, target_dir};
+use crate::process::{cargo, command, output, root, run, target_dir};
 use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
 use crate::sizes;
@@ -80,6 +80,9 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     );
     let figures = report.step("three steps on eight emulated boards", || {
         figures(&emulator, &images.folder)
+    });
+    report.step("three steps with the predictive law", || {
+        predictive(&emulator, &images.folder)
     });
     if options.json
         && let Some(figures) = figures
@@ -225,10 +228,23 @@ pub(crate) fn three_steps(
     environment: &[(&str, &Path)],
     further: &[&str],
 ) -> anyhow::Result<Value> {
+    run_nodes(Path::new("three-step"), nodes, folder, environment, further)
+}
+
+/// Runs a scenario with all nodes of one kind; gives its summary.
+fn run_nodes(
+    scenario: &Path,
+    nodes: &str,
+    folder: &str,
+    environment: &[(&str, &Path)],
+    further: &[&str],
+) -> anyhow::Result<Value> {
     run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))?;
     let mut wheeleg = command(target_dir().join("release").join("wheeleg"));
     wheeleg
-        .args(["run", "three-step", "--nodes", nodes, "--json", "--out"])
+        .arg("run")
+        .arg(scenario)
+        .args(["--nodes", nodes, "--json", "--out"])
         .arg(target_dir().join(folder))
         .args(further);
     for (name, value) in environment {
@@ -269,14 +285,7 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     let first = three_steps("pil", "pil-run/first", &environment, &["--compare-sil"])?;
     let second = three_steps("pil", "pil-run/second", &environment, &[])?;
     let pil = &first["pil"];
-    let most = |key: &str, image: &str| {
-        let boards = pil["boards"].as_array().into_iter().flatten();
-        let boards = boards.filter(|board| board["image"] == image);
-        boards
-            .filter_map(|board| board[key].as_u64())
-            .max()
-            .unwrap_or(0)
-    };
+    let most = |key: &str, image: &str| most(pil, key, image);
     let speeds = [&first, &second].map(|run| run["realtime_factor"].as_f64().unwrap_or(0.0));
     let worse = speeds[0].min(speeds[1]);
     let mut figures = json!({
@@ -314,6 +323,63 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     }
     within_budget?;
     Ok(json!({ "pil": figures }))
+}
+
+/// Largest figure of the boards with this image.
+fn most(pil: &Value, key: &str, image: &str) -> u64 {
+    let boards = pil["boards"].as_array().into_iter().flatten();
+    let boards = boards.filter(|board| board["image"] == image);
+    let figures = boards.filter_map(|board| board[key].as_u64());
+    figures.max().unwrap_or(0)
+}
+
+/// A copy of the paper's test in which the joints have the predictive law.
+fn predictive_scenario() -> anyhow::Result<PathBuf> {
+    let folder = target_dir().join("pil-run").join("predictive");
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let changed = |from: &str, to: &str, old: &str, new: &str| {
+        let path = root().join("host-sim").join(from);
+        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        ensure!(text.matches(old).count() == 1, "{from} has no `{old}`");
+        let path = folder.join(to);
+        fs::write(&path, text.replace(old, new)).with_context(|| path.display().to_string())?;
+        Ok(path)
+    };
+    let law = r#"law = { value = 5, unit = "1", source = "ASSUMED: this run's" }"#;
+    changed(
+        "robots/wheeleg-2003.toml",
+        "robot.toml",
+        "[node.joint]\n",
+        &format!("[node.joint]\n{law}\n"),
+    )?;
+    changed(
+        "scenarios/three-step.toml",
+        "three-step.toml",
+        r#"robot = "wheeleg-2003""#,
+        r#"robot = "robot.toml""#,
+    )
+}
+
+/// The paper's test with the predictive law: no bit may differ from the host, and the
+/// worst tick has a budget of its own.
+fn predictive(emulator: &Path, images: &Path) -> StepResult {
+    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
+    let summary = run_nodes(
+        &predictive_scenario()?,
+        "pil",
+        "pil-run/predictive/out",
+        &environment,
+        &["--compare-sil"],
+    )?;
+    let pil = &summary["pil"];
+    let tick = |key| most(pil, key, "joint");
+    let worst = tick("tick_instructions_worst");
+    println!(
+        "    joint tick with the predictive law: {} instructions in the median, {worst} at worst",
+        tick("tick_instructions_median")
+    );
+    ensure_equal(pil)?;
+    sizes::check_predictive(worst)
 }
 
 /// Runs the paper's test on emulated boards and prints the profiles of their worst ticks.

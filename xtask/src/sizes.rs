@@ -94,6 +94,12 @@ pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
     }
 }
 
+/// Holds the worst tick of joint boards with the predictive law against its budget.
+pub(crate) fn check_predictive(tick: u64) -> StepResult {
+    let breach = Budget::read("joint")?.breach_of_predictive(tick);
+    breach.map_or(Ok(()), |text| Err(anyhow::anyhow!("joint: {text}").into()))
+}
+
 struct Row {
     name: &'static str,
     hash: String,

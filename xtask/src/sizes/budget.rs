@@ -16,6 +16,8 @@ pub(super) struct Budget {
     pub(super) stack_margin_min: f64,
     /// Used by the runs on emulated boards.
     pub(super) tick_instructions_max: u64,
+    /// The same with the predictive law, of an image that has it.
+    pub(super) predictive_tick_instructions_max: Option<u64>,
     /// Flash that is known to be missing, if it is.
     pub(super) flash_shortfall: Option<Shortfall>,
     /// Instructions of a tick that are known to be too many, if they are.
@@ -88,6 +90,13 @@ impl Budget {
             ));
         }
         breaches
+    }
+
+    /// What a run with the predictive law has shown to be beyond the limit.
+    pub(super) fn breach_of_predictive(&self, tick: u64) -> Option<String> {
+        let max = self.predictive_tick_instructions_max?;
+        (tick == 0 || tick > max)
+            .then(|| format!("tick {tick} instructions with the predictive law, allowed are {max}"))
     }
 
     /// What runs on emulated boards have shown to be beyond the limits, or beyond
@@ -194,6 +203,19 @@ mod tests {
         assert_eq!(breaches(&budget, max + 50, 100), 0);
         assert_eq!(breaches(&budget, max + 51, 100), 1);
         assert_eq!(breaches(&budget, max, 100), 1, "no shortfall any more");
+    }
+
+    #[test]
+    fn a_tick_of_the_predictive_law_beyond_its_budget_is_a_breach() {
+        let budget = Budget::read("joint").expect("budget");
+        let max = budget
+            .predictive_tick_instructions_max
+            .expect("has the law");
+        assert_eq!(budget.breach_of_predictive(max), None);
+        assert!(budget.breach_of_predictive(max + 1).is_some());
+        assert!(budget.breach_of_predictive(0).is_some(), "not counted");
+        let wheel = Budget::read("wheel").expect("budget");
+        assert_eq!(wheel.breach_of_predictive(u64::MAX), None);
     }
 
     #[test]
