@@ -2,6 +2,7 @@
 //! with `core` from source, and laid down in `target/firmware`.
 
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -54,6 +55,35 @@ const PROBE: &str = "probe_store";
 /// What a reachable panic leaves for the linker to complain about.
 const PANIC_SYMBOL: &str = "this_image_can_panic";
 
+/// Images for a bench board, beside the shipped one of the same kind.
+const BENCH: [(&str, &str); 2] = [("joint-hil", "joint"), ("wheel-hil", "wheel")];
+
+/// What the compiler says to both of `outputs` and `hil` (firmware/board/src/g431/mod.rs).
+const EXCLUSION: &str =
+    "a hardware-in-the-loop image must not contain the code that drives outputs";
+
+/// Registers that a bench image has no business with: where they lie, and which of the
+/// shipped images use them.
+const DRIVERS: [(&str, Range<u32>, &[&str]); 5] = [
+    (
+        "TIM1 (valves)",
+        0x4001_2C00..0x4001_3000,
+        &["joint", "wheel"],
+    ),
+    ("TIM8 (motor)", 0x4001_3400..0x4001_3800, &["wheel"]),
+    (
+        "TIM15 (bus driver)",
+        0x4001_4000..0x4001_4400,
+        &["joint", "wheel"],
+    ),
+    (
+        "USART1 (bus)",
+        0x4001_3800..0x4001_3C00,
+        &["joint", "wheel"],
+    ),
+    ("DMA1 (bus)", 0x4002_0000..0x4002_0400, &["joint", "wheel"]),
+];
+
 /// One image.
 pub(crate) struct Image {
     pub(crate) name: &'static str,
@@ -69,6 +99,10 @@ pub(crate) fn steps(report: &mut Report) {
     report.step(
         "no fixed-point literal is parsed in an image",
         literal_check,
+    );
+    report.step(
+        "images for a bench board cannot drive anything",
+        exclusion_check,
     );
     report.step("lints of the board support", lint);
 }
@@ -150,6 +184,12 @@ pub(crate) fn link_check() -> StepResult {
 
 fn must_not_link(command: &mut Command) -> anyhow::Result<()> {
     println!("    the planted panic must be found");
+    must_not_build(command, &format!("undefined symbol: {PANIC_SYMBOL}"))
+        .context("the link check does not find a planted panic")
+}
+
+/// A build that must fail, and must say so with these words.
+fn must_not_build(command: &mut Command, words: &str) -> anyhow::Result<()> {
     let output = command
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -157,9 +197,47 @@ fn must_not_link(command: &mut Command) -> anyhow::Result<()> {
         .context("cannot start cargo")?;
     let text = String::from_utf8_lossy(&output.stderr);
     ensure!(
-        !output.status.success() && text.contains(&format!("undefined symbol: {PANIC_SYMBOL}")),
-        "the link check does not find a planted panic:\n{text}"
+        !output.status.success() && text.contains(words),
+        "a build that must fail ({words}) ended with {}:\n{text}",
+        output.status
     );
+    Ok(())
+}
+
+/// No image for a bench board can be built together with the code that drives outputs,
+/// and none holds the address of a register that does. The shipped images hold them, or
+/// the search would show nothing.
+fn exclusion_check() -> StepResult {
+    let way = set_up(TARGET)?;
+    println!("    both of the features must be refused");
+    for (bench, shipped) in BENCH {
+        for image in [bench, shipped] {
+            must_not_build(&mut cargo(way, "build", "outputs,hil", image)?, EXCLUSION)?;
+        }
+    }
+    let images = build()?;
+    let contents = |name: &str| {
+        let image = images.iter().find(|image| image.name == name);
+        Elf::read(&image.with_context(|| format!("no image {name}"))?.elf)
+    };
+    for (bench, shipped) in BENCH {
+        let (bench_elf, shipped_elf) = (contents(bench)?, contents(shipped)?);
+        for (what, registers, users) in DRIVERS {
+            let found = bench_elf.names_address(&registers);
+            ensure_that(!found, || format!("{bench} holds an address of {what}"))?;
+            if users.contains(&shipped) {
+                let found = shipped_elf.names_address(&registers);
+                ensure_that(found, || {
+                    format!("the search does not find {what} in {shipped}, which uses it")
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn ensure_that(holds: bool, what: impl FnOnce() -> String) -> anyhow::Result<()> {
+    ensure!(holds, "{}", what());
     Ok(())
 }
 

@@ -14,7 +14,7 @@ mod thumb;
 use std::fs;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::firmware::{self, Image, SHIPPED};
@@ -52,6 +52,33 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         }
         within_budget(&rows)
     });
+    report.step("stack of the images for a bench board", || {
+        let images = firmware::build()?;
+        let bench = images.iter().filter(|image| !SHIPPED.contains(&image.name));
+        for image in bench {
+            stack_fits(image)?;
+        }
+        Ok(())
+    });
+}
+
+/// Images without a budget of their own still must not leave their stack.
+fn stack_fits(image: &Image) -> anyhow::Result<()> {
+    let elf = Elf::read(&image.elf)?;
+    let stack = stack::bound(&elf).with_context(|| format!("image {}", image.name))?;
+    let room = elf.stack_room()?;
+    println!(
+        "    {:<10} stack {:>6} of {room:>6} bytes at worst",
+        image.name, stack.bytes
+    );
+    ensure!(
+        stack.bytes <= room,
+        "{} may leave its stack: {} of {room} bytes\n{}",
+        image.name,
+        stack.bytes,
+        stack.path.join("\n")
+    );
+    Ok(())
 }
 
 /// Holds what runs on emulated boards have measured (`tick_instructions_worst` and

@@ -89,6 +89,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             // A new partner, or the old one once more: the board starts afresh.
             Request::Hello { .. } => {
                 self.forget();
+                self.over = false;
                 Ok(self.hello())
             }
             Request::Store(stretch) => self.store(stretch),

@@ -47,6 +47,8 @@ pub(crate) enum Stop {
     PowerFailed,
     /// The tick timer has been started.
     TickStarted,
+    /// The program looks for bytes on its second serial line, and none are on their way.
+    Waits,
 }
 
 type Engine = Unicorn<'static, State>;
@@ -313,10 +315,19 @@ impl Machine {
                 return Ok(Some(Stop::Reset(crate::soc::rcc::WATCHDOG_RESET)));
             }
             // A request that software has just enabled.
-            let Some(transfer) = self.uc.get_data_mut().soc.transfer() else {
+            if let Some(transfer) = self.uc.get_data_mut().soc.transfer() {
+                self.carry(transfer, cycle)?;
+                continue;
+            }
+            let state = self.uc.get_data_mut();
+            if !state.soc.serial.take_wait() {
                 return Ok(None);
-            };
-            self.carry(transfer, cycle)?;
+            }
+            // A program that polls finds nothing new before the next byte has come or gone.
+            match state.soc.serial.next() {
+                None => return Ok(Some(Stop::Waits)),
+                Some(at) => state.pass(at.min(horizon).saturating_sub(state.cycle)),
+            }
         }
     }
 

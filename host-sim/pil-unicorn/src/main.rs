@@ -8,7 +8,14 @@
 //! output, in order. Nothing here reads a clock or a random number: equal
 //! requests get equal replies. `--awake` is for a process with a processor core of
 //! its own: it does not sleep between requests that follow each other closely.
+//!
+//!     wheeleg-pil-unicorn --bench IMAGE.elf
+//!
+//! runs an image for a bench board with its second serial port on a pseudo-terminal,
+//! whose name it prints, until it is killed.
 
+#[cfg(unix)]
+mod bench;
 mod board;
 mod image;
 mod machine;
@@ -46,6 +53,12 @@ fn main() -> ExitCode {
 /// Answers requests until the input ends or every board has said good-bye.
 fn serve() -> Result<(), String> {
     let mut paths: Vec<_> = std::env::args_os().skip(1).collect();
+    #[cfg(unix)]
+    if let [first, image] = paths.as_slice()
+        && first == "--bench"
+    {
+        return bench::serve(Path::new(image));
+    }
     let awake = paths.first().is_some_and(|first| first == "--awake");
     if awake {
         paths.remove(0);

@@ -25,3 +25,19 @@ pub(crate) const DUMP: u32 = 15;
 pub(crate) const PULSE: u32 = 6;
 /// Alternate function of the motor pulse.
 pub(crate) const PULSE_FUNCTION: u32 = 4;
+/// Port A: serial line to the PC, USART2, of the images for a bench board.
+pub(crate) const SERIAL_TX: u32 = 2;
+/// Port A: its other direction.
+pub(crate) const SERIAL_RX: u32 = 3;
+/// Alternate function of both.
+pub(crate) const SERIAL_FUNCTION: u32 = 7;
+/// All that drives something: port (A = 0), pin, name.
+pub(crate) const POWER_PINS: [(usize, u32, &str); 7] = [
+    (0, VALVES[0].0, "PA8 (valve fill A)"),
+    (0, VALVES[1].0, "PA9 (valve vent A)"),
+    (0, VALVES[2].0, "PA10 (valve fill B)"),
+    (0, VALVES[3].0, "PA11 (valve vent B)"),
+    (1, DIRECTION, "PB13 (motor direction)"),
+    (1, DUMP, "PB15 (dump valve)"),
+    (2, PULSE, "PC6 (motor pulse)"),
+];

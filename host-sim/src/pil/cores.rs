@@ -5,6 +5,9 @@
 //! boards near to it share one core, on which a turn is a change of the process; the
 //! far boards have a core of their own, which stays awake between requests. What is
 //! computed does not depend on it.
+//!
+//! Where a program cannot choose its cores (anywhere but on Linux) all emulated boards
+//! share one process and run one after the other: slower, and the same to the bit.
 
 #[cfg(target_os = "linux")]
 use rustix::thread::{CpuSet, sched_getaffinity, sched_getcpu, sched_setaffinity};

@@ -37,14 +37,71 @@ impl<S: Stream> Line for Partner<S> {
     }
 
     fn queue(&mut self, _index: u8, request: &Request) -> Result<(), SimError> {
-        self.send(request)
-    }
-
-    fn flush(&mut self) -> Result<(), SimError> {
+        self.queue(request);
         Ok(())
     }
 
+    fn flush(&mut self) -> Result<(), SimError> {
+        self.send_next()
+    }
+
     fn receive(&mut self) -> Result<(u8, Reply), SimError> {
-        self.receive().map(|reply| (0, reply))
+        let reply = self.receive()?;
+        self.send_next()?;
+        Ok((0, reply))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pil::Stream;
+    use wheeleg_pil_link::frame::MAX_FRAME;
+    use wheeleg_pil_link::{Deframer, encode};
+
+    /// A board that loses what comes while it owes an answer.
+    #[derive(Default)]
+    struct OneAtATime {
+        deframer: Deframer,
+        answers: Vec<u8>,
+        asked: usize,
+    }
+
+    impl Stream for OneAtATime {
+        fn name(&self) -> String {
+            "a board".to_owned()
+        }
+
+        fn send(&mut self, mut bytes: &[u8]) -> Result<(), SimError> {
+            assert!(self.answers.is_empty(), "the board is at work");
+            while let Ok(Some(_)) = self.deframer.next::<Request>(&mut bytes) {
+                self.asked += 1;
+                let mut frame = [0; MAX_FRAME];
+                let frame = encode(0, &Reply::Done, &mut frame).expect("fits");
+                self.answers.extend_from_slice(frame);
+            }
+            Ok(())
+        }
+
+        fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, SimError> {
+            let answers = std::mem::take(&mut self.answers);
+            buffer[..answers.len()].copy_from_slice(&answers);
+            Ok(answers.len())
+        }
+    }
+
+    #[test]
+    fn a_line_to_one_board_asks_again_when_the_last_answer_is_there() {
+        let mut partner = Partner::new(OneAtATime::default());
+        let line: &mut dyn Line = &mut partner;
+        for _ in 0..3 {
+            line.queue(0, &Request::Bye).expect("queued");
+        }
+        for _ in 0..3 {
+            line.flush().expect("sent");
+            assert_eq!(line.receive().expect("answered"), (0, Reply::Done));
+        }
+        line.flush().expect("nothing to send");
+        assert_eq!(partner.stream().asked, 3);
     }
 }

@@ -92,7 +92,7 @@ impl Outside {
             told: false,
             cores: None,
         };
-        outside.start_pil(nodes)?;
+        // Before cores are chosen: a process inherits what its starter is bound to.
         for (address, kind) in (1..).zip(&nodes.0) {
             match kind {
                 NodeKind::Sil | NodeKind::Pil => {}
@@ -117,6 +117,7 @@ impl Outside {
                 }
             }
         }
+        outside.start_pil(nodes)?;
         for number in 0..outside.boards.len() {
             outside.power_up(number, robot)?;
         }
@@ -365,7 +366,8 @@ impl Outside {
             line.flush()?;
         }
         let mut asked = std::mem::take(&mut self.requests);
-        // The far boards are at work while the near ones answer.
+        // The far boards, and those of other programs, are at work while the near ones
+        // answer.
         asked.sort_by_key(|number| Reverse(self.boards[*number].line));
         for number in asked.drain(..) {
             let line = self.boards[number].line;

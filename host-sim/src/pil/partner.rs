@@ -1,5 +1,7 @@
 //! A board outside of this process, over any stream of bytes.
 
+use std::collections::VecDeque;
+
 use wheeleg_pil_link::frame::MAX_FRAME;
 use wheeleg_pil_link::{Deframer, FrameError, Hello, LINK_VERSION, Reply, Request, encode};
 
@@ -50,6 +52,9 @@ pub struct Partner<S> {
     unread: std::ops::Range<usize>,
     /// Requests without a reply.
     waiting: u32,
+    /// Requests that wait for the reply to the one before: a board that answers keeps
+    /// no more than a few bytes of the next.
+    queued: VecDeque<Request>,
 }
 
 impl<S: Stream> Partner<S> {
@@ -61,6 +66,7 @@ impl<S: Stream> Partner<S> {
             buffer: [0; MAX_FRAME],
             unread: 0..0,
             waiting: 0,
+            queued: VecDeque::new(),
         }
     }
 
@@ -137,6 +143,24 @@ impl<S: Stream> Partner<S> {
                 Err(error) => return Err(self.damaged(error)),
             }
         }
+    }
+
+    /// Queues a request behind those that have no reply yet.
+    pub(super) fn queue(&mut self, request: &Request) {
+        self.queued.push_back(request.clone());
+    }
+
+    /// Sends the next request of the queue if the board has nothing to answer.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub(super) fn send_next(&mut self) -> Result<(), SimError> {
+        if self.waiting == 0
+            && let Some(request) = self.queued.pop_front()
+        {
+            self.send(&request)?;
+        }
+        Ok(())
     }
 
     /// Sends a request and waits for its reply.

@@ -2,16 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use object::read::elf::{ElfFile32, ProgramHeader as _};
 use object::{Endianness, Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 
+use super::thumb::{self, Moved};
+
 /// Flash of the part.
-const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0802_0000;
+const FLASH: Range<u64> = 0x0800_0000..0x0802_0000;
 /// RAM of the part.
-const RAM: std::ops::Range<u64> = 0x2000_0000..0x2000_8000;
+const RAM: Range<u64> = 0x2000_0000..0x2000_8000;
 
 /// One function: where it lies, what it is called.
 #[derive(Debug, Clone)]
@@ -224,6 +227,50 @@ impl Elf {
             let (words, _) = data.as_chunks::<4>();
             words.iter().map(|word| u32::from_le_bytes(*word))
         })
+    }
+
+    /// Every aligned word of flash that is no instruction, and every constant that two
+    /// instructions (MOVW, MOVT) put into a register.
+    fn constants(&self) -> Vec<u32> {
+        let mut constants = Vec::new();
+        for (base, data) in &self.segments {
+            let starts = (*base as u32..).step_by(4).take(data.len() / 4);
+            let data = starts.filter(|address| !self.is_code(*address));
+            constants.extend(data.filter_map(|address| self.word(address)));
+        }
+        for function in self.functions.values() {
+            let mut low = [0; 16];
+            let mut at = function.address;
+            while at < function.address + function.size {
+                if self.is_data(at) {
+                    at += 2;
+                    continue;
+                }
+                let halves = (self.halfword(at), self.halfword(at + 2));
+                let (first, second) = (halves.0.unwrap_or(0), halves.1.unwrap_or(0));
+                match thumb::moved(first, second) {
+                    Some(Moved::Low(register, value)) => low[register] = value,
+                    Some(Moved::High(register, value)) => {
+                        constants.push(value << 16 | low[register])
+                    }
+                    None => {}
+                }
+                at += thumb::length(first);
+            }
+        }
+        constants
+    }
+
+    /// Whether an instruction lies at an address.
+    fn is_code(&self, address: u32) -> bool {
+        let function = self.functions.range(..=address).next_back();
+        let within = function.is_some_and(|(start, function)| address - start < function.size);
+        within && !self.is_data(address)
+    }
+
+    /// Whether the image holds an address in this range. (One that is computed is not found.)
+    pub(crate) fn names_address(&self, range: &Range<u32>) -> bool {
+        self.constants().iter().any(|word| range.contains(word))
     }
 
     /// Fixed-point literals are parsed by the compiler. `I16F16::lit` outside a

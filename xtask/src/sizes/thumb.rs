@@ -41,6 +41,27 @@ pub(super) fn decode(address: u32, first: u16, second: u16) -> Effect {
     }
 }
 
+/// Half of a constant that an instruction puts into a register.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Moved {
+    /// MOVW: bits 0 to 15 of this register; the rest becomes 0.
+    Low(usize, u32),
+    /// MOVT: bits 16 to 31 of it.
+    High(usize, u32),
+}
+
+/// The half that this instruction moves, if it is one of the two.
+pub(super) fn moved(first: u16, second: u16) -> Option<Moved> {
+    let (a, b) = (u32::from(first), u32::from(second));
+    let value = (a & 0xF) << 12 | (a >> 10 & 1) << 11 | (b >> 12 & 7) << 8 | b & 0xFF;
+    let register = (b >> 8 & 0xF) as usize;
+    match (first & 0xFBF0, second & 0x8000) {
+        (0xF240, 0) => Some(Moved::Low(register, value)),
+        (0xF2C0, 0) => Some(Moved::High(register, value)),
+        _ => None,
+    }
+}
+
 fn sign_extend(value: u32, bits: u32) -> u32 {
     let shift = 32 - bits;
     (((value << shift) as i32) >> shift) as u32
@@ -172,5 +193,26 @@ mod tests {
         assert_eq!(at(0xF3BF, 0x8F6F), Effect::None, "isb");
         assert_eq!(at(0xF380, 0x8808), Effect::None, "msr msp, r0");
         assert_eq!(at(0xDF00, 0), Effect::None, "svc 0");
+    }
+
+    #[test]
+    fn halves_of_a_constant_as_the_assembler_encodes_them() {
+        assert_eq!(
+            moved(0xF642, 0x4300),
+            Some(Moved::Low(3, 0x2C00)),
+            "movw r3"
+        );
+        assert_eq!(
+            moved(0xF2C4, 0x0301),
+            Some(Moved::High(3, 0x4001)),
+            "movt r3"
+        );
+        assert_eq!(
+            moved(0xF64C, 0x7CFE),
+            Some(Moved::Low(12, 0xCFFE)),
+            "movw r12"
+        );
+        assert_eq!(moved(0xF000, 0xF87E), None, "bl");
+        assert_eq!(moved(0x2301, 0), None, "movs r3, #1");
     }
 }

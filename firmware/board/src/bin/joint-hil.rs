@@ -6,7 +6,8 @@
 
 use cortex_m_rt::entry;
 use wheeleg_board::g431::hil;
-use wheeleg_remote::{JointPins, RemoteJoint};
+use wheeleg_board::g431::slot::Slot;
+use wheeleg_remote::{JointPins, RemoteJoint, Session};
 
 unsafe extern "C" {
     fn this_image_can_panic() -> !;
@@ -18,10 +19,12 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { this_image_can_panic() }
 }
 
+static PINS: Slot<JointPins> = Slot::new();
+static SESSION: Slot<Session<'static, RemoteJoint<'static>>> = Slot::new();
+
 #[entry]
 fn main() -> ! {
-    let pins = JointPins::default();
-    hil::run::<RemoteJoint<'_>>(&pins)
+    hil::run(&PINS, &SESSION)
 }
 
 wheeleg_board::ways_down!();

@@ -6,7 +6,9 @@
 //! that could change that are not compiled into these images, and the two
 //! features exclude each other.
 
+use super::slot::Slot;
 use super::{clock, fatal, pac, pins, power, timebase, watchdog};
+use crate::reset::Note;
 use pac::usart::vals::Over8;
 use wheeleg_remote::{Board, Session, Stopwatch, Stream, serve};
 use wheeleg_units::Micros;
@@ -16,8 +18,15 @@ const DIVIDER: u16 = (clock::CLOCK_HZ / 1_000_000) as u16;
 const HOST: &str = "STM32G431, HIL over USART2";
 
 /// Runs a board on the serial line, for ever: the next partner may open a new
-/// session.
-pub fn run<'p, B: Board<'p>>(board_pins: &'p B::Pins) -> ! {
+/// session. Pins and session are kept where they are made: the stack holds what it takes
+/// to make a board, and not the board as well.
+pub fn run<B: Board<'static>>(
+    board_pins: &'static Slot<B::Pins>,
+    session: &'static Slot<Session<'static, B>>,
+) -> !
+where
+    B::Pins: Default,
+{
     let _ = fatal::take_cause();
     watchdog::start();
     let source = clock::start();
@@ -29,14 +38,22 @@ pub fn run<'p, B: Board<'p>>(board_pins: &'p B::Pins) -> ! {
     pins::set_hil_led(source == clock::Source::Crystal);
     let mut line = Line::start();
     let mut stopwatch = Clock { began: 0 };
+    let board_pins = board_pins.fill(B::Pins::default);
+    let session =
+        board_pins.and_then(|pins| session.fill(|| Session::new(pins, HOST, clock::CLOCK_HZ)));
+    // Both are there: they are made here, and once.
+    let Some(session) = session else {
+        fatal::reset(Note::ProcessorFault);
+    };
     loop {
-        let mut session = Session::<B>::new(board_pins, HOST, clock::CLOCK_HZ);
-        serve(&mut session, &mut line, &mut stopwatch);
+        serve(session, &mut line, &mut stopwatch);
     }
 }
 
 /// USART2, polled: the protocol is request and reply, so nothing arrives while
-/// a request is being answered.
+/// a request is being answered. Its FIFO of eight bytes covers what a byte takes to be
+/// worked off; to disable the detection of overruns would pass the FIFO by (RM0440,
+/// USART_CR3.OVRDIS). A byte that is lost all the same damages its frame, which is refused.
 struct Line {
     _one: (),
 }
@@ -45,7 +62,6 @@ impl Line {
     fn start() -> Self {
         let usart = pac::USART2;
         usart.brr().write(|r| r.set_brr(DIVIDER));
-        usart.cr3().write(|r| r.set_ovrdis(true));
         usart.cr1().write(|r| {
             r.set_fifoen(true);
             r.set_over8(Over8::OVERSAMPLING16);

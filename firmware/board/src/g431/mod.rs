@@ -31,7 +31,7 @@ mod mutant;
 pub mod parameters;
 pub mod pins;
 pub mod power;
-#[cfg(feature = "outputs")]
+#[cfg(any(feature = "outputs", feature = "hil"))]
 pub mod slot;
 #[cfg(feature = "outputs")]
 pub mod start;

@@ -15,13 +15,18 @@ const WORK_NS: u64 = 500_000;
 /// From the voltage detector's threshold to the brown-out reset (ASSUMED: a
 /// capacitor that lasts so long) [ns].
 const FALL_NS: u64 = 20_000;
+/// What an image for a bench board does here.
+const WAITS: &str = "the program waits for its second serial port, which nothing is connected to";
 /// The byte between bus frames.
 const DELIMITER: u8 = 0;
 
 impl Board {
     /// Runs the start-up code until the tick timer runs.
     pub(super) fn start_up(&mut self, until_ns: u64) -> Result<Stop, String> {
-        self.machine()?.run(until_ns, Until::Cycle, false)
+        match self.machine()?.run(until_ns, Until::Cycle, false)? {
+            Stop::Waits => Err(WAITS.to_owned()),
+            stop => Ok(stop),
+        }
     }
 
     /// The tick timer has been started: its next edge is `edge_ns`. (The
@@ -32,7 +37,8 @@ impl Board {
         if let Some(machine) = &mut self.machine {
             let state = machine.state_mut();
             if let Some(edge) = state.soc.tick_timer().overflow_at() {
-                state.soc.align(edge, edge_ns);
+                let now = state.cycle;
+                state.soc.align(edge, edge_ns, now);
             }
             // The cycles before this edge count as up to one period.
             self.grid_ns = self.period_us().max(1) * 1000;
@@ -41,6 +47,10 @@ impl Board {
 
     pub(super) fn run(&mut self, run: &Run) -> Result<Ran, String> {
         self.deliver(run)?;
+        if self.power == Power::BrownOut && run.power == Power::Good {
+            // The supply comes back at the end of this run.
+            self.advance(run.until_ns, Until::Cycle)?;
+        }
         self.supply(run.power)?;
         // Only behind a delimiter is there anything to work off; before one, the
         // next byte of the frame would come late. What comes with an edge nobody answers
@@ -197,6 +207,7 @@ impl Board {
                     machine.reset(cause | PIN_RESET, false)?;
                     self.tripped(at_ns, cause);
                 }
+                Stop::Waits => return Err(WAITS.to_owned()),
                 Stop::PowerFailed => {
                     self.power = Power::BrownOut;
                     self.power_lost_in_save = true;

@@ -33,6 +33,9 @@ impl Machine {
                             Ok(value) => {
                                 // A read takes flags away at most: nothing is due sooner.
                                 state.nvic.lines = state.soc.lines();
+                                if state.soc.serial.waits() {
+                                    state.due = 0;
+                                }
                                 u64::from(value)
                             }
                             Err(what) => {

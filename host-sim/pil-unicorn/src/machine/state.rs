@@ -72,6 +72,8 @@ pub(crate) struct State {
     pub(super) unanswered: String,
     /// Faults have been injected: a hard fault is the program's to handle.
     pub(crate) tolerant: bool,
+    /// No pin that drives something may ever leave its idle state.
+    pub(crate) outputs_forbidden: bool,
     /// What the program read in the last tick that was worked off.
     pub(crate) seen: Seen,
     /// Stop as soon as the tick timer runs.
@@ -112,6 +114,7 @@ impl State {
             fault: None,
             unanswered: String::new(),
             tolerant: false,
+            outputs_forbidden: false,
             seen: Seen::default(),
             await_tick: false,
             trace: [0; TRACE],
@@ -180,6 +183,11 @@ impl State {
 
     /// After an access to a peripheral: what is due, and when.
     pub(super) fn touched(&mut self) {
+        if self.outputs_forbidden
+            && let Some(pin) = self.soc.power_pin_in_use()
+        {
+            self.refuse(format!("the program drives {pin}, which it must never do"));
+        }
         if self.outputs_low_after.is_none() && self.soc.outputs_are_low() {
             self.outputs_low_after = Some(self.retired() - self.reset_at);
         }

@@ -219,3 +219,41 @@ fn a_first_access_in_an_it_block_leaves_no_condition_behind() {
     assert_eq!(machine.get(R::R0), Ok(2));
     assert_eq!(machine.get(R::R5), Ok(1), "movs has set the flags");
 }
+
+#[test]
+fn where_outputs_are_forbidden_a_program_that_drives_one_ends_by_the_name_of_its_pin() {
+    // RCC_AHB2ENR = 1; GPIOA_MODER = mode; GPIOA_BSRR = set; b .
+    let ended = |forbidden: bool, mode: u32, set: u16| {
+        let code = [
+            0x4904,
+            0x2201,
+            0x600A,
+            0x4904,
+            0x4A04,
+            0x600A,
+            0x4A04,
+            0x618A,
+            0xE7FE,
+            0xBF00, //
+            0x104C,
+            0x4002,
+            0x0000,
+            0x4800,
+            mode as u16,
+            (mode >> 16) as u16,
+            set,
+            0,
+        ];
+        let mut machine = machine(&code, &[]);
+        machine.state_mut().outputs_forbidden = forbidden;
+        machine.run(10_000, Until::Cycle, true)
+    };
+    // As after a reset but for PA8: an output, and in the hands of a timer.
+    let (output, timer) = (0xABFD_FFFF, 0xABFE_FFFF);
+    assert_eq!(ended(true, output, 1 << 5), Ok(Stop::Time), "kept low");
+    for (mode, set) in [(output, 1 << 8), (timer, 0)] {
+        let error = ended(true, mode, set).expect_err("driven");
+        assert!(error.contains("PA8 (valve fill A)"), "{error}");
+        assert_eq!(ended(false, mode, set), Ok(Stop::Time));
+    }
+}

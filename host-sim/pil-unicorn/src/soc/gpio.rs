@@ -48,6 +48,11 @@ impl Port {
         self.mode(pin) == 1 && self.odr >> pin & 1 == 0
     }
 
+    /// Whether a pin is an input, analogue as after a reset, or an output at low.
+    pub(crate) fn is_idle(&self, pin: u32) -> bool {
+        matches!(self.mode(pin), 0 | 3) || self.drives_low(pin)
+    }
+
     /// Whether a pin is analogue.
     pub(crate) fn is_analogue(&self, pin: u32) -> bool {
         self.mode(pin) == 3
@@ -126,7 +131,12 @@ mod tests {
         port.write(0x00, 1 << 4).expect("modelled");
         port.write(0x18, 4).expect("modelled");
         assert!(port.drives_high(2) && !port.drives_low(2) && !port.carries(2, 0));
+        assert!(!port.is_idle(2) && port.is_idle(1));
         port.write(0x18, 4 << 16).expect("modelled");
+        assert!(port.is_idle(2));
+        port.write(0x00, 2 << 4).expect("modelled");
+        assert!(!port.is_idle(2), "in the hands of a peripheral");
+        port.write(0x00, 1 << 4).expect("modelled");
         assert!(!port.drives_high(2) && port.drives_low(2) && !port.drives_low(1));
     }
 

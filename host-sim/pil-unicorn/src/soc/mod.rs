@@ -8,6 +8,7 @@ pub(crate) mod adc;
 pub(crate) mod dma;
 pub(crate) mod flash;
 pub(crate) mod gpio;
+mod map;
 pub(crate) mod rcc;
 pub(crate) mod tim;
 pub(crate) mod usart;
@@ -47,6 +48,7 @@ const IRQ_TIM1_UP: u32 = 25;
 const IRQ_TIM2: u32 = 28;
 const IRQ_TIM3: u32 = 29;
 const IRQ_USART1: u32 = 37;
+const IRQ_USART2: u32 = 38;
 
 /// Trigger of the converter: TIM1_TRGO (RM0440 table 163).
 const ADC_TIM1_TRGO: u32 = 9;
@@ -59,10 +61,11 @@ const TIM8: usize = 3;
 const TIM15: usize = 4;
 
 /// What has events, in the order in which they are taken at one cycle: timers,
-/// converter, serial interface.
+/// converter, serial interfaces.
 const ADC: usize = 5;
 const USART: usize = 6;
-const SOURCES: usize = 7;
+const USART2: usize = 7;
+const SOURCES: usize = 8;
 
 /// A transfer that the machine carries out in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +90,12 @@ pub(crate) struct Soc {
     pub(crate) ports: [Port; 4],
     pub(crate) tim: [Tim; 5],
     pub(crate) adc: Adc,
+    /// The bus.
     pub(crate) usart: Usart,
+    /// USART2: the line to the PC of the images for a bench board.
+    pub(crate) serial: Usart,
+    /// What went out on that line.
+    pub(crate) serial_out: Vec<u8>,
     pub(crate) dma: Dma,
     pub(crate) unique_id: [u8; 12],
     pub(crate) time: Time,
@@ -122,6 +130,15 @@ impl Soc {
             && c.drives_low(wiring::PULSE)
     }
 
+    /// The first pin that drives a valve, the motor or the dump and is neither as a reset
+    /// leaves it nor an output at low: its name.
+    pub(crate) fn power_pin_in_use(&self) -> Option<&'static str> {
+        let pins = wiring::POWER_PINS.iter();
+        pins.filter(|(port, pin, _)| !self.ports[*port].is_idle(*pin))
+            .map(|(_, _, name)| *name)
+            .next()
+    }
+
     pub(crate) fn new(store: Vec<u8>, unique_id: [u8; 12], crystal: bool, cause: u32) -> Self {
         Self {
             rcc: Rcc::new(crystal, cause),
@@ -143,6 +160,8 @@ impl Soc {
             ],
             adc: Adc::default(),
             usart: Usart::default(),
+            serial: Usart::default(),
+            serial_out: Vec::new(),
             dma: Dma::default(),
             unique_id,
             time: Time::new(rcc::HSI_HZ),
@@ -193,6 +212,7 @@ impl Soc {
         self.due[source] = match source {
             ADC => self.adc.next(),
             USART => self.usart.next(),
+            USART2 => self.serial.next(),
             _ => self.tim[source].next().map(|(at, event)| {
                 self.events[source] = event;
                 at
@@ -212,9 +232,13 @@ impl Soc {
         self.bites_at = bite.map_or(u64::MAX, |ns| self.time.cycle_of(ns));
     }
 
-    /// Cycle `cycle` is `ns` from now on.
-    pub(crate) fn align(&mut self, cycle: u64, ns: u64) {
+    /// Cycle `cycle` is `ns` from now, cycle `now`, on. Bytes on the line keep their times;
+    /// those whose times have been passed over are lost.
+    pub(crate) fn align(&mut self, cycle: u64, ns: u64, now: u64) {
         let moved = self.time.align(cycle, ns);
+        let cycles = self.time.cycles(u64::try_from(moved).unwrap_or(0));
+        self.usart.come_sooner(cycles, now);
+        self.plan(USART);
         self.watchdog.shift(moved);
         self.plan_bite();
     }
@@ -234,6 +258,7 @@ impl Soc {
         match source {
             ADC => self.adc.happen(),
             USART => self.usart_event(at),
+            USART2 => self.serial_event(at),
             n => {
                 let event = self.events[n];
                 self.tim[n].happen(at, event);
@@ -295,6 +320,25 @@ impl Soc {
             self.burst_high = Some(driver);
         }
         self.finish_burst();
+    }
+
+    /// Bytes come in on the second serial line, one after the other from `cycle` on.
+    pub(crate) fn expect_serial(&mut self, cycle: u64, bytes: &[u8]) {
+        let byte_cycles = self.serial.byte_cycles();
+        for (count, byte) in (1..).zip(bytes) {
+            self.serial.expect(cycle + count * byte_cycles, *byte);
+        }
+        self.plan(USART2);
+    }
+
+    fn serial_event(&mut self, at: u64) {
+        let hears = self.ports[0].carries(wiring::SERIAL_RX, wiring::SERIAL_FUNCTION);
+        self.serial.happen(at, !hears);
+        if let Some((_, bytes)) = self.serial.take_burst()
+            && self.ports[0].carries(wiring::SERIAL_TX, wiring::SERIAL_FUNCTION)
+        {
+            self.serial_out.extend(bytes);
+        }
     }
 
     /// A burst that was driven from its first bit to its last is a frame.
@@ -395,199 +439,6 @@ impl Soc {
             | line(self.tim[TIM2].line(), IRQ_TIM2)
             | line(self.tim[TIM3].line(), IRQ_TIM3)
             | line(self.usart.line(), IRQ_USART1)
-    }
-
-    /// Name and clock-enable of the peripheral at an address.
-    fn block(&self, address: u32) -> Option<(&'static str, u32, bool)> {
-        let enr = &self.rcc.enr;
-        let on = |bus: usize, bit: u32| enr[bus] >> bit & 1 != 0;
-        Some(match address {
-            0x4000_0000..0x4000_0400 => ("TIM2", 0x4000_0000, on(2, 0)),
-            0x4000_0400..0x4000_0800 => ("TIM3", 0x4000_0400, on(2, 1)),
-            0x4000_3000..0x4000_3400 => ("IWDG", 0x4000_3000, true),
-            0x4000_7000..0x4000_7400 => ("PWR", 0x4000_7000, on(2, 28)),
-            0x4001_0000..0x4001_0400 => ("SYSCFG", 0x4001_0000, on(3, 0)),
-            0x4001_0400..0x4001_0800 => ("EXTI", 0x4001_0400, true),
-            0x4001_2C00..0x4001_3000 => ("TIM1", 0x4001_2C00, on(3, 11)),
-            0x4001_3400..0x4001_3800 => ("TIM8", 0x4001_3400, on(3, 13)),
-            0x4001_3800..0x4001_3C00 => ("USART1", 0x4001_3800, on(3, 14)),
-            0x4001_4000..0x4001_4400 => ("TIM15", 0x4001_4000, on(3, 16)),
-            0x4002_0000..0x4002_0400 => ("DMA1", 0x4002_0000, on(0, 0)),
-            0x4002_0800..0x4002_0C00 => ("DMAMUX", 0x4002_0800, on(0, 2)),
-            0x4002_1000..0x4002_1400 => ("RCC", 0x4002_1000, true),
-            0x4002_2000..0x4002_2400 => ("FLASH", 0x4002_2000, on(0, 8)),
-            0x4800_0000..0x4800_0400 => ("GPIOA", 0x4800_0000, on(1, 0)),
-            0x4800_0400..0x4800_0800 => ("GPIOB", 0x4800_0400, on(1, 1)),
-            0x4800_0800..0x4800_0C00 => ("GPIOC", 0x4800_0800, on(1, 2)),
-            0x4800_1400..0x4800_1800 => ("GPIOF", 0x4800_1400, on(1, 5)),
-            0x5000_0000..0x5000_0400 => ("ADC1", 0x5000_0000, on(1, 13)),
-            _ => return None,
-        })
-    }
-
-    /// The peripheral and register of an address, for messages.
-    pub(crate) fn name(&self, address: u32) -> String {
-        match self.block(address) {
-            Some((name, base, _)) => format!("{name}+{:#05x}", address - base),
-            None => format!("no peripheral at {address:#010x}"),
-        }
-    }
-
-    fn timer_of(name: &str) -> Option<usize> {
-        ["TIM1", "TIM2", "TIM3", "TIM8", "TIM15"]
-            .iter()
-            .position(|n| *n == name)
-    }
-
-    /// A read of a peripheral's register.
-    ///
-    /// # Errors
-    /// A sentence that names the register and what is wrong.
-    pub(crate) fn read(&mut self, address: u32, size: usize, cycle: u64) -> Result<u32, String> {
-        if (0x1FFF_7590..0x1FFF_759C).contains(&address) {
-            let at = (address - 0x1FFF_7590) as usize;
-            return Ok((0..size).fold(0, |v, i| {
-                v | u32::from(self.unique_id.get(at + i).copied().unwrap_or(0)) << (8 * i)
-            }));
-        }
-        let Some((name, base, clocked)) = self.block(address) else {
-            return Err(format!("read of {}", self.name(address)));
-        };
-        if !clocked {
-            return Err(format!("read of {} with its clock off", self.name(address)));
-        }
-        // Narrow reads see their part of the word.
-        let part = (address & 3) * 8;
-        let offset = ((address - base) & !3) as usize;
-        let value = match name {
-            "IWDG" => self.watchdog.read(offset),
-            "PWR" => self.pwr.read(offset),
-            "SYSCFG" => self.read_syscfg(offset),
-            "EXTI" => self.pwr.read_exti(offset),
-            "USART1" => self.usart.read(offset),
-            "DMA1" => self.dma.read(offset),
-            "DMAMUX" => self.dma.read_mux(offset),
-            "RCC" => self.rcc.read(offset),
-            "FLASH" => self.flash.read(offset, cycle),
-            "GPIOA" => self.ports[0].read(offset),
-            "GPIOB" => self.ports[1].read(offset),
-            "GPIOC" => self.ports[2].read(offset),
-            "GPIOF" => self.ports[3].read(offset),
-            "ADC1" => self.adc.read(offset),
-            _ => match Self::timer_of(name) {
-                Some(n) => self.tim[n].read(offset, cycle),
-                None => Err(Refusal::Register),
-            },
-        };
-        let value = value.map_err(|_| format!("read of {}, not modelled", self.name(address)))?;
-        Ok(value >> part
-            & if size == 4 {
-                u32::MAX
-            } else {
-                (1 << (8 * size)) - 1
-            })
-    }
-
-    /// A write to a peripheral's register.
-    ///
-    /// # Errors
-    /// A sentence that names the register and what is wrong.
-    pub(crate) fn write(
-        &mut self,
-        address: u32,
-        size: usize,
-        value: u32,
-        cycle: u64,
-    ) -> Result<(), String> {
-        let Some((name, base, clocked)) = self.block(address) else {
-            return Err(format!("write to {}", self.name(address)));
-        };
-        if !clocked {
-            return Err(format!(
-                "write to {} with its clock off",
-                self.name(address)
-            ));
-        }
-        // Half-word writes are taken for 16-bit registers; the flash data
-        // path is elsewhere.
-        if size == 1 && name != "USART1" || address & 3 != 0 {
-            return Err(format!("{size}-byte write to {}", self.name(address)));
-        }
-        let offset = (address - base) as usize;
-        let done = match name {
-            "IWDG" => self
-                .watchdog
-                .write(offset, value, self.time.signed_ns(cycle)),
-            "PWR" => self.pwr.write(offset, value),
-            "SYSCFG" => self.write_syscfg(offset, value),
-            "EXTI" => self.pwr.write_exti(offset, value),
-            "USART1" => self.usart.write(offset, value, cycle),
-            "DMA1" => self.dma.write(offset, value),
-            "DMAMUX" => self.dma.write_mux(offset, value),
-            "RCC" => self.rcc.write(offset, value),
-            "FLASH" => self.flash.write(offset, value),
-            "GPIOA" => self.ports[0].write(offset, value),
-            "GPIOB" => self.ports[1].write(offset, value),
-            "GPIOC" => self.ports[2].write(offset, value),
-            "GPIOF" => self.ports[3].write(offset, value),
-            "ADC1" => self.adc.write(offset, value),
-            _ => match Self::timer_of(name) {
-                Some(n) => self.tim[n].write(offset, value, cycle),
-                None => Err(Refusal::Register),
-            },
-        };
-        done.map_err(|refusal| match refusal {
-            Refusal::Register | Refusal::Store => {
-                format!(
-                    "write of {value:#x} to {}, not modelled",
-                    self.name(address)
-                )
-            }
-            Refusal::Bits(bits) => format!(
-                "write of {value:#x} to {}: bits {bits:#x} are not modelled or make no sense",
-                self.name(address)
-            ),
-        })?;
-        if name == "RCC" && offset == 0x08 {
-            let hz = self.rcc.hclk_hz();
-            if hz == 0 || !self.rcc.buses_undivided() {
-                return Err(format!(
-                    "RCC_CFGR = {value:#x}: a clock that is not modelled"
-                ));
-            }
-            self.time.clock(cycle, hz);
-            self.plan_bite();
-        }
-        match name {
-            "USART1" => {
-                self.finish_burst();
-                self.plan(USART);
-            }
-            "ADC1" => self.plan(ADC),
-            "IWDG" => self.plan_bite(),
-            _ => {
-                if let Some(n) = Self::timer_of(name) {
-                    self.plan(n);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn read_syscfg(&self, offset: usize) -> Result<u32, Refusal> {
-        match offset {
-            0x00 | 0x04 => Ok(self.syscfg[offset / 4]),
-            0x18 => Ok(self.syscfg[2]),
-            _ => Err(Refusal::Register),
-        }
-    }
-
-    fn write_syscfg(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
-        match offset {
-            // CFGR2: break on lock-up, parity error, voltage detector, ECC.
-            0x18 => self.syscfg[2] = value,
-            _ => return Err(Refusal::Register),
-        }
-        Ok(())
+            | line(self.serial.line(), IRQ_USART2)
     }
 }

@@ -1,4 +1,5 @@
-//! USART1: 8N1, reception by DMA with character match, transmission by DMA.
+//! USART1: 8N1, reception by DMA with character match, transmission by DMA. USART2: the
+//! same interface, polled, with its FIFOs.
 
 use std::collections::VecDeque;
 
@@ -10,6 +11,8 @@ const TE: u32 = 1 << 3;
 const RXNEIE: u32 = 1 << 5;
 const TCIE: u32 = 1 << 6;
 const CMIE: u32 = 1 << 14;
+const FIFOEN: u32 = 1 << 29;
+const OVRDIS: u32 = 1 << 12;
 const DMAR: u32 = 1 << 6;
 const DMAT: u32 = 1 << 7;
 
@@ -20,6 +23,11 @@ const CMF: u32 = 1 << 17;
 const ORE: u32 = 1 << 3;
 const TEACK: u32 = 1 << 21;
 const REACK: u32 = 1 << 22;
+
+/// Bytes of either FIFO.
+const FIFO: usize = 8;
+/// Looks at an interface with nothing received after which the program is taken to wait.
+const LOOKS: u32 = 8;
 
 /// Bits of one byte on the line.
 const BITS: u64 = 10;
@@ -32,8 +40,13 @@ pub(crate) struct Usart {
     cr3: u32,
     brr: u32,
     isr: u32,
+    /// Byte that was read last.
     rdr: u8,
-    tdr: Option<u8>,
+    received: VecDeque<u8>,
+    /// Bytes that wait for the shift register.
+    waiting: VecDeque<u8>,
+    /// Looks since the program did anything else here, or found something received.
+    looks: u32,
     /// Byte in the shift register: its end.
     shifting_until: Option<u64>,
     /// Bytes on their way in: end of each and the byte.
@@ -50,9 +63,11 @@ impl Default for Usart {
             cr2: 0,
             cr3: 0,
             brr: 0,
-            isr: TXE | TC,
+            isr: TC,
             rdr: 0,
-            tdr: None,
+            received: VecDeque::new(),
+            waiting: VecDeque::new(),
+            looks: 0,
             shifting_until: None,
             incoming: VecDeque::new(),
             burst: None,
@@ -66,9 +81,55 @@ impl Usart {
         self.incoming.push_back((cycle, byte));
     }
 
+    /// All bytes on their way come `cycles` sooner; those that would have come before
+    /// `now` do not come.
+    pub(crate) fn come_sooner(&mut self, cycles: u64, now: u64) {
+        self.incoming.retain_mut(|(at, _)| {
+            *at = at.saturating_sub(cycles);
+            *at > now
+        });
+    }
+
     /// Duration of a byte in cycles.
     pub(crate) fn byte_cycles(&self) -> u64 {
         BITS * u64::from(self.brr)
+    }
+
+    /// Whether the program looks again and again and finds nothing received; once.
+    pub(crate) fn take_wait(&mut self) -> bool {
+        let waits = self.waits();
+        if waits {
+            self.looks = 0;
+        }
+        waits
+    }
+
+    /// As [`Self::take_wait`], which is still to come.
+    pub(crate) fn waits(&self) -> bool {
+        self.looks >= LOOKS
+    }
+
+    /// Room of the receiver. Without overrun detection its FIFO is passed by (RM0440,
+    /// USART_CR3.OVRDIS).
+    fn receiver_room(&self) -> usize {
+        if self.cr1 & FIFOEN != 0 && self.cr3 & OVRDIS == 0 {
+            FIFO
+        } else {
+            1
+        }
+    }
+
+    /// Room of the transmitter.
+    fn transmitter_room(&self) -> usize {
+        if self.cr1 & FIFOEN != 0 { FIFO } else { 1 }
+    }
+
+    /// The flags, with those that follow from what is held.
+    fn flags(&self) -> u32 {
+        let flag = |on: bool, flag: u32| if on { flag } else { 0 };
+        self.isr
+            | flag(!self.received.is_empty(), RXNE)
+            | flag(self.waiting.len() < self.transmitter_room(), TXE)
     }
 
     /// Cycle of the next event.
@@ -84,11 +145,14 @@ impl Usart {
         {
             self.incoming.pop_front();
             if !deaf && self.cr1 & (UE | RE) == UE | RE {
-                if self.isr & RXNE != 0 && self.cr3 & 1 << 12 == 0 {
+                let full = self.received.len() >= self.receiver_room();
+                if full && self.cr3 & OVRDIS == 0 {
                     self.isr |= ORE;
                 } else {
-                    self.rdr = byte;
-                    self.isr |= RXNE;
+                    if full {
+                        self.received.pop_back();
+                    }
+                    self.received.push_back(byte);
                 }
                 if u32::from(byte) == self.cr2 >> 24 {
                     self.isr |= CMF;
@@ -108,9 +172,8 @@ impl Usart {
     fn shift(&mut self, cycle: u64) {
         if self.shifting_until.is_none()
             && self.cr1 & (UE | TE) == UE | TE
-            && let Some(byte) = self.tdr.take()
+            && let Some(byte) = self.waiting.pop_front()
         {
-            self.isr |= TXE;
             self.isr &= !TC;
             self.shifting_until = Some(cycle + self.byte_cycles());
             let (_, bytes) = self.burst.get_or_insert_with(|| (cycle, Vec::new()));
@@ -120,7 +183,7 @@ impl Usart {
 
     /// The burst that has ended, with its start.
     pub(crate) fn take_burst(&mut self) -> Option<(u64, Vec<u8>)> {
-        if self.shifting_until.is_none() && self.tdr.is_none() {
+        if self.shifting_until.is_none() && self.waiting.is_empty() {
             self.burst.take()
         } else {
             None
@@ -130,39 +193,44 @@ impl Usart {
     /// A reset or a driver that was switched off cuts what is under way.
     pub(crate) fn cut(&mut self) -> bool {
         let under_way = self.shifting_until.take().is_some();
-        self.tdr = None;
+        self.waiting.clear();
         self.burst = None;
         under_way
     }
 
     /// A received byte waits for DMA.
     pub(crate) fn dma_waits(&self) -> bool {
-        self.cr3 & DMAR != 0 && self.isr & RXNE != 0
+        self.cr3 & DMAR != 0 && !self.received.is_empty()
     }
 
     /// DMA takes the received byte.
     pub(crate) fn dma_receive(&mut self) -> Option<u8> {
-        self.dma_waits().then(|| {
-            self.isr &= !RXNE;
-            self.rdr
-        })
+        if self.dma_waits() {
+            self.received.pop_front()
+        } else {
+            None
+        }
     }
 
     /// Whether DMA may hand over a byte to send.
     pub(crate) fn wants_byte(&self) -> bool {
-        self.cr3 & DMAT != 0 && self.isr & TXE != 0 && self.cr1 & (UE | TE) == UE | TE
+        self.cr3 & DMAT != 0 && self.flags() & TXE != 0 && self.cr1 & (UE | TE) == UE | TE
     }
 
     /// A byte to send.
     pub(crate) fn send(&mut self, byte: u8, cycle: u64) {
-        self.tdr = Some(byte);
-        self.isr &= !(TXE | TC);
+        if self.waiting.len() >= self.transmitter_room() {
+            self.waiting.pop_back();
+        }
+        self.waiting.push_back(byte);
+        self.isr &= !TC;
         self.shift(cycle);
     }
 
     /// Interrupt line.
     pub(crate) fn line(&self) -> bool {
-        let on = |enable: u32, flag: u32| self.cr1 & enable != 0 && self.isr & flag != 0;
+        let flags = self.flags();
+        let on = |enable: u32, flag: u32| self.cr1 & enable != 0 && flags & flag != 0;
         on(RXNEIE, RXNE | ORE) || on(TCIE, TC) || on(CMIE, CMF)
     }
 
@@ -180,10 +248,14 @@ impl Usart {
                         0
                     }
                 };
-                self.isr | ready(TE, TEACK) | ready(RE, REACK)
+                let flags = self.flags() | ready(TE, TEACK) | ready(RE, REACK);
+                let found = flags & RXNE != 0;
+                self.looks = if found { 0 } else { self.looks + 1 };
+                flags
             }
             0x24 => {
-                self.isr &= !RXNE;
+                self.looks = 0;
+                self.rdr = self.received.pop_front().unwrap_or(self.rdr);
                 u32::from(self.rdr)
             }
             _ => return Err(Refusal::Register),
@@ -198,9 +270,10 @@ impl Usart {
                 Err(Refusal::Bits(value & !mask))
             }
         };
+        self.looks = 0;
         match offset {
             0x00 => {
-                only(UE | RE | TE | RXNEIE | TCIE | CMIE)?;
+                only(UE | RE | TE | RXNEIE | TCIE | CMIE | FIFOEN)?;
                 self.cr1 = value;
             }
             0x04 => {
@@ -208,17 +281,17 @@ impl Usart {
                 self.cr2 = value;
             }
             0x08 => {
-                only(DMAR | DMAT | 1 << 12)?;
+                only(DMAR | DMAT | OVRDIS)?;
                 self.cr3 = value;
             }
             0x0C => {
                 only(0xFFFF)?;
                 self.brr = value;
             }
-            // Requests to flush: nothing is kept that could be flushed but RDR.
+            // Requests: to flush what was received.
             0x18 => {
                 only(1 << 3)?;
-                self.isr &= !RXNE;
+                self.received.clear();
             }
             0x20 => self.isr &= !(value & (TC | CMF | ORE)),
             0x28 => self.send(value as u8, cycle),
@@ -250,6 +323,49 @@ mod tests {
         usart.happen(5100, true);
         assert!(!usart.line());
         assert_eq!(usart.dma_receive(), None);
+    }
+
+    #[test]
+    fn a_polled_interface_keeps_eight_bytes_and_one_without_overrun_detection_the_newest() {
+        for (cr3, kept, overrun) in [(0, &[1, 2, 3, 4, 5, 6, 7, 8][..], ORE), (OVRDIS, &[9], 0)] {
+            let mut usart = Usart::default();
+            usart.write(0x08, cr3, 0).expect("modelled");
+            usart
+                .write(0x00, UE | RE | TE | FIFOEN, 0)
+                .expect("modelled");
+            for byte in 1..=9 {
+                usart.expect(u64::from(byte) * 1700, byte);
+                usart.happen(u64::from(byte) * 1700, false);
+            }
+            let mut found = Vec::new();
+            while usart.read(0x1C).expect("modelled") & RXNE != 0 {
+                assert!(!usart.waits(), "something is there");
+                found.push(usart.read(0x24).expect("modelled") as u8);
+            }
+            assert_eq!(found, kept);
+            assert_eq!(usart.read(0x1C).expect("modelled") & ORE, overrun);
+            for _ in 2..LOOKS {
+                assert!(!usart.take_wait());
+                usart.read(0x1C).expect("modelled");
+            }
+            assert!(usart.take_wait() && !usart.take_wait(), "told once");
+        }
+    }
+
+    #[test]
+    fn the_transmitter_takes_eight_bytes_beside_the_one_that_leaves() {
+        let mut usart = Usart::default();
+        usart.write(0x0C, 170, 0).expect("modelled");
+        usart.write(0x00, UE | TE | FIFOEN, 0).expect("modelled");
+        for byte in 0..9 {
+            assert!(usart.read(0x1C).expect("modelled") & TXE != 0, "{byte}");
+            usart.write(0x28, byte, 0).expect("modelled");
+        }
+        assert_eq!(usart.read(0x1C).expect("modelled") & (TXE | TC), 0);
+        while let Some(at) = usart.next() {
+            usart.happen(at, false);
+        }
+        assert_eq!(usart.take_burst(), Some((0, (0..9).collect())));
     }
 
     #[test]

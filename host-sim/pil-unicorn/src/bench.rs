@@ -1,0 +1,111 @@
+//! A bench board: one image with its second serial port on a pseudo-terminal, as the
+//! debug probe of a Nucleo board gives it to the PC. Nothing else is connected.
+//!
+//! The board runs as fast as it can, and its time stands still while its program waits
+//! for bytes; so what it answers does not depend on when it is asked. It stops with an
+//! error as soon as its program lets go of a pin that drives something.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+use crate::image::Image;
+use crate::machine::blocks::Blocks;
+use crate::machine::{Machine, Stop, Until};
+use crate::soc::Soc;
+use crate::soc::flash::STORE_SIZE;
+use crate::soc::rcc::{BROWN_OUT_RESET, PIN_RESET};
+
+/// Rate of the line [bit/s]; the PC opens it with that (host-sim/src/hil).
+const BAUD: u64 = 1_000_000;
+/// Most by which two ends may differ: half a bit in ten, shared between both.
+const TOLERANCE: u64 = BAUD / 50;
+/// The board is run in stretches of this [ns].
+const STRETCH_NS: u64 = 10_000_000;
+
+/// A pseudo-terminal.
+struct Line {
+    /// The board's end.
+    near: File,
+    /// The PC's end by name.
+    name: String,
+    /// The PC's end, held open so that partners may come and go.
+    _far: File,
+}
+
+impl Line {
+    fn open() -> std::io::Result<Self> {
+        let near = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        grantpt(&near)?;
+        unlockpt(&near)?;
+        let name = ptsname(&near, Vec::new())?;
+        let name = name.to_string_lossy().into_owned();
+        let far = File::options().read(true).write(true).open(&name)?;
+        // Bytes as they are: no echo, no line ends.
+        let mut settings = tcgetattr(&far)?;
+        settings.make_raw();
+        tcsetattr(&far, OptionalActions::Now, &settings)?;
+        Ok(Self {
+            near: near.into(),
+            name,
+            _far: far,
+        })
+    }
+}
+
+/// Runs the image for ever, and says on standard output where its port is.
+///
+/// # Errors
+/// A sentence: the image cannot be read, drives what it must not drive, or touches
+/// what is not modelled.
+pub(crate) fn serve(path: &Path) -> Result<(), String> {
+    let image = Image::read(path)?;
+    let cause = BROWN_OUT_RESET | PIN_RESET;
+    let soc = Soc::new(vec![0xFF; STORE_SIZE], [0; 12], true, cause);
+    let mut machine = Machine::new(&image, Blocks::new(&image), soc)?;
+    machine.state_mut().outputs_forbidden = true;
+    let mut line = Line::open().map_err(|e| format!("no pseudo-terminal: {e}"))?;
+    println!("{}", line.name);
+    std::io::stdout().flush().map_err(|e| e.to_string())?;
+    let mut chunk = [0; 4096];
+    loop {
+        let stop = stretch(&mut machine);
+        let stop = stop.map_err(|what| format!("{what} ({})", machine.whereabouts(&image).1))?;
+        match stop {
+            Stop::Reset(cause) => machine.reset(cause | PIN_RESET, false)?,
+            Stop::Waits => {
+                rate(&machine)?;
+                let answer = std::mem::take(&mut machine.state_mut().soc.serial_out);
+                line.near.write_all(&answer).map_err(|e| e.to_string())?;
+                let count = line.near.read(&mut chunk).map_err(|e| e.to_string())?;
+                let bytes = chunk.get(..count).unwrap_or_default();
+                let state = machine.state_mut();
+                state.soc.expect_serial(state.cycle, bytes);
+            }
+            _ => {}
+        }
+    }
+}
+
+fn stretch(machine: &mut Machine) -> Result<Stop, String> {
+    let state = machine.state();
+    let until_ns = state.soc.time.ns_of(state.cycle) + STRETCH_NS;
+    machine.run(until_ns, Until::Cycle, true)
+}
+
+/// The PC understands what the board's port sends.
+fn rate(machine: &Machine) -> Result<(), String> {
+    let soc = &machine.state().soc;
+    let byte_cycles = soc.serial.byte_cycles();
+    let baud = soc.time.hz() * 10 / byte_cycles.max(1);
+    if baud.abs_diff(BAUD) <= TOLERANCE {
+        Ok(())
+    } else {
+        Err(format!(
+            "USART2 runs at {baud} bit/s, the line at {BAUD} bit/s"
+        ))
+    }
+}

@@ -1,0 +1,156 @@
+//! The registers, as a program reads and writes them.
+
+use super::{BKE, Kind, MOE, Tim};
+use crate::soc::Refusal;
+
+pub(super) const CR1: usize = 0x00;
+pub(super) const CR2: usize = 0x04;
+pub(super) const SMCR: usize = 0x08;
+pub(super) const DIER: usize = 0x0C;
+pub(super) const SR: usize = 0x10;
+pub(super) const EGR: usize = 0x14;
+pub(super) const CCMR1: usize = 0x18;
+pub(super) const CCMR2: usize = 0x1C;
+pub(super) const CCER: usize = 0x20;
+pub(super) const CNT: usize = 0x24;
+pub(super) const PSC: usize = 0x28;
+pub(super) const ARR: usize = 0x2C;
+pub(super) const RCR: usize = 0x30;
+pub(super) const CCR1: usize = 0x34;
+pub(super) const CCR4: usize = 0x40;
+pub(super) const BDTR: usize = 0x44;
+
+impl Tim {
+    pub(crate) fn read(&mut self, offset: usize, cycle: u64) -> Result<u32, Refusal> {
+        Ok(match offset {
+            CR1 => self.cr1,
+            CR2 => self.cr2,
+            SMCR => self.smcr,
+            DIER => self.dier,
+            SR => self.sr,
+            CCMR1 => self.ccmr[0],
+            CCMR2 if self.kind != Kind::Small => self.ccmr[1],
+            CCER => self.ccer,
+            CNT => {
+                self.counted = self.count(cycle);
+                self.counted
+            }
+            PSC => self.psc,
+            ARR => self.arr,
+            RCR => 0,
+            CCR1..=CCR4 if offset.is_multiple_of(4) => {
+                let channel = (offset - CCR1) / 4;
+                if self.ccmr_of(channel) & 3 != 0 {
+                    // Reading a capture takes its flag away.
+                    self.sr &= !(2 << channel);
+                }
+                self.ccr[channel]
+            }
+            BDTR if matches!(self.kind, Kind::Advanced | Kind::Small) => self.bdtr,
+            _ => return Err(Refusal::Register),
+        })
+    }
+
+    pub(crate) fn write(&mut self, offset: usize, value: u32, cycle: u64) -> Result<(), Refusal> {
+        let only = |mask: u32| {
+            if value & !mask == 0 {
+                Ok(())
+            } else {
+                Err(Refusal::Bits(value & !mask))
+            }
+        };
+        match offset {
+            CR1 => {
+                only(0x8D)?;
+                let starts = value & 1 != 0 && !self.runs();
+                let stops = value & 1 == 0 && self.runs();
+                if stops {
+                    let count = self.count(cycle);
+                    self.set_count(count, cycle);
+                }
+                self.cr1 = value;
+                if starts {
+                    self.since = cycle;
+                    self.seen = cycle;
+                }
+            }
+            // Idle states other than low would be an output that is on without MOE.
+            CR2 => {
+                only(0x70)?;
+                if !matches!(value >> 4 & 7, 0 | 2 | 3) {
+                    return Err(Refusal::Bits(value));
+                }
+                self.cr2 = value;
+            }
+            SMCR => {
+                only(0x77)?;
+                if !matches!(value & 7, 0 | 3 | 6) {
+                    return Err(Refusal::Bits(value));
+                }
+                let count = self.count(cycle);
+                self.set_count(count, cycle);
+                self.smcr = value;
+            }
+            DIER => {
+                only(0x1F1F)?;
+                self.dier = value;
+            }
+            SR => self.sr &= value,
+            EGR => {
+                only(1)?;
+                if value & 1 != 0 {
+                    self.set_count(0, cycle);
+                    self.seen = cycle;
+                    let quiet = self.cr1 & 4 != 0;
+                    let flag = self.sr & 1;
+                    self.update();
+                    if quiet {
+                        self.sr = self.sr & !1 | flag;
+                    }
+                }
+            }
+            CCMR1 => self.ccmr[0] = value,
+            CCMR2 if self.kind != Kind::Small => self.ccmr[1] = value,
+            CCER => {
+                only(0x3333)?;
+                let count = self.count(cycle);
+                self.set_count(count, cycle);
+                self.ccer = value;
+            }
+            CNT => {
+                self.set_count(value, cycle);
+                self.seen = cycle;
+            }
+            PSC => {
+                only(0xFFFF)?;
+                self.psc = value;
+            }
+            ARR => {
+                self.arr = value & self.top();
+                if self.cr1 & 0x80 == 0 {
+                    self.arr_now = self.arr;
+                }
+            }
+            RCR => only(0)?,
+            CCR1..=CCR4 if offset.is_multiple_of(4) => {
+                let channel = (offset - CCR1) / 4;
+                self.ccr[channel] = value & self.top();
+                let preload = self.ccmr_of(channel) & 8 != 0;
+                // Updates that nobody listens to are no events here; they come
+                // within one period, 50 µs on the motor's bridge.
+                if !preload || !self.listens_to_update() {
+                    self.ccr_now[channel] = self.ccr[channel];
+                }
+                // What lies behind is not reached again before the next round.
+                self.seen = self.seen.max(cycle);
+            }
+            BDTR if matches!(self.kind, Kind::Advanced | Kind::Small) => {
+                only(0xFFFF)?;
+                let broken = self.sr & 1 << 7 != 0 && self.bdtr & BKE != 0;
+                self.bdtr = if broken { value & !MOE } else { value };
+            }
+            _ => return Err(Refusal::Register),
+        }
+        Ok(())
+    }
+}
