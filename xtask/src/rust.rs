@@ -26,6 +26,12 @@ pub(crate) fn clippy() -> StepResult {
         "-D",
         "warnings",
     ]))?;
+    // Tests that need images and emulators to run need neither to be read.
+    let emulated = ["--package", "wheeleg-tests", "--features", "pil,qemu"];
+    run(cargo()
+        .args(["clippy", "--locked", "--no-deps", "--tests"])
+        .args(emulated)
+        .args(["--", "-D", "warnings"]))?;
     Ok(())
 }
 
