@@ -12,8 +12,8 @@ use bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
 use wheeleg_node::{joint, wheel};
 use wheeleg_pil_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, text};
 use wheeleg_protocol::{
-    Address, Arm, Decoder, Fault, FaultReport, LinkReport, Message, SCHEMA_HASH, SyncSlots,
-    WheelSetpoint,
+    Address, Arm, ClearFault, Decoder, Fault, FaultReport, LinkReport, Message, SCHEMA_HASH,
+    SyncSlots, TransmitPosition, WheelSetpoint,
 };
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_tests::{STEP, mix};
@@ -435,6 +435,104 @@ fn a_flipped_bit_in_a_joint_is_found_or_does_nothing() {
 #[test]
 fn a_flipped_bit_in_a_wheel_is_found_or_does_nothing() {
     every_flip_is_found_or_does_nothing(&WHEEL);
+}
+
+/// Edges of a wheel at which its count is well beyond the 16 bits of its counter.
+const TURNED: u64 = 60;
+/// Counts of each sample until then.
+const COUNTS: i32 = 5_000;
+
+/// What a wheel says of its position once a flip of bit 17 of this word of its
+/// application has been found and its fault was cleared: its count less the true one.
+/// `None` without an answer: it was reset, or is no longer where it can be reached.
+fn error_after_clear(word: u32) -> Option<i32> {
+    let address = Address::wheel(WHEEL_ADDRESS).expect("a wheel");
+    let mut board = Board::new(image("wheel").expect("an image"));
+    board.ran(&power_up(WHEEL_ADDRESS));
+    let (mut sample, mut reset) = (0, false);
+    let mut turn = |board: &mut Board, samples: u64| {
+        for _ in 0..samples {
+            sample += 1;
+            let run = Run {
+                until_ns: sample * SAMPLE_NS,
+                edge: Some(Inputs {
+                    encoder: sample.min(TURNED) as i32 * COUNTS,
+                    ..Inputs::default()
+                }),
+                ..Run::default()
+            };
+            match board.ask(&Request::Run(run)) {
+                Reply::Ran(ran) => reset |= ran.trip.is_some(),
+                _ => reset = true,
+            }
+        }
+        (sample * SAMPLE_NS, reset)
+    };
+    turn(&mut board, TURNED + 4);
+    let hook = Hook::FlipBit {
+        symbol: text("NODE"),
+        address: 4 * word + 2,
+        bit: 1,
+    };
+    assert_eq!(board.ask(&Request::Hook(hook)), Reply::Done);
+    let (mut edge_ns, mut was_reset) = turn(&mut board, 20);
+    // The first question may be lost to a flip in the decoder.
+    let questions: [Message; 3] = [
+        ClearFault {}.into(),
+        ClearFault {}.into(),
+        TransmitPosition {}.into(),
+    ];
+    let mut found = None;
+    for (number, question) in (2..).zip(&questions) {
+        let request = numbered(number, address, question);
+        let reply = board.ask(&delivery(&request, edge_ns + SAMPLE_NS / 2));
+        if let Reply::Ran(ran) = reply {
+            for sent in &ran.sent {
+                Decoder::new().push_slice(&sent.bytes, |frame| {
+                    if let Ok(Ok(Message::Position(position))) = frame.map(|f| Message::parse(&f)) {
+                        found = Some(position.position_raw);
+                    }
+                });
+            }
+        }
+        (edge_ns, was_reset) = turn(&mut board, 4);
+    }
+    let true_count = TURNED as i32 * COUNTS;
+    found.filter(|_| !was_reset).map(|raw| raw - true_count)
+}
+
+#[test]
+fn a_wheel_knows_its_position_when_the_fault_of_a_flipped_bit_is_cleared() {
+    let words = object_size("wheel", "NODE") / 4;
+    let errors: Vec<(u32, Option<i32>)> = std::thread::scope(|scope| {
+        let halves: Vec<_> = (0..2)
+            .map(|half| {
+                let mine = (half..words).step_by(2);
+                scope.spawn(|| {
+                    mine.map(|word| (word, error_after_clear(word)))
+                        .collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        let joined = halves
+            .into_iter()
+            .flat_map(|half| half.join().expect("a half"));
+        joined.collect()
+    });
+    let wrong: Vec<_> = errors
+        .iter()
+        .filter(|(_, e)| e.is_some_and(|e| e != 0))
+        .collect();
+    let silent = errors.iter().filter(|(_, error)| error.is_none()).count();
+    println!(
+        "{words} words, {silent} without an answer, {} wrong: {wrong:?}",
+        wrong.len()
+    );
+    assert!(wrong.is_empty(), "{wrong:?}");
+    assert!(
+        silent * 20 < words as usize,
+        "{silent} of {words} without an answer"
+    );
 }
 
 /// Size of a variable in an image, bytes.

@@ -150,3 +150,68 @@ fn every_damaged_register_of_the_controller_is_seen() {
         );
     }
 }
+
+/// A counter of 16 bits, as on the boards.
+struct Short(u16);
+
+impl Encoder for Short {
+    fn count(&mut self, before: WheelCount) -> WheelCount {
+        let counts = self.0.wrapping_sub(before.get() as u16) as i16;
+        WheelCount::wrapping_new(before.get().wrapping_add(i32::from(counts)))
+    }
+}
+
+#[test]
+fn a_count_longer_than_the_counter_survives_a_flip_in_any_of_its_copies() {
+    type Node = WheelNode<Motor, Short, NoSwitches, NoDumpValve>;
+    // Beyond 16 bits both ways: 400 counts a sample, and back.
+    let turned = |node: &mut Node, samples: std::ops::Range<u32>, by: u16| {
+        for sample in samples {
+            node.encoder.0 = node.encoder.0.wrapping_add(by);
+            node.tick(Micros(sample * 520));
+        }
+    };
+    for (by, each) in [(400, 400), (400_u16.wrapping_neg(), -400)] {
+        for bit in 0..24 {
+            for copy in 0..4 {
+                let identity = NodeIdentity {
+                    address: Address::wheel(8).unwrap(),
+                    unique_id: [0; 12],
+                };
+                let parameters = WheelParameters::default();
+                let (motor, encoder) = (Motor(0), Short(0));
+                let mut node = Node::new(
+                    identity,
+                    parameters,
+                    motor,
+                    encoder,
+                    NoSwitches,
+                    NoDumpValve,
+                )
+                .unwrap();
+                turned(&mut node, 0..200, by);
+                assert_eq!(node.snapshot().count.get(), 200 * each);
+                let flip = |count: &mut WheelCount| {
+                    *count = WheelCount::wrapping_new(count.get() ^ 1 << bit);
+                };
+                match copy {
+                    0 => flip(&mut node.state.actual),
+                    1 => flip(&mut node.counts[0]),
+                    2 => flip(&mut node.counts[1]),
+                    // Damage elsewhere has no part in it.
+                    _ => node.state.drive ^= 1,
+                }
+                turned(&mut node, 200..201, by);
+                let found = node.faults().contains(Fault::StateCorrupt);
+                assert_eq!(found, copy == 0 || copy == 3, "bit {bit}, copy {copy}");
+                assert_eq!(
+                    node.snapshot().count.get(),
+                    201 * each,
+                    "bit {bit}, copy {copy}"
+                );
+                turned(&mut node, 201..300, by);
+                assert_eq!(node.snapshot().count.get(), 300 * each, "and after it");
+            }
+        }
+    }
+}

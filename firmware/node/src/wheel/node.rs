@@ -55,6 +55,9 @@ pub struct WheelNode<M, E, P, D> {
     pub(super) controller: WheelController,
     pub(super) target: Target,
     pub(super) state: TickState,
+    /// Copies of the count in `state`: a counter shorter than the count cannot give it
+    /// back once it is damaged.
+    pub(super) counts: [WheelCount; 2],
     /// Seals of what only a request changes.
     fixed_seals: PartSeals<PARTS>,
     /// Seal of what a sample changes.
@@ -62,7 +65,7 @@ pub struct WheelNode<M, E, P, D> {
     pub(super) snapshot: WheelSnapshot,
     switches: Debounce<SWITCH_TICKS>,
     pub(super) motor: M,
-    encoder: E,
+    pub(super) encoder: E,
     switch_pins: P,
     pub(super) dump_valve: D,
 }
@@ -95,6 +98,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             controller: WheelController::new(),
             target: Target::default(),
             state: TickState::default(),
+            counts: [WheelCount::ZERO; 2],
             fixed_seals: PartSeals::new(),
             seal: Seal::default(),
             snapshot: WheelSnapshot::at_boot(),
@@ -163,12 +167,14 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     /// One sample that starts at `now`: latches the inputs, controls, writes
     /// the outputs. They act from the next tick edge on.
     pub fn tick(&mut self, now: Micros) -> TickReport {
-        let actual = self.encoder.count(self.state.actual);
+        let mut actual = self.encoder.count(self.state.actual);
         let switches = self.switch_pins.read();
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
         if !self.looks_intact() {
+            self.state.actual = self.undamaged_count();
+            actual = self.encoder.count(self.state.actual);
             self.axis_fault(Fault::StateCorrupt, now);
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -177,6 +183,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         }
         let counts = actual.wrapping_difference(self.state.actual);
         self.state.actual = actual;
+        self.counts = [actual; 2];
         if self.core.mode() == Mode::Boot {
             self.state.boot_ticks = self.state.boot_ticks.next();
             if self.state.boot_ticks >= BOOT_TICKS {
@@ -321,6 +328,15 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     fn looks_intact(&mut self) -> bool {
         let part = self.fixed_seals.next();
         self.fixed_seals.holds(part, self.fixed(part)) && self.seal.holds(&self.moving())
+    }
+
+    /// The count of the sample before, whichever one of its three copies is damaged: each
+    /// bit as two of them have it.
+    #[cold]
+    fn undamaged_count(&self) -> WheelCount {
+        let [a, b] = self.counts.map(WheelCount::get);
+        let c = self.state.actual.get();
+        WheelCount::wrapping_new(a & b | b & c | c & a)
     }
 
     #[inline]
