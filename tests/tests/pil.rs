@@ -5,8 +5,9 @@
 mod bench;
 
 use bench::pil::{Board, edge};
-use wheeleg_pil_link::{Figures, Hook, Outputs, Power, Ran, Reply, Request, Straps};
+use wheeleg_pil_link::{Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, Straps};
 use wheeleg_sim::pil::unicorn::image;
+use wheeleg_sim::sil::BOARD_START_UP_NS;
 
 /// RCC_CSR: the independent watchdog has bitten.
 const WATCHDOG: u32 = 1 << 29;
@@ -167,6 +168,44 @@ fn a_brown_out_resets_with_outputs_off_and_the_board_returns_with_the_supply() {
     let up = bench.tick(Power::Good);
     assert_eq!(up.period_us, 1000);
     assert_eq!(up.seen.adc, 30_000);
+}
+
+#[test]
+fn a_board_starts_in_the_time_that_the_simulator_takes_it_for() {
+    const STEP_NS: u64 = 100_000;
+    for (address, period_ns, start_up_ns) in [
+        (3, TICK_NS, BOARD_START_UP_NS[0]),
+        (8, SAMPLE_NS, BOARD_START_UP_NS[1]),
+    ] {
+        // Power comes back later and later after a tick edge.
+        for later_ns in (0..period_ns).step_by(STEP_NS as usize) {
+            let mut bench = Bench::new(address);
+            for _ in 0..50 {
+                bench.tick_of(period_ns, Power::Good);
+            }
+            bench.tick_of(period_ns, Power::BrownOut);
+            let on_ns = bench.now_ns + later_ns;
+            let edge_ns = bench.now_ns;
+            bench.tick_of(period_ns, Power::BrownOut);
+            let back = Run {
+                until_ns: on_ns,
+                ..Run::default()
+            };
+            bench.ran(&Request::Run(back));
+            let trip = (0..60).find_map(|_| {
+                let trip = bench.tick_of(period_ns, Power::Good).trip;
+                trip.filter(|trip| trip.running_ns > 0)
+            });
+            let first_ns = trip.expect("it comes back").running_ns;
+            let earliest_ns = on_ns + start_up_ns;
+            let periods = (earliest_ns - edge_ns).div_ceil(period_ns);
+            assert_eq!(
+                first_ns,
+                edge_ns + periods * period_ns,
+                "board {address}, power back {later_ns} ns after an edge"
+            );
+        }
+    }
 }
 
 /// Polls before a board gives its crystal up (firmware/board/src/g431/clock.rs), each of

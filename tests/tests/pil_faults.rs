@@ -193,6 +193,8 @@ fn assert_shut_after_one_reset(
         "{physical} s"
     );
     assert_eq!(pil.boards[0].resets, 1);
+    // Down to the times in the record of the fault, for which the master asks.
+    assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     assert_all_stopped(recording, t + 0.2);
     println!(
         "{what}: outputs off after {:.1} ms, valves shut after {:.1} ms",

@@ -217,3 +217,55 @@ fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
         "{said:?}"
     );
 }
+
+#[test]
+fn in_a_whole_run_a_board_without_power_goes_on_with_what_it_had_saved_as_on_the_host() {
+    let (own, error) = (PARAMETER.id(), WheelParam::FollowingError.id());
+    let write = |board, id, raw| command_about("WriteParameter", board, Some((id, Some(raw))));
+    let read = |board, id| command_about("ReadParameter", board, Some((id, None)));
+    let mm = |mm: f64| (mm * 65_536.0) as i32;
+    let events = [
+        (0.2, command("Disarm")),
+        (0.4, write(3, own, mm(55.0))),
+        (0.5, write(8, error, 12_345)),
+        (0.6, command_about("SaveParameters", 3, None)),
+        (0.8, command_about("SaveParameters", 8, None)),
+        // In force, and not saved.
+        (1.0, write(3, own, mm(70.0))),
+        (1.1, write(8, error, 777)),
+        (1.3, read(3, own)),
+        (1.4, read(8, error)),
+        (2.2, read(3, own)),
+        (2.3, read(8, error)),
+    ];
+    let mut scenario = stand(2.6, &events);
+    scenario.faults = vec!["brown-out:joint3=30@1.5s".parse().expect("a fault")];
+    let (recording, pil) = run_with(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+    assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
+    let resets: Vec<u16> = pil.boards.iter().map(|board| board.resets).collect();
+    assert_eq!(resets, [0, 0, 1, 0, 0, 0, 0, 0]);
+    let events = recording.events.iter().map(|row| row.v.text.as_str());
+    let values: Vec<&str> = events
+        .filter_map(|text| {
+            text.split_once("following_error of ")?
+                .1
+                .split(" is ")
+                .nth(1)
+        })
+        .collect();
+    assert_eq!(
+        values,
+        [
+            "55 mm",
+            "12345 counts",
+            "70 mm",
+            "777 counts",
+            "70 mm",
+            "777 counts",
+            "55 mm",
+            "777 counts"
+        ],
+        "{}",
+        sil::story(&recording)
+    );
+}

@@ -69,7 +69,8 @@ pub struct Run {
     /// A tick edge falls on `until_ns`, with these inputs latched. Without an
     /// edge the inputs stay as they are.
     pub edge: Option<Inputs>,
-    /// State of the supply from now on.
+    /// State of the supply: failing, from the end of the last run on; back, from the end
+    /// of this one on.
     pub power: Power,
     /// Bytes received since the last `Run`, in order.
     pub received: Vec<u8, MAX_RECEIVED>,

@@ -252,10 +252,10 @@ impl Outside {
         self.number(address).map(|n| self.boards[n].ran.outputs)
     }
 
-    /// Whether the board at `address` runs a tick at `now_ns`, if it is outside.
-    pub(crate) fn ticks(&self, address: u8, now_ns: u64) -> Option<bool> {
-        let from = self.boards[self.number(address)?].running_from_ns;
-        Some(from.is_some_and(|from| from <= now_ns))
+    /// First tick edge of the board at `address` since its newest start, ns, if it is
+    /// outside and not down.
+    pub(crate) fn running_from_ns(&self, address: u8) -> Option<u64> {
+        self.boards[self.number(address)?].running_from_ns
     }
 
     /// The newest edge of the board at `address`, ns; `None` for one that runs here.

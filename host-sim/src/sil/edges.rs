@@ -82,7 +82,11 @@ impl World {
         self.run_outside(&all)
     }
 
-    fn run_outside(&mut self, edges: &[(u8, Option<link::Inputs>)]) -> Result<(), SimError> {
+    /// Runs boards outside to this instant, with an edge those that have inputs.
+    pub(super) fn run_outside(
+        &mut self,
+        edges: &[(u8, Option<link::Inputs>)],
+    ) -> Result<(), SimError> {
         let (now_ns, bus) = (self.now_ns, &self.bus);
         let Some(outside) = &mut self.outside else {
             return Ok(());

@@ -30,6 +30,7 @@ use wheeleg_protocol::LinkQuality;
 
 pub use self::audit::LineAudit;
 pub(crate) use self::boards::{JointBoard, identity};
+pub use self::power::BOARD_START_UP_NS;
 pub(crate) use self::words::hex;
 
 use self::observe::Observer;

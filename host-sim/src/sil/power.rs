@@ -7,9 +7,10 @@ use wheeleg_master::master::LOCAL_DEADLINE_US;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_pil_link as link;
 use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_units::Micros;
 
 use super::boards::{JointBoard, WheelBoard, identity};
-use super::traffic::micros;
+use super::traffic::{NS_PER_US, micros};
 use super::world::{JOINT_TICK_NS, World};
 use crate::SimError;
 use crate::faults::{FaultKind, FaultSpec, Victim};
@@ -17,6 +18,9 @@ use crate::faults::{FaultKind, FaultSpec, Victim};
 /// A stopped program is reset after this, ns: the independent watchdog of the
 /// boards (firmware/board/BOARD.md).
 const WATCHDOG_NS: u64 = 50_000_000;
+/// From power-up to the first tick edge, ns: a joint board's, and a wheel board's. Memory, clock, converter and parameters as the shipped images set them up, measured on
+/// emulated boards (tests/tests/pil.rs). A crystal that is slow to swing makes it longer.
+pub const BOARD_START_UP_NS: [u64; 2] = [3_335_000, 2_345_000];
 /// What a master adds to the first number of its requests at every start, so that
 /// no board takes them for repetitions; any odd number would do.
 const SEQUENCE_STEP: u16 = 0x2F35;
@@ -30,6 +34,13 @@ pub(super) enum Down {
     Off {
         /// When power comes back, ns.
         until_ns: u64,
+    },
+    /// Its processor starts: all its outputs are off.
+    Starting {
+        /// When its first tick begins at the earliest, ns; it hears the line a tick before.
+        until_ns: u64,
+        /// What it finds as the cause of its reset.
+        cause: ResetCause,
     },
     /// It stores its parameters, which keeps its processor from everything else: its
     /// outputs stay as they are, off.
@@ -45,12 +56,9 @@ pub(super) enum Down {
 }
 
 impl Down {
-    /// What the processor finds as the cause of its reset when this is over.
-    fn ended_by(self) -> ResetCause {
-        match self {
-            Self::Hung { .. } => ResetCause::Watchdog,
-            Self::No | Self::Off { .. } | Self::Storing { .. } => ResetCause::PowerUp,
-        }
+    /// Whether nothing drives the outputs of the board.
+    pub(super) fn is_off(self) -> bool {
+        matches!(self, Self::Off { .. } | Self::Starting { .. })
     }
 }
 
@@ -95,11 +103,44 @@ impl World {
     /// Whether the board at `address` works: here unless it is down, outside
     /// unless it is in reset.
     pub(super) fn runs(&self, address: u8) -> bool {
+        self.first_edge_ns(address)
+            .is_some_and(|edge_ns| edge_ns <= self.now_ns)
+    }
+
+    /// First tick edge of the board at `address` since its processor has started, ns;
+    /// `None` while it is down.
+    fn first_edge_ns(&self, address: u8) -> Option<u64> {
+        let i = usize::from(address) - 1;
+        match self.outside.as_ref().filter(|o| o.has(address)) {
+            _ if self.down[i] != Down::No => None,
+            Some(outside) => outside.running_from_ns(address),
+            None => Some(self.clock_zero_ns[i]),
+        }
+    }
+
+    /// From when on the board at `address` hears the line, ns: its tick timer is started
+    /// a tick before its first edge.
+    pub(super) fn hears_from_ns(&self, address: u8) -> Option<u64> {
+        let edge_ns = self.first_edge_ns(address)?;
+        Some(edge_ns.saturating_sub(self.tick_ns(address)))
+    }
+
+    /// Tick of a board, ns.
+    fn tick_ns(&self, address: u8) -> u64 {
+        match address.checked_sub(7) {
+            Some(wheel) => u64::from(self.wheels[usize::from(wheel)].period_us()) * NS_PER_US,
+            None => JOINT_TICK_NS,
+        }
+    }
+
+    /// The clock of the board at `address` at `ns`: it counts from the first tick edge
+    /// after its processor has started.
+    pub(super) fn clock(&self, address: u8, ns: u64) -> Micros {
         let outside = self.outside.as_ref();
-        self.down[usize::from(address) - 1] == Down::No
-            && outside
-                .and_then(|o| o.ticks(address, self.now_ns))
-                .unwrap_or(true)
+        let there = outside.and_then(|o| o.running_from_ns(address));
+        let zero_ns = there.unwrap_or(self.clock_zero_ns[usize::from(address) - 1]);
+        let now = micros(self.faults.clock_ns(address, ns));
+        Micros(now.get().wrapping_sub(micros(zero_ns).get()))
     }
 
     /// The application of a board from its reset by `cause` on.
@@ -122,6 +163,7 @@ impl World {
         } else {
             self.wheels[i - 6] = WheelBoard::new(who, &stored, cause)?;
         }
+        self.clock_zero_ns[i] = self.now_ns + self.tick_ns(address.raw());
         Ok(())
     }
 
@@ -132,7 +174,7 @@ impl World {
             return;
         }
         let i = usize::from(address) - 1;
-        let now = micros(self.faults.clock_ns(address, self.now_ns));
+        let now = self.clock(address, self.now_ns);
         let taken = match self.joints.get_mut(i) {
             Some(board) => board.take_save(now),
             None => self.wheels[i - 6].take_save(now),
@@ -150,6 +192,9 @@ impl World {
             let down = self.down[usize::from(raw) - 1];
             let until_ns = match down {
                 Down::No => continue,
+                // It begins with an edge of its own.
+                Down::Starting { .. } if raw > 6 => continue,
+                Down::Starting { until_ns, .. } => until_ns.saturating_sub(JOINT_TICK_NS),
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
                 // The tick of the last edge before the end is worked off then.
                 Down::Storing { until_ns } => {
@@ -170,8 +215,14 @@ impl World {
                     if matches!(down, Down::Off { .. }) {
                         self.down[usize::from(raw) - 1] = Down::No;
                     }
+                    // From this very instant on.
+                    self.run_outside(&[(raw, None)])?;
                 }
-                _ => self.start_anew(address, down.ended_by())?,
+                _ => match down {
+                    Down::Starting { cause, .. } => self.start_anew(address, cause)?,
+                    Down::Hung { .. } => self.begin_start(raw, ResetCause::Watchdog),
+                    _ => self.begin_start(raw, ResetCause::PowerUp),
+                },
             }
         }
         if self.master_back_ns.is_some_and(|at| at <= self.now_ns) {
@@ -179,6 +230,30 @@ impl World {
             self.restart_master()?;
         }
         Ok(())
+    }
+
+    /// The processor of a board leaves its reset.
+    fn begin_start(&mut self, address: u8, cause: ResetCause) {
+        let start_up_ns = BOARD_START_UP_NS[usize::from(address > 6)];
+        self.down[usize::from(address) - 1] = Down::Starting {
+            until_ns: self.now_ns.saturating_add(start_up_ns),
+            cause,
+        };
+    }
+
+    /// A wheel board begins with the next sample, if it has started by then.
+    pub(super) fn start_wheel(&mut self, wheel: usize) -> Result<(), SimError> {
+        let Some(address) = Address::new(wheel as u8 + 7) else {
+            return Ok(());
+        };
+        match self.down[wheel + 6] {
+            Down::Starting { until_ns, cause }
+                if until_ns <= self.now_ns + self.tick_ns(address.raw()) =>
+            {
+                self.start_anew(address, cause)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// A master that remembers nothing. Whoever was connected to it reconnects.

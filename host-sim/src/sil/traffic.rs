@@ -67,17 +67,24 @@ impl World {
         while let Some(delivery) = self.bus.take_due(self.now_ns) {
             answerable |= !(1..=8).contains(&delivery.from);
             for address in 1..=8_u8 {
-                if !self.runs(address) {
+                let Some(from_ns) = self.hears_from_ns(address) else {
                     continue;
-                }
+                };
                 let Some((bytes, end_ns)) = self.bus.heard_by(address, &delivery) else {
                     continue;
                 };
-                let t_end = micros(self.faults.clock_ns(address, end_ns));
+                // A board that starts hears the end of a frame.
+                let heard = end_ns.saturating_sub(from_ns).div_ceil(self.bus.byte_ns());
+                let missed = bytes.len().saturating_sub(heard as usize);
+                let bytes = &bytes[missed..];
+                if bytes.is_empty() {
+                    continue;
+                }
+                let t_end = self.clock(address, end_ns);
                 let i = usize::from(address) - 1;
                 match self.joints.get_mut(i) {
-                    Some(board) => board.on_bus_bytes(&bytes, t_end),
-                    None => self.wheels[i - 6].on_bus_bytes(&bytes, t_end),
+                    Some(board) => board.on_bus_bytes(bytes, t_end),
+                    None => self.wheels[i - 6].on_bus_bytes(bytes, t_end),
                 }
             }
             let master = Address::MASTER.raw();
@@ -102,13 +109,15 @@ impl World {
     /// Puts on the line what the boards want to send, at the times they chose.
     pub(super) fn collect_transmissions(&mut self) {
         let now_ns = self.now_ns;
+        let clocks: [Micros; 8] = std::array::from_fn(|i| self.clock(i as u8 + 1, now_ns));
+        let clock = |address: u8| clocks[usize::from(address) - 1];
         let (bus, audit) = (&mut self.bus, &mut self.audit);
         let (faults, outside) = (&mut self.faults, &mut self.outside);
         // True if the guard of the board's driver cut it off.
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
             // Start times are on the board's own clock.
-            let now = micros(faults.clock_ns(from, now_ns));
-            let start_ns = now_ns + faults.duration_ns(from, ahead_us(now, t.start_at));
+            let ahead_us = ahead_us(clock(from), t.start_at);
+            let start_ns = now_ns + faults.duration_ns(from, ahead_us);
             let Some(bytes) = faults.board_sends(from, t.bytes.to_vec()) else {
                 return false;
             };
@@ -127,14 +136,14 @@ impl World {
         for (board, address) in self.joints.iter_mut().zip(1..) {
             while let Some(t) = board.take_transmission() {
                 if send(address, t) {
-                    board.driver_cut_off(micros(now_ns));
+                    board.driver_cut_off(clock(address));
                 }
             }
         }
         for (board, address) in self.wheels.iter_mut().zip(7..) {
             while let Some(t) = board.take_transmission() {
                 if send(address, t) {
-                    board.driver_cut_off(micros(now_ns));
+                    board.driver_cut_off(clock(address));
                 }
             }
         }

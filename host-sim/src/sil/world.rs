@@ -20,7 +20,7 @@ use super::edges::Sensed;
 use super::memory::Memory;
 use super::power::{Client, Down};
 use super::strangers::Strangers;
-use super::traffic::{NS_PER_US, micros};
+use super::traffic::NS_PER_US;
 use crate::SimError;
 use crate::config::{NodeParams, RobotConfig};
 use crate::faults::{FaultKind, FaultSpec, Injector, Victim};
@@ -63,6 +63,8 @@ pub(super) struct World {
     pub(super) tick_inputs: TickInputs,
     pub(super) faults: Injector,
     pub(super) down: [Down; 8],
+    /// First tick edge of each board since its processor has started, ns.
+    pub(super) clock_zero_ns: [u64; 8],
     pub(super) strangers: Strangers,
     pub(super) config: MasterConfig,
     pub(super) master_back_ns: Option<u64>,
@@ -195,6 +197,7 @@ impl World {
             tick_inputs: TickInputs::default(),
             faults: Injector::new(seed),
             down: [Down::No; 8],
+            clock_zero_ns: [0; 8],
             outside,
             memories: std::array::from_fn(|i| {
                 // Joints first, then wheels, as on the bus.
@@ -269,7 +272,7 @@ impl World {
             let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
             let on_us = match (outside, self.down[i]) {
                 (Some(outputs), _) => outputs.valve_on_us,
-                (None, Down::Off { .. }) => [0; 4],
+                (None, down) if down.is_off() => [0; 4],
                 (None, _) => self.joints[i].active_on_us(),
             };
             self.tick_inputs.take(i, on_us);
@@ -279,7 +282,7 @@ impl World {
         self.inputs.dump = match (outside, self.down[6]) {
             (Some(outputs), _) => outputs.dump,
             // The dump valve shuts without current: air stays on.
-            (None, Down::Off { .. }) => false,
+            (None, down) if down.is_off() => false,
             (None, _) => self.wheels[0].dumps(),
         };
         self.plant
@@ -291,7 +294,7 @@ impl World {
             None => self.sense(),
         };
         for (i, address) in (0..6).zip(1..) {
-            let now = micros(self.faults.clock_ns(address, self.now_ns));
+            let now = self.clock(address, self.now_ns);
             if self.runs(address) {
                 self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
                 self.store(address);
@@ -317,12 +320,13 @@ impl World {
 
     fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
         self.advance_plant()?;
+        self.start_wheel(wheel)?;
         let (edges, switch) = self.wheel_inputs(wheel);
         self.wheel_edge_outside(wheel)?;
         let address = wheel as u8 + 7;
         let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         // Only the bridge takes new inputs here: the valves keep their tick.
-        let off = matches!(self.down[wheel + 6], Down::Off { .. });
+        let off = self.down[wheel + 6].is_off();
         self.inputs.bridge_duty[wheel] = match outside {
             Some(outputs) => duty(&outputs),
             None if off => 0.0,
@@ -332,9 +336,9 @@ impl World {
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];
-        let now_ns = self.faults.clock_ns(address, self.now_ns);
+        let now = self.clock(address, self.now_ns);
         if self.runs(address) {
-            self.wheels[wheel].tick(micros(now_ns), edges, switch);
+            self.wheels[wheel].tick(now, edges, switch);
             self.store(address);
         }
         self.strangers.wheel_sample(address, self.now_ns);
