@@ -281,6 +281,8 @@ impl Saver {
     /// Switches the supply off and on; gives the set that is found then.
     fn restart(&mut self) -> Set {
         self.run(5, Power::BrownOut);
+        // The supply comes back at the end of a run.
+        self.run(1, Power::Good);
         // Long enough for the clock to start and the pages to be read, too short for
         // the next save to begin.
         let outputs = self.run(60, Power::Good).outputs;
