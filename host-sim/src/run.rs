@@ -59,7 +59,7 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 pub fn run(options: &Options) -> Result<Finished, SimError> {
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
-    faults::check(&scenario)?;
+    faults::check(&scenario, &options.nodes)?;
     let robot = match &options.robot {
         Some(robot) => builtin::robot(robot)?,
         None => builtin::robot_of(&scenario.robot, &options.scenario)?,

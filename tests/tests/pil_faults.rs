@@ -16,7 +16,7 @@ use sil::{at, energised, gait, range, robot, run_with, window};
 use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
 use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
-use wheeleg_sim::telemetry::{JointSample, Recording, Row};
+use wheeleg_sim::telemetry::{JointSample, Recording, Row, WheelSample};
 
 /// Valves commanded shut and wheel ramps begun within this, s.
 const REACTION_S: f64 = 0.060;
@@ -243,6 +243,35 @@ fn a_brown_out_in_mid_move_turns_the_outputs_off_and_the_board_comes_back_disarm
     // The fault strikes within the tick of its instant; the next one has none.
     assert!(commanded <= 2.0 * TICK_S, "off after {commanded} s");
     assert_shut_after_one_reset("supply fails", &recording, &pil, t, commanded);
+}
+
+#[test]
+fn a_wheel_that_lost_its_supply_counts_from_zero_again_as_its_hardware_does() {
+    // While the wheels push: at a standstill any zero would do.
+    let (sound, _) = run_with(&gait(LegChoice::Left, 4.0, &[]), &one("wheel8=pil"));
+    let pushes = |row: &&Row<WheelSample>| row.v.velocity_mm_s > 30.0;
+    let push = sound.wheels[1].iter().find(pushes).expect("a push");
+    let (t, off_s) = (push.t_s() + 0.1, 0.030);
+    let scenario = gait_with(&format!("brown-out:wheel8=30@{t:.3}s"), t + 1.0);
+    let (recording, pil) = run_with(&scenario, &one("wheel8=pil"));
+    assert_eq!(pil.boards[0].resets, 1);
+    assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
+    let rows = &recording.wheels[1];
+    let before = window(rows, t - 0.1, t);
+    let (slowest, fastest) = range(before, |s| s.velocity_mm_s);
+    assert!(slowest > 20.0, "{slowest} … {fastest} mm/s");
+    let count = before.last().expect("a sample").v.count;
+    // From zero on, with a wheel that runs out: it would need twice the time that it is
+    // looked at to come to half of the count that it had.
+    let after = window(rows, t + off_s + 0.005, t + off_s + 0.020);
+    let read: Vec<_> = after.iter().map(|row| row.v.count).collect();
+    assert!(read.len() > 10 && count > 600, "{count}, {read:?}");
+    assert!(
+        read.iter().all(|now| (0..count / 2).contains(now)),
+        "{count}, {read:?}"
+    );
+    assert!(read.is_sorted() && read.last() > read.first(), "{read:?}");
+    assert!(after.iter().all(|row| row.v.mode <= 1), "armed again");
 }
 
 /// A board that saves its parameters (firmware/board/src/bin/probe_store.rs).

@@ -6,6 +6,7 @@ mod sil;
 
 use sil::{at, command, energised, gait, range, robot, run, story, window};
 use wheeleg_sim::config::{EventAction, LegChoice};
+use wheeleg_sim::pil::Nodes;
 use wheeleg_sim::telemetry::Recording;
 
 /// The wheels push, the horizontal cylinder moves.
@@ -64,7 +65,7 @@ fn restart(order: [Who; 3], gap_s: f64) -> (Recording, f64) {
             scenario.faults.push(text.parse().expect("a fault"));
         }
     }
-    wheeleg_sim::faults::check(&scenario).expect("faults that can be");
+    wheeleg_sim::faults::check(&scenario, &Nodes::default()).expect("faults that can be");
     (run(&scenario, &robot(), 1), last_s)
 }
 

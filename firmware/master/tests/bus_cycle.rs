@@ -318,6 +318,27 @@ fn wheel_moves_start_at_the_last_reference_and_wrap() {
 }
 
 #[test]
+fn a_wheel_that_starts_anew_has_not_moved() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    let travel_um = |rig: &Rig| rig.master.layer0().odometry().travel_um();
+    let before = travel_um(&rig);
+    // It is back before three replies are missed, and counts from 0.
+    let wheel = &mut rig.nodes[6];
+    wheel.mode = NodeMode::Boot;
+    wheel.position = 0;
+    rig.run(1);
+    assert_eq!(travel_um(&rig), before);
+    // From there on what it counts is motion again: half of it is the mean of both.
+    rig.nodes[6].mode = NodeMode::Idle;
+    rig.nodes[6].position = 1_000;
+    rig.run(1);
+    let counts_um = WheelGeometry::default().counts_to_um(1_000);
+    let moved = travel_um(&rig) - before;
+    assert!((moved - counts_um / 2).abs() <= 1, "{moved} of {counts_um}");
+}
+
+#[test]
 fn user_requests_are_answered_by_the_node() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.run(60);

@@ -176,6 +176,7 @@ impl Machine {
         }
         soc.driver_timeouts = state.soc.driver_timeouts;
         soc.wiper = state.soc.wiper;
+        soc.encoder_timer().keep_wheel(state.soc.encoder_timer());
         state.reset(soc);
         self.settle()?;
         if power_was_away {

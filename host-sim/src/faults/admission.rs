@@ -1,16 +1,19 @@
 //! Which faults a run can have: what makes no sense is refused, never left out
 //! in silence.
 
-use super::FaultSpec;
+use super::{FaultKind, FaultSpec, Victim};
 use crate::SimError;
 use crate::config::Scenario;
+use crate::pil::{NodeKind, Nodes};
 
-/// Checks the faults of a scenario against its duration and each other.
+/// Checks the faults of a scenario against its duration, each other, and where the
+/// nodes run.
 ///
 /// # Errors
 /// [`SimError::Simulation`] with the first fault that cannot be, and why.
-pub fn check(scenario: &Scenario) -> Result<(), SimError> {
+pub fn check(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
     for fault in &scenario.faults {
+        can_be_there(fault, nodes)?;
         if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
             return Err(SimError::simulation(
                 format!("the fault `{fault}` cannot begin or end while the robot runs"),
@@ -34,6 +37,42 @@ pub fn check(scenario: &Scenario) -> Result<(), SimError> {
     no_twins(&scenario.faults)
 }
 
+/// What strikes a board itself must be possible where that board runs: an image has a
+/// clock, a transmitter and an interface of its own, and a board on QEMU or on a bench
+/// no supply that could come back and no program that could be stopped.
+fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
+    let Victim::Board(address) = fault.victim else {
+        return Ok(());
+    };
+    let number = usize::from(address).checked_sub(1);
+    let Some(there) = number.and_then(|i| nodes.0.get(i)) else {
+        return Ok(());
+    };
+    let (possible, where_else) = match (there, fault.kind) {
+        (NodeKind::Sil, _) => (true, ""),
+        (
+            _,
+            FaultKind::ClockDrift
+            | FaultKind::Babble
+            | FaultKind::BabbleUnguarded
+            | FaultKind::OtherInterface,
+        ) => (false, "`sil`"),
+        (NodeKind::Pil, _) => (true, ""),
+        (_, FaultKind::NodeOff) => (fault.until_s.is_none(), "`sil` or `pil`"),
+        (_, FaultKind::NodeReset | FaultKind::BrownOut | FaultKind::NodeHang) => {
+            (false, "`sil` or `pil`")
+        }
+        _ => (true, ""),
+    };
+    if possible {
+        return Ok(());
+    }
+    Err(SimError::simulation(
+        format!("the fault `{fault}` cannot strike a board that runs on `{there}`"),
+        format!("let that node run as {where_else}"),
+    ))
+}
+
 /// The same fault at the same place twice at a time has no meaning.
 fn no_twins(faults: &[FaultSpec]) -> Result<(), SimError> {
     for (i, a) in faults.iter().enumerate() {
@@ -50,4 +89,46 @@ fn no_twins(faults: &[FaultSpec]) -> Result<(), SimError> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::builtin;
+
+    #[test]
+    fn what_a_board_cannot_suffer_where_it_runs_is_refused() {
+        let admitted = |fault: &str, there: &str| {
+            let mut scenario = builtin::scenario("three-step").expect("built in");
+            scenario.faults = vec![fault.parse().expect("a fault")];
+            let choice = there.parse().expect("a choice");
+            check(&scenario, &Nodes::new(&NodeKind::Sil, &[choice]))
+        };
+        let anew = [
+            "brown-out:joint3@1s",
+            "node-reset:joint3@1s",
+            "node-hang:joint3@1s",
+            "node-off:joint3@1s..2s",
+        ];
+        let own = ["clock-drift:joint3=200@1s", "babble:joint3@1s"];
+        let places = ["joint3=pil", "joint3=qemu", "joint3=hil:/dev/ttyACM0"];
+        for there in places {
+            for fault in anew.iter().chain(&own) {
+                let outcome = admitted(fault, there);
+                if there == "joint3=pil" && anew.contains(fault) {
+                    assert!(outcome.is_ok(), "{fault} {there}");
+                    continue;
+                }
+                let refusal = outcome.expect_err(fault).to_string();
+                for part in [fault.split([':', '@']).next(), there.split('=').nth(1)] {
+                    assert!(refusal.contains(part.expect("a part")), "{refusal}");
+                }
+            }
+            assert!(admitted("node-off:joint3@1s", there).is_ok());
+            assert!(admitted("pot-open:joint3@1s", there).is_ok());
+        }
+        for fault in anew.iter().chain(&own) {
+            assert!(admitted(fault, "joint4=qemu").is_ok(), "{fault}");
+        }
+    }
 }

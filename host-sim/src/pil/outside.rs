@@ -43,6 +43,8 @@ struct Board {
     edge_ns: Option<u64>,
     /// Inputs of the newest edges that have not been compared.
     latched: VecDeque<(u64, Inputs)>,
+    /// Quadrature edges at which its counter stood at 0, of a wheel.
+    count_zero: i32,
     /// Sent here by the native application, there by the board.
     here: VecDeque<(u64, Vec<u8>)>,
     there: VecDeque<(u64, Vec<u8>)>,
@@ -195,6 +197,7 @@ impl Outside {
             heard_ns: 0,
             edge_ns: None,
             latched: VecDeque::new(),
+            count_zero: 0,
             here: VecDeque::new(),
             there: VecDeque::new(),
             running_from_ns: Some(0),
@@ -267,6 +270,13 @@ impl Outside {
     pub(crate) fn take_trip(&mut self, address: u8) -> Option<Trip> {
         let n = self.number(address)?;
         self.boards[n].tripped.take()
+    }
+
+    /// Quadrature edges at which the counter of the wheel board at `address` stood at 0,
+    /// if that is outside.
+    pub(crate) fn count_zero(&self, address: u8) -> Option<i64> {
+        let number = self.number(address)?;
+        Some(i64::from(self.boards[number].count_zero))
     }
 
     /// Supply of the board at `address` from its next run on.
@@ -402,6 +412,12 @@ impl Outside {
                 board.latched.clear();
             }
             board.running_from_ns = (trip.running_ns > 0).then_some(trip.running_ns);
+            // It started before the edge of this very run, if there was one.
+            let mut known = board.latched.iter().rev();
+            let at_edge = board.edge_ns == Some(board.heard_ns);
+            if let Some((_, inputs)) = known.nth(usize::from(at_edge)) {
+                board.count_zero = inputs.encoder;
+            }
         }
         // The tick that was worked off last, once.
         while let Some((edge_ns, inputs)) = board.latched.front() {
@@ -410,8 +426,12 @@ impl Outside {
             }
             // Before its first tick a board names time zero, too.
             if *edge_ns == ran.seen_at_ns && *edge_ns > 0 {
+                let latched = Inputs {
+                    encoder: inputs.encoder.wrapping_sub(board.count_zero),
+                    ..*inputs
+                };
                 self.comparison
-                    .inputs(*edge_ns, board.address, inputs, &ran.seen);
+                    .inputs(*edge_ns, board.address, &latched, &ran.seen);
                 board.tick_instructions.push(ran.figures.tick_instructions);
             }
             board.latched.pop_front();

@@ -221,6 +221,8 @@ macro_rules! each_wheel {
 pub(super) struct WheelBoard {
     application: WheelApplication,
     encoder: CounterInput,
+    /// Quadrature edges at which the counter stood at 0.
+    count_zero: i64,
     pulse: PwmChannel,
     sign: Line,
     supply: Line,
@@ -270,11 +272,17 @@ impl WheelBoard {
         Ok(Self {
             application,
             encoder,
+            count_zero: 0,
             pulse,
             sign,
             supply,
             dump,
         })
+    }
+
+    /// The counter of the board has just been started, with the wheel at `edges`.
+    pub(super) fn counts_from(&mut self, edges: i64) {
+        self.count_zero = edges;
     }
 
     /// Bridge duty that becomes active at this sample edge, −1..=1.
@@ -315,7 +323,8 @@ impl WheelBoard {
         encoder_edges: i64,
         supply_switch: bool,
     ) -> TickReport {
-        self.encoder.latch(encoder_edges);
+        self.encoder
+            .latch(encoder_edges.wrapping_sub(self.count_zero));
         self.supply.set_level(supply_switch);
         each_wheel!(&mut self.application, node => {
             let report = node.tick(now);

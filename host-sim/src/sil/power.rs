@@ -18,7 +18,8 @@ use crate::faults::{FaultKind, FaultSpec, Victim};
 /// A stopped program is reset after this, ns: the independent watchdog of the
 /// boards (firmware/board/BOARD.md).
 const WATCHDOG_NS: u64 = 50_000_000;
-/// From power-up to the first tick edge, ns: a joint board's, and a wheel board's. Memory, clock, converter and parameters as the shipped images set them up, measured on
+/// From power-up to the first tick edge, ns: a joint board's, and a wheel board's.
+/// Memory, clock, converter and parameters as the shipped images set them up, measured on
 /// emulated boards (tests/tests/pil.rs). A crystal that is slow to swing makes it longer.
 pub const BOARD_START_UP_NS: [u64; 2] = [3_335_000, 2_345_000];
 /// What a master adds to the first number of its requests at every start, so that
@@ -140,7 +141,8 @@ impl World {
         let there = outside.and_then(|o| o.running_from_ns(address));
         let zero_ns = there.unwrap_or(self.clock_zero_ns[usize::from(address) - 1]);
         let now = micros(self.faults.clock_ns(address, ns));
-        Micros(now.get().wrapping_sub(micros(zero_ns).get()))
+        let zero = micros(self.faults.clock_ns(address, zero_ns));
+        Micros(now.get().wrapping_sub(zero.get()))
     }
 
     /// The application of a board from its reset by `cause` on.
@@ -253,6 +255,21 @@ impl World {
                 self.start_anew(address, cause)
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Wheel boards whose first sample is the one that now comes: their counters have
+    /// counted since their start-up, between the two samples before this one.
+    pub(super) fn start_counters(&mut self) {
+        for wheel in 0..2 {
+            let address = wheel as u8 + 7;
+            let due = self.next_wheel_ns[wheel] == self.now_ns;
+            if due && self.first_edge_ns(address) == Some(self.now_ns) {
+                let outside = self.outside.as_ref();
+                let there = outside.and_then(|o| o.count_zero(address));
+                let [_, here] = self.wheel_edges[wheel];
+                self.wheels[wheel].counts_from(there.unwrap_or(here));
+            }
         }
     }
 

@@ -50,6 +50,8 @@ pub(super) struct World {
     pub(super) outputs: Outputs,
     pub(super) joints: [JointBoard; 6],
     pub(super) wheels: [WheelBoard; 2],
+    /// Quadrature edges of each wheel at its newest sample and the one before it.
+    pub(super) wheel_edges: [[i64; 2]; 2],
     pub(super) bus: Bus,
     pub(super) audit: Audit,
     pub(super) master: Master,
@@ -180,6 +182,7 @@ impl World {
                 joint(6)?,
             ],
             wheels,
+            wheel_edges: [[0; 2]; 2],
             bus,
             audit: Audit::default(),
             client: Client::connect(&mut brain),
@@ -321,8 +324,10 @@ impl World {
     fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
         self.advance_plant()?;
         self.start_wheel(wheel)?;
+        self.start_counters();
         let (edges, switch) = self.wheel_inputs(wheel);
         self.wheel_edge_outside(wheel)?;
+        self.wheel_edges[wheel] = [edges, self.wheel_edges[wheel][0]];
         let address = wheel as u8 + 7;
         let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         // Only the bridge takes new inputs here: the valves keep their tick.
@@ -332,7 +337,12 @@ impl World {
             None if off => 0.0,
             None => self.wheels[wheel].active_duty(),
         };
-        self.inputs.bridge_enabled[wheel] = outside.is_some() || !off;
+        // A board in reset lets its wheel coast, wherever it runs.
+        let starts = match self.outside.as_ref().filter(|o| o.has(address)) {
+            Some(outside) => outside.running_from_ns(address).is_none(),
+            None => false,
+        };
+        self.inputs.bridge_enabled[wheel] = !off && !starts;
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];

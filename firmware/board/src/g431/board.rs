@@ -67,7 +67,7 @@ impl Start {
             .is_some_and(|identity| identity.address.raw() == 7);
         (
             bridge::configure(),
-            encoder::start(),
+            encoder::configure(),
             latch::Supply { fitted: first },
             bridge::Dump { fitted: first },
         )
@@ -82,6 +82,7 @@ impl Start {
             unmask(interrupt);
         }
         bridge::permit();
+        encoder::start();
         tick::start();
         G431 {
             bus,

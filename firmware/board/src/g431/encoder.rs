@@ -5,8 +5,8 @@ use pac::timer::vals::{CcmrInputCcs, FilterValue, Sms};
 use wheeleg_node::hardware::Encoder;
 use wheeleg_units::WheelCount;
 
-/// Starts the counter at 0.
-pub(super) fn start() -> WheelEncoder {
+/// Sets the counter up; it stands until [`start`].
+pub(super) fn configure() -> WheelEncoder {
     let tim = pac::TIM3;
     tim.arr().write(|r| r.set_arr(u16::MAX));
     tim.ccmr_input(0).write(|r| {
@@ -20,9 +20,15 @@ pub(super) fn start() -> WheelEncoder {
     tim.ccer()
         .write(|r| r.set_ccp(0, cfg!(not(feature = "mutant-encoder"))));
     tim.smcr().write(|r| r.set_sms(Sms::ENCODER_MODE_3));
+    WheelEncoder
+}
+
+/// Counts from 0 on: with the sample timer, so that the first sample brings the counts
+/// of one sample and not those of a start-up, too.
+pub(super) fn start() {
+    let tim = pac::TIM3;
     tim.cnt().write(|r| r.set_cnt(0));
     tim.cr1().modify(|r| r.set_cen(true));
-    WheelEncoder
 }
 
 /// The counter at a tick edge.

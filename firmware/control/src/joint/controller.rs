@@ -10,8 +10,7 @@ use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{
-    Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32,
-    shift_right_round_inner,
+    Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32, shift_right_round_inner,
 };
 
 /// From gain (24) × position or velocity (16) fractional bits to duty (30).
@@ -308,7 +307,11 @@ impl JointController {
             // Symmetric, so that its magnitude is a number, too.
             self.fade = last.saturating_sub(law).max(-i32::MAX);
             // Rounded up: the fade ends within the configured time.
-            match self.fade.unsigned_abs().checked_div(self.config.bumpless_ticks) {
+            match self
+                .fade
+                .unsigned_abs()
+                .checked_div(self.config.bumpless_ticks)
+            {
                 // Below 2^31.
                 Some(step) => self.fade_step = (step as i32).saturating_add(1),
                 None => self.fade = 0,

@@ -8,6 +8,7 @@ use wheeleg_protocol::{
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::questions::has_started;
 use super::reflex::Senses;
 use super::{Layer0, Power};
 use crate::TxBytes;
@@ -271,12 +272,17 @@ impl Layer0 {
         let before = self.nodes.get(index).and_then(|node| node.last);
         self.questions.on_reply(index, before.as_ref(), &reply);
         self.nodes.store(from, reply);
+        let side = match from.raw() {
+            7 => Side::Left,
+            8 => Side::Right,
+            _ => return,
+        };
+        if has_started(before.as_ref(), &reply) {
+            // Its counter stands at 0: that is no motion.
+            self.odometry.rebase(side);
+        }
         if let Some(count) = reply.wheel_position() {
-            match from.raw() {
-                7 => self.odometry.update(Side::Left, count),
-                8 => self.odometry.update(Side::Right, count),
-                _ => {}
-            }
+            self.odometry.update(side, count);
         }
     }
 }

@@ -40,6 +40,11 @@ pub struct Questions {
     noisy: bool,
 }
 
+/// Whether a board has started anew between two replies.
+pub(super) fn has_started(before: Option<&SlotReply>, reply: &SlotReply) -> bool {
+    reply.mode == NodeMode::Boot && before.is_some_and(|b| b.mode != NodeMode::Boot)
+}
+
 impl Questions {
     /// A reply of node index 0..8; `before` is the one before it, if the node has not
     /// been lost since. A new fault is a question, and a start in operation.
@@ -48,8 +53,7 @@ impl Questions {
             return;
         };
         let faults = reply.active_faults.raw();
-        let started =
-            reply.mode == NodeMode::Boot && before.is_some_and(|b| b.mode != NodeMode::Boot);
+        let started = has_started(before, reply);
         node.why |= faults & !node.faults != 0 || started || core::mem::take(&mut node.lost);
         node.faults = faults;
     }

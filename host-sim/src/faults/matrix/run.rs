@@ -16,6 +16,7 @@ use crate::config::{
     TargetSet, builtin, raw_of,
 };
 use crate::faults::{FaultSpec, check};
+use crate::pil::Nodes;
 use crate::run::DEFAULT_SCENARIO;
 use crate::sil::{self, LineAudit};
 use crate::telemetry::{Recorder, Recording};
@@ -136,7 +137,7 @@ impl Robots {
                 .events
                 .push(event(duration_s - ARM_S, EventAction::command("Arm")));
         }
-        check(&scenario)?;
+        check(&scenario, &Nodes::default())?;
         let (recording, line, error) = simulate(&scenario, robot, self.seed);
         let ran = Ran {
             at_s,

@@ -27,7 +27,13 @@ impl Tim {
         self.smcr & 7 == 3
     }
 
-    /// The wheel turned: edges since reset.
+    /// A counter that is reset with the wheel where `old` has seen it.
+    pub(crate) fn keep_wheel(&mut self, old: &Self) {
+        self.edges = old.edges;
+        self.edges_base = old.edges;
+    }
+
+    /// The wheel turned: edges since power-up.
     pub(crate) fn turn(&mut self, edges: i32) {
         self.edges = edges;
     }

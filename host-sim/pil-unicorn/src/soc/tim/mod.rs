@@ -62,7 +62,7 @@ pub(crate) struct Tim {
     since: u64,
     /// Events up to this cycle have been handled.
     seen: u64,
-    /// Quadrature edges since reset, as the plant counts them (encoder mode).
+    /// Quadrature edges since power-up, as the plant counts them (encoder mode).
     edges: i32,
     edges_base: i32,
     /// The counter as the program read it last.
