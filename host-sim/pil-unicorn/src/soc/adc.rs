@@ -172,7 +172,9 @@ impl Adc {
             0x08 => {
                 only(ADEN | ADDIS | ADSTART | ADSTP | ADVREGEN | DEEPPWD | ADCAL)?;
                 let powered = value & DEEPPWD == 0 && value & ADVREGEN != 0;
-                if value & (ADEN | ADCAL) != 0 && !powered {
+                // From the bus clock: the asynchronous one is not modelled.
+                let clocked = self.divider() != 0;
+                if value & (ADEN | ADCAL) != 0 && !(powered && clocked) {
                     return Err(Refusal::Bits(value));
                 }
                 if value & ADEN != 0 && self.cr & ADEN == 0 {

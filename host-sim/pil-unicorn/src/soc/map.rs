@@ -69,7 +69,6 @@ impl Soc {
         let value = match name {
             "IWDG" => self.watchdog.read(offset),
             "PWR" => self.pwr.read(offset),
-            "SYSCFG" => self.read_syscfg(offset),
             "EXTI" => self.pwr.read_exti(offset),
             "USART1" => self.usart.read(offset),
             "USART2" => self.serial.read(offset),
@@ -127,7 +126,6 @@ impl Soc {
                 .watchdog
                 .write(offset, value, self.time.signed_ns(cycle)),
             "PWR" => self.pwr.write(offset, value),
-            "SYSCFG" => self.write_syscfg(offset, value),
             "EXTI" => self.pwr.write_exti(offset, value),
             "USART1" => self.usart.write(offset, value, cycle),
             "USART2" => self.serial.write(offset, value, cycle),
@@ -180,23 +178,6 @@ impl Soc {
                     self.plan(n);
                 }
             }
-        }
-        Ok(())
-    }
-
-    fn read_syscfg(&self, offset: usize) -> Result<u32, Refusal> {
-        match offset {
-            0x00 | 0x04 => Ok(self.syscfg[offset / 4]),
-            0x18 => Ok(self.syscfg[2]),
-            _ => Err(Refusal::Register),
-        }
-    }
-
-    fn write_syscfg(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
-        match offset {
-            // CFGR2: break on lock-up, parity error, voltage detector, ECC.
-            0x18 => self.syscfg[2] = value,
-            _ => return Err(Refusal::Register),
         }
         Ok(())
     }

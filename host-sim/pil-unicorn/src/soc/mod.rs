@@ -110,7 +110,6 @@ pub(crate) struct Soc {
     /// The frame that has been started last: start cycle, address, length.
     pub(crate) started: Option<(u64, u32, u32)>,
     burst_high: Option<(u64, u64)>,
-    syscfg: [u32; 3],
     /// Cycle of the next event of each source. Asked after every block, so it is
     /// kept: whoever changes a source calls [`Self::plan`].
     due: [u64; SOURCES],
@@ -171,7 +170,6 @@ impl Soc {
             gone: Vec::new(),
             started: None,
             burst_high: None,
-            syscfg: [0; 3],
             due: [u64::MAX; SOURCES],
             events: [Event::Update; ADC],
             bites_at: u64::MAX,

@@ -34,7 +34,6 @@ pub(crate) struct Rcc {
     cfgr: u32,
     pllcfgr: u32,
     cier: u32,
-    ccipr: u32,
     csr: u32,
     /// AHB1, AHB2, APB1-1, APB2 enables.
     pub(crate) enr: [u32; 4],
@@ -49,7 +48,6 @@ impl Rcc {
             cfgr: 1 << 2 | 1,
             pllcfgr: 0x1000,
             cier: 0,
-            ccipr: 0,
             csr: cause,
             // Flash interface on at reset.
             enr: [1 << 8, 0, 0, 0],
@@ -110,7 +108,7 @@ impl Rcc {
             0x4C => self.enr[1],
             0x58 => self.enr[2],
             0x60 => self.enr[3],
-            0x88 => self.ccipr,
+            0x88 => 0,
             0x94 => self.csr | (self.csr & 1) << 1,
             _ => return Err(Refusal::Register),
         })
@@ -129,7 +127,19 @@ impl Rcc {
                 only(HSION | HSIRDY | HSEON | HSERDY | CSSON | PLLON | PLLRDY)?;
                 self.cr = value | HSIRDY;
             }
-            0x08 => self.cfgr = value,
+            0x08 => {
+                // The processor would stand still on a clock that is not there.
+                let ready = match value & 3 {
+                    2 => self.read(0x00)? & HSERDY,
+                    3 => self.read(0x00)? & PLLRDY,
+                    1 => HSIRDY,
+                    _ => 0,
+                };
+                if ready == 0 {
+                    return Err(Refusal::Bits(value & 3));
+                }
+                self.cfgr = value;
+            }
             0x0C => self.pllcfgr = value,
             0x18 => self.cier = value,
             0x20 => {}
@@ -137,7 +147,8 @@ impl Rcc {
             0x4C => self.enr[1] = value,
             0x58 => self.enr[2] = value,
             0x60 => self.enr[3] = value,
-            0x88 => self.ccipr = value,
+            // Other clocks of serial ports and converter are not modelled.
+            0x88 => only(0)?,
             0x94 => {
                 if value & RMVF != 0 {
                     self.csr &= 1;
@@ -329,6 +340,8 @@ mod tests {
         assert_ne!(rcc.read(0x00).expect("modelled") & HSERDY, 0);
         rcc.write(0x0C, 3 | 5 << 4 | 85 << 8 | 1 << 24)
             .expect("modelled");
+        assert!(rcc.write(0x08, 3 | 8 << 4).is_err(), "the PLL is off");
+        rcc.write(0x00, HSION | HSEON | PLLON).expect("modelled");
         rcc.write(0x08, 3 | 8 << 4).expect("modelled");
         assert_eq!(rcc.hclk_hz(), 85_000_000);
         rcc.write(0x08, 3).expect("modelled");
@@ -338,6 +351,7 @@ mod tests {
         assert_eq!(rcc.hclk_hz(), 170_000_000);
         rcc.crystal = false;
         assert_eq!(rcc.read(0x00).expect("modelled") & HSERDY, 0);
+        assert!(rcc.write(0x08, 2).is_err(), "a dead crystal gives no clock");
     }
 
     #[test]

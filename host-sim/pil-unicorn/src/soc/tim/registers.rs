@@ -20,6 +20,21 @@ pub(super) const CCR1: usize = 0x34;
 pub(super) const CCR4: usize = 0x40;
 pub(super) const BDTR: usize = 0x44;
 
+/// CCER: the second signal is inverted.
+const SECOND_INVERTED: u32 = 1 << 5;
+
+/// Two channels' modes, of which an output has one of those that [`Tim::high_counts`]
+/// knows.
+fn modes(value: u32) -> Result<u32, Refusal> {
+    for channel in [value, value >> 8] {
+        let mode = channel >> 4 & 7 | channel >> 13 & 8;
+        if channel & 3 == 0 && !matches!(mode, 0 | 5 | 6 | 7) {
+            return Err(Refusal::Bits(value));
+        }
+    }
+    Ok(value)
+}
+
 impl Tim {
     pub(crate) fn read(&mut self, offset: usize, cycle: u64) -> Result<u32, Refusal> {
         Ok(match offset {
@@ -84,7 +99,12 @@ impl Tim {
             }
             SMCR => {
                 only(0x77)?;
-                if !matches!(value & 7, 0 | 3 | 6) {
+                let known = match value & 7 {
+                    0 | 6 => true,
+                    3 => self.ccer & SECOND_INVERTED == 0,
+                    _ => false,
+                };
+                if !known {
                     return Err(Refusal::Bits(value));
                 }
                 let count = self.count(cycle);
@@ -109,10 +129,16 @@ impl Tim {
                     }
                 }
             }
-            CCMR1 => self.ccmr[0] = value,
-            CCMR2 if self.kind != Kind::Small => self.ccmr[1] = value,
+            CCMR1 => self.ccmr[0] = modes(value)?,
+            CCMR2 if self.kind != Kind::Small => self.ccmr[1] = modes(value)?,
             CCER => {
-                only(0x3333)?;
+                // In encoder mode the first signal's polarity alone turns the direction.
+                let inverted = if self.encoder_mode() {
+                    SECOND_INVERTED
+                } else {
+                    0
+                };
+                only(0x3333 & !inverted)?;
                 let count = self.count(cycle);
                 self.set_count(count, cycle);
                 self.ccer = value;

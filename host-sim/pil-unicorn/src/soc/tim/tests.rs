@@ -91,3 +91,19 @@ fn a_one_shot_ends_itself() {
     tim.happen(1000 + 14 * 170, Event::Update);
     assert!(!tim.runs());
 }
+
+#[test]
+fn settings_that_are_not_modelled_are_refused() {
+    let mut tim = Tim::new(Kind::Advanced);
+    // Toggle on match, and an asymmetric mode whose bit is far from the others.
+    assert!(tim.write(CCMR1, 0x30, 0).is_err());
+    assert!(tim.write(CCMR1, 1 << 24 | 0x6000, 0).is_err());
+    tim.write(CCMR1, 0x7060, 0).expect("modelled");
+    // An inverted second signal would turn the direction of an encoder.
+    let mut encoder = Tim::new(Kind::General);
+    encoder.write(SMCR, 3, 0).expect("modelled");
+    assert!(encoder.write(CCER, 0x20, 0).is_err());
+    encoder.write(SMCR, 0, 0).expect("modelled");
+    encoder.write(CCER, 0x20, 0).expect("modelled");
+    assert!(encoder.write(SMCR, 3, 0).is_err());
+}
