@@ -10,6 +10,7 @@ mod conformance;
 mod deep;
 mod firmware;
 mod fuzz;
+mod machine;
 mod main_job;
 mod mcap;
 mod mutants;

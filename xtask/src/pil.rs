@@ -10,6 +10,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::firmware;
+use crate::machine::Machine;
 use crate::no_std::{self, Way, set_up};
 use crate::process::{cargo, command, output, root, run, target_dir};
 use crate::qemu;
@@ -34,7 +35,7 @@ pub(crate) struct Options {
     /// Only build emulator and images, so that `wheeleg run --nodes pil` finds them.
     #[arg(long)]
     build: bool,
-    /// Print the figures as one line of JSON at the end.
+    /// Print the figures as one line of JSON, and all else to standard error.
     #[arg(long)]
     json: bool,
     /// Only print, by function, where the instructions of the worst tick of three steps
@@ -45,6 +46,9 @@ pub(crate) struct Options {
 
 /// `cargo xtask pil`.
 pub(crate) fn steps(report: &mut Report, options: &Options) {
+    let Some(machine) = Machine::of(report, options.json) else {
+        return;
+    };
     if report
         .step("set-up: build tools of the emulator", tools)
         .is_none()
@@ -86,10 +90,8 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     report.step("three steps with the predictive law", || {
         predictive(&emulator, &images.folder)
     });
-    if options.json
-        && let Some(figures) = figures
-    {
-        println!("{figures}");
+    if let (Some(machine), Some(figures)) = (machine, figures) {
+        report.step("figures for machines", || Ok(machine.print(&figures)?));
     }
 }
 

@@ -18,6 +18,7 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::firmware::{self, Image, SHIPPED};
+use crate::machine::Machine;
 use crate::process::target_dir;
 use crate::report::{Report, StepResult};
 use budget::{Budget, Figures, Run};
@@ -26,14 +27,17 @@ use elf::Elf;
 /// `cargo xtask sizes`.
 #[derive(clap::Args, Default)]
 pub(crate) struct Options {
-    /// Print the figures as one line of JSON. They are in `target/firmware/sizes.json`
-    /// in any case.
+    /// Print the figures as one line of JSON, and all else to standard error. They are
+    /// in `target/firmware/sizes.json` in any case.
     #[arg(long)]
     json: bool,
 }
 
 /// Builds the images and compares them with their budgets.
 pub(crate) fn steps(report: &mut Report, options: &Options) {
+    let Some(machine) = Machine::of(report, options.json) else {
+        return;
+    };
     report.step("sizes within their budgets", || {
         let images = firmware::build()?;
         let rows = images
@@ -45,10 +49,9 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         let file = target_dir().join("firmware/sizes.json");
         fs::write(&file, format!("{figures:#}\n"))
             .with_context(|| format!("cannot write {}", file.display()))?;
-        if options.json {
-            println!("{figures}");
-        } else {
-            rows.iter().for_each(Row::print);
+        match machine {
+            Some(machine) => machine.print(&figures)?,
+            None => rows.iter().for_each(Row::print),
         }
         within_budget(&rows)
     });
