@@ -49,7 +49,7 @@ pub(super) struct RunArgs {
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
-    /// Exit with code 1 if a required target is not met.
+    /// Exit with code 1 if a required target is not met, not only if boards differ.
     #[arg(long)]
     strict: bool,
 }
@@ -98,11 +98,20 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
     Ok(if !finished.summary.complete {
         eprintln!("interrupted; the files hold what was recorded until then");
         ExitCode::from(INTERRUPTED)
+    } else if differing_bits(&finished) > 0 {
+        eprintln!("boards differ from the native application beside them");
+        ExitCode::from(TARGETS_MISSED)
     } else if args.strict && !finished.summary.passed {
         ExitCode::from(TARGETS_MISSED)
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// Bits in which boards outside differ from the application here.
+fn differing_bits(finished: &Finished) -> u64 {
+    let pil = finished.summary.pil.as_ref();
+    pil.map_or(0, |pil| pil.differing_bits)
 }
 
 /// Repeats a run with all nodes here. The logs hold every input, output,

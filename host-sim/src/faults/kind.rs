@@ -105,7 +105,7 @@ kinds! {
     NodeOff = "node-off", Board, None,
         "A board loses its power, for good unless an end is given: its outputs drop, it hears and says nothing.";
     NodeReset = "node-reset", Board, None,
-        "A board is reset by its watchdog and starts anew.";
+        "A board loses its power for a tick and starts anew.";
     BrownOut = "brown-out", Board, value("ms", 1.0, 1000.0, 30.0, "time without power"),
         "A board loses its power for a while and starts anew.";
     NodeHang = "node-hang", Board, None,

@@ -81,9 +81,14 @@ pub fn image(name: &str) -> Result<PathBuf, SimError> {
         .into_iter()
         .find(|path| path.is_file())
         .ok_or_else(|| {
+            let build = if name.starts_with("qemu-") {
+                "build the images with: cargo xtask qemu"
+            } else {
+                BUILD
+            };
             SimError::simulation(
                 format!("the firmware image `{name}` is not there"),
-                format!("{BUILD}; or name its folder in {IMAGES_VARIABLE}"),
+                format!("{build}; or name its folder in {IMAGES_VARIABLE}"),
             )
         })
 }
