@@ -381,24 +381,9 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
     let times = std::env::var(TIMES_VARIABLE).map_or(1, |times| times.parse().expect("a number"));
     let flips = subject.flips * times;
     let size = object_size(subject.image, "NODE");
-    // Two boards at a time; which one takes a flip changes nothing.
-    let mut outcomes: Vec<(Flip, Came)> = std::thread::scope(|scope| {
-        let sound = &sound;
-        let halves: Vec<_> = (0..2)
-            .map(|half| {
-                scope.spawn(move || {
-                    let mine = (half..flips).step_by(2);
-                    let struck = mine.map(|number| Flip::new(number, subject, size));
-                    struck
-                        .map(|flip| (flip, judge(subject, sound, flip)))
-                        .collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        let joined = halves
-            .into_iter()
-            .flat_map(|half| half.join().expect("a half"));
-        joined.collect()
+    let mut outcomes: Vec<(Flip, Came)> = in_two_halves(flips, |number| {
+        let flip = Flip::new(number, subject, size);
+        (flip, judge(subject, &sound, flip))
     });
     outcomes.sort_by_key(|(flip, _)| (flip.edge, flip.offset, flip.bit));
     let count = |came: Came| outcomes.iter().filter(|(_, c)| *c == came).count() as u64;
@@ -504,20 +489,8 @@ fn error_after_clear(word: u32) -> Option<i32> {
 #[test]
 fn a_wheel_knows_its_position_when_the_fault_of_a_flipped_bit_is_cleared() {
     let words = object_size("wheel", "NODE") / 4;
-    let errors: Vec<(u32, Option<i32>)> = std::thread::scope(|scope| {
-        let halves: Vec<_> = (0..2)
-            .map(|half| {
-                let mine = (half..words).step_by(2);
-                scope.spawn(|| {
-                    mine.map(|word| (word, error_after_clear(word)))
-                        .collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        let joined = halves
-            .into_iter()
-            .flat_map(|half| half.join().expect("a half"));
-        joined.collect()
+    let errors = in_two_halves(u64::from(words), |word| {
+        (word, error_after_clear(word as u32))
     });
     let wrong: Vec<_> = errors
         .iter()
@@ -533,6 +506,20 @@ fn a_wheel_knows_its_position_when_the_fault_of_a_flipped_bit_is_cleared() {
         silent * 20 < words as usize,
         "{silent} of {words} without an answer"
     );
+}
+
+/// What `judge` says of each number below `count`, on two boards at a time; which one
+/// takes a number changes nothing.
+fn in_two_halves<T: Send>(count: u64, judge: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let judge = &judge;
+        let halves = [0, 1].map(|half| {
+            let mine = (half..count).step_by(2);
+            scope.spawn(move || mine.map(judge).collect::<Vec<_>>())
+        });
+        let joined = halves.map(|half| half.join().expect("a half"));
+        joined.into_iter().flatten().collect()
+    })
 }
 
 /// Size of a variable in an image, bytes.

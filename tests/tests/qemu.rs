@@ -23,9 +23,7 @@ use wheeleg_sim::pil::Partner;
 use wheeleg_sim::pil::qemu::{Qemu, QemuOptions};
 use wheeleg_units::{PositionMm, WheelCount, WireVelocity};
 
-use bench::{
-    NoTime, assert_follows, assert_same, closed_loop, closed_loop_natively, power_up, script,
-};
+use bench::{NoTime, assert_same, closed_loop, closed_loop_as_the_host, power_up, script};
 
 /// Environment variable with the folder of the images.
 const IMAGES: &str = "WHEELEG_IMAGES";
@@ -52,11 +50,7 @@ fn said(error: &SimError) -> String {
 #[test]
 fn the_loop_closed_by_the_emulated_board_is_that_of_the_host_bit_for_bit() {
     let mut partner = board("qemu-joint");
-    let trace = closed_loop(bench::SCRIPT_MS, |request| {
-        partner.ask(request).expect("the image answers")
-    });
-    assert_follows(&trace);
-    assert_same(&trace, &closed_loop_natively());
+    closed_loop_as_the_host(|request| partner.ask(request).expect("the image answers"));
 }
 
 #[test]

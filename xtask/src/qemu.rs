@@ -112,23 +112,6 @@ fn lint() -> StepResult {
         .args(["clippy", "--locked", "--no-deps", "--package", PACKAGE])
         .args(["--features", "image", "--target", TARGET])
         .args(["--", "-D", "warnings"]))?;
-    run(cargo()
-        .args([
-            "clippy",
-            "--locked",
-            "--no-deps",
-            "--package",
-            "wheeleg-tests",
-        ])
-        .args([
-            "--features",
-            "qemu",
-            "--test",
-            "qemu",
-            "--",
-            "-D",
-            "warnings",
-        ]))?;
     Ok(())
 }
 

@@ -48,28 +48,18 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
     let Some(there) = number.and_then(|i| nodes.0.get(i)) else {
         return Ok(());
     };
-    let (possible, where_else) = match (there, fault.kind) {
-        (NodeKind::Sil, _) => (true, ""),
-        (
-            _,
-            FaultKind::ClockDrift
-            | FaultKind::Babble
-            | FaultKind::BabbleUnguarded
-            | FaultKind::OtherInterface,
-        ) => (false, "`sil`"),
-        (NodeKind::Pil, _) => (true, ""),
-        (_, FaultKind::NodeOff) => (fault.until_s.is_none(), "`sil` or `pil`"),
-        (_, FaultKind::NodeReset | FaultKind::BrownOut | FaultKind::NodeHang) => {
-            (false, "`sil` or `pil`")
-        }
-        _ => (true, ""),
+    use FaultKind as F;
+    let elsewhere = match (there, fault.kind) {
+        (NodeKind::Sil, _) => return Ok(()),
+        (_, F::ClockDrift | F::Babble | F::BabbleUnguarded | F::OtherInterface) => "`sil`",
+        (NodeKind::Pil, _) => return Ok(()),
+        (_, F::NodeReset | F::BrownOut | F::NodeHang) => "`sil` or `pil`",
+        (_, F::NodeOff) if fault.until_s.is_some() => "`sil` or `pil`",
+        _ => return Ok(()),
     };
-    if possible {
-        return Ok(());
-    }
     Err(SimError::simulation(
         format!("the fault `{fault}` cannot strike a board that runs on `{there}`"),
-        format!("let that node run as {where_else}"),
+        format!("let that node run as {elsewhere}"),
     ))
 }
 

@@ -261,6 +261,11 @@ impl Outside {
         self.boards[self.number(address)?].running_from_ns
     }
 
+    /// Whether the board at `address` is outside and down.
+    pub(crate) fn is_in_reset(&self, address: u8) -> bool {
+        self.has(address) && self.running_from_ns(address).is_none()
+    }
+
     /// The newest edge of the board at `address`, ns; `None` for one that runs here.
     pub(crate) fn edge_ns(&self, address: u8) -> Option<u64> {
         self.boards[self.number(address)?].edge_ns

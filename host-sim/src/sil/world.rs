@@ -338,11 +338,9 @@ impl World {
             None => self.wheels[wheel].active_duty(),
         };
         // A board in reset lets its wheel coast, wherever it runs.
-        let starts = match self.outside.as_ref().filter(|o| o.has(address)) {
-            Some(outside) => outside.running_from_ns(address).is_none(),
-            None => false,
-        };
-        self.inputs.bridge_enabled[wheel] = !off && !starts;
+        let outside = self.outside.as_ref();
+        let in_reset = outside.is_some_and(|o| o.is_in_reset(address));
+        self.inputs.bridge_enabled[wheel] = !off && !in_reset;
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];

@@ -51,11 +51,16 @@ pub(crate) struct Trace {
     pub stroke_mm: Vec<f64>,
 }
 
-/// Closed loop with the application in this process.
-pub(crate) fn closed_loop_natively() -> Trace {
+/// Closes the loop with the board that `ask` reaches: it must follow its set-points, and
+/// do so as the application in this process does, bit for bit.
+pub(crate) fn closed_loop_as_the_host(ask: impl FnMut(&Request) -> Reply) -> Trace {
+    let trace = closed_loop(SCRIPT_MS, ask);
+    assert_follows(&trace);
     let pins = JointPins::default();
     let mut session = Session::<RemoteJoint<'_>>::new(&pins, "this process", 0);
-    closed_loop(SCRIPT_MS, |request| session.answer(request, &mut NoTime))
+    let here = closed_loop(SCRIPT_MS, |request| session.answer(request, &mut NoTime));
+    assert_same(&trace, &here);
+    trace
 }
 
 pub(crate) fn frame(destination: Address, message: &Message) -> Vec<u8> {
@@ -193,7 +198,7 @@ pub(crate) fn script(
 }
 
 /// The loop was closed: the cylinder came to rest at the set-points.
-pub(crate) fn assert_follows(trace: &Trace) {
+fn assert_follows(trace: &Trace) {
     for (from_ms, target_mm) in SCRIPT {
         let until = SCRIPT.iter().map(|(ms, _)| *ms).find(|ms| *ms > from_ms);
         let at = until.unwrap_or(SCRIPT_MS) as usize - 1;

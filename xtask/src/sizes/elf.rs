@@ -230,8 +230,8 @@ impl Elf {
     }
 
     /// Every aligned word of flash that is no instruction, and every constant that two
-    /// instructions (MOVW, MOVT) put into a register.
-    fn constants(&self) -> Vec<u32> {
+    /// instructions (MOVW, MOVT) put into a register. What is computed is not found.
+    pub(crate) fn constants(&self) -> Vec<u32> {
         let mut constants = Vec::new();
         for (base, data) in &self.segments {
             let starts = (*base as u32..).step_by(4).take(data.len() / 4);
@@ -266,11 +266,6 @@ impl Elf {
         let function = self.functions.range(..=address).next_back();
         let within = function.is_some_and(|(start, function)| address - start < function.size);
         within && !self.is_data(address)
-    }
-
-    /// Whether the image holds an address in this range. (One that is computed is not found.)
-    pub(crate) fn names_address(&self, range: &Range<u32>) -> bool {
-        self.constants().iter().any(|word| range.contains(word))
     }
 
     /// Fixed-point literals are parsed by the compiler. `I16F16::lit` outside a

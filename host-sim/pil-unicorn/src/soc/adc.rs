@@ -156,13 +156,7 @@ impl Adc {
     }
 
     pub(crate) fn write(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
-        let only = |mask: u32| {
-            if value & !mask == 0 {
-                Ok(())
-            } else {
-                Err(Refusal::Bits(value & !mask))
-            }
-        };
+        let only = |mask: u32| Refusal::beyond(mask, value);
         match offset {
             0x00 => self.isr &= !value,
             0x04 => {

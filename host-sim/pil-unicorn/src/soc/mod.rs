@@ -35,6 +35,16 @@ pub(crate) enum Refusal {
     Store,
 }
 
+impl Refusal {
+    /// Of a value with other bits than those that a model knows.
+    fn beyond(known: u32, value: u32) -> Result<(), Self> {
+        match value & !known {
+            0 => Ok(()),
+            unknown => Err(Self::Bits(unknown)),
+        }
+    }
+}
+
 /// Requests of the multiplexer that the images use (RM0440 table 91).
 const REQUEST_USART1_RX: u32 = 24;
 const REQUEST_USART1_TX: u32 = 25;
@@ -122,20 +132,16 @@ pub(crate) struct Soc {
 impl Soc {
     /// Whether every pin that drives a valve, the motor or the dump is an output at low.
     pub(crate) fn outputs_are_low(&self) -> bool {
-        let [a, b, c, _] = &self.ports;
-        wiring::VALVES.iter().all(|(pin, _)| a.drives_low(*pin))
-            && b.drives_low(wiring::DIRECTION)
-            && b.drives_low(wiring::DUMP)
-            && c.drives_low(wiring::PULSE)
+        let mut pins = wiring::POWER_PINS.iter();
+        pins.all(|(port, pin, _)| self.ports[*port].drives_low(*pin))
     }
 
     /// The first pin that drives a valve, the motor or the dump and is neither as a reset
     /// leaves it nor an output at low: its name.
     pub(crate) fn power_pin_in_use(&self) -> Option<&'static str> {
-        let pins = wiring::POWER_PINS.iter();
-        pins.filter(|(port, pin, _)| !self.ports[*port].is_idle(*pin))
-            .map(|(_, _, name)| *name)
-            .next()
+        let mut pins = wiring::POWER_PINS.iter();
+        let used = pins.find(|(port, pin, _)| !self.ports[*port].is_idle(*pin));
+        used.map(|(_, _, name)| *name)
     }
 
     pub(crate) fn new(store: Vec<u8>, unique_id: [u8; 12], crystal: bool, cause: u32) -> Self {

@@ -115,13 +115,7 @@ impl Rcc {
     }
 
     pub(crate) fn write(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
-        let only = |mask: u32| {
-            if value & !mask == 0 {
-                Ok(())
-            } else {
-                Err(Refusal::Bits(value & !mask))
-            }
-        };
+        let only = |mask: u32| Refusal::beyond(mask, value);
         match offset {
             0x00 => {
                 only(HSION | HSIRDY | HSEON | HSERDY | CSSON | PLLON | PLLRDY)?;

@@ -263,13 +263,7 @@ impl Usart {
     }
 
     pub(crate) fn write(&mut self, offset: usize, value: u32, cycle: u64) -> Result<(), Refusal> {
-        let only = |mask: u32| {
-            if value & !mask == 0 {
-                Ok(())
-            } else {
-                Err(Refusal::Bits(value & !mask))
-            }
-        };
+        let only = |mask: u32| Refusal::beyond(mask, value);
         self.looks = 0;
         match offset {
             0x00 => {

@@ -23,18 +23,6 @@ pub(super) const BDTR: usize = 0x44;
 /// CCER: the second signal is inverted.
 const SECOND_INVERTED: u32 = 1 << 5;
 
-/// Two channels' modes, of which an output has one of those that [`Tim::high_counts`]
-/// knows.
-fn modes(value: u32) -> Result<u32, Refusal> {
-    for channel in [value, value >> 8] {
-        let mode = channel >> 4 & 7 | channel >> 13 & 8;
-        if channel & 3 == 0 && !matches!(mode, 0 | 5 | 6 | 7) {
-            return Err(Refusal::Bits(value));
-        }
-    }
-    Ok(value)
-}
-
 impl Tim {
     pub(crate) fn read(&mut self, offset: usize, cycle: u64) -> Result<u32, Refusal> {
         Ok(match offset {
@@ -67,13 +55,7 @@ impl Tim {
     }
 
     pub(crate) fn write(&mut self, offset: usize, value: u32, cycle: u64) -> Result<(), Refusal> {
-        let only = |mask: u32| {
-            if value & !mask == 0 {
-                Ok(())
-            } else {
-                Err(Refusal::Bits(value & !mask))
-            }
-        };
+        let only = |mask: u32| Refusal::beyond(mask, value);
         match offset {
             CR1 => {
                 only(0x8D)?;
@@ -129,8 +111,8 @@ impl Tim {
                     }
                 }
             }
-            CCMR1 => self.ccmr[0] = modes(value)?,
-            CCMR2 if self.kind != Kind::Small => self.ccmr[1] = modes(value)?,
+            CCMR1 => self.set_modes(0, value)?,
+            CCMR2 if self.kind != Kind::Small => self.set_modes(1, value)?,
             CCER => {
                 // In encoder mode the first signal's polarity alone turns the direction.
                 let inverted = if self.encoder_mode() {
@@ -176,6 +158,18 @@ impl Tim {
                 self.bdtr = if broken { value & !MOE } else { value };
             }
             _ => return Err(Refusal::Register),
+        }
+        Ok(())
+    }
+
+    /// Modes of two channels. An output has one of those that [`Self::high_counts`] knows.
+    fn set_modes(&mut self, half: usize, value: u32) -> Result<(), Refusal> {
+        self.ccmr[half] = value;
+        for channel in [2 * half, 2 * half + 1] {
+            let output = self.ccmr_of(channel) & 3 == 0;
+            if output && !matches!(self.mode_of(channel), 0 | 5..=7) {
+                return Err(Refusal::Bits(value));
+            }
         }
         Ok(())
     }
