@@ -9,7 +9,16 @@ use std::path::{Path, PathBuf};
 use crate::SimError;
 
 /// Everything that a run writes.
-const RESULTS: [&str; 5] = ["log.mcap", "summary.json", "report.html", "csv", "figures"];
+const RESULTS: [&str; 6] = [
+    "log.mcap",
+    "summary.json",
+    "report.html",
+    "csv",
+    "figures",
+    NATIVE,
+];
+/// Folder below of the native run that a run was compared with (`--compare-sil`).
+pub(crate) const NATIVE: &str = "sil";
 /// Where the results of the run before stay.
 const PREVIOUS: &str = "previous";
 
@@ -67,6 +76,8 @@ mod tests {
             fs::create_dir_all(folder.join("figures")).expect("created");
             fs::write(folder.join("figures").join(figure), [n]).expect("written");
             fs::write(folder.join("log.mcap"), [n]).expect("written");
+            fs::create_dir_all(folder.join(NATIVE)).expect("created");
+            fs::write(folder.join(NATIVE).join("log.mcap"), [n]).expect("written");
         };
         run(1, "event.png");
         fs::write(folder.join("notes.txt"), "mine").expect("written");
@@ -85,6 +96,9 @@ mod tests {
         assert_eq!(fs::read(second.join("log.mcap")).expect("kept"), [2]);
         assert!(second.join("figures/other.png").exists());
         assert!(!second.join("figures/event.png").exists());
+        // A comparison stays with the run that it belongs to.
+        assert!(!folder.join(NATIVE).exists());
+        assert_eq!(fs::read(second.join("sil/log.mcap")).expect("kept"), [2]);
     }
 
     #[test]

@@ -9,9 +9,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{RobotConfig, Scenario, builtin};
 use crate::faults::{self, FaultSpec};
-use crate::pil::{Nodes, Outside};
+use crate::pil::Nodes;
 use crate::report::{self, RunInfo, Summary};
-use crate::sil;
+use crate::sil::{self, Boards, DownTimes};
 use crate::telemetry::Recorder;
 use crate::{SimError, analysis, output};
 
@@ -44,6 +44,8 @@ pub struct Finished {
     pub summary: Summary,
     /// Path of the report.
     pub report: PathBuf,
+    /// When boards outside were down.
+    pub down_times: DownTimes,
 }
 
 /// Set by Ctrl-C.
@@ -57,6 +59,29 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// # Errors
 /// Any [`SimError`]. A log that was begun is closed and stays readable.
 pub fn run(options: &Options) -> Result<Finished, SimError> {
+    run_on(options, None)
+}
+
+/// Runs a scenario once more with all nodes in this program. Boards that a fault strikes
+/// are down when those of the run before were: how long a processor takes to start is no
+/// part of what is compared.
+///
+/// # Errors
+/// As [`run`].
+pub fn repeat_natively(
+    options: &Options,
+    before: &Finished,
+    out: PathBuf,
+) -> Result<Finished, SimError> {
+    let options = Options {
+        nodes: Nodes::default(),
+        out: Some(out),
+        ..options.clone()
+    };
+    run_on(&options, Some(&before.down_times))
+}
+
+fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, SimError> {
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
     faults::check(&scenario, &options.nodes)?;
@@ -70,7 +95,10 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
         .clone()
         .unwrap_or_else(|| crate::cli::default_out(&scenario.name, seed));
     // A board that does not answer must not cost the results of the run before.
-    let boards = Outside::connect(&options.nodes, &robot)?;
+    let boards = match kept {
+        Some(kept) => Boards::native_with(kept.clone()),
+        None => Boards::connect(&options.nodes, &robot)?,
+    };
     output::prepare(&folder)?;
     let mut recorder = Recorder::create(&folder.join("log.mcap"))?;
     provenance(&mut recorder, &scenario, &robot, seed);
@@ -112,7 +140,11 @@ pub fn run(options: &Options) -> Result<Finished, SimError> {
     let analysis = analysis::analyse(&scenario, &robot, &recording);
     let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
     let report = report::write(&folder, &scenario, &robot, &recording, &analysis, &summary)?;
-    Ok(Finished { summary, report })
+    Ok(Finished {
+        summary,
+        report,
+        down_times: outcome.down_times,
+    })
 }
 
 /// What went into the run, as messages at time zero: part of the log and of

@@ -5,10 +5,12 @@
 //! what its native application hears. `cargo xtask pil` runs this.
 
 mod bench;
+mod program;
 mod sil;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use bench::pil::Board;
 use bench::power_up;
@@ -33,7 +35,7 @@ const EXHAUST: u8 = 5;
 
 fn one(choice: &str) -> Nodes {
     let choice: NodeChoice = choice.parse().expect("a node");
-    Nodes::new(&NodeKind::Sil, &[choice])
+    Nodes::new(&NodeKind::Sil, &[choice]).expect("one each")
 }
 
 /// The gait with one fault.
@@ -74,7 +76,10 @@ fn the_master_dies_and_every_image_goes_to_its_safe_state() {
     // The wheels push; the foot is in the air.
     for t in [1.0, 2.1] {
         let scenario = gait(LegChoice::Left, t + 1.0, &[(t, EventAction::KillMaster)]);
-        let (recording, pil) = run_with(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+        let (recording, pil) = run_with(
+            &scenario,
+            &Nodes::new(&NodeKind::Pil, &[]).expect("one each"),
+        );
         assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
         let mut worst_ms = [0.0_f64; 2];
         for (joint, rows) in recording.joints.iter().enumerate() {
@@ -123,7 +128,10 @@ fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
     // while it hears broken frames itself.
     let mut scenario = gait(LegChoice::Left, 2.5, &[]);
     scenario.faults = vec!["bit-errors=1e-4@0s..1.5s".parse().expect("a fault")];
-    let (recording, pil) = run_with(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+    let (recording, pil) = run_with(
+        &scenario,
+        &Nodes::new(&NodeKind::Pil, &[]).expect("one each"),
+    );
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     for (board, rows) in pil.boards.iter().zip(&recording.links) {
         assert_eq!(board.late_frames, 0, "{}", board.node);
@@ -272,6 +280,60 @@ fn a_wheel_that_lost_its_supply_counts_from_zero_again_as_its_hardware_does() {
     );
     assert!(read.is_sorted() && read.last() > read.first(), "{read:?}");
     assert!(after.iter().all(|row| row.v.mode <= 1), "armed again");
+}
+
+/// Two seconds of the gait.
+fn short_gait(folder: &Path) -> PathBuf {
+    let path = folder.join("gait.toml");
+    let text = r#"
+name = "gait"
+description = "Two seconds of the paper's gait"
+robot = "wheeleg-2003"
+duration = { value = 2.0, unit = "s" }
+seed = 1
+targets = "none"
+
+[motion]
+kind = "square-wave"
+leg = "left"
+"#;
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+#[test]
+fn a_native_run_is_that_of_boards_that_were_down_to_the_last_bit_of_the_log() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let scenario = short_gait(folder.path());
+    let faults = [
+        ["node-hang:joint2@0.8s", "brown-out:wheel8=30@1.2s"],
+        ["brown-out:joint2=30@0.8s", "node-hang:wheel8@1.2s"],
+        ["node-reset:joint2@0.8s", "node-off:wheel8@1.2s..1.3s"],
+    ];
+    for pair in faults {
+        let out = folder.path().join(pair[0].replace([':', '@', '='], "-"));
+        let mut wheeleg = Command::new(program::path());
+        wheeleg
+            .arg("run")
+            .arg(&scenario)
+            .args(["--node", "joint2=pil", "--node", "wheel8=pil"])
+            .args(["--compare-sil", "--json", "--out"])
+            .arg(&out);
+        for fault in pair {
+            wheeleg.args(["--fault", fault]);
+        }
+        let ran = wheeleg.output().expect("runs");
+        let said = String::from_utf8_lossy(&ran.stderr);
+        assert!(ran.status.success(), "{pair:?}: {said}");
+        let summary: serde_json::Value = serde_json::from_slice(&ran.stdout).expect("a summary");
+        // Each of them was down once, and that is not what was compared away.
+        for board in summary["pil"]["boards"].as_array().expect("boards") {
+            assert_eq!(board["resets"], 1, "{pair:?}: {board}");
+        }
+        assert_eq!(summary["pil"]["differing_bits"], 0, "{pair:?}");
+        let log = |folder: &Path| std::fs::read(folder.join("log.mcap")).expect("a log");
+        assert!(log(&out) == log(&out.join("sil")), "{pair:?}");
+    }
 }
 
 /// A board that saves its parameters (firmware/board/src/bin/probe_store.rs).

@@ -109,7 +109,7 @@ fn the_wheel_image_for_the_bench_answers_as_the_host_does_bit_for_bit() {
 fn the_robot_walks_with_a_joint_and_a_wheel_on_the_bench() {
     let (joint, wheel) = (Bench::new("joint-hil"), Bench::new("wheel-hil"));
     let choices = [joint.choice("joint2"), wheel.choice("wheel7")];
-    let nodes = Nodes::new(&NodeKind::Sil, &choices);
+    let nodes = Nodes::new(&NodeKind::Sil, &choices).expect("one each");
     let (recording, pil) = run_with(&gait(LegChoice::Left, 1.2, &[]), &nodes);
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     assert!(pil.compared_bits > 200_000, "{}", pil.compared_bits);
@@ -129,7 +129,7 @@ fn the_robot_walks_with_a_joint_and_a_wheel_on_the_bench() {
 #[test]
 fn a_cable_pulled_in_mid_run_ends_it_with_an_error_that_names_the_port() {
     let mut bench = Bench::new("joint-hil");
-    let nodes = Nodes::new(&NodeKind::Sil, &[bench.choice("joint1")]);
+    let nodes = Nodes::new(&NodeKind::Sil, &[bench.choice("joint1")]).expect("one each");
     let port = bench.port.clone();
     let mut recorder = Recorder::in_memory();
     let outcome = wheeleg_sim::sil::run_with(

@@ -202,7 +202,7 @@ fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
         (1.6, command_about("ReadParameter", 8, Some((error, None)))),
     ];
     let scenario = stand(1.8, &events);
-    let nodes = Nodes::new(&NodeKind::Pil, &[]);
+    let nodes = Nodes::new(&NodeKind::Pil, &[]).expect("one each");
     let (recording, pil) = run_with(&scenario, &nodes);
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     let events = recording.events.iter().map(|row| row.v.text.as_str());
@@ -240,7 +240,10 @@ fn in_a_whole_run_a_board_without_power_goes_on_with_what_it_had_saved_as_on_the
     ];
     let mut scenario = stand(2.6, &events);
     scenario.faults = vec!["brown-out:joint3=30@1.5s".parse().expect("a fault")];
-    let (recording, pil) = run_with(&scenario, &Nodes::new(&NodeKind::Pil, &[]));
+    let (recording, pil) = run_with(
+        &scenario,
+        &Nodes::new(&NodeKind::Pil, &[]).expect("one each"),
+    );
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     let resets: Vec<u16> = pil.boards.iter().map(|board| board.resets).collect();
     assert_eq!(resets, [0, 0, 1, 0, 0, 0, 0, 0]);

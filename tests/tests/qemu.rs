@@ -2,6 +2,7 @@
 //! builds the images and runs these tests.
 
 mod bench;
+mod sil;
 
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -18,9 +19,10 @@ use wheeleg_protocol::{
 };
 use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, WheelPins};
 use wheeleg_sim::SimError;
+use wheeleg_sim::config::{LegChoice, Scenario};
 use wheeleg_sim::hil::{HilOptions, connect};
-use wheeleg_sim::pil::Partner;
 use wheeleg_sim::pil::qemu::{Qemu, QemuOptions};
+use wheeleg_sim::pil::{NodeKind, Nodes, Partner};
 use wheeleg_units::{PositionMm, WheelCount, WireVelocity};
 
 use bench::{NoTime, assert_same, closed_loop, closed_loop_as_the_host, power_up, script};
@@ -335,7 +337,7 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
             }
         }
     }
-    // The lives were worth comparing: outputs moved, frames were sent, a reset seen.
+    // The lives were worth comparing: outputs moved, frames were sent, the supply failed.
     for (n, replies) in expected.iter().enumerate() {
         let ran = || {
             replies.iter().filter_map(|reply| match reply {
@@ -351,13 +353,78 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
             "board {}",
             n + 1
         );
-        assert_eq!(
-            ran().filter(|r| r.trip.is_some()).count(),
-            1,
-            "board {}",
-            n + 1
-        );
+        // Reset, and started again.
+        let trips: Vec<bool> = ran()
+            .filter_map(|r| r.trip.map(|trip| trip.running_ns > 0))
+            .collect();
+        assert_eq!(trips, [false, true], "board {}", n + 1);
     }
+}
+
+const HOLD: u8 = 4;
+
+/// The gait with a loss of power of `node` at `t` s, and that board on QEMU.
+fn loss_of_power(fault: &str, t: f64, node: &str) -> (wheeleg_sim::telemetry::Recording, u16) {
+    let scenario = Scenario {
+        faults: vec![format!("{fault}@{t:.3}s").parse().expect("a fault")],
+        ..sil::gait(LegChoice::Left, t + 0.6, &[])
+    };
+    let choice = format!("{node}=qemu").parse().expect("a node");
+    let nodes = Nodes::new(&NodeKind::Sil, &[choice]).expect("one choice");
+    let (recording, pil) = sil::run_with(&scenario, &nodes);
+    assert_eq!(pil.differing_bits, 0, "{fault}: {:?}", pil.first_difference);
+    assert!(pil.compared_bits > 50_000, "{}", pil.compared_bits);
+    (recording, pil.boards[0].resets)
+}
+
+#[test]
+fn a_joint_that_lost_its_supply_comes_back_disarmed_and_the_robot_stays_held() {
+    for fault in ["brown-out:joint2=30", "node-reset:joint2"] {
+        let (recording, resets) = loss_of_power(fault, 1.0, "joint2");
+        assert_eq!(resets, 1, "{fault}");
+        for (joint, rows) in recording.joints.iter().enumerate() {
+            let before = sil::at(rows, 0.999);
+            assert!(before.mode == 3 && before.faults == 0, "worth stopping");
+            let after = sil::window(rows, 1.2, f64::INFINITY);
+            assert!(after.len() > 300);
+            for row in after {
+                assert!(!sil::energised(&row.v) && row.v.valves_open == 0);
+                // Held, or started anew and not armed again.
+                assert!(
+                    row.v.mode == HOLD || joint == 1 && row.v.mode <= 1,
+                    "{fault}: joint {} in mode {} at {:.3} s",
+                    joint + 1,
+                    row.v.mode,
+                    row.t_s()
+                );
+            }
+        }
+        // It reads its potentiometer again: it runs.
+        let row = sil::at(&recording.joints[1], 1.5);
+        assert!((row.sensed_mm - row.position_mm).abs() < 2.0, "{row:?}");
+    }
+}
+
+#[test]
+fn a_wheel_that_lost_its_supply_counts_from_zero_again() {
+    // While the wheels push: at a standstill any zero would do.
+    let sound = sil::run(&sil::gait(LegChoice::Left, 4.0, &[]), &sil::robot(), 1);
+    let push = sound.wheels[1]
+        .iter()
+        .find(|row| row.v.velocity_mm_s > 30.0);
+    let t = push.expect("a push").t_s() + 0.1;
+    let (recording, resets) = loss_of_power("brown-out:wheel8=30", t, "wheel8");
+    assert_eq!(resets, 1);
+    let rows = &recording.wheels[1];
+    let before = sil::at(rows, t - 0.001);
+    assert!(before.velocity_mm_s > 20.0, "pushes: {before:?}");
+    let after = sil::at(rows, t + 0.05);
+    assert!(
+        before.count > 600 && after.count < before.count / 2,
+        "{after:?}"
+    );
+    assert!(after.mode <= 1 || after.mode == HOLD, "armed again");
+    assert!(sil::at(&recording.wheels[0], t + 0.5).mode == HOLD);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The firmware images on emulated STM32G431 boards: emulator, images, the
 //! tests, and the figures of the three-step run.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -89,6 +90,9 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     });
     report.step("three steps with the predictive law", || {
         predictive(&emulator, &images.folder)
+    });
+    report.step("one step with boards here, emulated, and on QEMU", || {
+        mixed(&emulator, &images.folder)
     });
     if let (Some(machine), Some(figures)) = (machine, figures) {
         report.step("figures for machines", || Ok(machine.print(&figures)?));
@@ -239,23 +243,37 @@ pub(crate) fn three_steps(
     environment: &[(&str, &Path)],
     further: &[&str],
 ) -> anyhow::Result<Value> {
-    run_nodes(Path::new("three-step"), nodes, folder, environment, further)
+    let nodes = ["--nodes", nodes];
+    run_nodes(
+        Path::new("three-step"),
+        &nodes,
+        folder,
+        environment,
+        further,
+    )
 }
 
-/// Runs a scenario with all nodes of one kind; gives its summary.
+/// Builds the program.
+fn build_wheeleg() -> anyhow::Result<()> {
+    run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))
+}
+
+/// Builds the program and runs a scenario with it; gives its summary. `nodes` says which
+/// node runs where.
 fn run_nodes(
     scenario: &Path,
-    nodes: &str,
+    nodes: &[&str],
     folder: &str,
     environment: &[(&str, &Path)],
     further: &[&str],
 ) -> anyhow::Result<Value> {
-    run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))?;
+    build_wheeleg()?;
     let mut wheeleg = command(target_dir().join("release").join("wheeleg"));
     wheeleg
         .arg("run")
         .arg(scenario)
-        .args(["--nodes", nodes, "--json", "--out"])
+        .args(nodes)
+        .args(["--json", "--out"])
         .arg(target_dir().join(folder))
         .args(further);
     for (name, value) in environment {
@@ -313,14 +331,12 @@ fn speed_verdict(runs: [Speed; 2]) -> Result<String, String> {
     }
 }
 
-/// Three steps on emulated boards, and the cores that others used meanwhile.
-fn watched(
-    folder: &str,
-    environment: &[(&str, &Path)],
-    further: &[&str],
-) -> anyhow::Result<(Value, Option<f64>)> {
+/// Three steps on emulated boards, and the cores that others used meanwhile. Only the run
+/// itself is watched: what is built for it stands before.
+fn watched(folder: &str, environment: &[(&str, &Path)]) -> anyhow::Result<(Value, Option<f64>)> {
+    build_wheeleg()?;
     let meter = load::Meter::begin();
-    let summary = three_steps("pil", folder, environment, further)?;
+    let summary = three_steps("pil", folder, environment, &[])?;
     Ok((summary, meter.and_then(|meter| meter.others())))
 }
 
@@ -328,8 +344,9 @@ fn watched(
 /// the host, nor between the runs.
 fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
-    let (first, others_first) = watched("pil-run/first", &environment, &["--compare-sil"])?;
-    let (second, others_second) = watched("pil-run/second", &environment, &[])?;
+    let (first, others_first) = watched("pil-run/first", &environment)?;
+    let (second, others_second) = watched("pil-run/second", &environment)?;
+    let native = three_steps("sil", "pil-run/native", &environment, &[])?;
     let pil = &first["pil"];
     let most = |key: &str, image: &str| most(pil, key, image);
     let speeds = [&first, &second].map(|run| run["realtime_factor"].as_f64().unwrap_or(0.0));
@@ -361,6 +378,15 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     let verdict = speed_verdict(runs);
     println!("    {}", verdict.as_ref().unwrap_or_else(|line| line));
     ensure_equal(pil)?;
+    if first["hash"] != native["hash"] {
+        return Err(anyhow::anyhow!(
+            "the log of the native run differs: {} there, {} with the boards; \
+             `wheeleg run three-step --nodes pil --compare-sil` names the first difference",
+            native["hash"],
+            first["hash"]
+        )
+        .into());
+    }
     if first["hash"] != second["hash"] {
         return Err(anyhow::anyhow!("two runs differ").into());
     }
@@ -382,26 +408,30 @@ fn most(pil: &Value, key: &str, image: &str) -> u64 {
     figures.max().unwrap_or(0)
 }
 
+/// A copy of a file of the simulator's in `folder`, with one text replaced.
+fn changed(folder: &Path, from: &str, to: &str, old: &str, new: &str) -> anyhow::Result<PathBuf> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let path = root().join("host-sim").join(from);
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    ensure!(text.matches(old).count() == 1, "{from} has no `{old}`");
+    let path = folder.join(to);
+    fs::write(&path, text.replace(old, new)).with_context(|| path.display().to_string())?;
+    Ok(path)
+}
+
 /// A copy of the paper's test in which the joints have the predictive law.
 fn predictive_scenario() -> anyhow::Result<PathBuf> {
     let folder = target_dir().join("pil-run").join("predictive");
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let changed = |from: &str, to: &str, old: &str, new: &str| {
-        let path = root().join("host-sim").join(from);
-        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        ensure!(text.matches(old).count() == 1, "{from} has no `{old}`");
-        let path = folder.join(to);
-        fs::write(&path, text.replace(old, new)).with_context(|| path.display().to_string())?;
-        Ok(path)
-    };
     let law = r#"law = { value = 5, unit = "1", source = "ASSUMED: this run's" }"#;
     changed(
+        &folder,
         "robots/wheeleg-2003.toml",
         "robot.toml",
         "[node.joint]\n",
         &format!("[node.joint]\n{law}\n"),
     )?;
     changed(
+        &folder,
         "scenarios/three-step.toml",
         "three-step.toml",
         r#"robot = "wheeleg-2003""#,
@@ -415,7 +445,7 @@ fn predictive(emulator: &Path, images: &Path) -> StepResult {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let summary = run_nodes(
         &predictive_scenario()?,
-        "pil",
+        &["--nodes", "pil"],
         "pil-run/predictive/out",
         &environment,
         &["--compare-sil"],
@@ -429,6 +459,71 @@ fn predictive(emulator: &Path, images: &Path) -> StepResult {
     );
     ensure_equal(pil)?;
     sizes::check_predictive(worst)
+}
+
+/// Which nodes of a mixed run are outside, and where.
+const MIXED: [&str; 10] = [
+    "--node",
+    "joint1=qemu",
+    "--node",
+    "joint2=pil",
+    "--node",
+    "joint6=pil",
+    "--node",
+    "wheel7=pil",
+    "--node",
+    "wheel8=qemu",
+];
+
+/// Part of the paper's test with boards of three kinds on one bus: in the simulator, as
+/// images on the emulated part, and on QEMU. No bit may differ from the host, and the log
+/// must be that of the native run.
+fn mixed(emulator: &Path, images: &Path) -> StepResult {
+    qemu::emulator()?;
+    let folder = target_dir().join("pil-run").join("mixed");
+    let both = folder.join("images");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&both).with_context(|| both.display().to_string())?;
+    // The program looks for all images in one folder.
+    let on_qemu = qemu::images()?;
+    let wanted = [(images, "joint.elf"), (images, "wheel.elf")]
+        .into_iter()
+        .chain([(&*on_qemu, "qemu-joint"), (&*on_qemu, "qemu-wheel")]);
+    for (from, name) in wanted {
+        fs::copy(from.join(name), both.join(name)).with_context(|| name.to_owned())?;
+    }
+    // Start-up and the first step.
+    let scenario = changed(
+        &folder,
+        "scenarios/three-step.toml",
+        "first-step.toml",
+        "duration = { value = 10.0,",
+        "duration = { value = 3.5,",
+    )?;
+    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", &both)];
+    let further = ["--compare-sil"];
+    let summary = run_nodes(
+        &scenario,
+        &MIXED,
+        "pil-run/mixed/out",
+        &environment,
+        &further,
+    )?;
+    let pil = &summary["pil"];
+    let kinds = pil["nodes"].as_array().into_iter().flatten();
+    let kinds: BTreeSet<&str> = kinds.filter_map(Value::as_str).collect();
+    ensure_three_kinds(&kinds)?;
+    println!(
+        "    {} bits compared, {} differ; the log is that of the native run",
+        pil["compared_bits"], pil["differing_bits"]
+    );
+    Ok(ensure_equal(pil)?)
+}
+
+fn ensure_three_kinds(kinds: &BTreeSet<&str>) -> anyhow::Result<()> {
+    let all = BTreeSet::from(["pil", "qemu", "sil"]);
+    ensure!(*kinds == all, "boards of {kinds:?}, not {all:?}");
+    Ok(())
 }
 
 /// Runs the paper's test on emulated boards and prints the profiles of their worst ticks.

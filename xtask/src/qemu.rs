@@ -57,7 +57,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
 }
 
 /// Finds the emulator or installs it.
-fn emulator() -> StepResult {
+pub(crate) fn emulator() -> StepResult {
     if have(EMULATOR) || (may_apt() && apt_install(&[EMULATOR]) && have(EMULATOR)) {
         let version = ask(command(EMULATOR).arg("--version")).unwrap_or_default();
         println!("    {}", version.lines().next().unwrap_or_default());
@@ -71,7 +71,7 @@ fn emulator() -> StepResult {
 
 /// Builds the images; gives the folder in which they lie. They link only if no
 /// panic can be reached.
-fn images() -> StepResult<PathBuf> {
+pub(crate) fn images() -> StepResult<PathBuf> {
     let way = set_up(TARGET)?;
     println!("    way: {}", way.describe());
     let products = match way {

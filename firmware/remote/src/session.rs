@@ -6,8 +6,8 @@ use heapless::{String, Vec};
 use wheeleg_node::hardware::{ParameterStore, StoreError};
 use wheeleg_node::{ConfigError, NodeIdentity};
 use wheeleg_pil_link::{
-    Figures, Hello, Image, LINK_VERSION, Nonvolatile, Outputs, Power, Ran, Reply, Request, Run,
-    Sent, Straps, Trip, text,
+    Figures, Hello, Image, Inputs, LINK_VERSION, Nonvolatile, Outputs, Power, Ran, Reply, Request,
+    Run, Sent, Straps, Trip, text,
 };
 use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_units::Micros;
@@ -53,8 +53,14 @@ pub struct Session<'p, B: Board<'p>> {
     board: Option<B>,
     /// Outputs that act since the last tick edge.
     active: Outputs,
-    /// The last tick edge.
+    /// The last tick edge that was worked off since the newest start.
     edge_ns: u64,
+    /// First tick edge after the newest start, at which the board's clock stands at 0.
+    zero_ns: u64,
+    /// The counter stood here, in the partner's edges, when it was started.
+    count_zero: i32,
+    /// Encoder at the newest edge, with or without supply.
+    count: i32,
     resets: u16,
     over: bool,
 }
@@ -73,6 +79,9 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             board: None,
             active: Outputs::default(),
             edge_ns: 0,
+            zero_ns: 0,
+            count_zero: 0,
+            count: 0,
             resets: 0,
             over: false,
         }
@@ -113,6 +122,9 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         self.board = None;
         self.active = Outputs::default();
         self.edge_ns = 0;
+        self.zero_ns = 0;
+        self.count_zero = 0;
+        self.count = 0;
         self.resets = 0;
     }
 
@@ -172,22 +184,19 @@ impl<'p, B: Board<'p>> Session<'p, B> {
 
     fn run(&mut self, run: &Run, stopwatch: &mut impl Stopwatch) -> Result<Ran, &'static str> {
         let identity = self.identity.ok_or("the board has no power yet")?;
-        if run.power == Power::BrownOut {
-            let trip = self.board.take().map(|_| Trip {
-                at_ns: run.until_ns,
-                running_ns: 0,
-                cause: BROWN_OUT,
-            });
-            return Ok(Ran {
+        let count_before = self.count;
+        self.count = run.edge.map_or(self.count, |inputs| inputs.encoder);
+        if run.power == Power::BrownOut || self.board.is_none() {
+            let trip = self.without_board(run, identity, count_before)?;
+            let figures = self.figures(stopwatch);
+            return Ok(self.report(Ran {
                 trip,
-                figures: self.figures(stopwatch),
+                figures,
                 ..Ran::default()
-            });
+            }));
         }
-        if self.board.is_none() {
-            self.resets = self.resets.saturating_add(1);
-            self.start(identity)?;
-        }
+        let (zero_ns, count_zero) = (self.zero_ns, self.count_zero);
+        let micros = |ns: u64| micros_since(zero_ns, ns);
         let board = self.board.as_mut().ok_or("the board has no power yet")?;
         if !run.received.is_empty() {
             stopwatch.bytes_begin();
@@ -200,7 +209,10 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             self.active = board.outputs();
             self.edge_ns = run.until_ns;
             stopwatch.tick_begins();
-            board.latch(inputs);
+            board.latch(&Inputs {
+                encoder: inputs.encoder.wrapping_sub(count_zero),
+                ..*inputs
+            });
             board.tick(now);
             let took = stopwatch.tick_ended();
             board.tick_done(Micros(now.get().wrapping_add(took.get())));
@@ -213,7 +225,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         while !sent.is_full()
             && let Some(transmission) = board.take_transmission()
         {
-            let start_ns = start_ns(transmission.start_at, run.until_ns);
+            let start_ns = start_ns(transmission.start_at, zero_ns, run.until_ns);
             let sent_bytes = Vec::from_slice(&transmission.bytes).unwrap_or_default();
             // There is room: asked above.
             let _ = sent.push(Sent {
@@ -227,6 +239,40 @@ impl<'p, B: Board<'p>> Session<'p, B> {
             figures,
             ..Ran::default()
         }))
+    }
+
+    /// A run in which the supply fails or is away, or in which the board starts: with
+    /// the first tick edge after the supply has come back, as a processor whose tick
+    /// timer is started just before it. The first tick is that of the edge after; until
+    /// this one the board hears nothing.
+    fn without_board(
+        &mut self,
+        run: &Run,
+        identity: NodeIdentity,
+        count_before: i32,
+    ) -> Result<Option<Trip>, &'static str> {
+        let trip = |running_ns| Trip {
+            at_ns: run.until_ns,
+            running_ns,
+            cause: BROWN_OUT,
+        };
+        if run.power == Power::BrownOut {
+            let fails = self.board.take().is_some();
+            self.active = Outputs::default();
+            self.resets = self.resets.saturating_add(u16::from(fails));
+            return Ok(fails.then(|| trip(0)));
+        }
+        if run.edge.is_none() {
+            return Ok(None);
+        }
+        self.start(identity)?;
+        let period_us = self.board.as_ref().map_or(0, B::period_us);
+        let period_ns = u64::from(period_us).saturating_mul(NS_PER_US);
+        self.edge_ns = 0;
+        self.zero_ns = run.until_ns.saturating_add(period_ns);
+        // The counter is started between this edge and the one before it.
+        self.count_zero = count_before;
+        Ok(Some(trip(self.zero_ns)))
     }
 
     /// Adds what can be seen of the board.
@@ -272,19 +318,21 @@ impl<'p, B: Board<'p>> ParameterStore for Memory<'_, 'p, B> {
     }
 }
 
-/// The board's microsecond counter at an instant.
+/// The board's microsecond counter at an instant; it stood at 0 at `zero_ns`. Both are
+/// whole microseconds of the counter before they are compared, as on the host.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the counter has 32 bits and wraps"
 )]
-fn micros(ns: u64) -> Micros {
-    Micros((ns.wrapping_div(NS_PER_US)) as u32)
+fn micros_since(zero_ns: u64, ns: u64) -> Micros {
+    let micros = |ns: u64| ns.wrapping_div(NS_PER_US) as u32;
+    Micros(micros(ns).wrapping_sub(micros(zero_ns)))
 }
 
 /// Instant at which the board's counter stands at `at`, seen from `now_ns`;
 /// what lies in the past starts now.
-fn start_ns(at: Micros, now_ns: u64) -> u64 {
-    let ahead = at.get().wrapping_sub(micros(now_ns).get());
+fn start_ns(at: Micros, zero_ns: u64, now_ns: u64) -> u64 {
+    let ahead = at.get().wrapping_sub(micros_since(zero_ns, now_ns).get());
     if ahead < 1 << 31 {
         now_ns.saturating_add(u64::from(ahead).saturating_mul(NS_PER_US))
     } else {

@@ -148,6 +148,12 @@ impl Board {
     }
 
     fn hook(&mut self, hook: &Hook) -> Reply {
+        if matches!(hook, Hook::StopProcessor)
+            && self.machine.is_some()
+            && let Err(what) = self.finish_tick()
+        {
+            return Reply::Refused(text(&what));
+        }
         let Some(machine) = &mut self.machine else {
             return Reply::Refused(text("the board has no supply yet"));
         };

@@ -35,7 +35,7 @@ pub(super) fn command(args: &CommissionArgs) -> Result<ExitCode, SimError> {
     let robot = builtin::robot(&args.robot)?;
     let mut scenario = builtin::scenario(DEFAULT_SCENARIO)?;
     scenario.faults.clone_from(&args.faults);
-    let nodes = Nodes::new(&args.nodes, &args.node);
+    let nodes = Nodes::new(&args.nodes, &args.node)?;
     let ids = sil::commission(&scenario, &robot, scenario.seed, &nodes)?;
     let mut out = String::from(
         "# Boards of this robot: another one at one of these addresses bars arming.\n[commissioned]\n",

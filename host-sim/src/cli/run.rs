@@ -13,6 +13,7 @@ use crate::analysis::Target;
 use crate::faults::FaultSpec;
 use crate::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
 use crate::run::{self, Finished, Options};
+use crate::{output, telemetry};
 
 /// Arguments of `wheeleg run`.
 #[derive(Debug, Args)]
@@ -84,10 +85,11 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
         seed: args.seed,
         out: args.out.clone(),
         faults: args.faults.clone(),
-        nodes: Nodes::new(&args.nodes, &args.node),
+        nodes: Nodes::new(&args.nodes, &args.node)?,
     };
     let finished = run::run(&options)?;
-    if args.compare_sil {
+    // A part of a run equals no whole one.
+    if args.compare_sil && finished.summary.complete {
         compare_sil(&options, &finished)?;
     }
     if args.json {
@@ -115,25 +117,29 @@ fn differing_bits(finished: &Finished) -> u64 {
 }
 
 /// Repeats a run with all nodes here. The logs hold every input, output,
-/// frame and internal at its time, so equal hashes mean equal runs.
+/// frame and internal at its time, so equal hashes mean equal runs. Boards here are down
+/// when those outside were; that time is the hardware's.
 fn compare_sil(options: &Options, finished: &Finished) -> Result<(), SimError> {
     let folder = finished.report.parent().unwrap_or(Path::new("."));
-    let native = run::run(&Options {
-        nodes: Nodes::default(),
-        out: Some(folder.join("sil")),
-        ..options.clone()
-    })?;
+    let native = run::repeat_natively(options, finished, folder.join(output::NATIVE))?;
     if native.summary.hash == finished.summary.hash {
         return Ok(());
     }
+    let here = folder.join(output::NATIVE).join("log.mcap");
+    let first = telemetry::first_difference(&here, &folder.join("log.mcap"))?;
+    let first = match first {
+        Some(first) => format!("first difference: {first}"),
+        None => "but what could be written to them does not".to_owned(),
+    };
     let pil = finished.summary.pil.as_ref();
-    let first = pil.and_then(|p| p.first_difference.clone());
+    let pins = match pil.and_then(|p| p.first_difference.as_ref()) {
+        Some(pins) => format!("; first at a board's pins: {pins}"),
+        None => "; no board differed from the application beside it".to_owned(),
+    };
     Err(SimError::simulation(
         format!(
-            "the logs differ: {} here, {} on the boards; first difference: {}",
-            native.summary.hash,
-            finished.summary.hash,
-            first.as_deref().unwrap_or("none at the boards' pins")
+            "the logs differ: {} on the host, {} with the boards; {first}{pins}",
+            native.summary.hash, finished.summary.hash
         ),
         format!("both logs are below {}", folder.display()),
     ))
@@ -149,17 +155,19 @@ fn pil_text(pil: &PilSummary) -> String {
         let _ = writeln!(out, "        first difference: {first}");
     }
     for board in &pil.boards {
-        let _ = writeln!(
-            out,
-            "        {} on {}: tick {} instructions (median {}), stack {} of {} B, {} resets",
-            board.node,
-            board.host,
+        let _ = write!(out, "        {} on {}:", board.node, board.host);
+        // What nobody measures where the board runs is left out.
+        let ticks = (
             board.tick_instructions_worst,
             board.tick_instructions_median,
-            board.stack_used_bytes,
-            board.stack_size_bytes,
-            board.resets
         );
+        if let (Some(worst), Some(median)) = ticks {
+            let _ = write!(out, " tick {worst} instructions (median {median}),");
+        }
+        if let (Some(used), Some(size)) = (board.stack_used_bytes, board.stack_size_bytes) {
+            let _ = write!(out, " stack {used} of {size} B,");
+        }
+        let _ = writeln!(out, " {} resets", board.resets);
     }
     out
 }

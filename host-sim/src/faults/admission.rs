@@ -38,8 +38,8 @@ pub fn check(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
 }
 
 /// What strikes a board itself must be possible where that board runs: an image has a
-/// clock, a transmitter and an interface of its own, and a board on QEMU or on a bench
-/// no supply that could come back and no program that could be stopped.
+/// clock, a transmitter and an interface of its own; a board on QEMU has no watchdog that
+/// would end a stopped program, and a bench board a supply that nobody here can cut.
 fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
     let Victim::Board(address) = fault.victim else {
         return Ok(());
@@ -49,16 +49,28 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
         return Ok(());
     };
     use FaultKind as F;
-    let elsewhere = match (there, fault.kind) {
+    let (why, elsewhere) = match (there, fault.kind) {
         (NodeKind::Sil, _) => return Ok(()),
-        (_, F::ClockDrift | F::Babble | F::BabbleUnguarded | F::OtherInterface) => "`sil`",
+        (_, F::ClockDrift | F::Babble | F::BabbleUnguarded | F::OtherInterface) => {
+            ("an image brings its own", "`sil`")
+        }
         (NodeKind::Pil, _) => return Ok(()),
-        (_, F::NodeReset | F::BrownOut | F::NodeHang) => "`sil` or `pil`",
-        (_, F::NodeOff) if fault.until_s.is_some() => "`sil` or `pil`",
+        (_, F::NodeHang) => (
+            "it has no watchdog that would start it again",
+            "`sil` or `pil`",
+        ),
+        (NodeKind::Qemu, _) => return Ok(()),
+        // One that falls silent for good can keep its cable.
+        (_, F::NodeOff) if fault.until_s.is_none() => return Ok(()),
+        (_, F::NodeOff | F::NodeReset | F::BrownOut) => (
+            "a bench board is fed by the cable to this computer, whose voltage the \
+             simulator cannot switch off",
+            "`sil`, `pil` or `qemu`",
+        ),
         _ => return Ok(()),
     };
     Err(SimError::simulation(
-        format!("the fault `{fault}` cannot strike a board that runs on `{there}`"),
+        format!("the fault `{fault}` cannot strike a board that runs on `{there}`: {why}"),
         format!("let that node run as {elsewhere}"),
     ))
 }
@@ -92,20 +104,31 @@ mod tests {
             let mut scenario = builtin::scenario("three-step").expect("built in");
             scenario.faults = vec![fault.parse().expect("a fault")];
             let choice = there.parse().expect("a choice");
-            check(&scenario, &Nodes::new(&NodeKind::Sil, &[choice]))
+            let nodes = Nodes::new(&NodeKind::Sil, &[choice]).expect("one choice");
+            check(&scenario, &nodes)
         };
-        let anew = [
+        let power = [
             "brown-out:joint3@1s",
             "node-reset:joint3@1s",
-            "node-hang:joint3@1s",
             "node-off:joint3@1s..2s",
+            "node-off:joint3@1s",
         ];
+        let hang = ["node-hang:joint3@1s"];
         let own = ["clock-drift:joint3=200@1s", "babble:joint3@1s"];
-        let places = ["joint3=pil", "joint3=qemu", "joint3=hil:/dev/ttyACM0"];
-        for there in places {
-            for fault in anew.iter().chain(&own) {
+        let all = || power.iter().chain(&hang).chain(&own);
+        for (there, possible, why) in [
+            ("joint3=pil", [&power[..], &hang].concat(), "its own"),
+            ("joint3=qemu", power.to_vec(), "no watchdog"),
+            (
+                "joint3=hil:/dev/ttyACM0",
+                vec!["node-off:joint3@1s"],
+                "cable to this computer",
+            ),
+        ] {
+            let mut refusals = String::new();
+            for fault in all() {
                 let outcome = admitted(fault, there);
-                if there == "joint3=pil" && anew.contains(fault) {
+                if possible.contains(fault) {
                     assert!(outcome.is_ok(), "{fault} {there}");
                     continue;
                 }
@@ -113,11 +136,12 @@ mod tests {
                 for part in [fault.split([':', '@']).next(), there.split('=').nth(1)] {
                     assert!(refusal.contains(part.expect("a part")), "{refusal}");
                 }
+                refusals.push_str(&refusal);
             }
-            assert!(admitted("node-off:joint3@1s", there).is_ok());
+            assert!(refusals.contains(why), "{refusals}");
             assert!(admitted("pot-open:joint3@1s", there).is_ok());
         }
-        for fault in anew.iter().chain(&own) {
+        for fault in all() {
             assert!(admitted(fault, "joint4=qemu").is_ok(), "{fault}");
         }
     }

@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use crate::SimError;
+
 /// Where the application of one node runs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum NodeKind {
@@ -83,14 +85,23 @@ impl FromStr for NodeChoice {
 pub struct Nodes(pub [NodeKind; 8]);
 
 impl Nodes {
-    /// All as `kind`, but for the choices, of which later ones win.
-    #[must_use]
-    pub fn new(kind: &NodeKind, choices: &[NodeChoice]) -> Self {
-        let mut nodes: [NodeKind; 8] = std::array::from_fn(|_| kind.clone());
-        for choice in choices {
-            nodes[usize::from(choice.address) - 1] = choice.kind.clone();
+    /// All as `kind`, but for the choices.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`]: two choices for one node.
+    pub fn new(kind: &NodeKind, choices: &[NodeChoice]) -> Result<Self, SimError> {
+        let mut nodes: [Option<&NodeKind>; 8] = [None; 8];
+        for NodeChoice { address, kind } in choices {
+            let i = usize::from(*address) - 1;
+            if let Some(first) = nodes[i].replace(kind) {
+                let name = NODE_NAMES[i];
+                return Err(SimError::simulation(
+                    format!("{name} is given twice: `{name}={first}` and `{name}={kind}`"),
+                    "leave one of them out",
+                ));
+            }
         }
-        Self(nodes)
+        Ok(Self(nodes.map(|chosen| chosen.unwrap_or(kind).clone())))
     }
 
     /// Whether all run in this process.
@@ -105,14 +116,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn later_choices_win_and_mistakes_name_what_is_allowed() {
+    fn every_node_is_chosen_once_and_mistakes_name_what_is_allowed() {
         let choice = |text: &str| text.parse::<NodeChoice>();
         let choices = [
-            choice("joint3=qemu").expect("valid"),
             choice("joint3=sil").expect("valid"),
             choice("wheel8=hil:/dev/ttyACM0").expect("valid"),
         ];
-        let nodes = Nodes::new(&NodeKind::Pil, &choices);
+        let nodes = Nodes::new(&NodeKind::Pil, &choices).expect("one each");
+        let twice = [choices[0].clone(), choice("joint3=qemu").expect("valid")];
+        let refused = Nodes::new(&NodeKind::Sil, &twice).expect_err("twice");
+        for named in ["joint3=sil", "joint3=qemu"] {
+            assert!(refused.to_string().contains(named), "{refused}");
+        }
         assert_eq!(nodes.0[0], NodeKind::Pil);
         assert_eq!(nodes.0[2], NodeKind::Sil);
         assert_eq!(nodes.0[7].to_string(), "hil:/dev/ttyACM0");

@@ -23,16 +23,22 @@ pub struct BoardFigures {
     pub differing_bits: u64,
     /// Ticks worked off.
     pub ticks: u64,
-    /// Instructions of a tick, interrupt entry and main loop included, median.
-    pub tick_instructions_median: u32,
+    /// Instructions of a tick, interrupt entry and main loop included, median; `None`
+    /// where nobody counts them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tick_instructions_median: Option<u32>,
     /// The same, worst.
-    pub tick_instructions_worst: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tick_instructions_worst: Option<u32>,
     /// Most instructions between two sleeps, whatever caused them.
-    pub longest_awake_instructions: u32,
-    /// Deepest stack, bytes.
-    pub stack_used_bytes: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_awake_instructions: Option<u32>,
+    /// Deepest stack, bytes; `None` where it is not measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_used_bytes: Option<u32>,
     /// Room for the stack, bytes.
-    pub stack_size_bytes: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_size_bytes: Option<u32>,
     /// Resets.
     pub resets: u16,
     /// Bytes that came late to the emulator.
@@ -50,6 +56,8 @@ impl BoardFigures {
         late_frames: u32,
         compared: Count,
     ) -> Self {
+        // A board that cannot take a measurement sends zero.
+        let known = |figure: u32| (figure > 0).then_some(figure);
         let mut sorted = ticks.to_vec();
         sorted.sort_unstable();
         Self {
@@ -65,11 +73,11 @@ impl BoardFigures {
             compared_bits: compared.bits,
             differing_bits: compared.differing,
             ticks: ticks.len() as u64,
-            tick_instructions_median: sorted.get(sorted.len() / 2).copied().unwrap_or(0),
-            tick_instructions_worst: sorted.last().copied().unwrap_or(0),
-            longest_awake_instructions: figures.longest_awake,
-            stack_used_bytes: figures.stack_used,
-            stack_size_bytes: figures.stack_size,
+            tick_instructions_median: sorted.get(sorted.len() / 2).copied().and_then(known),
+            tick_instructions_worst: sorted.last().copied().and_then(known),
+            longest_awake_instructions: known(figures.longest_awake),
+            stack_used_bytes: known(figures.stack_used),
+            stack_size_bytes: known(figures.stack_size),
             resets: figures.resets,
             late_bytes: figures.late_bytes,
             late_frames,

@@ -51,6 +51,8 @@ struct Board {
     /// Time of the first tick after the newest start, ns; `None` while down.
     running_from_ns: Option<u64>,
     tripped: Option<Trip>,
+    /// First tick after a start that has not been told, ns.
+    started_ns: Option<u64>,
     power: Power,
     tick_instructions: Vec<u32>,
     /// Frames that were told when others should have heard some of them.
@@ -202,6 +204,7 @@ impl Outside {
             there: VecDeque::new(),
             running_from_ns: Some(0),
             tripped: None,
+            started_ns: None,
             power: Power::Good,
             tick_instructions: Vec::new(),
             late_frames: 0,
@@ -261,11 +264,6 @@ impl Outside {
         self.boards[self.number(address)?].running_from_ns
     }
 
-    /// Whether the board at `address` is outside and down.
-    pub(crate) fn is_in_reset(&self, address: u8) -> bool {
-        self.has(address) && self.running_from_ns(address).is_none()
-    }
-
     /// The newest edge of the board at `address`, ns; `None` for one that runs here.
     pub(crate) fn edge_ns(&self, address: u8) -> Option<u64> {
         self.boards[self.number(address)?].edge_ns
@@ -275,6 +273,13 @@ impl Outside {
     pub(crate) fn take_trip(&mut self, address: u8) -> Option<Trip> {
         let n = self.number(address)?;
         self.boards[n].tripped.take()
+    }
+
+    /// First tick of the board at `address` after a start that is known since the last
+    /// call, ns.
+    pub(crate) fn take_first_edge(&mut self, address: u8) -> Option<u64> {
+        let n = self.number(address)?;
+        self.boards[n].started_ns.take()
     }
 
     /// Quadrature edges at which the counter of the wheel board at `address` stood at 0,
@@ -417,6 +422,7 @@ impl Outside {
                 board.latched.clear();
             }
             board.running_from_ns = (trip.running_ns > 0).then_some(trip.running_ns);
+            board.started_ns = board.running_from_ns;
             // It started before the edge of this very run, if there was one.
             let mut known = board.latched.iter().rev();
             let at_edge = board.edge_ns == Some(board.heard_ns);

@@ -18,12 +18,8 @@ fn grouped(count: u64) -> String {
     out
 }
 
-fn measured(count: u64) -> String {
-    if count == 0 {
-        "–".to_owned()
-    } else {
-        grouped(count)
-    }
+fn measured(count: Option<u32>) -> String {
+    count.map_or("–".to_owned(), |count| grouped(count.into()))
 }
 
 fn row(name: &str, kind: &str, board: Option<&BoardFigures>) -> Value {
@@ -39,10 +35,10 @@ fn row(name: &str, kind: &str, board: Option<&BoardFigures>) -> Value {
         bits => grouped(board.compared_bits),
         differing => grouped(board.differing_bits),
         equal => board.compared_bits > 0 && board.differing_bits == 0,
-        median => measured(board.tick_instructions_median.into()),
-        worst => measured(board.tick_instructions_worst.into()),
-        stack => measured(board.stack_used_bytes.into()),
-        room => measured(board.stack_size_bytes.into()),
+        median => measured(board.tick_instructions_median),
+        worst => measured(board.tick_instructions_worst),
+        stack => measured(board.stack_used_bytes),
+        room => measured(board.stack_size_bytes),
         resets => board.resets,
     }
 }
@@ -91,7 +87,7 @@ mod tests {
         assert_eq!(grouped(0), "0");
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(8_123_456), "8\u{2009}123\u{2009}456");
-        assert_eq!(measured(0), "–");
-        assert_eq!(measured(1500), "1\u{2009}500");
+        assert_eq!(measured(None), "–");
+        assert_eq!(measured(Some(1500)), "1\u{2009}500");
     }
 }

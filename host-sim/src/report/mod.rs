@@ -121,6 +121,27 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_was_cut_short_is_not_judged() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario("three-step").expect("built in");
+        let recording = testing::from_reference(&robot, 0.25, 0.0);
+        let analysis = analysis::analyse(&scenario, &robot, &recording);
+        let (folder, mut summary) = report("three-step");
+        let mut page = |complete: bool| {
+            summary.complete = complete;
+            let (r, a) = (&recording, &analysis);
+            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            std::fs::read_to_string(folder.path().join("report.html")).expect("written")
+        };
+        let (whole, part) = (page(true), page(false));
+        let verdict = "required targets met</span>";
+        assert!(whole.contains(verdict) && whole.contains(">PASS<"));
+        assert!(!whole.contains("was stopped after") && !whole.contains("not judged"));
+        assert!(!part.contains(verdict) && !part.contains(">PASS<") && !part.contains(">FAIL<"));
+        assert!(part.contains("was stopped after") && part.contains("not judged"));
+    }
+
+    #[test]
     fn the_page_shows_what_boards_outside_did_and_what_differed() {
         use crate::pil::{BoardFigures, ChannelFigures, PilSummary};
         let page = |differing: u64| {
@@ -151,11 +172,11 @@ mod tests {
                     compared_bits: 1_234_567,
                     differing_bits: differing,
                     ticks: 10_000,
-                    tick_instructions_median: 1_111,
-                    tick_instructions_worst: 1_444,
-                    longest_awake_instructions: 2_000,
-                    stack_used_bytes: 3_456,
-                    stack_size_bytes: 24_576,
+                    tick_instructions_median: Some(1_111),
+                    tick_instructions_worst: Some(1_444),
+                    longest_awake_instructions: Some(2_000),
+                    stack_used_bytes: Some(3_456),
+                    stack_size_bytes: Some(24_576),
                     resets: 0,
                     late_bytes: 0,
                     late_frames: 0,

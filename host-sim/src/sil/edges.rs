@@ -110,7 +110,14 @@ impl World {
             } else {
                 ResetCause::Watchdog
             };
+            self.down_times.reset(self.now_ns, raw, cause);
             self.start_anew(address, cause)?;
+        }
+        for raw in 1..=8_u8 {
+            let first = self.outside.as_mut().and_then(|o| o.take_first_edge(raw));
+            if let Some(first_ns) = first {
+                self.down_times.first_edge(self.now_ns, raw, first_ns);
+            }
         }
         Ok(())
     }

@@ -9,6 +9,7 @@
 mod audit;
 mod boards;
 mod bus;
+mod downtime;
 mod edges;
 mod hal;
 mod memory;
@@ -30,6 +31,7 @@ use wheeleg_protocol::LinkQuality;
 
 pub use self::audit::LineAudit;
 pub(crate) use self::boards::{JointBoard, identity};
+pub use self::downtime::DownTimes;
 pub use self::power::BOARD_START_UP_NS;
 pub(crate) use self::words::hex;
 
@@ -65,6 +67,8 @@ pub struct RunOutcome {
     pub line: LineAudit,
     /// Frames and errors that the master counted, by kind.
     pub link: LinkQuality,
+    /// When boards outside were down.
+    pub down_times: DownTimes,
 }
 
 /// Runs a scenario and records it.
@@ -99,16 +103,46 @@ pub fn run_with(
     recorder: &mut Recorder,
     progress: &mut dyn FnMut(f64) -> Control,
 ) -> Result<RunOutcome, SimError> {
-    let boards = Outside::connect(nodes, robot)?;
+    let boards = Boards::connect(nodes, robot)?;
     run_on(boards, scenario, robot, seed, nodes, recorder, progress)
 }
 
-/// As [`run_with`], on boards that are connected already; `None`: all here.
+/// What a run has in place of boards that find their own way.
+#[derive(Default)]
+pub(crate) struct Boards {
+    /// Those outside of this process; `None`: all are here.
+    outside: Option<Outside>,
+    /// Of those here, when they are down after a fault, if not when they would be.
+    kept: DownTimes,
+}
+
+impl Boards {
+    /// Connects those that are outside.
+    ///
+    /// # Errors
+    /// As [`Outside::connect`].
+    pub(crate) fn connect(nodes: &Nodes, robot: &RobotConfig) -> Result<Self, SimError> {
+        Ok(Self {
+            outside: Outside::connect(nodes, robot)?,
+            kept: DownTimes::default(),
+        })
+    }
+
+    /// All here, and down when the boards of another run were.
+    pub(crate) fn native_with(kept: DownTimes) -> Self {
+        Self {
+            outside: None,
+            kept,
+        }
+    }
+}
+
+/// As [`run_with`], on boards that are connected already.
 ///
 /// # Errors
 /// As [`run_with`].
 pub(crate) fn run_on(
-    boards: Option<Outside>,
+    boards: Boards,
     scenario: &Scenario,
     robot: &RobotConfig,
     seed: u64,
@@ -194,6 +228,7 @@ pub(crate) fn run_on(
             .map(|outside| outside.summary(nodes, now_ns)),
         line: world.audit(),
         link,
+        down_times: world.take_down_times(),
     })
 }
 
@@ -209,7 +244,7 @@ pub fn commission(
     seed: u64,
     nodes: &Nodes,
 ) -> Result<[UniqueId; 8], SimError> {
-    let boards = Outside::connect(nodes, robot)?;
+    let boards = Boards::connect(nodes, robot)?;
     let plant = setup::plant(scenario, robot);
     let master = setup::master(scenario, robot);
     let mut world = World::new(robot, &plant, master, seed, boards)?;

@@ -10,6 +10,7 @@ use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_units::Micros;
 
 use super::boards::{JointBoard, WheelBoard, identity};
+use super::downtime::{DownTimes, Due};
 use super::traffic::{NS_PER_US, micros};
 use super::world::{JOINT_TICK_NS, World};
 use crate::SimError;
@@ -108,14 +109,26 @@ impl World {
             .is_some_and(|edge_ns| edge_ns <= self.now_ns)
     }
 
+    /// Whether the board at `address` drives its bridge: from its first tick edge on, and
+    /// on with what it was told last when its program has stopped.
+    pub(super) fn drives(&self, address: u8) -> bool {
+        let started = self.started_ns(address);
+        !self.down[usize::from(address) - 1].is_off() && started.is_some_and(|ns| ns <= self.now_ns)
+    }
+
     /// First tick edge of the board at `address` since its processor has started, ns;
     /// `None` while it is down.
     fn first_edge_ns(&self, address: u8) -> Option<u64> {
-        let i = usize::from(address) - 1;
+        let runs = self.down[usize::from(address) - 1] == Down::No;
+        self.started_ns(address).filter(|_| runs)
+    }
+
+    /// First tick edge of the board at `address` since its newest start, ns; `None` if
+    /// that is not known yet.
+    fn started_ns(&self, address: u8) -> Option<u64> {
         match self.outside.as_ref().filter(|o| o.has(address)) {
-            _ if self.down[i] != Down::No => None,
             Some(outside) => outside.running_from_ns(address),
-            None => Some(self.clock_zero_ns[i]),
+            None => Some(self.clock_zero_ns[usize::from(address) - 1]),
         }
     }
 
@@ -143,6 +156,47 @@ impl World {
         let now = micros(self.faults.clock_ns(address, ns));
         let zero = micros(self.faults.clock_ns(address, zero_ns));
         Micros(now.get().wrapping_sub(zero.get()))
+    }
+
+    /// Does to boards here what had become of them outside, in the run that this one
+    /// repeats.
+    ///
+    /// # Errors
+    /// [`SimError`] if the application refuses its parameters.
+    pub(super) fn keep_down_times(&mut self) -> Result<(), SimError> {
+        let now_ns = self.now_ns;
+        loop {
+            let struck = |address: u8| match self.down[usize::from(address) - 1] {
+                Down::Off { .. } | Down::Starting { .. } | Down::Hung { .. } => true,
+                Down::No | Down::Storing { .. } => false,
+            };
+            match self.kept.next(now_ns, struck) {
+                None => return Ok(()),
+                Some(Due::Reset(raw, cause)) => {
+                    if let Some(address) = Address::new(raw) {
+                        self.start_anew(address, cause)?;
+                    }
+                    self.down[usize::from(raw) - 1] = Down::Starting {
+                        until_ns: u64::MAX,
+                        cause,
+                    };
+                }
+                Some(Due::FirstEdge(raw, until_ns)) => {
+                    let down = &mut self.down[usize::from(raw) - 1];
+                    let cause = match *down {
+                        Down::Starting { cause, .. } => cause,
+                        // Struck once more while it started.
+                        _ => ResetCause::PowerUp,
+                    };
+                    *down = Down::Starting { until_ns, cause };
+                }
+            }
+        }
+    }
+
+    /// When boards outside were down, at the end of the run.
+    pub(super) fn take_down_times(&mut self) -> DownTimes {
+        std::mem::take(&mut self.down_times)
     }
 
     /// The application of a board from its reset by `cause` on.
@@ -197,6 +251,8 @@ impl World {
                 // It begins with an edge of its own.
                 Down::Starting { .. } if raw > 6 => continue,
                 Down::Starting { until_ns, .. } => until_ns.saturating_sub(JOINT_TICK_NS),
+                // How long that takes is known from the run that this one repeats.
+                Down::Off { .. } | Down::Hung { .. } if self.kept.rule(raw) => continue,
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
                 // The tick of the last edge before the end is worked off then.
                 Down::Storing { until_ns } => {
@@ -329,7 +385,8 @@ impl World {
             Down::Hung { .. } => outside.hook(address, link::Hook::StopProcessor),
             _ => {
                 outside.set_power(address, link::Power::BrownOut);
-                Ok(())
+                // At once: it may be back before the board is run otherwise.
+                self.run_outside(&[(address, None)])
             }
         }
     }

@@ -13,9 +13,11 @@ use wheeleg_pil_link as link;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::{Address, ResetCause};
 
+use super::Boards;
 use super::audit::{Audit, LineAudit};
 use super::boards::{JointBoard, WheelBoard, identity};
 use super::bus::Bus;
+use super::downtime::DownTimes;
 use super::edges::Sensed;
 use super::memory::Memory;
 use super::power::{Client, Down};
@@ -72,6 +74,10 @@ pub(super) struct World {
     pub(super) master_back_ns: Option<u64>,
     pub(super) client: Client,
     pub(super) outside: Option<Outside>,
+    /// When boards outside were down in this run.
+    pub(super) down_times: DownTimes,
+    /// When boards here are down after a fault, of those that do not find it themselves.
+    pub(super) kept: DownTimes,
     pub(super) stored: NodeParams,
     /// Parameter memories, addresses 1 to 8.
     pub(super) memories: [Memory; 8],
@@ -122,8 +128,9 @@ impl World {
         plant: &PlantParams,
         master: MasterConfig,
         seed: u64,
-        outside: Option<Outside>,
+        boards: Boards,
     ) -> Result<Self, SimError> {
+        let Boards { outside, kept } = boards;
         let refused = |part: &str, e: &dyn std::fmt::Display| {
             SimError::simulation(
                 format!("the {part} refuses its parameters: {e}"),
@@ -201,6 +208,11 @@ impl World {
             faults: Injector::new(seed),
             down: [Down::No; 8],
             clock_zero_ns: [0; 8],
+            down_times: DownTimes::new(std::array::from_fn(|i| {
+                let there = outside.as_ref();
+                there.is_some_and(|o| o.has(i as u8 + 1))
+            })),
+            kept,
             outside,
             memories: std::array::from_fn(|i| {
                 // Joints first, then wheels, as on the bus.
@@ -223,10 +235,12 @@ impl World {
             && due <= tick_ns
         {
             self.now_ns = due;
+            self.keep_down_times()?;
             self.deliver()?;
             return Ok(Happened::Delivery);
         }
         self.now_ns = tick_ns;
+        self.keep_down_times()?;
         if self.next_joint_ns == tick_ns {
             self.joint_tick()?;
             return Ok(Happened::JointTick);
@@ -331,16 +345,14 @@ impl World {
         let address = wheel as u8 + 7;
         let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         // Only the bridge takes new inputs here: the valves keep their tick.
-        let off = self.down[wheel + 6].is_off();
+        let drives = self.drives(address);
         self.inputs.bridge_duty[wheel] = match outside {
             Some(outputs) => duty(&outputs),
-            None if off => 0.0,
+            None if !drives => 0.0,
             None => self.wheels[wheel].active_duty(),
         };
-        // A board in reset lets its wheel coast, wherever it runs.
-        let outside = self.outside.as_ref();
-        let in_reset = outside.is_some_and(|o| o.is_in_reset(address));
-        self.inputs.bridge_enabled[wheel] = !off && !in_reset;
+        // A board that does not drive lets its wheel coast, wherever it runs.
+        self.inputs.bridge_enabled[wheel] = drives;
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];

@@ -6,6 +6,7 @@
 //! `wheeleg channels`.
 
 mod csv_out;
+mod difference;
 mod encode;
 mod filter;
 mod hash;
@@ -14,6 +15,7 @@ mod registry;
 pub mod samples;
 
 pub use csv_out::write_csv;
+pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;

@@ -99,6 +99,20 @@ impl Board {
         Ok(())
     }
 
+    /// Runs on until the tick under way is worked off. A program that stops at an instant
+    /// has done its newest tick, as the one on the host has, although the board answered
+    /// before that.
+    pub(super) fn finish_tick(&mut self) -> Result<(), String> {
+        if !self.running {
+            return Ok(());
+        }
+        let cap = self.before_next_edge()?;
+        let state = self.machine()?.state();
+        let now_ns = state.soc.time.ns_of(state.cycle);
+        let longest = cap.min(now_ns + WORK_NS);
+        self.advance(cap.min(now_ns), Until::Asleep(longest))
+    }
+
     /// The board's tick timer keeps the simulator's time.
     fn check_edge(&mut self, edge_ns: u64) -> Result<(), String> {
         let runs = self.running && self.first_edge_ns <= edge_ns;

@@ -1,0 +1,117 @@
+//! When boards outside were down, as taken down in one run and kept to in another.
+//!
+//! How long a processor takes to start, and when exactly its watchdog bites, are
+//! properties of its hardware, which the simulator's own boards only take averages of.
+//! A native run that repeats one with emulated boards is given those times, and nothing
+//! else: whatever else differs between the two is a difference.
+
+use std::collections::VecDeque;
+
+use wheeleg_protocol::ResetCause;
+
+/// What became of a board outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Change {
+    /// Its processor was reset: outputs off, memory lost.
+    Reset(ResetCause),
+    /// Its tick timer was started; the first edge is at this time, ns.
+    FirstEdge(u64),
+}
+
+/// One change, and when the simulator learnt of it, ns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Entry {
+    known_ns: u64,
+    address: u8,
+    change: Change,
+}
+
+/// Resets and starts of the boards that were outside in a run.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct DownTimes {
+    /// Which addresses from 1 were outside.
+    outside: [bool; 8],
+    /// In the order in which they came.
+    entries: VecDeque<Entry>,
+}
+
+/// What a board does next, of one that keeps to the times of another run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Due {
+    /// It is reset.
+    Reset(u8, ResetCause),
+    /// Its first tick edge is at this time, ns.
+    FirstEdge(u8, u64),
+}
+
+impl DownTimes {
+    /// Nothing has happened to the boards that are `outside` (addresses from 1).
+    pub(super) fn new(outside: [bool; 8]) -> Self {
+        Self {
+            outside,
+            entries: VecDeque::new(),
+        }
+    }
+
+    /// Whether the board at `address` keeps to these times instead of its own.
+    pub(super) fn rule(&self, address: u8) -> bool {
+        let i = usize::from(address).wrapping_sub(1);
+        self.outside.get(i).copied().unwrap_or(false)
+    }
+
+    fn take_down(&mut self, known_ns: u64, address: u8, change: Change) {
+        self.entries.push_back(Entry {
+            known_ns,
+            address,
+            change,
+        });
+    }
+
+    /// The processor of a board was reset.
+    pub(super) fn reset(&mut self, known_ns: u64, address: u8, cause: ResetCause) {
+        self.take_down(known_ns, address, Change::Reset(cause));
+    }
+
+    /// The first tick edge of a board after its reset is known.
+    pub(super) fn first_edge(&mut self, known_ns: u64, address: u8, edge_ns: u64) {
+        self.take_down(known_ns, address, Change::FirstEdge(edge_ns));
+    }
+
+    /// The next change that is due at `now_ns`. A board that nothing has brought `down`
+    /// is not reset: a reset without a fault is no property of the hardware, and the
+    /// runs shall differ by it.
+    pub(super) fn next(&mut self, now_ns: u64, down: impl Fn(u8) -> bool) -> Option<Due> {
+        let entry = *self.entries.front()?;
+        if entry.known_ns > now_ns || !down(entry.address) {
+            return None;
+        }
+        self.entries.pop_front();
+        Some(match entry.change {
+            Change::Reset(cause) => Due::Reset(entry.address, cause),
+            Change::FirstEdge(edge_ns) => Due::FirstEdge(entry.address, edge_ns),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_come_in_order_when_they_are_due_and_only_to_boards_that_are_down() {
+        let mut outside = [false; 8];
+        outside[1] = true;
+        let mut times = DownTimes::new(outside);
+        times.reset(5_000, 2, ResetCause::Watchdog);
+        times.first_edge(9_000, 2, 10_000);
+        assert!(times.rule(2) && !times.rule(1) && !times.rule(0) && !times.rule(9));
+        assert_eq!(times.next(4_999, |_| true), None, "not yet");
+        assert_eq!(times.next(5_000, |_| false), None, "nothing struck it");
+        let reset = Due::Reset(2, ResetCause::Watchdog);
+        assert_eq!(times.next(5_000, |address| address == 2), Some(reset));
+        assert_eq!(times.next(5_000, |_| true), None);
+        let edge = Due::FirstEdge(2, 10_000);
+        assert_eq!(times.next(9_000, |_| true), Some(edge));
+        assert_eq!(times.next(u64::MAX, |_| true), None);
+    }
+}
