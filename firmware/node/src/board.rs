@@ -8,6 +8,7 @@ use crate::overrun::elapsed;
 use crate::port::{BusPort, Incoming};
 use crate::supervisor::{SupervisionTimes, Supervisor};
 use crate::time::TimeSync;
+use crate::transmission::Transmission;
 use wheeleg_protocol::link::{
     DuplicateFilter, SlotTiming, TURNAROUND_US, Verdict, deadline_is_live,
 };
@@ -112,6 +113,15 @@ impl BoardCore {
     #[inline(never)]
     pub(crate) fn axis_fault(&mut self, fault: Fault, at: Micros) {
         self.supervisor.fault(fault, Event::AxisFault, at);
+    }
+
+    /// The next frame to send. Without one there is time for what a tick left over.
+    pub(crate) fn take_transmission(&mut self) -> Option<Transmission> {
+        let transmission = self.port.take();
+        if transmission.is_none() {
+            self.supervisor.settle_log();
+        }
+        transmission
     }
 
     /// Whether parameters wait to be stored.

@@ -3,17 +3,26 @@
 //! A reader holds a lease; without one nothing is recorded. A token bucket keeps a
 //! storm of events from pushing everything else out: sixteen records at once, one
 //! per millisecond on the average. What is beyond is counted.
+//!
+//! A tick only notes what happened, in a few words; whether that is recorded is worked
+//! out between two ticks, so that a fault costs its tick no more than its reaction. The
+//! result is the same whenever that is done.
 
-use heapless::Deque;
-use wheeleg_protocol::{LOG_ENTRIES, LogEntry, LogEvent, LogRecords};
+use heapless::{Deque, Vec};
+use wheeleg_protocol::{LOG_ENTRIES, LogEntry, LogRecords};
 use wheeleg_units::Micros;
 
 /// Records that wait, and tokens of a full bucket.
 const DEPTH: usize = 16;
 
+/// Notes that fit; a fault and the change of mode that it leads to are two.
+const NOTES: usize = 8;
+
 /// Waiting records of one board.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
+    /// What happened and was not looked at yet, oldest first.
+    noted: Vec<LogEntry, NOTES>,
     waiting: Deque<[u8; 8], DEPTH>,
     lost: u16,
     /// End of the lease, µs since reset; 0 when nobody reads.
@@ -24,9 +33,33 @@ pub struct Log {
 }
 
 impl Log {
-    /// Takes what happened at `at`, `now_us` on the clock that does not wrap.
+    /// Notes what happened, to be worked off by [`Self::settle`]; gives it back if there
+    /// is no room.
+    #[inline]
+    pub fn note(&mut self, entry: LogEntry) -> Result<(), LogEntry> {
+        self.noted.push(entry)
+    }
+
+    /// Whether anything waits to be worked off.
+    #[inline]
+    pub fn has_notes(&self) -> bool {
+        !self.noted.is_empty()
+    }
+
+    /// Works off what was noted; `time_us` gives the time of an entry on the clock that
+    /// does not wrap.
+    pub fn settle(&mut self, time_us: impl Fn(Micros) -> u64) {
+        let mut at = 0;
+        while let Some(entry) = self.noted.get(at).copied() {
+            self.push(entry, time_us(Micros(entry.time_us)));
+            at = at.saturating_add(1);
+        }
+        self.noted.clear();
+    }
+
+    /// Takes what happened at `now_us` on the clock that does not wrap.
     #[cold]
-    pub fn push(&mut self, event: LogEvent, a: u8, b: u16, at: Micros, now_us: u64) {
+    fn push(&mut self, entry: LogEntry, now_us: u64) {
         if now_us >= self.lease_end_us {
             return;
         }
@@ -34,12 +67,6 @@ impl Log {
         let earned = now_ms.saturating_sub(self.filled_ms).min(DEPTH as u64);
         self.filled_ms = now_ms;
         self.tokens = self.tokens.saturating_add(earned as u8).min(DEPTH as u8);
-        let entry = LogEntry {
-            time_us: at.get(),
-            event,
-            a,
-            b,
-        };
         if self.tokens > 0 && self.waiting.push_back(entry.to_bytes()).is_ok() {
             self.tokens = self.tokens.saturating_sub(1);
         } else {
@@ -47,7 +74,8 @@ impl Log {
         }
     }
 
-    /// Gives the oldest records away and the lease a new end.
+    /// Gives the oldest records away and the lease a new end; all that was noted has been
+    /// worked off.
     #[cold]
     pub fn read(&mut self, lease_ms: u16, now_us: u64) -> LogRecords {
         if now_us >= self.lease_end_us {
@@ -75,15 +103,19 @@ impl Log {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_protocol::LogEvent;
+
+    fn entry(number: u16, time_us: u64) -> LogEntry {
+        LogEntry {
+            time_us: time_us as u32,
+            event: LogEvent::Parameter,
+            a: 0,
+            b: number,
+        }
+    }
 
     fn push(log: &mut Log, number: u16, now_us: u64) {
-        log.push(
-            LogEvent::Parameter,
-            0,
-            number,
-            Micros(now_us as u32),
-            now_us,
-        );
+        log.push(entry(number, now_us), now_us);
     }
 
     fn numbers(records: &LogRecords) -> Vec<u16> {

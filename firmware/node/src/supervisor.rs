@@ -14,7 +14,7 @@ use crate::log::Log;
 use crate::mode::{Event, Mode, ModeRules, Refusal};
 use crate::overrun::{OverrunDetector, elapsed};
 use wheeleg_protocol::link::{LinkState, LinkSupervisor, WatchdogCycles};
-use wheeleg_protocol::{DisarmReason, Fault, LogEvent, LogRecords, NackReason};
+use wheeleg_protocol::{DisarmReason, Fault, LogEntry, LogEvent, LogRecords, NackReason};
 use wheeleg_units::Micros;
 
 /// Times of the supervision.
@@ -155,16 +155,50 @@ impl Supervisor {
         }
     }
 
-    /// Records what happened, for whoever reads the log.
-    #[cold]
+    /// Notes what happened, for whoever reads the log.
     #[inline(never)]
     pub(crate) fn note(&mut self, event: LogEvent, a: u8, b: u16, at: Micros) {
-        let now_us = self.clock.unwrap(at);
-        self.log.push(event, a, b, at, now_us);
+        let entry = LogEntry {
+            time_us: at.get(),
+            event,
+            a,
+            b,
+        };
+        if let Err(entry) = self.log.note(entry) {
+            self.note_more(entry);
+        }
+    }
+
+    /// Without room for a note the others are worked off at once.
+    #[cold]
+    #[inline(never)]
+    fn note_more(&mut self, entry: LogEntry) {
+        self.settle_log();
+        let _ = self.log.note(entry);
+    }
+
+    /// Works off what was noted, if there is any: called between two ticks.
+    #[inline]
+    pub(crate) fn settle_log(&mut self) {
+        if self.log.has_notes() {
+            self.work_off_notes();
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn work_off_notes(&mut self) {
+        let clock = self.clock;
+        self.log.settle(|at| {
+            // A copy: to look back never sets the clock.
+            let mut clock = clock;
+            clock.unwrap(at)
+        });
     }
 
     /// The oldest records of the log, which goes on for `lease_ms`.
     pub(crate) fn read_log(&mut self, lease_ms: u16, at: Micros) -> LogRecords {
+        self.settle_log();
         let now_us = self.clock.unwrap(at);
         self.log.read(lease_ms, now_us)
     }

@@ -309,7 +309,21 @@ impl WheelController {
         }
 
         let mode = self.mode();
-        let (motor, command, error) = self.run(actual, velocity);
+        let status = WheelStatus {
+            limit: self.limit,
+            stop: self.stop,
+            ..WheelStatus::default()
+        };
+        let Some((motor, command, error)) = self.run(actual, velocity) else {
+            self.negative = false;
+            return WheelOutput {
+                mode,
+                command: actual,
+                velocity,
+                status,
+                ..WheelOutput::default()
+            };
+        };
         let pwm = motor.value.clamp(-PWM_MAX, PWM_MAX);
         // The sign output is low, "positive", at zero too.
         let negative = pwm < 0;
@@ -324,31 +338,29 @@ impl WheelController {
             error,
             velocity,
             status: WheelStatus {
-                limit: self.limit,
-                stop: self.stop,
                 profile: matches!(self.run, Run::Trapezoidal(_)),
                 command_saturated: motor.saturated,
                 pwm_saturated: pwm != motor.value,
+                ..status
             },
         }
     }
 
-    /// Motor command, position command and error of this sample.
+    /// Motor command, position command and error of this sample; `None` in idle.
     #[inline]
-    fn run(&mut self, actual: WheelCount, velocity: i32) -> (MotorCommand, WheelCount, i32) {
+    fn run(
+        &mut self,
+        actual: WheelCount,
+        velocity: i32,
+    ) -> Option<(MotorCommand, WheelCount, i32)> {
         match &mut self.run {
-            Run::Idle => {
-                let rest = MotorCommand {
-                    value: 0,
-                    saturated: false,
-                };
-                return (rest, actual, 0);
-            }
+            Run::Idle => return None,
             Run::ProportionalVelocity => {
                 // |velocity| <= 2^23: sixteenths fit 28 bits.
                 let wanted = i32::from(self.velocity.to_bits());
                 let error = wanted.wrapping_sub(velocity.wrapping_mul(16));
-                return (FilterMemory::gain_only(self.filter, error), actual, error);
+                let motor = FilterMemory::gain_only(self.filter, error);
+                return Some((motor, actual, error));
             }
             Run::Position => {}
             Run::Trapezoidal(profile) => {
@@ -365,7 +377,7 @@ impl WheelController {
         }
         let error = self.command.wrapping_difference(actual);
         let motor = self.memory.update(self.filter, error);
-        (motor, self.command, error)
+        Some((motor, self.command, error))
     }
 }
 

@@ -241,6 +241,12 @@ impl Air {
         }
     }
 
+    /// Whether the tick to come is the third of a round, in which nothing is followed.
+    #[inline]
+    pub(super) const fn ends_round(&self) -> bool {
+        self.turn >= 2
+    }
+
     /// A tick that ends at `position`, with these on-times: A's pressure follows in the
     /// first of a round, B's in the second. True in the third, which has room for what
     /// is made of them.

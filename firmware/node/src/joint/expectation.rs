@@ -172,16 +172,24 @@ impl MotionWatch {
         self.from = position.raw();
     }
 
-    /// A tick under control, which sends `on`; true when a motion is overdue. The air
-    /// takes two ticks of a round, what it says of the piston the third.
+    /// A tick under control sends `on`: the air takes two ticks of a round.
     #[inline]
-    pub(super) fn sample(&mut self, on: &OnTimes, driven: &Driven, model: &MotionModel) -> bool {
-        self.air.follow(on, driven.position, &model.air) && self.judge(on, driven, model)
+    pub(super) fn follow(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
+        let third = self.air.follow(on, position, &model.air);
+        if third && self.stands >= MINUTE && *on == [0; 4] {
+            // A minute at rest: seals leak.
+            self.slid = 0;
+            self.air.forget();
+        }
     }
 
-    /// Whether a motion is overdue, once a round.
+    /// Whether a motion is overdue, judged in the third tick of a round, from what the
+    /// ticks before it did: so it is known before the pulses of this one are made.
     #[inline]
-    fn judge(&mut self, on: &OnTimes, driven: &Driven, model: &MotionModel) -> bool {
+    pub(super) fn judge(&mut self, driven: &Driven, model: &MotionModel) -> bool {
+        if !self.air.ends_round() {
+            return false;
+        }
         let &Driven {
             reference,
             position,
@@ -200,17 +208,18 @@ impl MotionWatch {
             return false;
         }
         self.stands = self.stands.saturating_add(1);
-        if self.stands >= MINUTE && *on == [0; 4] {
-            // A minute at rest: seals leak.
-            self.slid = 0;
-            self.air.forget();
-        }
         let doubt = self.doubts(reference, position, model);
         self.doubt = if doubt == 0 {
             0
         } else {
             self.doubt.saturating_add(doubt)
         };
+        self.is_overdue()
+    }
+
+    /// Whether a motion is overdue, as the last round has judged.
+    #[inline]
+    pub(super) const fn is_overdue(&self) -> bool {
         self.doubt >= FAULT && self.stands >= STANDING
     }
 
@@ -293,6 +302,13 @@ mod tests {
     use super::*;
     use wheeleg_control::axis::AxisData;
 
+    /// A tick under control that sends `on`.
+    fn sample(watch: &mut MotionWatch, on: &OnTimes, driven: &Driven, model: &MotionModel) -> bool {
+        let overdue = watch.judge(driven, model);
+        watch.follow(on, driven.position, model);
+        overdue
+    }
+
     const PUSH: OnTimes = [1000, 0, 0, 1000];
     const PULL: OnTimes = [0, 1000, 1000, 0];
     const SHUT: OnTimes = [0; 4];
@@ -337,7 +353,7 @@ mod tests {
     ) -> Option<(u32, f64)> {
         let mut forces = [0; 5000];
         (1..5000).find_map(|tick| {
-            let found = watch.sample(&on, &driven, model);
+            let found = sample(&mut watch, &on, &driven, model);
             forces[tick] = watch.air.force(&model.air);
             found.then(|| (tick as u32, f64::from(forces[tick - 33]) / 1e3))
         })
@@ -389,7 +405,7 @@ mod tests {
                     velocity: VelocityMmS::from_int(speed),
                     ..driven(120, 90)
                 };
-                watch.sample(&PUSH, &driven, &model)
+                sample(&mut watch, &PUSH, &driven, &model)
             })
         };
         // 0.55 mm in 30 ms, and half as much.
@@ -415,7 +431,7 @@ mod tests {
             let mut watch = knowing(0, 90, &model);
             if minute {
                 for _ in 0..=u16::MAX {
-                    watch.sample(&SHUT, &driven(90, 90), &model);
+                    sample(&mut watch, &SHUT, &driven(90, 90), &model);
                 }
             } else {
                 watch.rest(&SHUT, PositionMm::from_int(90), &model);
@@ -430,7 +446,7 @@ mod tests {
         let model = model(0);
         let mut watch = knowing(0, 20, &model);
         for _ in 0..2000 {
-            watch.sample(&[0, 0, 1000, 0], &driven(20, 20), &model);
+            sample(&mut watch, &[0, 0, 1000, 0], &driven(20, 20), &model);
         }
         // B at supply; 130 mm further in it would have 27 bar.
         let mut found = None;
@@ -445,7 +461,7 @@ mod tests {
                 },
                 ..driven(150, 20)
             };
-            if watch.sample(&SHUT, &driven, &model) {
+            if sample(&mut watch, &SHUT, &driven, &model) {
                 found = Some(tick);
                 break;
             }
@@ -469,7 +485,7 @@ mod tests {
                     velocity: VelocityMmS::from_int(speed),
                     ..driven(90, 90)
                 };
-                watch.sample(&SHUT, &driven, &model);
+                sample(&mut watch, &SHUT, &driven, &model);
             }
             // 10 N of Coulomb and 4 N of viscous friction.
             assert!(
@@ -480,12 +496,12 @@ mod tests {
         }
         // Standing teaches nothing, nor does a cushion.
         let before = watch.learnt;
-        watch.sample(&SHUT, &driven(90, 90), &model);
+        sample(&mut watch, &SHUT, &driven(90, 90), &model);
         let cushioned = Driven {
             velocity: VelocityMmS::from_int(100),
             ..driven(4, 4)
         };
-        watch.sample(&SHUT, &cushioned, &model);
+        sample(&mut watch, &SHUT, &cushioned, &model);
         assert_eq!(watch.learnt, before);
     }
 }

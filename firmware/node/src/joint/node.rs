@@ -166,9 +166,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         receive(self, bytes, t_end);
     }
 
-    /// The next frame to send and when to start; call until `None`.
+    /// The next frame to send and when to start; call between two ticks until `None`,
+    /// with which comes what a tick left over.
     pub fn take_transmission(&mut self) -> Option<Transmission> {
-        self.core.port.take()
+        self.core.take_transmission()
     }
 
     /// One control tick that starts at `now`: latches the inputs, controls,
@@ -190,6 +191,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let reading = self.monitor.sample(reading, &self.settings.sensor);
         self.state.measured = reading.position;
         self.supervise_sensor(&reading, now);
+        if let Some(fault) = self.found() {
+            self.axis_fault(fault, now);
+        }
 
         let on_times = if self.core.mode().may_drive() {
             self.drive(now)

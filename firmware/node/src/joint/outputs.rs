@@ -5,7 +5,7 @@ use super::node::JointNode;
 use super::reference::{Target, TickReference, advance};
 use crate::JOINT_TICK;
 use crate::hardware::{PinError, PositionSensor, SwitchBank, ValveBank};
-use crate::mode::{Mode, ModeRules};
+use crate::mode::Mode;
 use crate::supervisor::ExhaustKind;
 use wheeleg_control::joint::{JointInput, JointLimits};
 use wheeleg_control::pwm::OnTimes;
@@ -35,11 +35,14 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else {
             Ticks::ZERO
         };
-        if self.state.following >= self.settings.following_ticks {
-            self.axis_fault(Fault::FollowingError, now);
-        }
-        // At rest, and in the very tick of a fault, no pulse goes on.
-        let on_times = if !self.core.mode().may_drive() {
+        let driven = Driven {
+            reference,
+            position: self.state.measured,
+            velocity: output.velocity,
+        };
+        let overdue = self.state.motion.judge(&driven, &self.settings.motion);
+        // At rest, and in the very tick in which a fault is found, no pulse goes on.
+        let on_times = if overdue || self.is_behind() {
             self.pwm.shut()
         } else if let Some(on) = output.direct {
             self.pwm.direct(on)
@@ -50,13 +53,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             let openings = output.openings;
             self.pwm.tick(&openings)
         };
-        self.expect_motion(&on_times, output.velocity, now);
-        // A motion that did not come is a fault of this tick, too.
-        let on_times = if self.core.mode().may_drive() {
-            on_times
-        } else {
-            self.pwm.shut()
-        };
+        let state = &mut self.state;
+        state
+            .motion
+            .follow(&on_times, state.measured, &self.settings.motion);
         self.controller.sent(on_times);
         let mut limits = limit_bits(&output.limits, output.settled);
         if slew_limited {
@@ -68,21 +68,21 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         on_times
     }
 
-    /// Whether the piston follows what the valves were told.
-    fn expect_motion(&mut self, on_times: &OnTimes, velocity: VelocityMmS, now: Micros) {
-        let state = &mut self.state;
-        let model = &self.settings.motion;
-        if !self.core.mode().may_drive() {
-            state.motion.rest(on_times, state.measured, model);
-            return;
-        }
-        let driven = Driven {
-            reference: state.reference,
-            position: state.measured,
-            velocity,
-        };
-        if state.motion.sample(on_times, &driven, model) {
-            self.axis_fault(Fault::NoMotion, now);
+    /// Whether the following error has lasted its time.
+    fn is_behind(&self) -> bool {
+        self.state.following >= self.settings.following_ticks
+    }
+
+    /// The fault that the last tick under control has found. It had its valves shut
+    /// then; it is latched in this tick, which has no law to work out beside it.
+    #[inline]
+    pub(super) fn found(&self) -> Option<Fault> {
+        if self.is_behind() {
+            Some(Fault::FollowingError)
+        } else if self.state.motion.is_overdue() {
+            Some(Fault::NoMotion)
+        } else {
+            None
         }
     }
 

@@ -38,7 +38,7 @@ impl EncoderWatch {
             self.speed_at_start = speed;
         }
         self.samples = self.samples.saturating_add(1);
-        if self.samples < WINDOW.to_ticks_ceil(tick).get() {
+        if self.samples.saturating_mul(tick.get()) < WINDOW.get() {
             return false;
         }
         self.samples = 0;

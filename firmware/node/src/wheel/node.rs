@@ -15,14 +15,14 @@ use crate::snapshot::{TickReport, WheelSnapshot};
 use crate::transmission::Transmission;
 use crate::{ConfigError, SWITCH_TICKS};
 use wheeleg_control::wheel::{WheelCommand, WheelController};
-use wheeleg_protocol::{BoardKind, Fault, FaultBits, LimitBits, ResetCause, WheelControlMode};
+use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause, WheelControlMode};
 use wheeleg_units::{Micros, Ticks, WheelCount};
 
 /// Samples in Boot: long enough for the switch to be debounced.
 const BOOT_TICKS: Ticks = Ticks(10);
 
-/// Parts in which the configuration is sealed: parameters, two of settings, times. A
-/// sample looks at one of them.
+/// Parts in which the configuration is sealed: most parameters, two of settings, the rest
+/// of the parameters with the times. A sample looks at one of them.
 pub const PARTS: usize = 4;
 
 /// State that only a tick changes, sealed between two ticks.
@@ -159,9 +159,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         receive(self, bytes, t_end);
     }
 
-    /// The next frame to send and when to start; call until `None`.
+    /// The next frame to send and when to start; call between two ticks until `None`,
+    /// with which comes what a tick left over.
     pub fn take_transmission(&mut self) -> Option<Transmission> {
-        self.core.port.take()
+        self.core.take_transmission()
     }
 
     /// One sample that starts at `now`: latches the inputs, controls, writes
@@ -201,12 +202,15 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             }
         }
 
-        let mut limits = LimitBits::NONE;
-        let output = if self.core.mode().may_drive() {
-            self.drive(&mut limits, now)
+        if self.is_behind() {
+            self.axis_fault(Fault::FollowingError, now);
+        }
+
+        if self.core.mode().may_drive() {
+            self.drive();
         } else {
-            self.rest(now)
-        };
+            self.rest(now);
+        }
         let dump_open = self.core.supervisor.emergency_stop();
         if self.write(dump_open).is_err() {
             self.core
@@ -215,17 +219,15 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             self.state.drive = 0;
             let _ = self.write(dump_open);
         }
-        self.snapshot = WheelSnapshot {
-            at: now,
-            mode: self.core.mode(),
-            count: actual,
-            control: output,
-            drive_percent: self.state.drive,
-            supply_present: self.switches.state() & 1 != 0,
-            dump_open,
-            faults: self.faults(),
-            limits,
-        };
+        // The controller's output and the limits are noted where they are made.
+        let snapshot = &mut self.snapshot;
+        snapshot.at = now;
+        snapshot.mode = self.core.mode();
+        snapshot.count = actual;
+        snapshot.drive_percent = self.state.drive;
+        snapshot.supply_present = self.switches.state() & 1 != 0;
+        snapshot.dump_open = dump_open;
+        snapshot.faults = self.core.supervisor.faults().latched();
         self.reseal();
         TickReport {
             mode: self.core.mode(),
@@ -303,9 +305,13 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     #[inline]
     fn fixed(&self, part: usize) -> Seal {
         match part {
-            0 => Seal::of(&self.parameters),
+            0 => Seal::made(|sum| sum.words(self.parameters.part::<2>(0))),
             1 | 2 => Seal::made(|sum| self.settings.hash_half(part == 2, sum)),
-            _ => Seal::of(&(&self.core.times, self.control_mode)),
+            // With the few that are left of the parameters.
+            _ => Seal::made(|sum| {
+                sum.words(self.parameters.part::<2>(1));
+                (&self.core.times, self.control_mode).hash(sum);
+            }),
         }
     }
 

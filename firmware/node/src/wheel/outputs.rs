@@ -5,7 +5,7 @@ use super::node::WheelNode;
 use crate::hardware::{DumpValve, Encoder, MotorDrive, PinError, SwitchBank};
 use crate::mode::Mode;
 use wheeleg_control::wheel::{WheelCommand, WheelInput, WheelMode, WheelOutput, WheelStatus};
-use wheeleg_protocol::{DisarmReason, Fault, Limit, LimitBits};
+use wheeleg_protocol::{DisarmReason, Limit, LimitBits};
 use wheeleg_units::{Micros, Ticks};
 
 /// Fractional bits of the mean drive.
@@ -36,24 +36,34 @@ fn ramp_from(mean: i32, newest: i8) -> i8 {
     }
 }
 
+/// Drive of a ramp from `from` per cent with `left` of its `whole` time to go.
+fn ramped(from: i8, left: Micros, whole: Micros) -> i8 {
+    // A ramp takes 0.4 s at most: the product is below 2^26.
+    let scaled = i32::from(from).saturating_mul(left.get() as i32);
+    let drive = scaled.checked_div(whole.get() as i32).unwrap_or(0);
+    i8::try_from(drive).unwrap_or(0)
+}
+
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, D> {
     /// Closed loop.
-    pub(super) fn drive(&mut self, limits: &mut LimitBits, now: Micros) -> WheelOutput {
+    pub(super) fn drive(&mut self) {
         let motion = command(
             &mut self.controller,
             self.control_mode,
             &mut self.target,
             &self.settings,
         );
-        let output = self.controller.step(&WheelInput {
+        // Made where it is kept.
+        self.snapshot.control = self.controller.step(&WheelInput {
             actual: self.state.actual,
             limit: false,
             stop: false,
         });
+        let output = &self.snapshot.control;
         self.state.drive = output.pwm;
         self.state.drive_mean = mean(self.state.drive_mean, output.pwm);
         self.state.ramp_from = ramp_from(self.state.drive_mean, output.pwm);
-        *limits = limit_bits(&output, motion.rate);
+        self.snapshot.limits = limit_bits(output, motion.rate);
         let has_position = output.mode != WheelMode::ProportionalVelocity;
         let beyond = has_position && output.error.unsigned_abs() > self.settings.following_error;
         self.state.following = if beyond {
@@ -61,41 +71,44 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         } else {
             Ticks::ZERO
         };
-        if self.state.following >= self.settings.following_ticks {
-            self.axis_fault(Fault::FollowingError, now);
+        if self.is_behind() {
             self.state.drive = 0;
         }
-        output
+    }
+
+    /// Whether the following error has lasted its time. The drive is off in the sample
+    /// that finds it; it is latched in the next one, which has no law to work out beside it.
+    #[inline]
+    pub(super) fn is_behind(&self) -> bool {
+        self.state.following >= self.settings.following_ticks
     }
 
     /// No control: ramp to standstill in Hold, nothing otherwise.
-    pub(super) fn rest(&mut self, now: Micros) -> WheelOutput {
+    pub(super) fn rest(&mut self, now: Micros) {
         self.state.following = Ticks::ZERO;
         self.target = Target::at(self.state.actual);
         let _ = self.controller.apply(WheelCommand::Idle);
-        let output = self.controller.step(&WheelInput {
+        self.snapshot.control = self.controller.step(&WheelInput {
             actual: self.state.actual,
             limit: false,
             stop: false,
         });
+        self.snapshot.limits = LimitBits::NONE;
         // After a fault of the axis its drive may be what runs away: no ramp.
         // None either for a stop of what was stopped: a ramp cleared and braked
         // anew between two ticks would begin again.
         let ramps = self.core.mode() == Mode::Hold
             && self.core.supervisor.held_from_drive()
             && self.core.supervisor.disarm_reason() != DisarmReason::Fault;
-        let ramp = i64::from(self.settings.stop_ramp.get());
-        let left = ramp.saturating_sub(i64::from(self.core.supervisor.time_in_mode(now).get()));
-        self.state.drive = if ramps && left > 0 {
-            let scaled = i64::from(self.state.ramp_from).saturating_mul(left);
-            let drive = scaled.checked_div(ramp).unwrap_or(0);
-            i8::try_from(drive).unwrap_or(0)
+        let ramp = self.settings.stop_ramp;
+        let left = ramp.saturating_sub(self.core.supervisor.time_in_mode(now));
+        self.state.drive = if ramps && left > Micros::ZERO {
+            ramped(self.state.ramp_from, left, ramp)
         } else {
             self.state.drive_mean = 0;
             self.state.ramp_from = 0;
             0
         };
-        output
     }
 
     pub(super) fn write(&mut self, dump_open: bool) -> Result<(), PinError> {
