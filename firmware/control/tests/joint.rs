@@ -360,6 +360,43 @@ fn changing_the_law_does_not_bump_and_fades_out() {
     }
 }
 
+/// Laws far beyond the duty on both sides of a change: the bump is larger than what the
+/// fade can hold, and is faded by that much alone. The output still goes one way only.
+#[test]
+fn a_change_between_laws_far_beyond_the_duty_jumps_by_no_more_than_it_must_and_fades_out() {
+    let gains = JointGains {
+        dead_zone_duty: Duty::ZERO,
+        minimum_duty: Duty::ZERO,
+        correction_pd: Gain::ZERO,
+        correction_id: Gain::ZERO,
+        proportional: Gain::lit("0.06"),
+        bumpless_time: Micros::from_millis(100),
+        ..JointGains::default()
+    };
+    let config = JointConfig::new(&gains, TICK).unwrap();
+    for sign in [1.0, -1.0] {
+        let mut joint = controller(&gains);
+        // 0.06 / mm at 60 mm: 3.6 times the whole duty, cut to 2.
+        let far = |side: f64| at(90.0 - 60.0 * side * sign, 90.0);
+        let before = repeat(&mut joint, &far(1.0), 30).duty.to_f64();
+        assert!((before - sign).abs() < 1e-3, "{before}");
+        joint.retune(config.clone());
+        // The error turns round with the change: from +2 to -2 is a bump of 4, of which
+        // 2 is faded, so the duty is at zero at first and not at its other end.
+        let mut last = joint.step(&far(-1.0)).duty.to_f64();
+        assert!(last.abs() < 0.03, "{sign}: {last}");
+        for tick in 1..50 {
+            let duty = joint.step(&far(-1.0)).duty.to_f64();
+            let step = (last - duty) * sign;
+            assert!((0.0..0.03).contains(&step), "{tick}: {last} to {duty}");
+            last = duty;
+        }
+        assert!((last + sign).abs() < 0.05, "{last} halfway of the fade");
+        let faded = repeat(&mut joint, &far(-1.0), 60).duty.to_f64();
+        assert!((faded + sign).abs() < 1e-3, "{faded}");
+    }
+}
+
 #[test]
 fn observing_keeps_the_velocity_and_forgets_the_rest() {
     let mut joint = controller(&JointGains::default());

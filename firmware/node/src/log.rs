@@ -8,7 +8,7 @@
 //! out between two ticks, so that a fault costs its tick no more than its reaction. The
 //! result is the same whenever that is done.
 
-use heapless::{Deque, Vec};
+use heapless::Deque;
 use wheeleg_protocol::{LOG_ENTRIES, LogEntry, LogRecords};
 use wheeleg_units::Micros;
 
@@ -22,7 +22,7 @@ const NOTES: usize = 8;
 #[derive(Clone, Debug, Default)]
 pub struct Log {
     /// What happened and was not looked at yet, oldest first.
-    noted: Vec<LogEntry, NOTES>,
+    noted: heapless::Vec<LogEntry, NOTES>,
     waiting: Deque<[u8; 8], DEPTH>,
     lost: u16,
     /// End of the lease, µs since reset; 0 when nobody reads.
@@ -136,6 +136,40 @@ mod tests {
         push(&mut log, 5, 23_000);
         let late = log.read(20, 90_000);
         assert_eq!((numbers(&late), late.lost), (vec![], 0));
+    }
+
+    #[test]
+    fn notes_are_recorded_by_their_own_times_whenever_they_are_worked_off() {
+        // Worked off at once, or all together before the records are read.
+        let recorded = |at_once: bool| {
+            let mut log = Log::default();
+            let mut found = Vec::new();
+            let clock = |at: Micros| u64::from(at.get());
+            log.read(20, 0);
+            // The sixth comes after the end of the lease.
+            for (number, time_us) in [(1, 5), (2, 5), (3, 900), (4, 901), (5, 19_999), (6, 20_000)]
+            {
+                log.note(entry(number, time_us)).expect("room");
+                if at_once {
+                    log.settle(clock);
+                }
+            }
+            log.settle(clock);
+            assert!(!log.has_notes());
+            for _ in 0..2 {
+                found.extend(numbers(&log.read(20, 19_999)));
+            }
+            found
+        };
+        assert_eq!(recorded(true), [1, 2, 3, 4, 5]);
+        assert_eq!(recorded(false), recorded(true));
+        let mut log = Log::default();
+        let full = (0..=NOTES as u16).map(|number| log.note(entry(number, 0)));
+        assert_eq!(
+            full.filter(Result::is_err).count(),
+            1,
+            "given back, not lost"
+        );
     }
 
     #[test]

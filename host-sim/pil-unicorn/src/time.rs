@@ -25,6 +25,11 @@ impl Time {
         self.hz
     }
 
+    /// Time for which the clock has been what it is at `cycle` [ns].
+    pub(crate) fn steady_ns(&self, cycle: u64) -> u64 {
+        cycle.saturating_sub(self.cycle) * SECOND_NS as u64 / self.hz
+    }
+
     /// The clock changes.
     pub(crate) fn clock(&mut self, cycle: u64, hz: u64) {
         self.ns = self.signed_ns(cycle);

@@ -44,7 +44,9 @@ pub fn start() -> Source {
     rcc.apb1enr1().modify(|r| r.set_pwren(true));
     // Voltage range 1, boost mode: needed above 150 MHz (RM0440 §6.1.5).
     pac::PWR.cr1().modify(|r| r.set_vos(Vos::RANGE1));
-    pac::PWR.cr5().modify(|r| r.set_r1mode(false));
+    // R1MODE is bit 8 and all that is there; 0 is boost (RM0440, PWR_CR5). The register
+    // crate has it in bit 0.
+    pac::PWR.cr5().write_value(pac::pwr::regs::Cr5(0));
     wait(POLLS, || !pac::PWR.sr2().read().vosf());
 
     rcc.cr().modify(|r| r.set_hseon(true));

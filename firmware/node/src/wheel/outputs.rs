@@ -72,7 +72,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             Ticks::ZERO
         };
         if self.is_behind() {
+            // Nor has a stop that comes before the next sample anything to ramp down.
             self.state.drive = 0;
+            self.state.drive_mean = 0;
+            self.state.ramp_from = 0;
         }
     }
 

@@ -14,6 +14,11 @@ const ERASE_NS: u64 = 22_020_000;
 /// Programming of a double word, typical (DATASHEET DS12589: 81.69 µs).
 const PROGRAM_NS: u64 = 81_690;
 
+/// FLASH_ACR: wait states, prefetch and caches, access of the debugger.
+const LATENCY: u32 = 0xF;
+const CACHES: u32 = 7 << 8;
+const DEBUG: u32 = 1 << 18;
+
 const PG: u32 = 1;
 const PER: u32 = 1 << 1;
 const STRT: u32 = 1 << 16;
@@ -61,6 +66,11 @@ impl Flash {
         }
     }
 
+    /// Wait states of a read.
+    pub(crate) fn wait_states(&self) -> u64 {
+        u64::from(self.acr & LATENCY)
+    }
+
     /// One more unit; false when the supply fails in it.
     fn completes(&mut self) -> bool {
         match &mut self.units_left {
@@ -97,7 +107,10 @@ impl Flash {
 
     pub(crate) fn write(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
         match offset {
-            0x00 => self.acr = value,
+            0x00 => {
+                Refusal::beyond(LATENCY | CACHES | DEBUG, value)?;
+                self.acr = value;
+            }
             0x08 => {
                 self.key = match (self.key, value) {
                     (0, 0x4567_0123) => 1,

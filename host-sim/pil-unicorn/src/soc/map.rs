@@ -162,8 +162,17 @@ impl Soc {
                     "RCC_CFGR = {value:#x}: a clock that is not modelled"
                 ));
             }
+            if !self.may_step(hz, cycle) {
+                return Err(format!(
+                    "RCC_CFGR = {value:#x}: above 80 MHz only through half of it, for 1 us"
+                ));
+            }
             self.time.clock(cycle, hz);
             self.plan_bite();
+        }
+        if ["RCC", "FLASH", "PWR"].contains(&name) {
+            self.bears_its_clock()
+                .map_err(|why| format!("write of {value:#x} to {}: {why}", self.name(address)))?;
         }
         match name {
             "USART1" => {

@@ -5,6 +5,7 @@
 //! a silent zero would let an image run that fails on the real part.
 
 pub(crate) mod adc;
+mod clock;
 pub(crate) mod dma;
 pub(crate) mod flash;
 pub(crate) mod gpio;

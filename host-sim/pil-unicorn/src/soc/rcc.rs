@@ -2,6 +2,7 @@
 //! brown-out detector, and the independent watchdog.
 
 use super::Refusal;
+use super::clock::Range;
 
 /// Internal oscillator [Hz].
 pub(crate) const HSI_HZ: u64 = 16_000_000;
@@ -67,18 +68,48 @@ impl Rcc {
         source / m * n / r
     }
 
-    /// Processor clock [Hz].
-    pub(crate) fn hclk_hz(&self) -> u64 {
-        let system = match self.cfgr & 3 {
+    /// System clock [Hz].
+    pub(crate) fn system_hz(&self) -> u64 {
+        match self.cfgr & 3 {
             2 => HSE_HZ,
             3 => self.pll_hz(),
             _ => HSI_HZ,
-        };
+        }
+    }
+
+    /// Processor clock [Hz].
+    pub(crate) fn hclk_hz(&self) -> u64 {
+        let system = self.system_hz();
         match self.cfgr >> 4 & 0xF {
             n @ 8..=11 => system >> (n - 7),
             n @ 12..=15 => system >> (n - 6),
             _ => system,
         }
+    }
+
+    /// Whether the source of the system clock of this choice runs.
+    fn runs(&self, choice: u32) -> bool {
+        let ready = self.ready();
+        match choice & 3 {
+            1 => true,
+            2 => ready & HSERDY != 0,
+            3 => ready & PLLRDY != 0,
+            _ => false,
+        }
+    }
+
+    /// The control register with its ready flags.
+    fn ready(&self) -> u32 {
+        let mut cr = self.cr & !(HSERDY | PLLRDY);
+        let hse = cr & HSEON != 0 && self.crystal;
+        if hse {
+            cr |= HSERDY;
+        }
+        let fed = if self.pllcfgr & 3 == 3 { hse } else { true };
+        if cr & PLLON != 0 && fed {
+            cr |= PLLRDY;
+        }
+        cr
     }
 
     /// Whether the buses run at the processor's clock, as the timers here assume.
@@ -88,18 +119,7 @@ impl Rcc {
 
     pub(crate) fn read(&self, offset: usize) -> Result<u32, Refusal> {
         Ok(match offset {
-            0x00 => {
-                let mut cr = self.cr & !(HSERDY | PLLRDY);
-                let hse = cr & HSEON != 0 && self.crystal;
-                if hse {
-                    cr |= HSERDY;
-                }
-                let fed = if self.pllcfgr & 3 == 3 { hse } else { true };
-                if cr & PLLON != 0 && fed {
-                    cr |= PLLRDY;
-                }
-                cr
-            }
+            0x00 => self.ready(),
             0x08 => self.cfgr & !(3 << 2) | (self.cfgr & 3) << 2,
             0x0C => self.pllcfgr,
             0x18 => self.cier,
@@ -120,20 +140,20 @@ impl Rcc {
             0x00 => {
                 only(HSION | HSIRDY | HSEON | HSERDY | CSSON | PLLON | PLLRDY)?;
                 self.cr = value | HSIRDY;
+                // Nor is the clock taken away that it runs on.
+                if !self.runs(self.cfgr) {
+                    return Err(Refusal::Bits(value));
+                }
             }
             0x08 => {
                 // The processor would stand still on a clock that is not there.
-                let ready = match value & 3 {
-                    2 => self.read(0x00)? & HSERDY,
-                    3 => self.read(0x00)? & PLLRDY,
-                    1 => HSIRDY,
-                    _ => 0,
-                };
-                if ready == 0 {
+                if !self.runs(value) {
                     return Err(Refusal::Bits(value & 3));
                 }
                 self.cfgr = value;
             }
+            // Not while the PLL is on (RM0440, RCC_PLLCFGR).
+            0x0C if self.cr & PLLON != 0 => return Err(Refusal::Bits(value)),
             0x0C => self.pllcfgr = value,
             0x18 => self.cier = value,
             0x20 => {}
@@ -170,6 +190,12 @@ pub(crate) struct Pwr {
 }
 
 const PVD_LINE: u32 = 1 << 16;
+/// Range of the core's voltage: 1 or 2.
+const VOS: u32 = 3 << 9;
+const VOS_RANGE_1: u32 = 1 << 9;
+const VOS_RANGE_2: u32 = 2 << 9;
+/// No boost in range 1.
+const R1MODE: u32 = 1 << 8;
 
 impl Default for Pwr {
     fn default() -> Self {
@@ -198,6 +224,15 @@ impl Pwr {
         self.low = low;
     }
 
+    /// Voltage of the core: ready at once.
+    pub(crate) fn range(&self) -> Range {
+        match (self.cr1 & VOS == VOS_RANGE_1, self.cr5 & R1MODE != 0) {
+            (true, false) => Range::Boost,
+            (true, true) => Range::Normal,
+            (false, _) => Range::Low,
+        }
+    }
+
     /// Interrupt line of the detector.
     pub(crate) fn line(&self) -> bool {
         self.pr & self.imr & PVD_LINE != 0
@@ -216,9 +251,13 @@ impl Pwr {
 
     pub(crate) fn write(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
         match offset {
-            0x00 => self.cr1 = value,
+            0x00 if [VOS_RANGE_1, VOS_RANGE_2].contains(&value) => self.cr1 = value,
+            0x00 => return Err(Refusal::Bits(value)),
             0x04 if value & !0xF == 0 => self.cr2 = value,
-            0x80 => self.cr5 = value,
+            0x80 => {
+                Refusal::beyond(R1MODE, value)?;
+                self.cr5 = value;
+            }
             _ => return Err(Refusal::Register),
         }
         Ok(())
@@ -340,9 +379,13 @@ mod tests {
         assert_eq!(rcc.hclk_hz(), 85_000_000);
         rcc.write(0x08, 3).expect("modelled");
         assert_eq!(rcc.hclk_hz(), 170_000_000);
-        rcc.write(0x0C, 2 | 3 << 4 | 85 << 8 | 1 << 24)
+        let mut internal = Rcc::new(false, 0);
+        internal
+            .write(0x0C, 2 | 3 << 4 | 85 << 8 | 1 << 24)
             .expect("modelled");
-        assert_eq!(rcc.hclk_hz(), 170_000_000);
+        internal.write(0x00, HSION | PLLON).expect("modelled");
+        internal.write(0x08, 3).expect("modelled");
+        assert_eq!(internal.hclk_hz(), 170_000_000);
         rcc.crystal = false;
         assert_eq!(rcc.read(0x00).expect("modelled") & HSERDY, 0);
         assert!(rcc.write(0x08, 2).is_err(), "a dead crystal gives no clock");
