@@ -380,7 +380,7 @@ fn a_change_between_laws_far_beyond_the_duty_jumps_by_no_more_than_it_must_and_f
         let far = |side: f64| at(90.0 - 60.0 * side * sign, 90.0);
         let before = repeat(&mut joint, &far(1.0), 30).duty.to_f64();
         assert!((before - sign).abs() < 1e-3, "{before}");
-        joint.retune(config.clone());
+        joint.retune(config);
         // The error turns round with the change: from +2 to -2 is a bump of 4, of which
         // 2 is faded, so the duty is at zero at first and not at its other end.
         let mut last = joint.step(&far(-1.0)).duty.to_f64();
