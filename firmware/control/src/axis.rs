@@ -46,39 +46,46 @@ pub(crate) const fn part(a: i32, b: i32, shift: u32) -> i32 {
     (a as i64).wrapping_mul(b as i64).wrapping_shr(shift) as i32
 }
 
-/// `a × 2^shift / b` to 16 significant bits of `b`, saturating; 0 for a `b` that is
-/// not positive. Four divisions of 32 bits instead of one of 64, which takes ten
-/// times as long.
+/// `a × 2^shift / b` to 16 significant bits of `b`, saturating; 0 for a `b` of 0. Two
+/// divisions of 32 bits instead of one of 64, which takes ten times as long.
 #[inline(never)]
-pub(crate) fn quotient(a: i64, b: i64, shift: u32) -> i32 {
-    if b <= 0 {
-        return 0;
-    }
-    let bits = 64_u32.wrapping_sub(b.leading_zeros());
+pub(crate) fn quotient(a: u64, b: u32, shift: u32) -> i32 {
+    let bits = 32_u32.wrapping_sub(b.leading_zeros());
     let down = bits.saturating_sub(16);
-    let divisor = b.wrapping_shr(down) as u32;
-    let size = a.unsigned_abs();
+    let divisor = b.wrapping_shr(down);
     let dividend = if down >= shift {
-        size.wrapping_shr(down.wrapping_sub(shift))
+        a.wrapping_shr(down.wrapping_sub(shift))
     } else {
-        size.wrapping_shl(shift.wrapping_sub(down))
+        a.wrapping_shl(shift.wrapping_sub(down))
     };
     // 48 bits by 16 bits, in two digits of 16 bits.
     let high = u32::try_from(dividend.wrapping_shr(16)).unwrap_or(u32::MAX);
     let first = high.checked_div(divisor).unwrap_or(0);
+    if first >= 1 << 15 {
+        return i32::MAX;
+    }
     let rest = high.wrapping_sub(first.wrapping_mul(divisor));
     let low = rest.wrapping_shl(16) | (dividend & 0xFFFF) as u32;
     let second = low.checked_div(divisor).unwrap_or(0);
-    let quotient = if first >= 1 << 15 {
-        i32::MAX
-    } else {
-        first.wrapping_shl(16).wrapping_add(second) as i32
-    };
-    if a < 0 {
-        quotient.wrapping_neg()
-    } else {
-        quotient
-    }
+    first.wrapping_shl(16).wrapping_add(second) as i32
+}
+
+/// `value` limited to a number of `BITS` bits with its sign: one instruction of the
+/// processor, where a limit by comparison takes four, and one of a product of 64
+/// bits six.
+#[inline]
+pub(crate) fn clip<const BITS: u32>(value: i32) -> i32 {
+    let bound = const { i32::MAX >> (32 - BITS) };
+    value.max(!bound).min(bound)
+}
+
+/// One step of a sum of words of which any flipped bit changes it: a bijection of the
+/// running value and of the word.
+#[inline(always)]
+pub(crate) const fn mix(sum: u32, word: i32) -> u32 {
+    // Odd multiplier (Knuth, 2^32 / golden ratio).
+    sum.wrapping_mul(0x9E37_79B1)
+        .wrapping_add(word.cast_unsigned())
 }
 
 /// `value` limited to ±`bound`.
@@ -87,22 +94,25 @@ pub(crate) fn within(value: i32, bound: i32) -> i32 {
     value.max(bound.wrapping_neg()).min(bound)
 }
 
-/// Square root, rounded down to within one.
+/// Square root, good to 1/2000 of it and to one.
 ///
-/// Newton's method from a power of two: three steps leave 2e-6 of it.
+/// A straight line through the root of a number that is brought into 1…4 × 2^30 by an
+/// even shift is within 4.5 % of it; a step of Newton's method squares that.
 #[inline]
 pub(crate) fn square_root(value: u32) -> u32 {
-    if value == 0 {
-        return 0;
-    }
-    let bits = 32_u32.wrapping_sub(value.leading_zeros());
-    let mut root = 1_u32.wrapping_shl(bits.wrapping_add(1).wrapping_shr(1));
-    for _ in 0..4 {
-        root = root
-            .wrapping_add(value.checked_div(root).unwrap_or(0))
-            .wrapping_shr(1);
-    }
-    root
+    let zeros = value.leading_zeros() & !1;
+    let near = value.wrapping_shl(zeros);
+    // 0.328 x + 0.708.
+    let line = near
+        .wrapping_shr(17)
+        .wrapping_add(near.wrapping_shr(19))
+        .wrapping_add(near.wrapping_shr(21))
+        .wrapping_add(23_200);
+    let step = near.checked_div(line).unwrap_or(0);
+    // The mean is never below the root: half of the largest excess is taken off.
+    let root = line.wrapping_add(step).wrapping_sub(32);
+    // Of nothing, a shift by the whole width: twice the root is below 2^17.
+    root.wrapping_shr(zeros.wrapping_shr(1).wrapping_add(1))
 }
 
 #[cfg(test)]
@@ -112,19 +122,20 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_root_is_exact_to_one(value in any::<u32>()) {
+        fn the_root_is_good_to_a_two_thousandth(value in any::<u32>()) {
             let exact = f64::from(value).sqrt();
-            prop_assert!((f64::from(square_root(value)) - exact).abs() <= 1.0 + exact * 1e-6);
+            prop_assert!((f64::from(square_root(value)) - exact).abs() <= 1.0 + exact * 5e-4);
         }
     }
 
     proptest! {
         #[test]
         fn quotients_are_good_to_sixteen_bits(
-            a in -(1_i64 << 46)..1 << 46, b in 1_i64..1 << 46, shift in 0_u32..17,
+            a in 0_u64..1 << 46, b in 1..=u32::MAX, b_bits in 0_u32..32, shift in 0_u32..17,
         ) {
-            let exact = a as f64 * f64::from(1 << shift) / b as f64;
-            let limited = exact.clamp(-f64::from(i32::MAX), f64::from(i32::MAX));
+            let b = (b >> b_bits).max(1);
+            let exact = a as f64 * f64::from(1 << shift) / f64::from(b);
+            let limited = exact.min(f64::from(i32::MAX));
             let difference = (f64::from(quotient(a, b, shift)) - limited).abs();
             prop_assert!(difference <= 1.0 + exact.abs() * 4e-5, "{difference} {exact}");
         }
@@ -132,13 +143,16 @@ mod tests {
 
     #[test]
     fn what_has_no_quotient_is_zero() {
-        assert_eq!((quotient(5, 0, 3), quotient(5, -1, 3)), (0, 0));
+        assert_eq!((quotient(5, 0, 3), quotient(0, 5, 3)), (0, 0));
     }
 
     #[test]
     fn the_root_of_squares() {
         for root in [0_u32, 1, 2, 3, 255, 32_767, 46_340, 65_535] {
-            assert!(square_root(root * root).abs_diff(root) <= 1, "{root}");
+            assert!(
+                square_root(root * root).abs_diff(root) <= 1 + root / 2000,
+                "{root}"
+            );
         }
     }
 }

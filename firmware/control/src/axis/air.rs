@@ -16,6 +16,8 @@ pub struct Air {
     /// Open times of the tick that begins now, µs.
     opening: [i32; 4],
     pressures: Pressures,
+    /// End of the ticks taken so far, µs; wraps.
+    now: u32,
     /// Flows of A and B at these pressures, as far as they are known.
     flows: [ChamberFlows; 2],
 }
@@ -29,6 +31,7 @@ impl Hash for Air {
             valves: [fill_a, vent_a, fill_b, vent_b],
             opening: [first, second, third, fourth],
             pressures,
+            now,
             // Worked out anew in every tick.
             flows: _,
         } = self;
@@ -36,6 +39,7 @@ impl Hash for Air {
         state.write_i32(first ^ second.rotate_left(16));
         state.write_i32(third ^ fourth.rotate_left(16));
         pressures.hash(state);
+        state.write_u32(*now);
     }
 }
 
@@ -50,6 +54,7 @@ impl Air {
                 a: pressure,
                 b: pressure,
             },
+            now: 0,
             flows: [ChamberFlows::default(); 2],
         }
     }
@@ -73,8 +78,9 @@ impl Air {
             b: passed.b.max(least).min(MOST),
         };
         for ((opening, valve), &on) in self.opening.iter_mut().zip(&mut self.valves).zip(sent) {
-            *opening = valve.advance(i32::from(on), &model.times);
+            *opening = valve.advance(self.now, i32::from(on), &model.times);
         }
+        self.now = self.now.wrapping_add(model.times.tick as u32);
     }
 
     /// Pressures at the end of the dead time, with what has been committed to by
@@ -83,7 +89,7 @@ impl Air {
     pub fn ahead(&mut self, model: &AxisModel, stroke: i32, speed: i32) -> Pressures {
         let mut open = self.opening;
         for (open, valve) in open.iter_mut().zip(&self.valves) {
-            *open = open.wrapping_add(valve.committed(&model.times));
+            *open = open.wrapping_add(valve.committed(self.now, &model.times));
         }
         self.after(model, open, stroke, speed, model.horizon_us)
     }
@@ -136,7 +142,7 @@ impl Air {
             wanted(change, change.saturating_neg()),
         );
         let needs = flows_a.needs(change, model.stiffness_a(stroke));
-        let [first, second] = pair(model, needs, fill_a, vent_a);
+        let [first, second] = pair(model, self.now, needs, fill_a, vent_a);
         let change = target.b.saturating_sub(expected.b);
         flows_b.want(
             model,
@@ -145,7 +151,7 @@ impl Air {
             wanted(change, change.saturating_neg()),
         );
         let needs = flows_b.needs(change, model.stiffness_b(stroke));
-        let [third, fourth] = pair(model, needs, fill_b, vent_b);
+        let [third, fourth] = pair(model, self.now, needs, fill_b, vent_b);
         [first, second, third, fourth]
     }
 
@@ -155,7 +161,7 @@ impl Air {
     pub fn shut(&self, model: &AxisModel) -> OnTimes {
         let mut on = [0; 4];
         for (on, valve) in on.iter_mut().zip(&self.valves) {
-            *on = microseconds(valve.on_time(0, true, &model.times));
+            *on = microseconds(valve.on_time(self.now, 0, true, &model.times));
         }
         on
     }
@@ -171,11 +177,17 @@ const fn wanted(fill: i32, vent: i32) -> Wanted {
 
 /// On-times of a chamber's two valves for the openings that they need, µs.
 #[inline]
-fn pair(model: &AxisModel, needs: [i32; 2], fill: &ValveTrack, vent: &ValveTrack) -> [u16; 2] {
+fn pair(
+    model: &AxisModel,
+    now: u32,
+    needs: [i32; 2],
+    fill: &ValveTrack,
+    vent: &ValveTrack,
+) -> [u16; 2] {
     let [fill_need, vent_need] = needs;
     [
-        microseconds(fill.on_time(fill_need, vent.coil(), &model.times)),
-        microseconds(vent.on_time(vent_need, fill.coil(), &model.times)),
+        microseconds(fill.on_time(now, fill_need, vent.coil(), &model.times)),
+        microseconds(vent.on_time(now, vent_need, fill.coil(), &model.times)),
     ]
 }
 

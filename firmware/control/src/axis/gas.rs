@@ -3,9 +3,6 @@
 use super::model::AxisModel;
 use super::{part, scaled, square_root};
 
-/// Full scale of the flow function and of pressure ratios, 2^15.
-const ONE: u32 = 1 << 15;
-
 /// Subsonic flow of ISO 6358: constants of one critical ratio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct FlowCurve {
@@ -16,36 +13,36 @@ pub struct FlowCurve {
 }
 
 impl FlowCurve {
-    /// ψ(r), × 2^15, for a pressure ratio × 2^15: 1 when choked, 0 at r = 1.
-    #[inline]
-    #[must_use]
-    pub fn psi(&self, ratio: u32) -> i32 {
-        if ratio <= self.critical {
-            return 1 << 15;
-        }
-        // At most 2^15 × 10 × 2^15.
-        let y = ratio
-            .wrapping_sub(self.critical)
-            .wrapping_mul(self.stretch)
-            .wrapping_shr(15)
-            .min(ONE);
-        let inside = ONE.wrapping_mul(ONE).wrapping_sub(y.wrapping_mul(y));
-        // At most 2^15.
-        square_root(inside) as i32
-    }
-
     /// p₁ ψ(p₂/p₁) from 1 to 2, both in 1/256 Pa; negative when the gas runs back.
+    ///
+    /// With y = (p₂ − b p₁)/(1 − b), the root of p₁² − y²: no division.
     #[inline]
     #[must_use]
     pub fn drive(&self, from: i32, to: i32) -> i32 {
         let forward = from >= to;
         let (high, low) = if forward { (from, to) } else { (to, from) };
-        // Whole pascals of up to 2^21, so that the shifted number fits.
-        let numerator = (low.max(0) as u32).wrapping_shr(8).wrapping_shl(11);
-        let denominator = (high.max(1 << 12) as u32).wrapping_shr(12);
-        let ratio = numerator.checked_div(denominator).unwrap_or(ONE).min(ONE);
-        let drive = part(high, self.psi(ratio), 15);
+        // In 32 Pa: 16 bits.
+        let coarse = |pressure: i32| pressure.max(0).wrapping_shr(13) as u32;
+        let (p1, p2) = (coarse(high), coarse(low));
+        let above = p2
+            .wrapping_shl(15)
+            .saturating_sub(p1.wrapping_mul(self.critical));
+        let drive = if above == 0 {
+            high
+        } else {
+            let y = u64::from(above)
+                .wrapping_mul(u64::from(self.stretch))
+                .wrapping_shr(30) as u32;
+            let square = p1.saturating_sub(y).wrapping_mul(p1.wrapping_add(y));
+            square_root(square).wrapping_shl(13) as i32
+        };
         if forward { drive } else { drive.wrapping_neg() }
+    }
+
+    /// The same as a power, for an open valve's `flow` as a speed of the piston.
+    #[inline(never)]
+    fn power(&self, from: i32, to: i32, flow: i32) -> i32 {
+        power(self.drive(from, to), flow)
     }
 }
 
@@ -84,10 +81,10 @@ impl ChamberFlows {
     #[inline]
     pub fn want(&mut self, model: &AxisModel, flow: i32, pressure: i32, wanted: Wanted) {
         if wanted.fill && self.fill == 0 {
-            self.fill = power(model.curve.drive(model.supply, pressure), flow);
+            self.fill = model.curve.power(model.supply, pressure, flow);
         }
         if wanted.vent && self.vent == 0 {
-            self.vent = power(model.curve.drive(pressure, model.ambient), flow);
+            self.vent = model.curve.power(pressure, model.ambient, flow);
         }
     }
 

@@ -4,51 +4,50 @@
 //! viscous part, and the impulse of the known forces is
 //!
 //! ```text
-//! J(t) = ∫ (F − viscous) dt = m v(t) + c t + J₀
+//! J(t) = ∫ (F − viscous) dt = m (v(t) − v₀) + c t
 //! ```
 //!
-//! A regression of J on v and t over the move gives m. Speeding up and slowing
-//! down in one move tell the mass from the constant. The sums are of
-//! integers, sampled every eighth tick.
+//! Three moments of the move tell m from c: where it begins to slide, where it is
+//! fastest, and where it ends. What lies on the straight line from the first to the last
+//! is due to c; what the fastest has above that line is due to m, in J as in v.
 
 use super::model::AxisModel;
-use super::motion::Motion;
-use super::{quotient, scaled};
+use super::{part, quotient, scaled};
 use core::hash::{Hash, Hasher};
 
-/// Ticks between two samples.
-const STRIDE: u8 = 8;
-/// Samples that are taken of one move at most.
-const SAMPLES_MAX: i32 = 96;
-/// Samples without which there is no result.
-const SAMPLES_MIN: i32 = 10;
-/// Sliding faster than this is sampled, raw mm/s (20 mm/s).
+/// A move is looked at for so many ticks at most.
+const TICKS_MAX: u16 = 1000;
+/// Ticks without which there is no result.
+const TICKS_MIN: u16 = 80;
+/// Sliding faster than this is looked at, raw mm/s (20 mm/s).
 const SLIDES: i32 = 20 << 16;
-/// A move must have been this fast at least, mm/s.
-const FAST: i32 = 200;
+/// A move must have been this fast at least, raw mm/s (200 mm/s), …
+const FAST: i32 = 200 << 16;
+/// … and this much faster than its line (100 mm/s).
+const ABOVE: i32 = 100 << 16;
 /// The mass may be this many times what was told: a payload adds to it …
 const MOST: i32 = 12;
 /// … and at least this share of it, × 2^16 (0.6): the rod and the carriage stay.
 const LEAST: i32 = 39_322;
 
-/// Sums over the move under way, and its result.
-///
-/// Sample k is taken at t = k, so that sums of t alone follow from their number.
-#[derive(Clone, Copy, Debug, Default)]
+/// A moment of a move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Moment {
+    /// Ticks since the first.
+    ticks: u16,
+    /// Raw mm/s.
+    speed: i32,
+    /// Impulse since the first, 16 mN × ticks.
+    impulse: i32,
+}
+
+/// The move under way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Learner {
-    stride: u8,
-    forward: bool,
-    count: i32,
-    /// mm/s.
-    fastest: i32,
-    /// Impulse since the first sample, mN × ticks.
-    impulse: i64,
-    sum_v: i32,
-    sum_j: i32,
-    sum_vt: i32,
-    sum_vv: i64,
-    sum_jv: i64,
-    sum_jt: i64,
+    /// Speed at the first moment, raw mm/s; 0 before it.
+    first: i32,
+    fastest: Moment,
+    last: Moment,
     /// Mass of the last move, kg × 2^16, until it is taken; 0 if none.
     mass: i32,
 }
@@ -56,32 +55,23 @@ pub struct Learner {
 impl Hash for Learner {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
+        // Taken apart, so that a new field cannot be forgotten here. Without a first
+        // moment nothing of it is read.
         let Self {
-            stride,
-            forward,
-            count,
+            first,
             fastest,
-            impulse,
-            sum_v,
-            sum_j,
-            sum_vt,
-            sum_vv,
-            sum_jv,
-            sum_jt,
+            last,
             mass,
         } = self;
-        let small = u32::from(*stride) | u32::from(*forward).wrapping_shl(8);
-        state.write_i32(count ^ small.rotate_right(16) as i32);
         state.write_i32(*mass);
-        state.write_i32(*fastest);
-        state.write_i64(*impulse);
-        state.write_i32(*sum_v);
-        state.write_i32(*sum_j);
-        state.write_i32(*sum_vt);
-        state.write_i64(*sum_vv);
-        state.write_i64(*sum_jv);
-        state.write_i64(*sum_jt);
+        state.write_i32(*first);
+        if *first != 0 {
+            state.write_u32(u32::from(fastest.ticks) | u32::from(last.ticks).wrapping_shl(16));
+            state.write_i32(fastest.speed);
+            state.write_i32(fastest.impulse);
+            state.write_i32(last.speed);
+            state.write_i32(last.impulse);
+        }
     }
 }
 
@@ -99,94 +89,163 @@ impl Learner {
         (mass > 0).then_some(mass)
     }
 
-    /// One tick with pressure force `force`, mN.
+    /// One tick at `speed` (raw mm/s) with pressure force `force`, mN.
     #[inline]
-    pub fn sample(&mut self, model: &AxisModel, motion: &Motion, force: i32) {
-        let speed = motion.speed;
-        let forward = speed > 0;
+    pub fn sample(&mut self, model: &AxisModel, speed: i32, force: i32) {
         let sliding = speed.wrapping_abs() > SLIDES;
-        if !sliding || (self.count > 0 && forward != self.forward) {
-            if self.count > 0 {
-                self.finish(model);
+        if self.first == 0 {
+            if sliding {
+                *self = Self {
+                    first: speed,
+                    mass: self.mass,
+                    ..Self::default()
+                };
             }
             return;
         }
-        if self.count == 0 {
-            *self = Self {
-                forward,
-                mass: self.mass,
-                ..Self::default()
-            };
-        } else {
-            let viscous = scaled(speed, model.viscous, 24);
-            self.impulse = self
-                .impulse
-                .wrapping_add(i64::from(force.saturating_sub(viscous)));
-            self.stride = self.stride.wrapping_add(1);
-            if self.stride < STRIDE {
-                return;
-            }
-            self.stride = 0;
+        let used = force.saturating_sub(part(speed, model.viscous, 24));
+        // Forces below 2^26 in 16 mN, of up to 2^10 ticks.
+        let impulse = self.last.impulse.wrapping_add(used.wrapping_shr(4));
+        self.last = Moment {
+            ticks: self.last.ticks.wrapping_add(1),
+            speed,
+            impulse,
+        };
+        if speed.wrapping_abs() > self.fastest.speed.wrapping_abs() {
+            self.fastest = self.last;
         }
-        if self.count >= SAMPLES_MAX {
-            return;
+        if !sliding || (speed ^ self.first) < 0 || self.last.ticks >= TICKS_MAX {
+            self.finish(model);
         }
-        // At most 2^15.
-        let v = speed.wrapping_shr(16);
-        let t = self.count;
-        // mN × ticks to 1/8 mN s: below 2^23 for 100 samples of 8 ticks of 10 kN.
-        let per_tick = model.times.tick.wrapping_mul(134);
-        let j = self
-            .impulse
-            .wrapping_mul(i64::from(per_tick))
-            .wrapping_shr(24) as i32;
-        self.count = t.wrapping_add(1);
-        self.fastest = self.fastest.max(v.wrapping_abs());
-        // |v t| summed: below 2^15 × 96² / 2; |j| summed: below 2^30.
-        self.sum_v = self.sum_v.wrapping_add(v);
-        self.sum_j = self.sum_j.wrapping_add(j);
-        self.sum_vt = self.sum_vt.wrapping_add(v.wrapping_mul(t));
-        let product = |a: i32, b: i32| i64::from(a).wrapping_mul(i64::from(b));
-        self.sum_vv = self.sum_vv.wrapping_add(product(v, v));
-        self.sum_jv = self.sum_jv.wrapping_add(product(j, v));
-        self.sum_jt = self.sum_jt.wrapping_add(product(j, t));
     }
 
     /// The move has ended: solves for the mass.
+    // Seldom: small rather than fast.
+    #[cold]
     #[inline(never)]
     fn finish(&mut self, model: &AxisModel) {
-        let count = core::mem::take(&mut self.count);
-        if count < SAMPLES_MIN || self.fastest < FAST {
+        let Self {
+            first,
+            fastest,
+            last,
+            ..
+        } = *self;
+        self.first = 0;
+        if last.ticks < TICKS_MIN || fastest.speed.wrapping_abs() < FAST {
             return;
         }
-        let n = i64::from(count);
-        // 0 + 1 + … + n − 1, and their squares; n is at most 96.
-        let last = count.wrapping_sub(1);
-        let sum_t = count.wrapping_mul(last).wrapping_shr(1);
-        let sum_tt = sum_t.wrapping_mul(last.wrapping_mul(2).wrapping_add(1)) / 3;
-        // n times the sums about their means.
-        let about = |xy: i64, x: i32, y: i32| {
-            let means = i64::from(x).wrapping_mul(i64::from(y));
-            n.wrapping_mul(xy).wrapping_sub(means)
+        // At least the least number of ticks: no division by nothing.
+        let share = u32::from(fastest.ticks)
+            .wrapping_shl(16)
+            .checked_div(u32::from(last.ticks))
+            .unwrap_or(0) as i32;
+        let line = |end: i32| part(end, share, 16);
+        let speed = fastest
+            .speed
+            .wrapping_sub(first)
+            .wrapping_sub(line(last.speed.wrapping_sub(first)));
+        let impulse = fastest.impulse.wrapping_sub(line(last.impulse));
+        let (speed, impulse) = if first < 0 {
+            (speed.wrapping_neg(), impulse.wrapping_neg())
+        } else {
+            (speed, impulse)
         };
-        let vv = about(self.sum_vv, self.sum_v, self.sum_v);
-        let vt = about(i64::from(self.sum_vt), self.sum_v, sum_t);
-        let tt = about(i64::from(sum_tt), sum_t, sum_t);
-        let jv = about(self.sum_jv, self.sum_j, self.sum_v);
-        let jt = about(self.sum_jt, self.sum_j, sum_t);
-        // Without its part along t, v must still vary: else m and c are one.
-        let (slope_v, slope_j) = (quotient(vt, tt, 16), quotient(jt, tt, 8));
-        let along = |slope: i32, shift: u32| i64::from(slope).wrapping_mul(vt).wrapping_shr(shift);
-        let free_vv = vv.wrapping_sub(along(slope_v, 16));
-        let free_jv = jv.wrapping_sub(along(slope_j, 8));
-        if free_vv < n.wrapping_mul(n).wrapping_mul(30 * 30) {
+        if speed < ABOVE {
             return;
         }
-        // 1/8 mN s per mm/s = 1/8 kg.
-        let mass = quotient(free_jv, free_vv, 13);
+        // 16 mN × s × 2^32 over mm/s × 2^16.
+        let impulse = i64::from(impulse.max(0)).wrapping_mul(i64::from(model.tick));
+        let impulse = impulse.wrapping_shr(8).cast_unsigned();
+        let mass = quotient(impulse, speed.cast_unsigned(), 12);
         let told = model.mass;
         self.mass = mass
             .max(scaled(told, LEAST, 16))
             .min(told.saturating_mul(MOST));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    extern crate std;
+    use std::vec;
+    use std::vec::Vec;
+    use wheeleg_units::Micros;
+
+    /// A mass under a known force, with friction and a load: up to speed, and down again.
+    fn moved(model: &AxisModel, mass_kg: f64, sign: f64, load: f64) -> Option<f64> {
+        let mut learner = Learner::new();
+        let mut speed = 0.0_f64;
+        for tick in 0..300 {
+            // mm/s a tick.
+            let acceleration = if tick < 120 { 3.0 } else { -2.6 };
+            let viscous = speed * f64::from(model.viscous) / 256e3;
+            let force = acceleration * mass_kg + 10.0 + viscous;
+            let force = (sign * force - load) * 1e3;
+            assert_eq!(learner.mass, 0, "not before the end");
+            learner.sample(model, (sign * speed * 65_536.0) as i32, force as i32);
+            if tick > 120 && learner.first == 0 {
+                break;
+            }
+            speed = f64::max(speed + acceleration, 0.0);
+        }
+        let learnt = learner.take().map(|mass| f64::from(mass) / 65_536.0);
+        assert_eq!(learner.take(), None, "taken once");
+        learnt
+    }
+
+    fn model() -> AxisModel {
+        AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
+    }
+
+    #[test]
+    fn a_mass_is_learnt_from_one_move_under_any_load() {
+        let model = model();
+        for mass_kg in [1.0, 1.5, 4.0, 9.0] {
+            for (sign, load) in [(1.0, 0.0), (1.0, 60.0), (-1.0, 60.0), (-1.0, -90.0)] {
+                let learnt = moved(&model, mass_kg, sign, load).expect("learnt");
+                assert!((learnt / mass_kg - 1.0).abs() < 0.03, "{learnt} {mass_kg}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_bounded() {
+        let model = model();
+        let told = f64::from(model.mass) / 65_536.0;
+        for (mass_kg, bound) in [(0.1, 0.6 * told), (90.0, 12.0 * told)] {
+            let learnt = moved(&model, mass_kg, 1.0, 0.0).expect("learnt");
+            assert!((learnt / bound - 1.0).abs() < 1e-3, "{learnt}");
+        }
+    }
+
+    #[test]
+    fn what_tells_nothing_is_left() {
+        let model = model();
+        // At one speed for ever; too short; too slow.
+        let steady = vec![300; 1100];
+        let short = vec![100, 300, 500, 300, 0];
+        let slow: Vec<_> = (0..=150).chain((0..150).rev()).collect();
+        for speeds in [steady, short, slow] {
+            let mut learner = Learner::new();
+            for speed in speeds {
+                learner.sample(&model, speed << 16, 20_000);
+            }
+            assert_eq!(learner.take(), None);
+        }
+    }
+
+    #[test]
+    fn a_mass_waits_through_the_next_short_slide() {
+        let model = model();
+        let mut learner = Learner {
+            mass: 3 << 16,
+            ..Learner::new()
+        };
+        for speed in [30, 40, 0] {
+            learner.sample(&model, speed << 16, 0);
+        }
+        assert_eq!(learner.take(), Some(3 << 16));
     }
 }

@@ -1,7 +1,7 @@
 //! Stroke, speed and load from the measured stroke and the pressure force.
 
 use super::model::AxisModel;
-use super::{part, quotient, scaled, within};
+use super::{clip, mix, part, quotient, scaled, within};
 use core::hash::{Hash, Hasher};
 
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
@@ -13,8 +13,11 @@ const STOP_ZONE: i32 = 1 << 16;
 /// Length before an end stop in which a cushion may act, raw mm (6 mm).
 const CUSHION: i32 = 6 << 16;
 
+/// Least mass that is counted on, kg × 2^16 (0.02 kg): the least that may be told.
+const LIGHTEST: i32 = 1311;
+
 /// What follows from the moving mass; worked out when that changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inertia {
     /// Mass, kg × 2^16.
     pub mass: i32,
@@ -36,47 +39,101 @@ pub struct Inertia {
     pub slides: i32,
     /// Coulomb friction below it, mN per raw mm/s × 2^18.
     pub grip: i32,
+    /// Sum of all these.
+    check: u32,
 }
 
 impl Inertia {
     /// For a mass in kg × 2^16; gains fall with the cube root of what the mass
     /// exceeds the axis's nimble mass by.
+    // Seldom: small rather than fast.
+    #[cold]
+    #[inline]
     #[must_use]
     pub fn new(model: &AxisModel, mass: i32) -> Self {
-        let mass = mass.max(1000);
-        let wide = i64::from(mass);
+        let mass = mass.max(LIGHTEST);
+        let unsigned = mass.cast_unsigned();
         // 1/kg = mm/s² per mN: 2^(24+16) / raw kg.
-        let per_force = quotient(1 << 40, wide, 0);
+        let per_force = quotient(1 << 40, unsigned, 0);
         let share = if mass > model.nimble_mass {
-            cube_root(quotient(i64::from(model.nimble_mass), wide, 16) as u32)
+            cube_root(
+                quotient(u64::from(model.nimble_mass.cast_unsigned()), unsigned, 16)
+                    .cast_unsigned(),
+            )
         } else {
             1 << 16
         };
-        let squared = scaled(share, share, 16);
-        let slope = scaled(model.slope, share, 16).max(1 << 8);
+        // Shares are at most 1: what they are of fits as before.
+        let squared = part(share, share, 16);
+        let slope = part(model.slope, share, 16).clamp(1 << 8, (1 << 16) - 1);
         // 2^32 / (2 slope²) with slope × 2^8: 2^47 / slope².
-        let square = i64::from(slope).wrapping_mul(i64::from(slope));
+        // A dead time of 1 ms makes a slope of 190/s: 255/s is beyond any.
+        let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
         let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
         // Six tenths of it: a tick then turns at most two thirds of a speed round.
-        let slides = scaled(taken, 39_322, 16).max(STICK);
-        Self {
+        let slides = part(taken, 39_322, 16).max(STICK);
+        let made = Self {
             mass,
             per_force,
             slides,
-            grip: quotient(i64::from(model.coulomb), i64::from(slides), 18),
+            grip: quotient(
+                u64::from(model.coulomb.cast_unsigned()),
+                slides.cast_unsigned(),
+                18,
+            ),
             slope,
-            damping: scaled(model.damping, share, 16),
-            brake: scaled(model.brake, squared, 16),
+            damping: part(model.damping, share, 16),
+            brake: part(model.brake, squared, 16),
             linear: quotient(1 << 47, square, 0),
-            load_gain: scaled(model.observe_load, mass, 16),
+            load_gain: part(model.observe_load, mass, 16),
+            check: 0,
+        };
+        Self {
+            check: made.sum(),
+            ..made
         }
     }
 
-    /// Acceleration of a force in mN, mm/s².
+    #[inline]
+    fn sum(&self) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            mass,
+            per_force,
+            slope,
+            damping,
+            brake,
+            linear,
+            load_gain,
+            slides,
+            grip,
+            check: _,
+        } = *self;
+        let sum = 0;
+        let sum = mix(sum, mass);
+        let sum = mix(sum, per_force);
+        let sum = mix(sum, slope);
+        let sum = mix(sum, damping);
+        let sum = mix(sum, brake);
+        let sum = mix(sum, linear);
+        let sum = mix(sum, load_gain);
+        let sum = mix(sum, slides);
+        mix(sum, grip)
+    }
+
+    /// Whether all of it is as it was made.
     #[inline]
     #[must_use]
-    pub const fn acceleration(&self, force: i32) -> i32 {
-        scaled(force, self.per_force, 24)
+    pub fn is_sound(&self) -> bool {
+        self.check == self.sum()
+    }
+
+    /// Acceleration of a force in mN, mm/s², within ±2^22 (427 g).
+    #[inline]
+    #[must_use]
+    pub fn acceleration(&self, force: i32) -> i32 {
+        // Forces below 2^25 mN (33 kN), 2^40 over the least mass below 2^30: it fits.
+        clip::<23>(part(clip::<26>(force), self.per_force, 24))
     }
 }
 
@@ -165,15 +222,15 @@ impl Motion {
         self.friction = if self.stuck {
             drive
         } else {
-            part(within(self.speed, inertia.slides), inertia.grip, 18).saturating_add(scaled(
+            part(within(self.speed, inertia.slides), inertia.grip, 18).saturating_add(part(
                 self.speed,
                 model.viscous,
                 24,
             ))
         };
         self.acceleration = inertia.acceleration(drive.saturating_sub(self.friction));
-        // mm/s² × s × 2^32 to raw mm/s: / 2^16.
-        let gained = scaled(self.acceleration, model.tick, 16);
+        // mm/s² × s × 2^32 to raw mm/s: / 2^16. A tick is below 2^24: it fits.
+        let gained = part(self.acceleration, model.tick, 16);
         let mean = self.speed.saturating_add(gained.wrapping_shr(1));
         self.stroke = self.stroke.saturating_add(part(mean, model.tick, 32));
         self.speed = self.speed.saturating_add(gained);
@@ -228,6 +285,58 @@ mod tests {
                 assert!(
                     motion.stuck && motion.speed.abs() < STICK / 4,
                     "{mass}: {motion:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn every_flipped_bit_of_what_follows_from_the_mass_is_seen() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        let sound = Inertia::new(&model, 3 << 16);
+        assert!(sound.is_sound());
+        let words: [fn(&mut Inertia) -> &mut i32; 9] = [
+            |own| &mut own.mass,
+            |own| &mut own.per_force,
+            |own| &mut own.slope,
+            |own| &mut own.damping,
+            |own| &mut own.brake,
+            |own| &mut own.linear,
+            |own| &mut own.load_gain,
+            |own| &mut own.slides,
+            |own| &mut own.grip,
+        ];
+        for word in words {
+            for bit in 0..32 {
+                let mut flipped = sound;
+                *word(&mut flipped) ^= 1 << bit;
+                assert!(!flipped.is_sound());
+            }
+        }
+    }
+
+    #[test]
+    fn what_follows_from_a_mass_is_good_to_two_thousandths() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        for mass_kg in [0.05, 0.3, 1.0, 1.5, 6.0, 40.0, 200.0] {
+            let raw = (mass_kg * 65_536.0) as i32;
+            let inertia = Inertia::new(&model, raw);
+            let share = (f64::from(model.nimble_mass) / f64::from(raw))
+                .cbrt()
+                .min(1.0);
+            let slope = f64::from(model.slope) * share;
+            for (value, exact) in [
+                (inertia.per_force, 2_f64.powi(40) / f64::from(raw)),
+                (inertia.slope, slope),
+                (inertia.damping, f64::from(model.damping) * share),
+                (inertia.brake, f64::from(model.brake) * share * share),
+                (inertia.linear, 2_f64.powi(47) / (slope * slope)),
+            ] {
+                // The ratio of the masses is in steps of 2^-16.
+                let difference = (f64::from(value) - exact).abs();
+                assert!(
+                    difference <= 2.0 + 2e-3 * exact,
+                    "{mass_kg}: {value} {exact}"
                 );
             }
         }

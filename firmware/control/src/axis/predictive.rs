@@ -88,7 +88,8 @@ impl Hash for Predictive {
         // Taken apart, so that a new field cannot be forgotten here. Flags share a
         // word, each in its own bits.
         let Self {
-            inertia,
+            // Sealed apart: see `kept_is_sound`.
+            inertia: _,
             air,
             motion,
             learner,
@@ -98,7 +99,7 @@ impl Hash for Predictive {
             makes_up,
             primed,
         } = self;
-        (inertia, air, motion, learner, push, rest).hash(state);
+        (air, motion, learner, push, rest).hash(state);
         let flags = u32::from(*primed)
             | u32::from(awaits.is_some()).wrapping_shl(1)
             | u32::from(makes_up.is_some()).wrapping_shl(2)
@@ -123,6 +124,14 @@ impl Predictive {
             makes_up: None,
             primed: false,
         }
+    }
+
+    /// Whether what follows from the mass, which the `Hash` leaves out, is as it was
+    /// worked out.
+    #[inline]
+    #[must_use]
+    pub fn kept_is_sound(&self) -> bool {
+        self.inertia.is_sound()
     }
 
     /// Estimated motion and load.
@@ -169,7 +178,7 @@ impl Predictive {
         let force = model.pressure_force(self.air.pressures());
         self.motion
             .update(model, &self.inertia, force, measured.raw());
-        self.learner.sample(model, &self.motion, force);
+        self.learner.sample(model, self.motion.speed, force);
         VelocityMmS::from_raw(self.motion.speed)
     }
 
@@ -203,7 +212,6 @@ impl Predictive {
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
         let reference = input.reference.raw();
         let reference_speed = input.reference_velocity.raw();
-        self.learn(model);
         if self.rest.aim(model, reference) {
             self.push = Push::default();
         }
@@ -233,6 +241,11 @@ impl Predictive {
             };
             self.makes_up = Some(to > self.motion.stroke);
         }
+        if self.motion.speed.wrapping_abs() < STILL
+            && let Some(mass) = self.learner.take()
+        {
+            self.inertia = Inertia::new(model, mass);
+        }
         if awaited.is_none() && quiet {
             return Drive {
                 on: self.air.shut(model),
@@ -255,22 +268,15 @@ impl Predictive {
             let rest = &self.rest;
             wish.force(model, &mut self.push, |grip| rest.faded(grip))
         });
-        let (target, limited) = self.target(model, force, expected);
+        let possible = force
+            .max(model.force_in.wrapping_neg())
+            .min(model.force_out);
+        let target = self.target(model, possible, expected);
         Drive {
             on: self.air.pulses(model, expected, target, ahead.stroke),
             settled: false,
-            limited,
+            limited: possible != force,
             force,
-        }
-    }
-
-    /// Takes over a mass that has been learnt, while nothing moves.
-    #[inline]
-    fn learn(&mut self, model: &AxisModel) {
-        if self.motion.speed.wrapping_abs() < STILL
-            && let Some(mass) = self.learner.take()
-        {
-            self.inertia = Inertia::new(model, mass);
         }
     }
 
@@ -294,20 +300,16 @@ impl Predictive {
         Some(edge.saturating_sub(self.motion.load))
     }
 
-    /// Chamber pressures for a force, where `expected` will be; whether the supply
-    /// limits them.
+    /// Chamber pressures for a force that the supply can give, where `expected` will be.
     #[inline]
-    fn target(&mut self, model: &AxisModel, force: i32, expected: Pressures) -> (Pressures, bool) {
-        let (target, limited) = targets(model, force);
+    fn target(&mut self, model: &AxisModel, force: i32, expected: Pressures) -> Pressures {
+        let target = targets(model, force);
         let Some(extends) = self.makes_up else {
-            return (target, limited);
+            return target;
         };
-        match made_up(model, force, target, expected, extends) {
-            Some(other) => (other, limited),
-            None => {
-                self.makes_up = None;
-                (target, limited)
-            }
-        }
+        made_up(model, force, target, expected, extends).unwrap_or_else(|| {
+            self.makes_up = None;
+            target
+        })
     }
 }

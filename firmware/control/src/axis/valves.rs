@@ -11,9 +11,6 @@ use core::hash::{Hash, Hasher};
 /// Changes that can be under way at once.
 const EDGES: usize = 4;
 
-/// Longest time that is counted since a coil changed, µs.
-const LONG: i32 = 1_000_000;
-
 /// Timing of the valves, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ValveTimes {
@@ -41,17 +38,19 @@ impl ValveTimes {
     }
 }
 
-/// One valve as followed from its coil.
+/// One valve as followed from its coil. Times are moments of a clock in µs that wraps
+/// after 71 minutes: a valve that has been shut for just that long begins its next pulse
+/// late, by the shortest gap at most.
 #[derive(Clone, Copy, Debug)]
 pub struct ValveTrack {
     coil: bool,
     open: bool,
     /// Changes of the effect under way.
     pending: u8,
-    /// Time until each of them, oldest first; beyond `pending` without meaning.
-    edges: [i32; EDGES],
-    /// Time since the coil changed.
-    since: i32,
+    /// Moment of each of them, oldest first; beyond `pending` without meaning.
+    edges: [u32; EDGES],
+    /// When the coil changed.
+    changed: u32,
 }
 
 impl Default for ValveTrack {
@@ -70,19 +69,25 @@ impl Hash for ValveTrack {
             open,
             pending,
             edges: [first, second, third, fourth],
-            since,
+            changed,
         } = self;
         let flags = u32::from(*coil)
-            | u32::from(*open).wrapping_shl(1)
-            | u32::from(*pending).wrapping_shl(2);
-        state.write_i32(since ^ flags.rotate_right(8) as i32);
-        state.write_i32(first ^ second.rotate_left(16));
-        state.write_i32(third ^ fourth.rotate_left(16));
+            | u32::from(*open).wrapping_shl(8)
+            | u32::from(*pending).wrapping_shl(16);
+        state.write_u32(changed ^ flags.rotate_right(8));
+        if *pending > 0 {
+            state.write_u32(*first);
+            state.write_u32(*second);
+            if *pending > 2 {
+                state.write_u32(*third);
+                state.write_u32(*fourth);
+            }
+        }
     }
 }
 
 impl ValveTrack {
-    /// Shut for a long time.
+    /// Shut for a long time, on a clock that begins at 0.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -90,7 +95,7 @@ impl ValveTrack {
             open: false,
             pending: 0,
             edges: [0; EDGES],
-            since: LONG,
+            changed: 1 << 31,
         }
     }
 
@@ -100,28 +105,22 @@ impl ValveTrack {
         self.coil
     }
 
-    /// Time since the coil changed, µs.
-    #[must_use]
-    pub const fn since(&self) -> i32 {
-        self.since
-    }
-
-    /// The coil changes `at` µs into the tick.
-    #[inline]
-    fn change(&mut self, at: i32, times: &ValveTimes) {
-        let lasted = self.since.wrapping_add(at);
+    /// The coil changes at the moment `at`.
+    #[inline(never)]
+    fn change(&mut self, at: u32, times: &ValveTimes) {
+        let lasted = at.wrapping_sub(self.changed);
         let (took, delay) = if self.coil {
             (times.on, times.off)
         } else {
             (times.off, times.on)
         };
         self.coil = !self.coil;
-        self.since = at.wrapping_neg();
-        if lasted < took && self.pending > 0 {
+        self.changed = at;
+        if lasted < took as u32 && self.pending > 0 {
             // Called back before it moved: the change under way does not happen.
             self.pending = self.pending.wrapping_sub(1);
         } else if let Some(next) = self.edges.get_mut(usize::from(self.pending)) {
-            *next = at.wrapping_add(delay).wrapping_add(times.line);
+            *next = at.wrapping_add(delay.wrapping_add(times.line) as u32);
             self.pending = self.pending.wrapping_add(1);
         } else {
             // More changes than a line can hold: only the end is known.
@@ -130,31 +129,32 @@ impl ValveTrack {
         }
     }
 
-    /// Takes the on-time of one tick, 0…tick µs from its edge; gives for how long
-    /// the chamber sees the valve open in that tick, µs.
+    /// Takes the on-time of the tick that begins `now`, 0…tick µs from its edge; gives for
+    /// how long the chamber sees the valve open in that tick, µs.
     #[inline]
-    pub fn advance(&mut self, on: i32, times: &ValveTimes) -> i32 {
+    pub fn advance(&mut self, now: u32, on: i32, times: &ValveTimes) -> i32 {
         if on > 0 && !self.coil {
-            self.change(0, times);
+            self.change(now, times);
         }
         if on < times.tick && self.coil {
-            self.change(on, times);
+            self.change(now.wrapping_add(on as u32), times);
         }
-        self.since = self.since.wrapping_add(times.tick).min(LONG);
-        if self.pending == 0 {
-            return if self.open { times.tick } else { 0 };
+        if self.pending > 0 {
+            let [first, ..] = self.edges;
+            if first.wrapping_sub(now) as i32 <= times.tick {
+                return self.pass(now, times.tick);
+            }
         }
-        let opened = self.pass(times.tick);
-        self.edges = self.edges.map(|edge| edge.wrapping_sub(times.tick));
-        opened
+        if self.open { times.tick } else { 0 }
     }
 
-    /// Takes the changes within `span` µs; gives the time open.
-    #[inline]
-    fn pass(&mut self, span: i32) -> i32 {
+    /// Takes the changes within `span` µs from `now`; gives the time open.
+    #[inline(never)]
+    fn pass(&mut self, now: u32, span: i32) -> i32 {
         let (mut opened, mut from) = (0_i32, 0_i32);
         while self.pending > 0 {
-            let [first, second, third, fourth] = self.edges;
+            let [first, ..] = self.edges;
+            let first = first.wrapping_sub(now) as i32;
             if first > span {
                 break;
             }
@@ -164,7 +164,7 @@ impl ValveTrack {
             from = first;
             self.open = !self.open;
             self.pending = self.pending.wrapping_sub(1);
-            self.edges = [second, third, fourth, 0];
+            self.edges.rotate_left(1);
         }
         if self.open {
             opened = opened.wrapping_add(span.wrapping_sub(from));
@@ -172,53 +172,64 @@ impl ValveTrack {
         opened
     }
 
-    /// For how long the chamber will still see the valve open, if its coil falls
-    /// as soon as the shortest pulse allows, µs.
+    /// What is left at `now` of the shortest pulse under way, µs.
+    #[inline]
+    fn left(&self, now: u32, times: &ValveTimes) -> i32 {
+        let since = now.wrapping_sub(self.changed);
+        (times.shortest_pulse as u32).saturating_sub(since) as i32
+    }
+
+    /// For how long the chamber will still see the valve open after `now`, the end of the
+    /// ticks taken so far, if its coil falls as soon as the shortest pulse allows, µs.
     ///
     /// The time open is the sum of the times of closing less the sum of those of
     /// opening: changes alternate, and the last closes.
     #[inline]
     #[must_use]
-    pub fn committed(&self, times: &ValveTimes) -> i32 {
-        let fall = if self.coil {
-            if usize::from(self.pending) >= EDGES {
-                return 0;
-            }
-            let left = times.shortest_pulse.wrapping_sub(self.since).max(0);
-            left.wrapping_add(times.off).wrapping_add(times.line)
-        } else {
-            0
-        };
+    pub fn committed(&self, now: u32, times: &ValveTimes) -> i32 {
+        if !self.coil && self.pending == 0 {
+            return 0;
+        }
+        self.under_way(now, times)
+    }
+
+    #[inline(never)]
+    fn under_way(&self, now: u32, times: &ValveTimes) -> i32 {
         let mut sum = 0_i32;
         for edge in self.edges.iter().take(usize::from(self.pending)) {
             // The sum so far is that of an even or odd number of changes: each turns
             // the sign of all before it.
-            sum = edge.wrapping_sub(sum);
+            sum = (edge.wrapping_sub(now) as i32).wrapping_sub(sum);
         }
-        if self.coil {
-            // The fall is the last change, and closes.
-            fall.wrapping_sub(sum)
-        } else {
-            sum
+        if !self.coil {
+            return sum;
         }
+        if usize::from(self.pending) >= EDGES {
+            return 0;
+        }
+        // The fall is the last change, and closes.
+        let fall = self.left(now, times);
+        fall.wrapping_add(times.off)
+            .wrapping_add(times.line)
+            .wrapping_sub(sum)
     }
 
-    /// On-time of the next tick for `need` µs of opening beyond what is
-    /// [`ValveTrack::committed`]; `rival` says that the chamber's other valve is on.
+    /// On-time of the tick that begins `now`, at the end of those taken so far, for `need`
+    /// µs of opening beyond what is [`ValveTrack::committed`]; `rival` says that the
+    /// chamber's other valve is on.
     #[inline]
     #[must_use]
-    pub fn on_time(&self, need: i32, rival: bool, times: &ValveTimes) -> i32 {
-        let shortest = times.shortest_opening();
+    pub fn on_time(&self, now: u32, need: i32, rival: bool, times: &ValveTimes) -> i32 {
         let pulse = if self.coil {
-            let left = times.shortest_pulse.wrapping_sub(self.since).max(0);
             // A few microseconds are not worth a tick.
-            if need < 20 {
-                left
-            } else {
-                left.saturating_add(need)
+            let need = if need < 20 { 0 } else { need };
+            self.left(now, times).saturating_add(need)
+        } else if need > 0 && !rival {
+            let shortest = times.shortest_opening();
+            let since = now.wrapping_sub(self.changed);
+            if since < times.shortest_gap as u32 || need <= shortest.wrapping_mul(5) >> 3 {
+                return 0;
             }
-        } else if !rival && self.since >= times.shortest_gap && need > shortest.wrapping_mul(5) >> 3
-        {
             need.max(shortest)
                 .saturating_add(times.on)
                 .saturating_sub(times.off)
@@ -247,10 +258,10 @@ mod tests {
     fn pulse(length: i32) -> [i32; 20] {
         let mut track = ValveTrack::new();
         let mut left = length;
-        core::array::from_fn(|_| {
+        core::array::from_fn(|tick| {
             let on = left.clamp(0, 1000);
             left -= on;
-            track.advance(on, &TIMES)
+            track.advance(1000 * tick as u32, on, &TIMES)
         })
     }
 
@@ -268,10 +279,11 @@ mod tests {
     fn a_pulse_below_t_on_opens_nothing_and_leaves_nothing_behind() {
         assert_eq!(pulse(3400).iter().sum::<i32>(), 0);
         let mut track = ValveTrack::new();
-        for on in [
+        let on = [
             1000, 1000, 0, 0, 0, 0, 1000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0,
-        ] {
-            track.advance(on, &TIMES);
+        ];
+        for (on, now) in on.into_iter().zip((0..).step_by(1000)) {
+            track.advance(now, on, &TIMES);
         }
         assert!(!track.open && track.pending == 0);
     }
@@ -280,10 +292,14 @@ mod tests {
     fn a_gap_below_t_off_does_not_shut() {
         let mut track = ValveTrack::new();
         let mut opened = 0;
-        for on in [
+        let on = [
             1000, 1000, 1000, 1000, 1000, 1000, 500, 1000, 1000, 1000, 1000,
-        ] {
-            opened += track.advance(on, &TIMES);
+        ];
+        // The clock may wrap meanwhile.
+        let start = 4000_u32.wrapping_neg();
+        track.changed = start.wrapping_sub(1 << 30);
+        for (on, tick) in on.into_iter().zip(0_u32..) {
+            opened += track.advance(start.wrapping_add(1000 * tick), on, &TIMES);
         }
         assert_eq!(opened, 11_000 - 4400);
     }
@@ -292,14 +308,21 @@ mod tests {
         /// Whatever is sent, the end state follows the coil, and what was
         /// committed is what the chamber then sees.
         #[test]
-        fn commitment_is_kept(ticks in proptest::collection::vec(0_i32..=1000, 1..80)) {
+        fn commitment_is_kept(
+            ticks in proptest::collection::vec(0_i32..=1000, 1..80),
+        ) {
             let mut track = ValveTrack::new();
-            for on in ticks { track.advance(on, &TIMES); }
-            let committed = track.committed(&TIMES);
+            let mut now = 0;
+            for on in ticks {
+                track.advance(now, on, &TIMES);
+                now += 1000;
+            }
+            let committed = track.committed(now, &TIMES);
             let mut seen = 0;
             for _ in 0..40 {
-                let on = track.on_time(0, false, &TIMES);
-                seen += track.advance(on, &TIMES);
+                let on = track.on_time(now, 0, false, &TIMES);
+                seen += track.advance(now, on, &TIMES);
+                now += 1000;
             }
             prop_assert_eq!(seen, committed);
             prop_assert!(!track.coil && !track.open);

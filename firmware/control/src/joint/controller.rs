@@ -80,13 +80,15 @@ impl JointController {
         State(self)
     }
 
-    /// Whether the history of the velocity, which [`JointController::state`] leaves
-    /// out, is as it was written.
+    /// Whether what [`JointController::state`] leaves out is as it was written: the
+    /// history of the velocity, or what the predictive law keeps.
     #[inline]
     #[must_use]
     pub fn history_is_sound(&self) -> bool {
-        // The predictive law has none.
-        self.predictive.is_some() || self.velocity.is_sound()
+        match &self.predictive {
+            Some(law) => law.kept_is_sound(),
+            None => self.velocity.is_sound(),
+        }
     }
 
     /// The correction in use.

@@ -5,7 +5,7 @@ use super::rest::REFERENCE_RESTS;
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::{Inertia, Motion};
-use crate::axis::{part, scaled, square_root, within};
+use crate::axis::{clip, part, scaled, square_root, within};
 
 /// Fast enough for the sign of friction to be that of the motion (10 mm/s).
 const SLIDES: i32 = 10 << 16;
@@ -24,7 +24,7 @@ pub(super) struct Ahead {
 impl Ahead {
     /// Where the present acceleration takes the piston.
     #[inline]
-    pub(super) const fn new(model: &AxisModel, motion: &Motion) -> Self {
+    pub(super) fn new(model: &AxisModel, motion: &Motion) -> Self {
         let gained = scaled(motion.acceleration, model.horizon, 16);
         let mean = motion.speed.saturating_add(gained.wrapping_shr(1));
         Self {
@@ -122,13 +122,13 @@ impl Wish<'_> {
         } else {
             model.force_out.saturating_add(load)
         };
-        let possible = inertia.acceleration(scaled(left, 45_875, 16));
+        let possible = inertia.acceleration(part(clip::<26>(left), 45_875, 16));
         let brake = inertia.brake.min(possible).max(200);
         let (speed, slope) = speed_law(error, brake, inertia, model.top_speed);
         let wanted = reference_speed.saturating_add(speed);
         // 1/s × 2^8 times raw mm/s: mm/s² × 2^24.
         let pull = scaled(slope, reference_speed.saturating_sub(ahead.speed), 24);
-        let damp = scaled(inertia.damping, wanted.saturating_sub(ahead.speed), 24);
+        let damp = part(inertia.damping, wanted.saturating_sub(ahead.speed), 24);
         let limit = inertia.brake.saturating_mul(5) >> 1;
         let acceleration = within(pull.saturating_add(damp), limit);
 
@@ -146,10 +146,10 @@ impl Wish<'_> {
             wanted
         };
         // Full grip from 10 mm/s: × grip / (10 × 2^16).
-        let friction = scaled(within(along, SLIDES), grip / 10, 16);
+        let friction = part(within(along, SLIDES), grip / 10, 16);
         scaled(inertia.mass, acceleration, 16)
             .saturating_add(friction)
-            .saturating_add(scaled(wanted, model.viscous, 24))
+            .saturating_add(part(wanted, model.viscous, 24))
             .saturating_add(push.force.wrapping_shr(8))
             .saturating_sub(load)
     }

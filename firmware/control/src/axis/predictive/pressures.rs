@@ -2,7 +2,7 @@
 
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
-use crate::axis::scaled;
+use crate::axis::{part, scaled};
 
 /// A chamber lags whose pressure is so much above its target (10 kPa in 1/256 Pa).
 const LAG: i32 = 10_000 << 8;
@@ -16,7 +16,7 @@ fn possible(model: &AxisModel, pressure: i32) -> i32 {
 /// Pressure of B that makes `force` with `a` in A: (pA AA − rod − F) / AB.
 #[inline]
 fn b_of(model: &AxisModel, force: i32, a: i32) -> i32 {
-    scaled(a, model.area_ratio, 24).saturating_sub(scaled(
+    scaled(a, model.area_ratio, 24).saturating_sub(part(
         force.saturating_add(model.force_rod),
         model.pressure_b,
         12,
@@ -28,27 +28,27 @@ fn b_of(model: &AxisModel, force: i32, a: i32) -> i32 {
 fn a_of(model: &AxisModel, force: i32, b: i32) -> i32 {
     let sum = force
         .saturating_add(model.force_rod)
-        .saturating_add(scaled(b, model.force_b, 32));
+        .saturating_add(part(b, model.force_b, 32));
     scaled(sum, model.pressure_a, 12)
 }
 
-/// Pressures whose force is `force`, as near as the supply allows, about the mean.
+/// Pressures whose force is `force`, about the mean. The force must be one that the
+/// supply can give, so that products with it fit.
 #[inline]
-pub(super) fn targets(model: &AxisModel, force: i32) -> (Pressures, bool) {
+pub(super) fn targets(model: &AxisModel, force: i32) -> Pressures {
     let a = possible(
         model,
         model
             .mean
-            .saturating_add(scaled(force, model.half_pressure_a, 12)),
+            .saturating_add(part(force, model.half_pressure_a, 12)),
     );
     let b = b_of(model, force, a);
     let bounded = possible(model, b);
     if bounded == b {
-        return (Pressures { a, b }, false);
+        return Pressures { a, b };
     }
-    let wished = a_of(model, force, bounded);
-    let a = possible(model, wished);
-    (Pressures { a, b: bounded }, a != wished)
+    let a = possible(model, a_of(model, force, bounded));
+    Pressures { a, b: bounded }
 }
 
 /// Targets while the counter chamber still has too much: the drive chamber makes the
