@@ -110,15 +110,11 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     report.step("three steps with the predictive law", || {
         predictive(&emulator, &images.folder)
     });
-<<<<<<< HEAD
     report.step("one step with boards here, emulated, and on QEMU", || {
         mixed(&emulator, &images.folder)
     });
-    if let (Some(machine), Some(figures)) = (machine, figures) {
-=======
     if let (Some(machine), Some(mut figures)) = (machine, figures) {
         figures["pil"]["eventful"] = json!(eventful);
->>>>>>> 3c43c04 (Boost mode is on at 170 MHz: the register crate has its bit elsewhere; the emulated part refuses a clock beyond wait states, core voltage and steps; runs with faults are held to the tick budgets)
         report.step("figures for machines", || Ok(machine.print(&figures)?));
     }
 }
@@ -421,7 +417,13 @@ fn eventful(emulator: &Path, images: &Path) -> StepResult<Value> {
     for (number, (scenario, faults)) in EVENTFUL.into_iter().enumerate() {
         let folder = format!("pil-run/eventful-{number}");
         let further = [&["--compare-sil"], faults].concat();
-        let mut run = run_nodes(Path::new(scenario), "pil", &folder, &environment, &further)?;
+        let mut run = run_nodes(
+            Path::new(scenario),
+            &["--nodes", "pil"],
+            &folder,
+            &environment,
+            &further,
+        )?;
         ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
         runs.push(run["pil"].take());
     }

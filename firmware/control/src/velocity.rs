@@ -228,17 +228,18 @@ impl VelocityEstimator {
         let next = self.oldest.wrapping_add(1);
         self.oldest = if next < self.length { next } else { 0 };
         let oldest = i64::from(oldest);
-        // Every k falls by one, so that every sample that stays loses twice its value;
-        // the oldest leaves with −(N − 1), the newest comes with N − 1.
+        // Every k falls by one, so that every sample loses twice its value; the oldest
+        // leaves with −(N − 1) and loses nothing, the newest comes with N − 1.
         // |total| < 2^37, |slope| < 2^43.
-        let last = i64::from(i32::from(length).wrapping_sub(1));
-        let stay = self.total.wrapping_sub(oldest);
+        let length = i32::from(length);
+        let above = i64::from(length.wrapping_add(1));
+        let below = i64::from(length.wrapping_sub(1));
         self.slope = self
             .slope
-            .wrapping_add(last.wrapping_mul(oldest))
-            .wrapping_add(last.wrapping_mul(newest))
-            .wrapping_sub(stay.wrapping_mul(2));
-        self.total = stay.wrapping_add(newest);
+            .wrapping_sub(self.total.wrapping_mul(2))
+            .wrapping_add(above.wrapping_mul(oldest))
+            .wrapping_add(below.wrapping_mul(newest));
+        self.total = self.total.wrapping_sub(oldest).wrapping_add(newest);
         window.velocity(self.slope)
     }
 }

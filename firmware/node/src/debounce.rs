@@ -47,6 +47,10 @@ impl<const TICKS: u8> Debounce<TICKS> {
     #[inline]
     pub fn sample(&mut self, raw: u8) -> u8 {
         let changed = raw ^ self.state;
+        if changed == 0 {
+            self.planes = [0; 3];
+            return self.state;
+        }
         let [ones, twos, fours] = self.planes;
         // Where the level differs, the counter goes up by one; elsewhere it is zero.
         let ones_up = !ones & changed;
