@@ -114,14 +114,14 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, SimEr
         seed,
         &options.nodes,
         &mut recorder,
-        &mut |t_s| {
+        sil::Onlookers::new(&mut |t_s| {
             bar.set_position((t_s * 1e3) as u64);
             if INTERRUPTED.load(Ordering::SeqCst) {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
             }
-        },
+        }),
     );
     let closed = recorder.finish();
     let wall_s = begun.elapsed().as_secs_f64();

@@ -18,7 +18,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 7] = [
+const CHECKS: [Check; 8] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -43,6 +43,12 @@ const CHECKS: [Check; 7] = [
         "mutations of the code that decides safe states",
         90,
         mutations,
+    ),
+    Check(
+        "off-data",
+        "200 robots off their data through every scenario without a fault, and under loads",
+        20,
+        off_data,
     ),
     Check(
         "state-flips",
@@ -118,13 +124,17 @@ pub(crate) fn note(name: &str, text: &str) -> Result<()> {
     Ok(())
 }
 
-/// The line of a test program's output that starts with `marker`'s number, with
-/// the tests run by name in an optimised build.
-fn robustness(test: &str, variable: &str, amount: u32, marker: &str) -> StepResult<String> {
+/// The line of a test program's output that has `marker`, with one of its tests run by
+/// name in an optimised build, as often as `variable` says.
+fn measured(
+    [package, program, test]: [&str; 3],
+    (variable, amount): (&str, u32),
+    marker: &str,
+) -> StepResult<String> {
     let text = output(
         cargo()
-            .args(["test", "--release", "--package", "wheeleg-protocol"])
-            .args(["--test", "robustness", "--", "--exact", "--nocapture", test])
+            .args(["test", "--release", "--package", package])
+            .args(["--test", program, "--", "--exact", "--nocapture", test])
             .env(variable, amount.to_string()),
     )?;
     let line = text.lines().find(|line| line.contains(marker));
@@ -134,20 +144,28 @@ fn robustness(test: &str, variable: &str, amount: u32, marker: &str) -> StepResu
 }
 
 fn flips() -> StepResult<String> {
-    robustness(
-        "no_one_or_two_bit_flip_makes_another_frame",
-        "WHEELEG_FLIP_FRAMES_PER_TYPE",
-        1_000,
-        " flips: ",
-    )
+    let test = "no_one_or_two_bit_flip_makes_another_frame";
+    let amount = ("WHEELEG_FLIP_FRAMES_PER_TYPE", 1_000);
+    measured(["wheeleg-protocol", "robustness", test], amount, " flips: ")
 }
 
 fn streams() -> StepResult<String> {
-    robustness(
-        "a_million_random_streams_give_no_wrong_frame",
-        "WHEELEG_RANDOM_STREAMS",
-        10_000_000,
+    let test = "a_million_random_streams_give_no_wrong_frame";
+    let amount = ("WHEELEG_RANDOM_STREAMS", 10_000_000);
+    measured(
+        ["wheeleg-protocol", "robustness", test],
+        amount,
         " streams: ",
+    )
+}
+
+fn off_data() -> StepResult<String> {
+    let test = "nothing_trips_on_a_robot_off_its_data";
+    let amount = ("WHEELEG_OFF_ROBOTS", 200);
+    measured(
+        ["wheeleg-tests", "off_data", test],
+        amount,
+        " false alarms; ",
     )
 }
 

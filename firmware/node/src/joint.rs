@@ -11,5 +11,6 @@ mod settings;
 #[cfg(test)]
 mod integrity_tests;
 
+pub use expectation::MotionAccount;
 pub use node::{JointNode, PARTS};
 pub use settings::{JointSettings, TickSettings};

@@ -197,6 +197,11 @@ impl JointBoard {
     pub(crate) fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
         each!(&self.application, node => node.snapshot())
     }
+
+    /// What the board makes of its piston after the last tick.
+    pub(super) fn motion_account(&self) -> wheeleg_node::joint::MotionAccount {
+        each!(&self.application, node => node.motion_account())
+    }
 }
 
 /// The application of a wheel board; the first one has the supply switch and

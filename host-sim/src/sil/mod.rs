@@ -27,6 +27,9 @@ use std::ops::ControlFlow;
 use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_master::config::UniqueId;
 use wheeleg_master::event::Event;
+use wheeleg_node::joint::MotionAccount;
+use wheeleg_node::snapshot::JointSnapshot;
+use wheeleg_plant::assembly::CylinderOutputs;
 use wheeleg_protocol::LinkQuality;
 
 pub use self::audit::LineAudit;
@@ -48,6 +51,57 @@ use crate::telemetry::{EventKind, Recorder};
 const COMMISSION_S: f64 = 2.0;
 /// Beginning of every event in the record that tells of the time before it.
 pub(crate) const START_UP: &str = "start-up, ";
+
+/// What a caller sees of one joint board and its cylinder after every tick, start-up
+/// included, when it asks to ([`run_watched`]).
+#[derive(Debug, Clone, Copy)]
+pub struct WatchedJoint<'a> {
+    /// Time since power-up, s.
+    pub now_s: f64,
+    /// Joint 1..=6.
+    pub joint: u8,
+    /// The board's internals.
+    pub board: &'a JointSnapshot,
+    /// What it makes of its piston.
+    pub account: MotionAccount,
+    /// What the cylinder is.
+    pub cylinder: &'a CylinderOutputs,
+}
+
+/// Looks at every joint after every tick.
+pub type JointWatcher<'a> = &'a mut dyn FnMut(&WatchedJoint<'_>);
+
+/// Who is told of a run while it lasts.
+pub(crate) struct Onlookers<'a> {
+    progress: &'a mut dyn FnMut(f64) -> Control,
+    watcher: Option<JointWatcher<'a>>,
+}
+
+impl<'a> Onlookers<'a> {
+    /// One who is told the time, and can stop the run.
+    pub(crate) fn new(progress: &'a mut dyn FnMut(f64) -> Control) -> Self {
+        Self {
+            progress,
+            watcher: None,
+        }
+    }
+
+    fn tick(&mut self, world: &World) {
+        let Some(watcher) = &mut self.watcher else {
+            return;
+        };
+        for ((joint, board), cylinder) in (1..).zip(world.joints()).zip(&world.outputs().cylinders)
+        {
+            watcher(&WatchedJoint {
+                now_s: world.now_ns() as f64 * 1e-9,
+                joint,
+                board: board.snapshot(),
+                account: board.motion_account(),
+                cylinder,
+            });
+        }
+    }
+}
 
 /// Whether to go on, as the caller of [`run`] decides at every bus cycle.
 pub type Control = ControlFlow<()>;
@@ -104,7 +158,36 @@ pub fn run_with(
     progress: &mut dyn FnMut(f64) -> Control,
 ) -> Result<RunOutcome, SimError> {
     let boards = Boards::connect(nodes, robot)?;
-    run_on(boards, scenario, robot, seed, nodes, recorder, progress)
+    let onlookers = Onlookers::new(progress);
+    run_on(boards, scenario, robot, seed, nodes, recorder, onlookers)
+}
+
+/// As [`run`], with `watcher` called for every joint after every tick, in the time of
+/// the start-up, too.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    recorder: &mut Recorder,
+    watcher: JointWatcher<'_>,
+) -> Result<RunOutcome, SimError> {
+    let native = Nodes::default();
+    let onlookers = Onlookers {
+        progress: &mut |_| Control::Continue(()),
+        watcher: Some(watcher),
+    };
+    run_on(
+        Boards::default(),
+        scenario,
+        robot,
+        seed,
+        &native,
+        recorder,
+        onlookers,
+    )
 }
 
 /// What a run has in place of boards that find their own way.
@@ -148,7 +231,7 @@ pub(crate) fn run_on(
     seed: u64,
     nodes: &Nodes,
     recorder: &mut Recorder,
-    progress: &mut dyn FnMut(f64) -> Control,
+    mut onlookers: Onlookers<'_>,
 ) -> Result<RunOutcome, SimError> {
     let plant = setup::plant(scenario, robot);
     let master = setup::master(scenario, robot);
@@ -167,6 +250,9 @@ pub(crate) fn run_on(
     loop {
         let happened = world.step()?;
         let now_ns = world.now_ns();
+        if matches!(happened, Happened::JointTick) {
+            onlookers.tick(&world);
+        }
         match (happened, start_ns) {
             (Happened::JointTick, None) if operator.prepare(&mut world)? => {
                 start_ns = Some(now_ns);
@@ -204,7 +290,7 @@ pub(crate) fn run_on(
                     observer.pass(&world);
                 }
                 let t_s = started.map_or(-1.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9);
-                if progress(t_s).is_break() {
+                if (onlookers.progress)(t_s).is_break() {
                     stopped = true;
                     break;
                 }

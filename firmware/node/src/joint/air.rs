@@ -12,16 +12,21 @@
 //!
 //! Flow is choked up to a pressure ratio b and falls off beyond it; the chord
 //! `min(1, 3 (1 − r)/(1 − b))` stands for the ellipse of ISO 6358, at most 0.2 off it.
-//! Switching delays are left out: a pulse of a control law opens a valve for nearly as
-//! long as it lasts, and a few milliseconds are a few newtons.
+//! Switching delays are left out of it while the piston moves: a pulse of a control law opens
+//! a valve for nearly as long as it lasts, and what is off is learnt with the load.
+//!
+//! While it stands nothing corrects the account, and a valve that is slower than told lets
+//! a short pulse do nothing at all: pulse after pulse the account would gain force that is not
+//! there. So only what is certain counts then: a valve is open for certain once it has been
+//! energised for twice the time told for it to open ([`SLOWER`]).
 //!
 //! What was in the chambers at power-up nobody knows. It no longer matters once both
-//! have been vented for a while, so that is counted, too.
+//! have been vented for a while, for certain; so that is counted, too.
 
 use core::hash::{Hash, Hasher};
 use wheeleg_control::axis::AxisModel;
 use wheeleg_control::pwm::OnTimes;
-use wheeleg_units::{PositionMm, divide_signed};
+use wheeleg_units::{Micros, PositionMm, divide_signed};
 
 /// Supply pressure in the unit of [`Air`].
 const SUPPLY: i32 = 1 << 17;
@@ -33,6 +38,17 @@ pub(super) const ROUND: u16 = 3;
 const STEP: i32 = 4 << 16;
 /// Polytropic exponent × 2^8 (ASSUMED: 1.2, usual for small cylinders).
 const EXPONENT: i32 = 307;
+/// A round of a valve that is energised all the time, µs.
+const WHOLE: u32 = 1000 * ROUND as u32;
+/// Bits of a valve's time in a round, and above them of the whole rounds before it …
+const TIME: u32 = 0xFFF;
+const ROUNDS: u32 = 0xF000;
+/// … of which this is one.
+const ONE: u32 = 0x1000;
+const _: () = assert!(WHOLE <= TIME, "a round fits its bits");
+/// How often as long as told a valve may take to open (ASSUMED: small direct-acting valves
+/// of one type differ by that much with age, temperature and supply voltage).
+const SLOWER: u32 = 2;
 /// Vented times count in 64 µs.
 const VENTED_SHIFT: u32 = 6;
 
@@ -91,12 +107,15 @@ pub(super) struct AirModel {
     rod: i32,
     /// Time after which a vented chamber is known, in 64 µs.
     known: u16,
+    /// Whole rounds after which an energised valve is open for certain, in [`ONE`], at most
+    /// [`ROUNDS`].
+    slow: u32,
 }
 
 impl AirModel {
-    /// From the axis's coefficients.
+    /// From the axis's coefficients and the time that its valves are told to take to open.
     #[inline(never)]
-    pub(super) fn new(axis: &AxisModel) -> Self {
+    pub(super) fn new(axis: &AxisModel, valve_on: Micros) -> Self {
         let share = i64::from(axis.ambient).wrapping_shl(17);
         // 18/16 of what both chambers take together.
         let both = time(axis.lead_a.saturating_add(axis.stroke), axis.flow_a)
@@ -110,6 +129,9 @@ impl AirModel {
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
             rod: axis.force_rod,
             known: u16::try_from(known).unwrap_or(u16::MAX),
+            slow: (valve_on.get().saturating_mul(SLOWER) / WHOLE)
+                .saturating_mul(ONE)
+                .min(ROUNDS),
         }
     }
 
@@ -154,9 +176,10 @@ struct Content {
     p: i32,
     /// Length without the dead one for which it stands, raw mm.
     length: i32,
-    /// For how long its valves have been open since, µs: fill, and vent × 2^16.
+    /// For how long its valves have been energised since, µs, and × 2^12 in how many whole
+    /// rounds before, at most 15: fill, and vent × 2^16.
     open: u32,
-    /// For how long it has been vented since it was last unknown, in 64 µs.
+    /// For how long it has been vented for certain since it was last unknown, in 64 µs.
     vented: u16,
 }
 
@@ -188,7 +211,7 @@ impl Content {
         }
     }
 
-    /// A tick in which its valves are open for `fill` and `vent` µs.
+    /// A tick in which its valves are energised for `fill` and `vent` µs.
     #[inline]
     fn opens(&mut self, fill: u16, vent: u16) {
         // A round of ticks: each stays below 2^12.
@@ -196,14 +219,27 @@ impl Content {
         self.open = self.open.wrapping_add(open);
     }
 
-    /// Its length is now `length`.
+    /// Its length is now `length`; what counts of its valves is all, or what is certain.
     #[inline(never)]
-    fn follow(&mut self, length: i32, chamber: &Chamber, model: &AirModel) {
+    fn follow(&mut self, length: i32, chamber: &Chamber, model: &AirModel, certain: bool) {
         let moved = length.wrapping_sub(self.length);
+        let open = self.open;
         // Noise of a reading at rest moves no air.
-        if self.open == 0 && moved.wrapping_abs() < 1 << 13 {
+        if open == 0 && moved.wrapping_abs() < 1 << 13 {
             return;
         }
+        let (fill, sure_fill, fills) = taken(open, model.slow);
+        let (vent, sure_vent, vents) = taken(open.wrapping_shr(16), model.slow);
+        self.open = fills | vents.wrapping_shl(16);
+        // Below 2^16.
+        self.vented = self
+            .vented
+            .saturating_add((sure_vent >> VENTED_SHIFT) as u16);
+        let on = if certain {
+            [sure_fill, sure_vent]
+        } else {
+            [fill, vent]
+        };
         self.length = length;
         // No piston goes that far: another calibration, or the first reading.
         let moved = if moved.wrapping_abs() > STEP {
@@ -213,12 +249,22 @@ impl Content {
         };
         let growth = moved.wrapping_mul(EXPONENT) >> 8;
         let length = (length >> 8).wrapping_add(chamber.lead);
-        let (fill, vent) = (self.open & 0xFFFF, self.open.wrapping_shr(16));
-        self.open = 0;
-        self.p = model.after(self.p, chamber, length, [fill, vent], growth);
-        // Below 2^16.
-        self.vented = self.vented.saturating_add((vent >> VENTED_SHIFT) as u16);
+        self.p = model.after(self.p, chamber, length, on, growth);
     }
+}
+
+/// Of one valve: for how long it was energised in this round, µs, for how long of that it was
+/// open for certain, and what the next round starts with.
+#[inline(always)]
+fn taken(open: u32, slow: u32) -> (u32, u32, u32) {
+    let time = open & TIME;
+    let whole = open & ROUNDS;
+    let (sure, next) = if whole < slow {
+        (0, whole.wrapping_add(ONE))
+    } else {
+        (time, whole)
+    };
+    (time, sure, if time < WHOLE { 0 } else { next })
 }
 
 /// Air in both chambers, followed in rounds of [`ROUND`] ticks.
@@ -247,11 +293,17 @@ impl Air {
         self.turn >= 2
     }
 
-    /// A tick that ends at `position`, with these on-times: A's pressure follows in the
-    /// first of a round, B's in the second. True in the third, which has room for what
-    /// is made of them.
+    /// A tick that ends at `position`, with these on-times, of which only the `certain` part
+    /// counts for a piston that stands: A's pressure follows in the first of a round, B's in
+    /// the second. True in the third, which has room for what is made of them.
     #[inline]
-    pub(super) fn follow(&mut self, on: &OnTimes, position: PositionMm, model: &AirModel) -> bool {
+    pub(super) fn follow(
+        &mut self,
+        on: &OnTimes,
+        position: PositionMm,
+        model: &AirModel,
+        certain: bool,
+    ) -> bool {
         let [fill_a, vent_a, fill_b, vent_b] = *on;
         self.a.opens(fill_a, vent_a);
         self.b.opens(fill_b, vent_b);
@@ -264,7 +316,7 @@ impl Air {
                 return true;
             }
         };
-        content.follow(length, chamber, model);
+        content.follow(length, chamber, model, certain);
         self.turn = self.turn.wrapping_add(1);
         false
     }
@@ -278,6 +330,11 @@ impl Air {
             .saturating_sub(model.rod)
     }
 
+    /// Pressures in A and B, 2^-17 of the supply pressure.
+    pub(super) const fn pressures(&self) -> [i32; 2] {
+        [self.a.p, self.b.p]
+    }
+
     /// What is in the chambers is no longer known: air has had time to leak.
     pub(super) const fn forget(&mut self) {
         self.a.vented = 0;
@@ -285,10 +342,11 @@ impl Air {
     }
 
     /// Whether both chambers have been vented for long enough to compare forces with
-    /// what was learnt: a quarter of the time after which they are known.
+    /// what was learnt: for certain for a sixteenth of the time after which they are known,
+    /// which takes pulses of several times as much in all.
     #[inline]
     pub(super) fn is_comparable(&self, model: &AirModel) -> bool {
-        self.a.vented.min(self.b.vented) >= model.known >> 2
+        self.a.vented.min(self.b.vented) >= model.known >> 4
     }
 
     /// Whether the chamber that opposes is known to have been emptied.
@@ -314,8 +372,12 @@ mod tests {
 
     const MIDDLE: PositionMm = PositionMm::from_int(90);
 
+    fn of(data: &AxisData) -> AirModel {
+        AirModel::new(&AxisModel::new(data, JOINT_TICK).unwrap(), data.valve_on)
+    }
+
     fn model() -> AirModel {
-        AirModel::new(&AxisModel::new(&AxisData::default(), JOINT_TICK).unwrap())
+        of(&AxisData::default())
     }
 
     /// Absolute pressures in bar after so many ticks with these on-times.
@@ -325,10 +387,10 @@ mod tests {
         [air.a.p, air.b.p] = start.map(raw);
         // A round more, in which each chamber takes in what it has not yet.
         for _ in 0..ticks {
-            air.follow(&on, MIDDLE, model);
+            air.follow(&on, MIDDLE, model, false);
         }
         for _ in 0..ROUND {
-            air.follow(&[0; 4], MIDDLE, model);
+            air.follow(&[0; 4], MIDDLE, model, false);
         }
         [air.a.p, air.b.p].map(|p| f64::from(p) / f64::from(SUPPLY) * 7.01325)
     }
@@ -364,7 +426,7 @@ mod tests {
         let (a, b) = (f64::from(air.a.p), f64::from(air.b.p));
         for step in 0..=600 {
             let at = PositionMm::from_raw((90 << 16) + step * 6554);
-            air.follow(&[0; 4], at, &model);
+            air.follow(&[0; 4], at, &model, false);
         }
         let length = |lead: f64, stroke: f64| lead + stroke;
         let [lead_a, lead_b] = [model.a.lead, model.b.lead].map(|lead| f64::from(lead) / 256.0);
@@ -375,8 +437,13 @@ mod tests {
         assert!((f64::from(air.b.p) / b / rises - 1.0).abs() < 0.02);
         // A new calibration moves no air, and noise none either.
         let before = air;
-        air.follow(&[0; 4], MIDDLE, &model);
-        air.follow(&[0; 4], PositionMm::from_raw((90 << 16) + 5000), &model);
+        air.follow(&[0; 4], MIDDLE, &model, false);
+        air.follow(
+            &[0; 4],
+            PositionMm::from_raw((90 << 16) + 5000),
+            &model,
+            false,
+        );
         assert_eq!((air.a.p, air.b.p), (before.a.p, before.b.p));
     }
 
@@ -396,29 +463,60 @@ mod tests {
     }
 
     #[test]
-    fn what_has_been_vented_is_known() {
+    fn what_has_been_vented_for_certain_is_known() {
         let model = model();
         let mut air = Air::unknown(&model, MIDDLE);
-        // 18/16 of 1.03 s.
-        let mut vent = |ticks, on| {
-            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model));
+        let vent = |air: &mut Air, ticks, on| {
+            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model, false));
         };
-        vent(280, [0, 1000, 1000, 0]);
-        vent(280, [1000, 0, 0, 1000]);
+        // A sixteenth of 18/16 of 1.03 s is 73 ms, and both need it.
+        vent(&mut air, 300, [0, 1000, 1000, 0]);
+        vent(&mut air, 72, [1000, 0, 0, 1000]);
         assert!(!air.is_comparable(&model));
-        let mut vent = |ticks, on| {
-            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model));
-        };
-        vent(30, [0, 1000, 1000, 0]);
-        vent(30, [1000, 0, 0, 1000]);
+        // Pulses of 6 ms may not open the valve, however many.
+        for _ in 0..100 {
+            vent(&mut air, 6, [1000, 0, 0, 1000]);
+            vent(&mut air, 14, [0; 4]);
+        }
+        assert!(!air.is_comparable(&model));
+        vent(&mut air, 21, [1000, 0, 0, 1000]);
         assert!(air.is_comparable(&model) && !air.is_known(true, &model));
-        let mut vent = |ticks, on| {
-            (0..ticks).for_each(|_| _ = air.follow(&on, MIDDLE, &model));
-        };
-        vent(920, [1000, 0, 0, 1000]);
+        vent(&mut air, 1050, [1000, 0, 0, 1000]);
+        assert!(!air.is_known(true, &model));
+        vent(&mut air, 60, [1000, 0, 0, 1000]);
         assert!(air.is_known(true, &model) && !air.is_known(false, &model));
         air.forget();
         assert!(!air.is_comparable(&model) && !air.is_known(true, &model));
+    }
+
+    /// Valves told to open in 3.5 ms may take 7 ms.
+    #[test]
+    fn of_a_pulse_that_may_open_nothing_nothing_is_certain() {
+        let model = model();
+        // Pressure that a pulse every 20 ms brings into A in 0.2 s, bar.
+        let gain = |pulse: u32, begin: u32, certain: bool| {
+            let mut air = Air::unknown(&model, MIDDLE);
+            let before = air.a.p;
+            for tick in 0..203 + begin {
+                let phase = (tick + 20 - begin) % 20;
+                let on = if tick >= begin && tick < 200 + begin && phase < pulse {
+                    [1000, 0, 0, 0]
+                } else {
+                    [0; 4]
+                };
+                air.follow(&on, MIDDLE, &model, certain);
+            }
+            f64::from(air.a.p - before) / f64::from(SUPPLY) * 7.01325
+        };
+        // Whenever in a round it begins.
+        for begin in 0..3 {
+            assert_eq!(gain(6, begin, true).to_bits(), 0.0_f64.to_bits(), "{begin}");
+            let whole = gain(18, begin, false);
+            assert!((gain(6, begin, false) * 3.0 / whole - 1.0).abs() < 0.15);
+            // Of 18 ms 9 to 12 are left.
+            let sure = gain(18, begin, true) / whole;
+            assert!((0.45..0.72).contains(&sure), "{begin} {sure}");
+        }
     }
 
     #[test]
@@ -431,7 +529,7 @@ mod tests {
                 supply: PositionMm::from_int(1700),
                 ..AxisData::default()
             };
-            let model = AirModel::new(&AxisModel::new(&data, JOINT_TICK).unwrap());
+            let model = of(&data);
             let mut air = Air::unknown(&model, MIDDLE);
             for tick in 0..4000_u32 {
                 let on = if tick % 1000 < 500 {
@@ -440,7 +538,7 @@ mod tests {
                     [0, 1000, 1000, 0]
                 };
                 let at = PositionMm::from_raw((90 << 16) + (tick % 2) as i32 * STEP);
-                air.follow(&on, at, &model);
+                air.follow(&on, at, &model, false);
                 let bounds = (model.ambient >> 1)..=MOST;
                 assert!(bounds.contains(&air.a.p) && bounds.contains(&air.b.p));
             }

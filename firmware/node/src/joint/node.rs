@@ -2,7 +2,7 @@
 
 use core::hash::Hash;
 
-use super::expectation::MotionWatch;
+use super::expectation::{MotionAccount, MotionWatch};
 use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
@@ -262,6 +262,18 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// doubt takes to it; zero if there is none.
     pub const fn motion_overdue(&self) -> Micros {
         self.state.motion.overdue()
+    }
+
+    /// What the watch of motion makes of the axis. The firmware sends none of it: it is for
+    /// tests and tools around the node.
+    pub fn motion_account(&self) -> MotionAccount {
+        let TickState {
+            reference,
+            measured,
+            motion,
+            ..
+        } = &self.state;
+        motion.account(*reference, *measured, &self.settings.motion)
     }
 
     /// Present mode.
