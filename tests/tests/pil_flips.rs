@@ -45,9 +45,10 @@ struct Subject {
     reset: usize,
     /// Flips in the suite.
     flips: u64,
-    /// One flip in so many at least strikes sealed state and holds it; the rest of the
-    /// application is buffers, counters and its memory of answers.
-    sealed: u64,
+    /// Share of the flips that strike sealed state which holds the board within two ticks, as
+    /// `cargo xtask deep state-flips` has measured it; the rest of the bytes is copied, waits,
+    /// or is sealed in parts.
+    sealed: f64,
 }
 
 /// A joint that goes from one set-point to another, ticks of 1 ms.
@@ -61,7 +62,7 @@ const JOINT: Subject = Subject {
     cycle: 10,
     reset: 60,
     flips: 200,
-    sealed: 4,
+    sealed: 0.24,
 };
 
 /// A wheel that follows a moving set-point, samples of 520 µs.
@@ -75,7 +76,7 @@ const WHEEL: Subject = Subject {
     cycle: 20,
     reset: 120,
     flips: 80,
-    sealed: 10,
+    sealed: 0.11,
 };
 
 /// The second wheel: it has no dump valve, which acts at once.
@@ -408,7 +409,14 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
         count(Came::FrameLost),
         changed.len()
     );
-    assert!(held > flips / subject.sealed, "{held} of {flips} held");
+    // Within three standard deviations of so many draws: the flips do strike what is sealed.
+    let (draws, share) = (flips as f64, subject.sealed);
+    let spread = 3.0 * (draws * share * (1.0 - share)).sqrt();
+    assert!(
+        (held as f64 - draws * share).abs() < spread,
+        "{held} of {flips} held, expected are {:.0} within {spread:.0}",
+        draws * share
+    );
     assert_eq!(changed, [], "neither found nor without effect");
 }
 
