@@ -1,7 +1,6 @@
 //! The firmware images on emulated STM32G431 boards: emulator, images, the
 //! tests, and the figures of the three-step run.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,38 +12,27 @@ use serde_json::{Value, json};
 use crate::firmware;
 use crate::machine::Machine;
 use crate::no_std::{self, Way, set_up};
-use crate::process::{cargo, command, output, root, run, target_dir};
+use crate::process::{cargo, output, run, target_dir};
 use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
 use crate::sizes;
 use crate::tools::{apt_install, have, may_apt};
 
+mod further;
 mod load;
 mod profile;
+mod runs;
+mod speed;
+
+pub(crate) use runs::{ensure_equal, three_steps};
+
+use further::{eventful, mixed, predictive};
+use runs::{most, put_most};
+use speed::{SPEED_LEAST, speed_verdict, watched};
 
 const PACKAGE: &str = "wheeleg-pil-unicorn";
 /// What building the Unicorn engine takes, as Debian packages.
 const PACKAGES: [&str; 3] = ["cmake", "pkg-config", "libclang-dev"];
-/// Least speed of eight boards with the plant, times real time, on 2 cores.
-const SPEED_LEAST: f64 = 2.0;
-/// Cores that others may use in a run that has to meet it: what a system does by itself.
-const OTHERS_MOST: f64 = 0.15;
-
-/// Runs in which boards latch faults, with what strikes them: the master falls silent, a
-/// wheel runs against its drive, a valve does not open, the emergency stop.
-const EVENTFUL: [(&str, &[&str]); 3] = [
-    ("master-lost", &[]),
-    ("estop", &["--fault", "encoder-reversed:wheel8@5s"]),
-    ("estop", &["--fault", "valve-stuck-shut:joint3.fill-a@1s"]),
-];
-/// What is measured of each board.
-const MEASURED: [&str; 5] = [
-    "tick_instructions_median",
-    "tick_instructions_worst",
-    "longest_awake_instructions",
-    "stack_used_bytes",
-    "stack_size_bytes",
-];
 
 /// Arguments of `cargo xtask pil`.
 #[derive(Args, Debug, Default)]
@@ -256,110 +244,6 @@ fn ensure_file(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Runs the paper's test with all nodes of one kind; gives its summary.
-pub(crate) fn three_steps(
-    nodes: &str,
-    folder: &str,
-    environment: &[(&str, &Path)],
-    further: &[&str],
-) -> anyhow::Result<Value> {
-    let nodes = ["--nodes", nodes];
-    run_nodes(
-        Path::new("three-step"),
-        &nodes,
-        folder,
-        environment,
-        further,
-    )
-}
-
-/// Builds the program.
-fn build_wheeleg() -> anyhow::Result<()> {
-    run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))
-}
-
-/// Builds the program and runs a scenario with it; gives its summary. `nodes` says which
-/// node runs where.
-fn run_nodes(
-    scenario: &Path,
-    nodes: &[&str],
-    folder: &str,
-    environment: &[(&str, &Path)],
-    further: &[&str],
-) -> anyhow::Result<Value> {
-    build_wheeleg()?;
-    let mut wheeleg = command(target_dir().join("release").join("wheeleg"));
-    wheeleg
-        .arg("run")
-        .arg(scenario)
-        .args(nodes)
-        .args(["--json", "--out"])
-        .arg(target_dir().join(folder))
-        .args(further);
-    for (name, value) in environment {
-        wheeleg.env(name, value);
-    }
-    serde_json::from_str(&output(&mut wheeleg)?).context("the summary of the run")
-}
-
-/// Boards were compared with the host, and no bit differed.
-pub(crate) fn ensure_equal(pil: &Value) -> anyhow::Result<()> {
-    let (compared, differ) = (&pil["compared_bits"], &pil["differing_bits"]);
-    ensure!(
-        *differ == 0 && compared.as_u64() > Some(1_000_000),
-        "{compared} bits compared, {differ} differ: {}",
-        pil["first_difference"]
-    );
-    Ok(())
-}
-
-/// One run: times real time, and cores that others used meanwhile, if that is known.
-type Speed = (f64, Option<f64>);
-
-/// Whether nobody else was at work in a run.
-fn was_alone((_, others): Speed) -> bool {
-    others.is_some_and(|cores| cores <= OTHERS_MOST)
-}
-
-/// The speeds against the target. A run that was alone on the machine must meet it. One
-/// that was not says nothing about us, and is not shown as met, either.
-///
-/// # Errors
-/// The same line, if the target is missed.
-fn speed_verdict(runs: [Speed; 2]) -> Result<String, String> {
-    let each = runs.map(|(factor, others)| {
-        let others = others.map_or("unknown".to_owned(), |cores| format!("{cores:.2} cores"));
-        format!("{factor:.2} (others used {others})")
-    });
-    let missed = |run: &Speed| run.0 < SPEED_LEAST;
-    let verdict = if runs.iter().any(|run| missed(run) && was_alone(*run)) {
-        "MISSED"
-    } else if runs.iter().any(missed) {
-        "NOT JUDGED: run it again while nobody else is at work"
-    } else {
-        "met"
-    };
-    let line = format!(
-        "speed: {} times real time, target at least {SPEED_LEAST:.1} where others use at most \
-         {OTHERS_MOST:.2} cores: {verdict}",
-        each.join(" and ")
-    );
-    if verdict == "MISSED" {
-        Err(line)
-    } else {
-        Ok(line)
-    }
-}
-
-/// Three steps on emulated boards, and the cores that others used meanwhile. Only the run
-/// itself is watched: what is built for it stands before.
-fn watched(folder: &str, environment: &[(&str, &Path)]) -> anyhow::Result<(Value, Option<f64>)> {
-    build_wheeleg()?;
-    let meter = load::Meter::begin();
-    let summary = three_steps("pil", folder, environment, &[])?;
-    Ok((summary, meter.and_then(|meter| meter.others())))
-}
-
 /// Runs the paper's test twice on eight emulated boards: no bit may differ from
 /// the host, nor between the runs.
 fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
@@ -409,168 +293,6 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     Ok(json!({ "pil": figures }))
 }
 
-/// Runs with faults: no bit may differ from the host, and the worst ticks have the budgets
-/// of the others.
-fn eventful(emulator: &Path, images: &Path) -> StepResult<Value> {
-    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
-    let mut runs = Vec::new();
-    for (number, (scenario, faults)) in EVENTFUL.into_iter().enumerate() {
-        let folder = format!("pil-run/eventful-{number}");
-        let further = [&["--compare-sil"], faults].concat();
-        let mut run = run_nodes(
-            Path::new(scenario),
-            &["--nodes", "pil"],
-            &folder,
-            &environment,
-            &further,
-        )?;
-        ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
-        runs.push(run["pil"].take());
-    }
-    let mut figures = json!({});
-    put_most(&mut figures, &runs.iter().collect::<Vec<_>>());
-    let within_budget = sizes::check_run(images, &mut figures);
-    println!("    {figures}");
-    within_budget?;
-    Ok(figures)
-}
-
-/// Puts the largest figures of each image in these runs.
-fn put_most(figures: &mut Value, runs: &[&Value]) {
-    for image in ["joint", "wheel"] {
-        for key in MEASURED {
-            let each = runs.iter().map(|pil| most(pil, key, image));
-            figures[image][key] = json!(each.max().unwrap_or(0));
-        }
-    }
-}
-
-/// Largest figure of the boards with this image.
-fn most(pil: &Value, key: &str, image: &str) -> u64 {
-    let boards = pil["boards"].as_array().into_iter().flatten();
-    let boards = boards.filter(|board| board["image"] == image);
-    let figures = boards.filter_map(|board| board[key].as_u64());
-    figures.max().unwrap_or(0)
-}
-
-/// A copy of a file of the simulator's in `folder`, with one text replaced.
-fn changed(folder: &Path, from: &str, to: &str, old: &str, new: &str) -> anyhow::Result<PathBuf> {
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let path = root().join("host-sim").join(from);
-    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-    ensure!(text.matches(old).count() == 1, "{from} has no `{old}`");
-    let path = folder.join(to);
-    fs::write(&path, text.replace(old, new)).with_context(|| path.display().to_string())?;
-    Ok(path)
-}
-
-/// A copy of the paper's test in which the joints have the predictive law.
-fn predictive_scenario() -> anyhow::Result<PathBuf> {
-    let folder = target_dir().join("pil-run").join("predictive");
-    let law = r#"law = { value = 5, unit = "1", source = "ASSUMED: this run's" }"#;
-    changed(
-        &folder,
-        "robots/wheeleg-2003.toml",
-        "robot.toml",
-        "[node.joint]\n",
-        &format!("[node.joint]\n{law}\n"),
-    )?;
-    changed(
-        &folder,
-        "scenarios/three-step.toml",
-        "three-step.toml",
-        r#"robot = "wheeleg-2003""#,
-        r#"robot = "robot.toml""#,
-    )
-}
-
-/// The paper's test with the predictive law: no bit may differ from the host, and the
-/// worst tick has a budget of its own.
-fn predictive(emulator: &Path, images: &Path) -> StepResult {
-    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
-    let summary = run_nodes(
-        &predictive_scenario()?,
-        &["--nodes", "pil"],
-        "pil-run/predictive/out",
-        &environment,
-        &["--compare-sil"],
-    )?;
-    let pil = &summary["pil"];
-    let tick = |key| most(pil, key, "joint");
-    let worst = tick("tick_instructions_worst");
-    println!(
-        "    joint tick with the predictive law: {} instructions in the median, {worst} at worst",
-        tick("tick_instructions_median")
-    );
-    ensure_equal(pil)?;
-    sizes::check_predictive(worst)
-}
-
-/// Which nodes of a mixed run are outside, and where.
-const MIXED: [&str; 10] = [
-    "--node",
-    "joint1=qemu",
-    "--node",
-    "joint2=pil",
-    "--node",
-    "joint6=pil",
-    "--node",
-    "wheel7=pil",
-    "--node",
-    "wheel8=qemu",
-];
-
-/// Part of the paper's test with boards of three kinds on one bus: in the simulator, as
-/// images on the emulated part, and on QEMU. No bit may differ from the host, and the log
-/// must be that of the native run.
-fn mixed(emulator: &Path, images: &Path) -> StepResult {
-    qemu::emulator()?;
-    let folder = target_dir().join("pil-run").join("mixed");
-    let both = folder.join("images");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&both).with_context(|| both.display().to_string())?;
-    // The program looks for all images in one folder.
-    let on_qemu = qemu::images()?;
-    let wanted = [(images, "joint.elf"), (images, "wheel.elf")]
-        .into_iter()
-        .chain([(&*on_qemu, "qemu-joint"), (&*on_qemu, "qemu-wheel")]);
-    for (from, name) in wanted {
-        fs::copy(from.join(name), both.join(name)).with_context(|| name.to_owned())?;
-    }
-    // Start-up and the first step.
-    let scenario = changed(
-        &folder,
-        "scenarios/three-step.toml",
-        "first-step.toml",
-        "duration = { value = 10.0,",
-        "duration = { value = 3.5,",
-    )?;
-    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", &both)];
-    let further = ["--compare-sil"];
-    let summary = run_nodes(
-        &scenario,
-        &MIXED,
-        "pil-run/mixed/out",
-        &environment,
-        &further,
-    )?;
-    let pil = &summary["pil"];
-    let kinds = pil["nodes"].as_array().into_iter().flatten();
-    let kinds: BTreeSet<&str> = kinds.filter_map(Value::as_str).collect();
-    ensure_three_kinds(&kinds)?;
-    println!(
-        "    {} bits compared, {} differ; the log is that of the native run",
-        pil["compared_bits"], pil["differing_bits"]
-    );
-    Ok(ensure_equal(pil)?)
-}
-
-fn ensure_three_kinds(kinds: &BTreeSet<&str>) -> anyhow::Result<()> {
-    let all = BTreeSet::from(["pil", "qemu", "sil"]);
-    ensure!(*kinds == all, "boards of {kinds:?}, not {all:?}");
-    Ok(())
-}
-
 /// Runs the paper's test on emulated boards and prints the profiles of their worst ticks.
 fn profile(emulator: &Path, images: &Path) -> StepResult {
     let folder = target_dir().join("pil-run").join("profile");
@@ -584,30 +306,4 @@ fn profile(emulator: &Path, images: &Path) -> StepResult {
     three_steps("pil", "pil-run/profiled", &environment, &[])?;
     profile::print(&folder, images)?;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_run_alone_must_be_fast_and_a_disturbed_one_is_never_shown_as_met() {
-        let alone = |factor| (factor, Some(0.05));
-        let disturbed = |factor| (factor, Some(0.8));
-        let said = |runs| match speed_verdict(runs) {
-            Ok(line) | Err(line) => line,
-        };
-        assert!(said([alone(2.0), disturbed(3.0)]).ends_with(": met"));
-        for runs in [[alone(2.5), alone(1.98)], [alone(1.2), disturbed(3.0)]] {
-            let line = speed_verdict(runs).expect_err("too slow");
-            assert!(line.ends_with("MISSED"), "{line}");
-        }
-        for slow in [disturbed(1.2), (1.2, None)] {
-            let line = speed_verdict([alone(2.5), slow]).expect("nobody's fault");
-            assert!(
-                line.contains("NOT JUDGED") && line.contains("2.50"),
-                "{line}"
-            );
-        }
-    }
 }

@@ -1,0 +1,167 @@
+//! Runs beside the three-step test: with faults, with the predictive law, with boards of
+//! three kinds.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use serde_json::{Value, json};
+
+use super::runs::{ensure_equal, most, put_most, run_nodes};
+use crate::process::{root, target_dir};
+use crate::qemu;
+use crate::report::StepResult;
+use crate::sizes;
+
+/// Runs in which boards latch faults, with what strikes them: the master falls silent, a
+/// wheel runs against its drive, a valve does not open, the emergency stop.
+const EVENTFUL: [(&str, &[&str]); 3] = [
+    ("master-lost", &[]),
+    ("estop", &["--fault", "encoder-reversed:wheel8@5s"]),
+    ("estop", &["--fault", "valve-stuck-shut:joint3.fill-a@1s"]),
+];
+
+/// Runs with faults: no bit may differ from the host, and the worst ticks have the budgets
+/// of the others.
+pub(super) fn eventful(emulator: &Path, images: &Path) -> StepResult<Value> {
+    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
+    let mut runs = Vec::new();
+    for (number, (scenario, faults)) in EVENTFUL.into_iter().enumerate() {
+        let folder = format!("pil-run/eventful-{number}");
+        let further = [&["--compare-sil"], faults].concat();
+        let mut run = run_nodes(
+            Path::new(scenario),
+            &["--nodes", "pil"],
+            &folder,
+            &environment,
+            &further,
+        )?;
+        ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
+        runs.push(run["pil"].take());
+    }
+    let mut figures = json!({});
+    put_most(&mut figures, &runs.iter().collect::<Vec<_>>());
+    let within_budget = sizes::check_run(images, &mut figures);
+    println!("    {figures}");
+    within_budget?;
+    Ok(figures)
+}
+
+/// A copy of a file of the simulator's in `folder`, with one text replaced.
+fn changed(folder: &Path, from: &str, to: &str, old: &str, new: &str) -> anyhow::Result<PathBuf> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let path = root().join("host-sim").join(from);
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    ensure!(text.matches(old).count() == 1, "{from} has no `{old}`");
+    let path = folder.join(to);
+    fs::write(&path, text.replace(old, new)).with_context(|| path.display().to_string())?;
+    Ok(path)
+}
+
+/// A copy of the paper's test in which the joints have the predictive law.
+fn predictive_scenario() -> anyhow::Result<PathBuf> {
+    let folder = target_dir().join("pil-run").join("predictive");
+    let law = r#"law = { value = 5, unit = "1", source = "ASSUMED: this run's" }"#;
+    changed(
+        &folder,
+        "robots/wheeleg-2003.toml",
+        "robot.toml",
+        "[node.joint]\n",
+        &format!("[node.joint]\n{law}\n"),
+    )?;
+    changed(
+        &folder,
+        "scenarios/three-step.toml",
+        "three-step.toml",
+        r#"robot = "wheeleg-2003""#,
+        r#"robot = "robot.toml""#,
+    )
+}
+
+/// The paper's test with the predictive law: no bit may differ from the host, and the
+/// worst tick has a budget of its own.
+pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult {
+    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
+    let summary = run_nodes(
+        &predictive_scenario()?,
+        &["--nodes", "pil"],
+        "pil-run/predictive/out",
+        &environment,
+        &["--compare-sil"],
+    )?;
+    let pil = &summary["pil"];
+    let tick = |key| most(pil, key, "joint");
+    let worst = tick("tick_instructions_worst");
+    println!(
+        "    joint tick with the predictive law: {} instructions in the median, {worst} at worst",
+        tick("tick_instructions_median")
+    );
+    ensure_equal(pil)?;
+    sizes::check_predictive(worst)
+}
+
+/// Which nodes of a mixed run are outside, and where.
+const MIXED: [&str; 10] = [
+    "--node",
+    "joint1=qemu",
+    "--node",
+    "joint2=pil",
+    "--node",
+    "joint6=pil",
+    "--node",
+    "wheel7=pil",
+    "--node",
+    "wheel8=qemu",
+];
+
+/// Part of the paper's test with boards of three kinds on one bus: in the simulator, as
+/// images on the emulated part, and on QEMU. No bit may differ from the host, and the log
+/// must be that of the native run.
+pub(super) fn mixed(emulator: &Path, images: &Path) -> StepResult {
+    qemu::emulator()?;
+    let folder = target_dir().join("pil-run").join("mixed");
+    let both = folder.join("images");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&both).with_context(|| both.display().to_string())?;
+    // The program looks for all images in one folder.
+    let on_qemu = qemu::images()?;
+    let wanted = [(images, "joint.elf"), (images, "wheel.elf")]
+        .into_iter()
+        .chain([(&*on_qemu, "qemu-joint"), (&*on_qemu, "qemu-wheel")]);
+    for (from, name) in wanted {
+        fs::copy(from.join(name), both.join(name)).with_context(|| name.to_owned())?;
+    }
+    // Start-up and the first step.
+    let scenario = changed(
+        &folder,
+        "scenarios/three-step.toml",
+        "first-step.toml",
+        "duration = { value = 10.0,",
+        "duration = { value = 3.5,",
+    )?;
+    let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", &both)];
+    let further = ["--compare-sil"];
+    let summary = run_nodes(
+        &scenario,
+        &MIXED,
+        "pil-run/mixed/out",
+        &environment,
+        &further,
+    )?;
+    let pil = &summary["pil"];
+    let kinds = pil["nodes"].as_array().into_iter().flatten();
+    let kinds: BTreeSet<&str> = kinds.filter_map(Value::as_str).collect();
+    ensure_three_kinds(&kinds)?;
+    println!(
+        "    {} bits compared, {} differ; the log is that of the native run",
+        pil["compared_bits"], pil["differing_bits"]
+    );
+    Ok(ensure_equal(pil)?)
+}
+
+fn ensure_three_kinds(kinds: &BTreeSet<&str>) -> anyhow::Result<()> {
+    let all = BTreeSet::from(["pil", "qemu", "sil"]);
+    ensure!(*kinds == all, "boards of {kinds:?}, not {all:?}");
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! How fast eight emulated boards run, against the target.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::load;
+use super::runs::{build_wheeleg, three_steps};
+
+/// Least speed of eight boards with the plant, times real time, on 2 cores.
+pub(super) const SPEED_LEAST: f64 = 2.0;
+
+/// Cores that others may use in a run that has to meet it: what a system does by itself.
+const OTHERS_MOST: f64 = 0.15;
+
+/// One run: times real time, and cores that others used meanwhile, if that is known.
+pub(super) type Speed = (f64, Option<f64>);
+
+/// Whether nobody else was at work in a run.
+fn was_alone((_, others): Speed) -> bool {
+    others.is_some_and(|cores| cores <= OTHERS_MOST)
+}
+
+/// The speeds against the target. A run that was alone on the machine must meet it. One
+/// that was not says nothing about us, and is not shown as met, either.
+///
+/// # Errors
+/// The same line, if the target is missed.
+pub(super) fn speed_verdict(runs: [Speed; 2]) -> Result<String, String> {
+    let each = runs.map(|(factor, others)| {
+        let others = others.map_or("unknown".to_owned(), |cores| format!("{cores:.2} cores"));
+        format!("{factor:.2} (others used {others})")
+    });
+    let missed = |run: &Speed| run.0 < SPEED_LEAST;
+    let verdict = if runs.iter().any(|run| missed(run) && was_alone(*run)) {
+        "MISSED"
+    } else if runs.iter().any(missed) {
+        "NOT JUDGED: run it again while nobody else is at work"
+    } else {
+        "met"
+    };
+    let line = format!(
+        "speed: {} times real time, target at least {SPEED_LEAST:.1} where others use at most \
+         {OTHERS_MOST:.2} cores: {verdict}",
+        each.join(" and ")
+    );
+    if verdict == "MISSED" {
+        Err(line)
+    } else {
+        Ok(line)
+    }
+}
+
+/// Three steps on emulated boards, and the cores that others used meanwhile. Only the run
+/// itself is watched: what is built for it stands before.
+pub(super) fn watched(
+    folder: &str,
+    environment: &[(&str, &Path)],
+) -> anyhow::Result<(Value, Option<f64>)> {
+    build_wheeleg()?;
+    let meter = load::Meter::begin();
+    let summary = three_steps("pil", folder, environment, &[])?;
+    Ok((summary, meter.and_then(|meter| meter.others())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_alone_must_be_fast_and_a_disturbed_one_is_never_shown_as_met() {
+        let alone = |factor| (factor, Some(0.05));
+        let disturbed = |factor| (factor, Some(0.8));
+        let said = |runs| match speed_verdict(runs) {
+            Ok(line) | Err(line) => line,
+        };
+        assert!(said([alone(2.0), disturbed(3.0)]).ends_with(": met"));
+        for runs in [[alone(2.5), alone(1.98)], [alone(1.2), disturbed(3.0)]] {
+            let line = speed_verdict(runs).expect_err("too slow");
+            assert!(line.ends_with("MISSED"), "{line}");
+        }
+        for slow in [disturbed(1.2), (1.2, None)] {
+            let line = speed_verdict([alone(2.5), slow]).expect("nobody's fault");
+            assert!(
+                line.contains("NOT JUDGED") && line.contains("2.50"),
+                "{line}"
+            );
+        }
+    }
+}
