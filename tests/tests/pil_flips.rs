@@ -75,7 +75,7 @@ const WHEEL: Subject = Subject {
     period_ns: SAMPLE_NS,
     cycle: 20,
     reset: 120,
-    flips: 80,
+    flips: 320,
     sealed: 0.11,
 };
 
@@ -409,12 +409,13 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
         count(Came::FrameLost),
         changed.len()
     );
-    // Within three standard deviations of so many draws: the flips do strike what is sealed.
+    // At most three standard deviations of so many draws below: the flips do strike what is
+    // sealed.
     let (draws, share) = (flips as f64, subject.sealed);
     let spread = 3.0 * (draws * share * (1.0 - share)).sqrt();
     assert!(
-        (held as f64 - draws * share).abs() < spread,
-        "{held} of {flips} held, expected are {:.0} within {spread:.0}",
+        held as f64 > draws * share - spread,
+        "{held} of {flips} held, expected are {:.0}, less {spread:.0} at most",
         draws * share
     );
     assert_eq!(changed, [], "neither found nor without effect");

@@ -15,19 +15,42 @@ use crate::report::StepResult;
 use crate::sizes;
 
 /// Runs in which boards latch faults, with what strikes them: the master falls silent, a
-/// wheel runs against its drive, a valve does not open, the emergency stop.
-const EVENTFUL: [(&str, &[&str]); 3] = [
-    ("master-lost", &[]),
-    ("estop", &["--fault", "encoder-reversed:wheel8@5s"]),
-    ("estop", &["--fault", "valve-stuck-shut:joint3.fill-a@1s"]),
+/// wheel runs against its drive, a valve does not open, the emergency stop; and the faults
+/// that must come of it.
+const EVENTFUL: [(&str, &[&str], &[u8]); 3] = [
+    ("master-lost", &[], &[NO_SYNC]),
+    (
+        "estop",
+        &["--fault", "encoder-reversed:wheel8@5s"],
+        &[ENCODER, EMERGENCY_STOP],
+    ),
+    (
+        "estop",
+        &["--fault", "valve-stuck-shut:joint3.fill-a@1s"],
+        &[NO_MOTION, EMERGENCY_STOP],
+    ),
 ];
+/// Codes of faults, as boards report them.
+const NO_SYNC: u8 = 1;
+const EMERGENCY_STOP: u8 = 39;
+const ENCODER: u8 = 41;
+const NO_MOTION: u8 = 44;
+
+/// A run in which nothing happens says nothing about the ticks in which something does.
+fn ensure_told(messages: &str, code: u8) -> anyhow::Result<()> {
+    ensure!(
+        messages.contains(&format!("({code})")),
+        "no board has reported fault {code}"
+    );
+    Ok(())
+}
 
 /// Runs with faults: no bit may differ from the host, and the worst ticks have the budgets
 /// of the others.
 pub(super) fn eventful(emulator: &Path, images: &Path) -> StepResult<Value> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let mut runs = Vec::new();
-    for (number, (scenario, faults)) in EVENTFUL.into_iter().enumerate() {
+    for (number, (scenario, faults, codes)) in EVENTFUL.into_iter().enumerate() {
         let folder = format!("pil-run/eventful-{number}");
         let further = [&["--compare-sil"], faults].concat();
         let mut run = run_nodes(
@@ -38,6 +61,10 @@ pub(super) fn eventful(emulator: &Path, images: &Path) -> StepResult<Value> {
             &further,
         )?;
         ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
+        let told = run["messages"].to_string();
+        for code in codes {
+            ensure_told(&told, *code).with_context(|| format!("{scenario} {faults:?}"))?;
+        }
         runs.push(run["pil"].take());
     }
     let mut figures = json!({});

@@ -39,8 +39,9 @@ impl ValveTimes {
 }
 
 /// One valve as followed from its coil. Times are moments of a clock in µs that wraps
-/// after 71 minutes: a valve that has been shut for just that long begins its next pulse
-/// late, by the shortest gap at most.
+/// after 71 minutes: a valve that has been shut for just that long (35 minutes from its
+/// start) begins its next pulse late, by the shortest gap at most; one energised for just that
+/// long stays so for the shortest pulse.
 #[derive(Clone, Copy, Debug)]
 pub struct ValveTrack {
     coil: bool,
