@@ -1,10 +1,14 @@
-//! Hands the linker its script and the memory map in the workspace's root.
+//! Hands the linker its script and the memory map in the workspace's root, and the images
+//! the digest of what they are made of.
 
 use std::path::PathBuf;
 use std::{env, fs};
 
+use wheeleg_identity::sources::{self, Images};
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let map = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../../memory.x");
+    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../..");
+    let map = root.join("memory.x");
     println!("cargo:rerun-if-changed={}", map.display());
     if env::var("CARGO_CFG_TARGET_OS")? == "none" && env::var_os("CARGO_FEATURE_G431").is_some() {
         let out = PathBuf::from(env::var("OUT_DIR")?);
@@ -13,6 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("cargo:rustc-link-arg-bins=-Tlink.x");
         // No page alignment of sections: the image is written to flash, not loaded.
         println!("cargo:rustc-link-arg-bins=--nmagic");
+        sources::emit(&root, Images::G431, "sources")?;
     }
     Ok(())
 }

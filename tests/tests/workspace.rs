@@ -10,7 +10,8 @@ use serde_json::Value;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 18] = [
+const ARROWS: [(&str, &[&str]); 19] = [
+    ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
     ("wheeleg-control", &["wheeleg-units"]),
@@ -35,15 +36,26 @@ const ARROWS: [(&str, &[&str]); 18] = [
     (
         "wheeleg-board",
         &[
+            "wheeleg-identity",
             "wheeleg-node",
+            "wheeleg-pil-link",
             "wheeleg-protocol",
             "wheeleg-remote",
             "wheeleg-units",
         ],
     ),
-    ("wheeleg-board-qemu", &["wheeleg-remote", "wheeleg-units"]),
+    (
+        "wheeleg-board-qemu",
+        &[
+            "wheeleg-identity",
+            "wheeleg-pil-link",
+            "wheeleg-protocol",
+            "wheeleg-remote",
+            "wheeleg-units",
+        ],
+    ),
     ("wheeleg-plant", &["wheeleg-kinematics"]),
-    ("wheeleg-pil-link", &[]),
+    ("wheeleg-pil-link", &["wheeleg-identity"]),
     // GPL-2.0-only: nothing may depend on it (no line here names it).
     ("wheeleg-pil-unicorn", &["wheeleg-pil-link"]),
     ("wheeleg-sim", &LIBRARIES),
@@ -74,8 +86,9 @@ const ARROWS: [(&str, &[&str]); 18] = [
     ("insn-plugin", &[]),
 ];
 
-const LIBRARIES: [&str; 8] = [
+const LIBRARIES: [&str; 9] = [
     "wheeleg-control",
+    "wheeleg-identity",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",

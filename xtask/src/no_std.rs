@@ -18,7 +18,8 @@ use crate::report::{Report, StepError, StepResult};
 use crate::tools::{apt_install, have, may_apt};
 
 /// The `no_std` crates.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 8] = [
+    "wheeleg-identity",
     "wheeleg-units",
     "wheeleg-control",
     "wheeleg-kinematics",

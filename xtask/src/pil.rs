@@ -177,6 +177,7 @@ fn tests(emulator: &Path, images: &Images) -> StepResult {
         "pil_faults",
         "pil_flips",
         "pil_hil",
+        "pil_images",
         "pil_store",
         "pil_mutants",
     ];

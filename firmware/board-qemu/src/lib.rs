@@ -36,6 +36,8 @@ pub mod stopwatch;
 pub mod uart;
 
 #[cfg(target_os = "none")]
+pub mod identity;
+#[cfg(target_os = "none")]
 mod image;
 #[cfg(target_os = "none")]
 pub use image::{run_on_semihosting, run_on_uart};

@@ -33,4 +33,5 @@ pub mod ring;
 mod same_core;
 pub mod straps;
 
+pub use wheeleg_identity::{Kind, Record};
 pub use wheeleg_node::store;

@@ -42,10 +42,12 @@
     )
 )]
 
-#[cfg(all(unix, feature = "wait"))]
+#[cfg(any(feature = "image", all(unix, feature = "wait")))]
 extern crate std;
 
 pub mod frame;
+#[cfg(feature = "image")]
+pub mod image;
 mod reply;
 mod request;
 #[cfg(all(unix, feature = "wait"))]

@@ -12,6 +12,8 @@ use std::path::Path;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
+use wheeleg_pil_link::image::{Kind, identify};
+
 use crate::image::Image;
 use crate::machine::blocks::Blocks;
 use crate::machine::{Machine, Stop, Until};
@@ -62,6 +64,11 @@ impl Line {
 /// A sentence: the image cannot be read, drives what it must not drive, or touches
 /// what is not modelled.
 pub(crate) fn serve(path: &Path) -> Result<(), String> {
+    let wanted = [Kind::JointHil, Kind::WheelHil];
+    identify(path, &wanted, None).map_err(|wrong| {
+        let build = wrong.build;
+        format!("{wrong}; build the images with: {build}")
+    })?;
     let image = Image::read(path)?;
     let cause = BROWN_OUT_RESET | PIN_RESET;
     let soc = Soc::new(vec![0xFF; STORE_SIZE], [0; 12], true, cause);

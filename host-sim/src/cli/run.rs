@@ -11,7 +11,7 @@ use super::{INTERRUPTED, TARGETS_MISSED, print};
 use crate::SimError;
 use crate::analysis::Target;
 use crate::faults::FaultSpec;
-use crate::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
+use crate::pil::{self, NodeChoice, NodeKind, Nodes, PilSummary};
 use crate::run::{self, Finished, Options};
 use crate::{output, telemetry};
 
@@ -44,7 +44,8 @@ pub(super) struct RunArgs {
     #[arg(long = "node", value_name = "NODE=KIND")]
     node: Vec<NodeChoice>,
     /// Run the scenario once more with all nodes in this program; exit with code
-    /// 2 unless both logs are the same to the bit.
+    /// 2 unless both logs are the same to the bit. Images of other firmware sources
+    /// than this program's are refused.
     #[arg(long)]
     compare_sil: bool,
     /// Print the summary as JSON on stdout.
@@ -87,6 +88,9 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
         faults: args.faults.clone(),
         nodes: Nodes::new(&args.nodes, &args.node)?,
     };
+    if args.compare_sil {
+        pil::ensure_same_sources(&options.nodes)?;
+    }
     let finished = run::run(&options)?;
     // A part of a run equals no whole one.
     if args.compare_sil && finished.summary.complete {

@@ -7,6 +7,7 @@
 
 use std::cmp::Reverse;
 use std::collections::VecDeque;
+use std::path::PathBuf;
 
 use wheeleg_pil_link::{
     Hello, Hook, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run,
@@ -17,11 +18,12 @@ use super::choice::{NODE_NAMES, NodeKind, Nodes};
 use super::compare::Comparison;
 use super::cores::Cores;
 use super::figures::{BoardFigures, PilSummary};
+use super::images::{self, Image};
 use super::line::Line;
 use super::partner::unexpected;
 use super::qemu::{Qemu, QemuOptions};
 use super::store;
-use super::unicorn::{self, Place};
+use super::unicorn::{Place, Unicorn};
 use crate::SimError;
 use crate::config::RobotConfig;
 use crate::hil::{self, HilOptions};
@@ -76,6 +78,18 @@ pub(crate) struct Outside {
 /// Of eight boards, those that run on the simulator's core: it has enough to do itself.
 const NEAR: usize = 4;
 
+/// The image of the board at `address`, among those that were found.
+fn image_of(images: &[Image], kind: &NodeKind, address: u8) -> Result<PathBuf, SimError> {
+    let wanted = images::kind(kind, address);
+    let found = images.iter().find(|image| Some(image.kind) == wanted);
+    found.map(|image| image.path.clone()).ok_or_else(|| {
+        SimError::simulation(
+            format!("there is no image for node {address} as {kind}"),
+            "",
+        )
+    })
+}
+
 impl Outside {
     /// Starts the boards that do not run here, and powers them up. `None` when
     /// all do.
@@ -96,17 +110,15 @@ impl Outside {
             told: false,
             cores: None,
         };
+        let images = images::find(nodes)?;
+        images.iter().for_each(Image::warn);
         // Before cores are chosen: a process inherits what its starter is bound to.
         for (address, kind) in (1..).zip(&nodes.0) {
             match kind {
                 NodeKind::Sil | NodeKind::Pil => {}
                 NodeKind::Qemu => {
-                    let image = if address <= 6 {
-                        "qemu-joint"
-                    } else {
-                        "qemu-wheel"
-                    };
-                    let options = QemuOptions::new(unicorn::image(image)?);
+                    let image = image_of(&images, kind, address)?;
+                    let options = QemuOptions::new(image);
                     let line = outside.lines.len();
                     outside.lines.push(Box::new(Qemu::partner(&options)?));
                     outside.adopt(address, line, 0)?;
@@ -121,7 +133,7 @@ impl Outside {
                 }
             }
         }
-        outside.start_pil(nodes)?;
+        outside.start_pil(nodes, &images)?;
         for number in 0..outside.boards.len() {
             outside.power_up(number, robot)?;
         }
@@ -129,7 +141,7 @@ impl Outside {
     }
 
     /// Spreads the byte-identical images over two cores, where there are two.
-    fn start_pil(&mut self, nodes: &Nodes) -> Result<(), SimError> {
+    fn start_pil(&mut self, nodes: &Nodes, images: &[Image]) -> Result<(), SimError> {
         let pil = (1..).zip(&nodes.0).filter(|(_, k)| **k == NodeKind::Pil);
         let mut addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
         // The wheels are near: their edges come twice as often as the joints' and at
@@ -147,11 +159,11 @@ impl Outside {
             if mine.is_empty() {
                 continue;
             }
-            let images = mine
+            let paths = mine
                 .iter()
-                .map(|a| unicorn::image(if *a <= 6 { "joint" } else { "wheel" }))
+                .map(|address| image_of(images, &NodeKind::Pil, *address))
                 .collect::<Result<Vec<_>, _>>()?;
-            let start = || unicorn::Unicorn::start(&images, place);
+            let start = || Unicorn::start(&paths, place);
             let started = match (&self.cores, place) {
                 (Some(cores), Place::Far) => cores.far(start),
                 _ => start(),

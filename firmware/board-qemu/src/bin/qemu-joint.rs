@@ -1,6 +1,7 @@
 //! The joint application on QEMU.
 #![no_std]
 #![no_main]
+#![allow(unsafe_code, reason = "a section that the linker knows by name")]
 
 use wheeleg_board_qemu::run_on_semihosting;
 use wheeleg_remote::{JointPins, RemoteJoint};
@@ -10,3 +11,5 @@ fn main() -> ! {
     let pins = JointPins::default();
     run_on_semihosting::<RemoteJoint<'_>>(&pins)
 }
+
+wheeleg_board_qemu::image_record!(QemuJoint);

@@ -28,3 +28,4 @@ fn main() -> ! {
 }
 
 wheeleg_board::ways_down!();
+wheeleg_board::image_record!(JointHil);

@@ -1,6 +1,37 @@
-//! The 96-bit unique id of the processor.
+//! Who a board is: the 96-bit unique id of the processor, and what its image says of
+//! itself.
+
+use wheeleg_identity::{Digest, Identity, Kind, Record};
 
 use super::pac;
+
+/// What this build was made of.
+const SOURCES: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources"));
+
+/// The record of an image of this build.
+#[must_use]
+pub const fn record(kind: Kind) -> Record {
+    #[cfg(feature = "hil")]
+    let link = wheeleg_pil_link::LINK_VERSION;
+    #[cfg(not(feature = "hil"))]
+    let link = 0;
+    Record::new(&Identity {
+        kind,
+        link,
+        interface: wheeleg_protocol::SCHEMA_HASH,
+        sources: SOURCES,
+    })
+}
+
+/// Puts the record of its kind into an image.
+#[macro_export]
+macro_rules! image_record {
+    ($kind:ident) => {
+        #[used]
+        #[unsafe(link_section = ".wheeleg_image")]
+        static IMAGE_RECORD: $crate::Record = $crate::g431::identity::record($crate::Kind::$kind);
+    };
+}
 
 /// The id's twelve bytes, lowest address first (RM0440 §48.1).
 #[must_use]

@@ -69,3 +69,4 @@ fn DMA1_CHANNEL1() {
 }
 
 wheeleg_board::ways_down!();
+wheeleg_board::image_record!(Wheel);
