@@ -39,6 +39,8 @@ pub(crate) struct Board {
     edge_ns: u64,
     first_edge_ns: u64,
     grid_ns: u64,
+    /// Where the wheel stood at the newest edges, the newest first: time [ns] and quadrature edges.
+    turned: [(u64, i32); 2],
     power: Power,
     /// Transmissions that were told and have not gone out yet.
     announced: VecDeque<(u64, Vec<u8>)>,
@@ -68,6 +70,7 @@ impl Board {
             edge_ns: 0,
             first_edge_ns: 0,
             grid_ns: 1_000_000,
+            turned: [(0, 0); 2],
             power: Power::Good,
             announced: VecDeque::new(),
             figures: Figures::default(),

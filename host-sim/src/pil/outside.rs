@@ -294,11 +294,13 @@ impl Outside {
         self.boards[n].started_ns.take()
     }
 
-    /// Quadrature edges at which the counter of the wheel board at `address` stood at 0,
-    /// if that is outside.
-    pub(crate) fn count_zero(&self, address: u8) -> Option<i64> {
-        let number = self.number(address)?;
-        Some(i64::from(self.boards[number].count_zero))
+    /// The counter of the wheel board at `address`, if that is outside, stood at 0 at
+    /// `edges` quadrature edges.
+    pub(crate) fn counts_from(&mut self, address: u8, edges: i64) {
+        if let Some(n) = self.number(address) {
+            // The counter wraps, as the board's does.
+            self.boards[n].count_zero = edges as i32;
+        }
     }
 
     /// Supply of the board at `address` from its next run on.
@@ -435,12 +437,6 @@ impl Outside {
             }
             board.running_from_ns = (trip.running_ns > 0).then_some(trip.running_ns);
             board.started_ns = board.running_from_ns;
-            // It started before the edge of this very run, if there was one.
-            let mut known = board.latched.iter().rev();
-            let at_edge = board.edge_ns == Some(board.heard_ns);
-            if let Some((_, inputs)) = known.nth(usize::from(at_edge)) {
-                board.count_zero = inputs.encoder;
-            }
         }
         // The tick that was worked off last, once.
         while let Some((edge_ns, inputs)) = board.latched.front() {

@@ -116,6 +116,11 @@ impl World {
         !self.down[usize::from(address) - 1].is_off() && started.is_some_and(|ns| ns <= self.now_ns)
     }
 
+    /// Whether the program of the board at `address` has stopped.
+    pub(super) fn hangs(&self, address: u8) -> bool {
+        matches!(self.down[usize::from(address) - 1], Down::Hung { .. })
+    }
+
     /// First tick edge of the board at `address` since its processor has started, ns;
     /// `None` while it is down.
     fn first_edge_ns(&self, address: u8) -> Option<u64> {
@@ -321,10 +326,11 @@ impl World {
             let address = wheel as u8 + 7;
             let due = self.next_wheel_ns[wheel] == self.now_ns;
             if due && self.first_edge_ns(address) == Some(self.now_ns) {
-                let outside = self.outside.as_ref();
-                let there = outside.and_then(|o| o.count_zero(address));
-                let [_, here] = self.wheel_edges[wheel];
-                self.wheels[wheel].counts_from(there.unwrap_or(here));
+                let [_, edges] = self.wheel_edges[wheel];
+                self.wheels[wheel].counts_from(edges);
+                if let Some(outside) = &mut self.outside {
+                    outside.counts_from(address, edges);
+                }
             }
         }
     }

@@ -349,6 +349,8 @@ impl World {
         self.inputs.bridge_duty[wheel] = match outside {
             Some(outputs) => duty(&outputs),
             None if !drives => 0.0,
+            // The program hands its newest output over at the next edge; stopped, it does not.
+            None if self.hangs(address) => self.inputs.bridge_duty[wheel],
             None => self.wheels[wheel].active_duty(),
         };
         // A board that does not drive lets its wheel coast, wherever it runs.

@@ -15,9 +15,10 @@ use crate::report::StepResult;
 use crate::sizes;
 
 /// Runs in which boards latch faults, with what strikes them: the master falls silent, a
-/// wheel runs against its drive, a valve does not open, the emergency stop; and the faults
-/// that must come of it.
-const EVENTFUL: [(&str, &[&str], &[u8]); 3] = [
+/// wheel runs against its drive, a valve does not open, the emergency stop; in which a
+/// board's supply or program fails in mid-move, and a request to brake ends with a tick
+/// edge; and the faults that must come of it.
+const EVENTFUL: [(&str, &[&str], &[u8]); 6] = [
     ("master-lost", &[], &[NO_SYNC]),
     (
         "estop",
@@ -29,11 +30,23 @@ const EVENTFUL: [(&str, &[&str], &[u8]); 3] = [
         &["--fault", "valve-stuck-shut:joint3.fill-a@1s"],
         &[NO_MOTION, EMERGENCY_STOP],
     ),
+    (
+        "three-step",
+        &["--fault", "brown-out:joint2=30@3s"],
+        &[RESET],
+    ),
+    (
+        "three-step",
+        &["--fault", "node-reset:wheel8@3.0003s"],
+        &[RESET],
+    ),
+    ("three-step", &["--fault", "node-hang:wheel7@3s"], &[RESET]),
 ];
 /// Codes of faults, as boards report them.
 const NO_SYNC: u8 = 1;
 const EMERGENCY_STOP: u8 = 39;
 const ENCODER: u8 = 41;
+const RESET: u8 = 42;
 const NO_MOTION: u8 = 44;
 
 /// A run in which nothing happens says nothing about the ticks in which something does.

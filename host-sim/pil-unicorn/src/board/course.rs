@@ -43,6 +43,20 @@ impl Board {
             // The cycles before this edge count as up to one period.
             self.grid_ns = self.period_us().max(1) * 1000;
         }
+        for (at_ns, edges) in self.turned.into_iter().rev() {
+            self.start_counter(at_ns, edges);
+        }
+    }
+
+    /// The counter of the encoder is started just before the tick timer, and that a period
+    /// before the first edge: what the wheel has turned by an edge before that is not counted.
+    fn start_counter(&mut self, at_ns: u64, edges: i32) {
+        if self.running
+            && at_ns + 2 * self.grid_ns <= self.first_edge_ns
+            && let Some(machine) = &mut self.machine
+        {
+            machine.state_mut().soc.encoder_timer().count_from(edges);
+        }
     }
 
     pub(super) fn run(&mut self, run: &Run) -> Result<Ran, String> {
@@ -62,6 +76,8 @@ impl Board {
                 self.advance(before, Until::Cycle)?;
             }
             self.latch(&inputs)?;
+            self.turned = [(run.until_ns, inputs.encoder), self.turned[0]];
+            self.start_counter(run.until_ns, inputs.encoder);
             self.advance(run.until_ns + BEYOND_EDGE_NS, Until::Cycle)?;
             self.edges = self.edges.wrapping_add(1);
             self.check_edge(run.until_ns)?;
@@ -94,7 +110,9 @@ impl Board {
             let cap = self.before_next_edge()?;
             let longest = cap.min(now_ns + WORK_NS);
             self.advance(cap.min(now_ns), Until::Asleep(longest))?;
-            self.owes = !self.machine()?.rests();
+            // (A byte that ends with a tick edge arrives after this run, which ends before it.)
+            let machine = self.machine()?;
+            self.owes = !machine.rests() || machine.state().soc.expects();
         }
         Ok(())
     }

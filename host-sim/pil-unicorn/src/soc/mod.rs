@@ -289,6 +289,11 @@ impl Soc {
         self.plan(USART);
     }
 
+    /// Whether bytes are on their way to the board.
+    pub(crate) fn expects(&self) -> bool {
+        self.usart.expects()
+    }
+
     fn edge_at(&mut self, at: u64) {
         self.edge = Some(at);
         if self.tim[TIM1].triggers_on_update() {

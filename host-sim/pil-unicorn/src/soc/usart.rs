@@ -81,6 +81,11 @@ impl Usart {
         self.incoming.push_back((cycle, byte));
     }
 
+    /// Whether bytes are on their way.
+    pub(crate) fn expects(&self) -> bool {
+        !self.incoming.is_empty()
+    }
+
     /// All bytes on their way come `cycles` sooner; those that would have come before
     /// `now` do not come.
     pub(crate) fn come_sooner(&mut self, cycles: u64, now: u64) {

@@ -38,6 +38,11 @@ impl Tim {
         self.edges = edges;
     }
 
+    /// The counter was started where the wheel stood at `edges`.
+    pub(crate) fn count_from(&mut self, edges: i32) {
+        self.edges_base = edges;
+    }
+
     pub(super) fn set_count(&mut self, value: u32, cycle: u64) {
         self.base = value & self.top();
         self.since = cycle;
