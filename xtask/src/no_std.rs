@@ -183,7 +183,7 @@ mod tests {
         let members = ["protocol", "firmware/units", "firmware/control"]
             .into_iter()
             .chain(["firmware/kinematics", "firmware/node", "firmware/master"])
-            .chain(["firmware/remote"])
+            .chain(["firmware/remote", "firmware/identity"])
             .chain(["host-sim", "host-sim/plant", "tests", "xtask"]);
         let mut found = Vec::new();
         for member in members {
