@@ -435,6 +435,7 @@ fn images_that_are_wrong_on_purpose_are_built_by_their_own_step_alone() {
             || [
                 builder,
                 "firmware/board/Cargo.toml",
+                "tests/tests/pil_driver.rs",
                 "tests/tests/pil_mutants.rs",
                 "tests/tests/workspace.rs",
             ]

@@ -35,16 +35,34 @@ pub(crate) fn profile(image: &str) -> &'static str {
 /// Images that drive outputs: the ones with budgets.
 pub(crate) const SHIPPED: [&str; 2] = ["joint", "wheel"];
 
-/// Images that are wrong on purpose, which the comparison on emulated boards must
-/// find: the feature, and what is then wrong.
-pub(crate) const MUTANTS: [(&str, &str); 4] = [
-    ("mutant-valve-pins", "fill A and vent A are swapped"),
+/// Images that are wrong on purpose, which the tests on emulated boards must find: the
+/// feature, what is then wrong, and the images that show it.
+const MUTANTS: [(&str, &str, &[&str]); 5] = [
+    (
+        "mutant-valve-pins",
+        "fill A and vent A are swapped",
+        &["joint"],
+    ),
     (
         "mutant-pwm-polarity",
         "outputs are on when they should be off",
+        &["joint", "wheel"],
     ),
-    ("mutant-adc-scale", "the converter's sum is halved"),
-    ("mutant-encoder", "the encoder counts the wrong way"),
+    (
+        "mutant-adc-scale",
+        "the converter's sum is halved",
+        &["joint"],
+    ),
+    (
+        "mutant-encoder",
+        "the encoder counts the wrong way",
+        &["wheel"],
+    ),
+    (
+        "mutant-driver-limit",
+        "the bus driver stays on beyond its limit",
+        &["joint"],
+    ),
 ];
 /// The mark that such an image carries (firmware/board/src/g431/mutant.rs).
 const MUTANT_MARK: &str = "THIS_IMAGE_IS_WRONG_ON_PURPOSE";
@@ -150,13 +168,13 @@ pub(crate) fn probes(way: Way, folder: &Path) -> StepResult {
     Ok(())
 }
 
-/// Builds the images that are wrong on purpose, each pair into a folder of its own:
+/// Builds the images that are wrong on purpose, those of a mutation into a folder:
 /// `<folder>/<feature>/joint.elf`. Never beside the images that are flashed.
 pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
-    for (feature, what) in MUTANTS {
+    for (feature, what, images) in MUTANTS {
         let place = folder.join(feature);
         fs::create_dir_all(&place).with_context(|| format!("cannot make {}", place.display()))?;
-        for name in SHIPPED {
+        for name in images {
             run(&mut cargo(way, "build", feature, name)?)?;
             let elf = place.join(format!("{name}.elf"));
             fs::copy(product(way, name), &elf)

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use crate::firmware;
 use crate::machine::Machine;
 use crate::no_std::{self, Way, set_up};
-use crate::process::{cargo, output, run, target_dir};
+use crate::process::{self, cargo, run, target_dir};
 use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
 use crate::sizes;
@@ -99,7 +99,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         predictive(&emulator, &images.folder)
     });
     report.step("one step with boards here, emulated, and on QEMU", || {
-        mixed(&emulator, &images.folder)
+        mixed(&emulator, &images.folder, set_up(firmware::TARGET)?)
     });
     if let (Some(machine), Some(mut figures)) = (machine, figures) {
         figures["pil"]["eventful"] = json!(eventful);
@@ -174,6 +174,7 @@ impl Images {
 fn tests(emulator: &Path, images: &Images) -> StepResult {
     let names = [
         "pil",
+        "pil_driver",
         "pil_faults",
         "pil_flips",
         "pil_hil",
@@ -209,32 +210,41 @@ pub(crate) fn state_flips() -> StepResult<String> {
     let mut test = test_programs(&emulator, &images, &["pil_flips"]);
     test.args(["--", "--nocapture"])
         .env("WHEELEG_FLIP_TIMES", "20");
-    let text = output(&mut test)?;
-    let found: Vec<&str> = text.lines().filter(|l| l.contains(" flips in ")).collect();
+    let found = process::figures(&mut test, |line| line.contains(" flips in "))?;
     let [joint, wheel] = found.as_slice() else {
         return Err(anyhow::anyhow!("a joint's and a wheel's line, not {found:?}").into());
     };
     Ok(format!("{joint}; {wheel}"))
 }
 
-/// The whole suite with images of the second way of building. It shares only
-/// the sources with the first: compiler, `core` and flags are others.
+/// The whole suite with images of the second way of building: three steps, runs with
+/// faults, and boards of three kinds. It shares only the sources with the first: compiler,
+/// `core` and flags are others.
 pub(crate) fn second_way() -> StepResult<String> {
     tools()?;
     let emulator = emulator()?;
-    let images = Images::build(no_std::second_way()?, "firmware-debian", true)?;
+    let way = no_std::second_way()?;
+    let images = Images::build(way, "firmware-debian", true)?;
     tests(&emulator, &images)?;
     let figures = figures(&emulator, &images.folder)?;
+    let eventful = eventful(&emulator, &images.folder)?;
+    let mixed = mixed(&emulator, &images.folder, way)?;
     let pil = &figures["pil"];
     let of = |image: &str| {
-        let (image, tick) = (&pil[image], "tick_instructions_worst");
-        let hash = image["blake3"].as_str().unwrap_or_default();
-        format!("blake3 {hash:.16}, tick {} at worst", image[tick])
+        let (steps, tick) = (&pil[image], "tick_instructions_worst");
+        let hash = steps["blake3"].as_str().unwrap_or_default();
+        format!(
+            "blake3 {hash:.16}, tick {} at worst, {} with faults",
+            steps[tick], eventful[image][tick]
+        )
     };
     Ok(format!(
-        "Debian's compiler: {} bits compared, {} differ; joint {}; wheel {}",
+        "Debian's compiler: {} bits compared, {} differ, {} and {} with boards of three \
+         kinds; joint {}; wheel {}",
         pil["compared_bits"],
         pil["differing_bits"],
+        mixed["compared_bits"],
+        mixed["differing_bits"],
         of("joint"),
         of("wheel")
     ))

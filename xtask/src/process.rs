@@ -2,7 +2,7 @@
 
 use std::env;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 
 use anyhow::{Context, Result, bail};
 
@@ -47,16 +47,43 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
 
 /// Prints and runs a command and returns its standard output; standard error is passed on.
 pub(crate) fn output(command: &mut Command) -> Result<String> {
+    let (text, status) = captured(command)?;
+    if !status.success() {
+        bail!("`{}` ended with {status}", line(command));
+    }
+    Ok(text)
+}
+
+/// Prints and runs a program that measures; gives the lines of its standard output that
+/// are `wanted`. If it fails, they stand first in the error: what missed its bar is told.
+pub(crate) fn figures(command: &mut Command, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>> {
+    let (text, status) = captured(command)?;
+    let found: Vec<String> = text
+        .lines()
+        .filter(|line| wanted(line))
+        .map(str::to_owned)
+        .collect();
+    if status.success() {
+        return Ok(found);
+    }
+    println!("{text}");
+    let told = match &found[..] {
+        [] => "no figures".to_owned(),
+        found => found.join("; "),
+    };
+    bail!("{told}; `{}` ended with {status}", line(command))
+}
+
+/// Prints and runs a command; its standard output, and how it ended.
+fn captured(command: &mut Command) -> Result<(String, ExitStatus)> {
     let line = line(command);
     println!("    $ {line}");
     let output = command
         .stderr(Stdio::inherit())
         .output()
         .with_context(|| format!("cannot start `{line}`"))?;
-    if !output.status.success() {
-        bail!("`{line}` ended with {}", output.status);
-    }
-    String::from_utf8(output.stdout).with_context(|| format!("output of `{line}`"))
+    let text = String::from_utf8(output.stdout).with_context(|| format!("output of `{line}`"))?;
+    Ok((text, output.status))
 }
 
 /// Runs a command silently; true if it exists and succeeds.
@@ -82,4 +109,30 @@ fn line(command: &Command) -> String {
         line.push_str(&argument.to_string_lossy());
     }
     line
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn measure(script: &str) -> Result<Vec<String>> {
+        let wanted = |line: &str| line.contains(" flips: ");
+        figures(command("sh").args(["-c", script]), wanted)
+    }
+
+    #[test]
+    fn figures_are_told_whether_the_program_succeeds_or_not() {
+        let found = measure("echo begun; echo '12 flips: 0 wrong'").expect("succeeds");
+        assert_eq!(found, ["12 flips: 0 wrong"]);
+        let failed = measure("echo '12 flips: 1 wrong'; echo panicked; exit 101");
+        let says = format!("{:?}", failed.expect_err("fails"));
+        let first = says.lines().next().expect("a line");
+        assert!(first.starts_with("12 flips: 1 wrong; `sh"), "{says}");
+        assert!(
+            first.contains("101") && !first.contains("panicked;"),
+            "{says}"
+        );
+        let silent = measure("exit 1").expect_err("fails");
+        assert!(silent.to_string().starts_with("no figures; "), "{silent}");
+    }
 }

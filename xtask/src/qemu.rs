@@ -40,7 +40,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     if report.step("set-up: QEMU", emulator).is_none() {
         return;
     }
-    let Some(images) = report.step("QEMU images", images) else {
+    let Some(images) = report.step("QEMU images", || images(set_up(TARGET)?)) else {
         return;
     };
     report.step("lints of the QEMU board support", lint);
@@ -69,10 +69,9 @@ pub(crate) fn emulator() -> StepResult {
     ))
 }
 
-/// Builds the images; gives the folder in which they lie. They link only if no
-/// panic can be reached.
-pub(crate) fn images() -> StepResult<PathBuf> {
-    let way = set_up(TARGET)?;
+/// Builds the images in one of the ways; gives the folder in which they lie. They link
+/// only if no panic can be reached.
+pub(crate) fn images(way: Way) -> StepResult<PathBuf> {
     println!("    way: {}", way.describe());
     let products = match way {
         Way::Rustup => target_dir(),

@@ -172,6 +172,7 @@ mod tests {
             stack_size: u32::MAX,
             resets: u16::MAX,
             driver_timeouts: u16::MAX,
+            driver_on_us: u32::MAX,
             late_bytes: u32::MAX,
             outputs_low_after: u32::MAX,
         };

@@ -118,6 +118,8 @@ pub struct Figures {
     pub resets: u16,
     /// Driver-enable time-outs: transmissions that the hardware cut off.
     pub driver_timeouts: u16,
+    /// Longest that the bus driver was on without a break since power-up, whole \[µs\].
+    pub driver_on_us: u32,
     /// Bytes that came after the processor had already run past their end; the
     /// time stamps of their frames are late by up to 50 µs.
     pub late_bytes: u32,

@@ -170,4 +170,10 @@ pub enum Hook {
         /// Units still completed.
         after: u16,
     },
+    /// The bus transmitter takes this many times as long for each byte, as one whose
+    /// clock is wrong; 1 is sound. Acts until the next reset.
+    StretchTransmission {
+        /// At least 1.
+        times: u8,
+    },
 }

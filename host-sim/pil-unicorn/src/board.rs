@@ -163,6 +163,12 @@ impl Board {
         match hook {
             Hook::StopMainLoop => machine.state_mut().stop_main_loop = true,
             Hook::StopProcessor => machine.state_mut().stop_processor = true,
+            Hook::StretchTransmission { times: 0 } => {
+                return Reply::Refused(text("a byte takes some time: at least once its own"));
+            }
+            Hook::StretchTransmission { times } => {
+                machine.state_mut().soc.usart.stretch = u64::from(*times);
+            }
             Hook::BrownOutInSave { after } => {
                 machine.state_mut().soc.flash.units_left = Some(*after);
             }

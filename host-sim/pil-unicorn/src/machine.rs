@@ -175,6 +175,7 @@ impl Machine {
             fresh.driven = old.driven;
         }
         soc.driver_timeouts = state.soc.driver_timeouts;
+        soc.driver_on_us = state.soc.driver_on_us;
         soc.wiper = state.soc.wiper;
         soc.encoder_timer().keep_wheel(state.soc.encoder_timer());
         state.reset(soc);

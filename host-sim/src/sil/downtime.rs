@@ -22,17 +22,15 @@ enum Change {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Entry {
     known_ns: u64,
-    address: u8,
     change: Change,
 }
 
 /// Resets and starts of the boards that were outside in a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DownTimes {
-    /// Which addresses from 1 were outside.
-    outside: [bool; 8],
-    /// In the order in which they came.
-    entries: VecDeque<Entry>,
+    /// Of each address from 1 that was outside, in the order in which they came. One
+    /// board's wait for what does not come keeps nobody else waiting.
+    entries: [Option<VecDeque<Entry>>; 8],
 }
 
 /// What a board does next, of one that keeps to the times of another run.
@@ -48,23 +46,21 @@ impl DownTimes {
     /// Nothing has happened to the boards that are `outside` (addresses from 1).
     pub(super) fn new(outside: [bool; 8]) -> Self {
         Self {
-            outside,
-            entries: VecDeque::new(),
+            entries: outside.map(|outside| outside.then(VecDeque::new)),
         }
     }
 
     /// Whether the board at `address` keeps to these times instead of its own.
     pub(super) fn rule(&self, address: u8) -> bool {
         let i = usize::from(address).wrapping_sub(1);
-        self.outside.get(i).copied().unwrap_or(false)
+        self.entries.get(i).is_some_and(Option::is_some)
     }
 
     fn take_down(&mut self, known_ns: u64, address: u8, change: Change) {
-        self.entries.push_back(Entry {
-            known_ns,
-            address,
-            change,
-        });
+        let i = usize::from(address).wrapping_sub(1);
+        if let Some(Some(entries)) = self.entries.get_mut(i) {
+            entries.push_back(Entry { known_ns, change });
+        }
     }
 
     /// The processor of a board was reset.
@@ -77,18 +73,19 @@ impl DownTimes {
         self.take_down(known_ns, address, Change::FirstEdge(edge_ns));
     }
 
-    /// The next change that is due at `now_ns`. A board that nothing has brought `down`
-    /// is not reset: a reset without a fault is no property of the hardware, and the
-    /// runs shall differ by it.
+    /// The next change that is due at `now_ns`, of the lowest address that has one. A board
+    /// that nothing has brought `down` is not reset: a reset without a fault is no property
+    /// of the hardware, and the runs shall differ by it.
     pub(super) fn next(&mut self, now_ns: u64, down: impl Fn(u8) -> bool) -> Option<Due> {
-        let entry = *self.entries.front()?;
-        if entry.known_ns > now_ns || !down(entry.address) {
-            return None;
-        }
-        self.entries.pop_front();
-        Some(match entry.change {
-            Change::Reset(cause) => Due::Reset(entry.address, cause),
-            Change::FirstEdge(edge_ns) => Due::FirstEdge(entry.address, edge_ns),
+        (1..).zip(&mut self.entries).find_map(|(address, entries)| {
+            let entries = entries.as_mut()?;
+            entries
+                .front()
+                .filter(|entry| entry.known_ns <= now_ns && down(address))?;
+            Some(match entries.pop_front()?.change {
+                Change::Reset(cause) => Due::Reset(address, cause),
+                Change::FirstEdge(edge_ns) => Due::FirstEdge(address, edge_ns),
+            })
         })
     }
 }
@@ -112,6 +109,31 @@ mod tests {
         assert_eq!(times.next(5_000, |_| true), None);
         let edge = Due::FirstEdge(2, 10_000);
         assert_eq!(times.next(9_000, |_| true), Some(edge));
+        assert_eq!(times.next(u64::MAX, |_| true), None);
+    }
+
+    #[test]
+    fn a_board_that_resets_by_itself_does_not_keep_the_others_waiting() {
+        let mut outside = [false; 8];
+        (outside[1], outside[6]) = (true, true);
+        let mut times = DownTimes::new(outside);
+        let cause = ResetCause::Watchdog;
+        // Nothing struck board 2; board 7 was struck later.
+        times.reset(5_000, 2, cause);
+        times.reset(6_000, 7, cause);
+        times.first_edge(9_000, 2, 10_000);
+        times.first_edge(9_500, 7, 10_400);
+        let struck = |address| address == 7;
+        assert_eq!(times.next(5_999, struck), None);
+        assert_eq!(times.next(6_000, struck), Some(Due::Reset(7, cause)));
+        assert_eq!(times.next(9_400, struck), None, "its own order is kept");
+        let edge = Due::FirstEdge(7, 10_400);
+        assert_eq!(times.next(9_500, struck), Some(edge));
+        assert_eq!(times.next(u64::MAX, struck), None);
+        // Both at once: each gets its own.
+        assert_eq!(times.next(u64::MAX, |_| true), Some(Due::Reset(2, cause)));
+        let edge = Due::FirstEdge(2, 10_000);
+        assert_eq!(times.next(u64::MAX, |_| true), Some(edge));
         assert_eq!(times.next(u64::MAX, |_| true), None);
     }
 }

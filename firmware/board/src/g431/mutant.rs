@@ -7,11 +7,13 @@
 //! | `mutant-pwm-polarity` | valves and motor are on when they should be off |
 //! | `mutant-adc-scale` | the converter's sum is halved |
 //! | `mutant-encoder` | the encoder counts the wrong way |
+//! | `mutant-driver-limit` | the bus driver stays on for as long as its timer can count |
 
 const COUNT: u32 = cfg!(feature = "mutant-valve-pins") as u32
     + cfg!(feature = "mutant-pwm-polarity") as u32
     + cfg!(feature = "mutant-adc-scale") as u32
-    + cfg!(feature = "mutant-encoder") as u32;
+    + cfg!(feature = "mutant-encoder") as u32
+    + cfg!(feature = "mutant-driver-limit") as u32;
 
 const _: () = assert!(COUNT == 1, "one mutation at a time");
 

@@ -175,6 +175,7 @@ impl Board {
         self.figures.longest_awake = state.longest_awake as u32;
         self.figures.outputs_low_after = state.outputs_low_after.unwrap_or(0) as u32;
         self.figures.driver_timeouts = state.soc.driver_timeouts;
+        self.figures.driver_on_us = state.soc.driver_on_us;
         self.retired = retired;
         if self.edges.is_multiple_of(STACK_EVERY) {
             let top = self.image.word(0);

@@ -112,8 +112,10 @@ pub(crate) struct Soc {
     pub(crate) time: Time,
     /// Wiper of the potentiometer as latched at the newest edge.
     pub(crate) wiper: u16,
-    /// A byte came while the transmitter's one-shot had gone.
+    /// Transmissions that outlasted the driver's one-shot.
     pub(crate) driver_timeouts: u16,
+    /// Longest that the driver was on, whole µs.
+    pub(crate) driver_on_us: u32,
     /// Cycle of the newest tick edge.
     pub(crate) edge: Option<u64>,
     /// Frames that went out whole: start cycle and bytes.
@@ -173,6 +175,7 @@ impl Soc {
             time: Time::new(rcc::HSI_HZ),
             wiper: 0,
             driver_timeouts: 0,
+            driver_on_us: 0,
             edge: None,
             gone: Vec::new(),
             started: None,
@@ -266,6 +269,9 @@ impl Soc {
             USART2 => self.serial_event(at),
             n => {
                 let event = self.events[n];
+                if (n, event) == (TIM15, Event::Update) {
+                    self.driver_off(at);
+                }
                 self.tim[n].happen(at, event);
                 match (n, event) {
                     (TIM1, Event::Update) => self.edge_at(at),
@@ -274,7 +280,6 @@ impl Soc {
                         self.plan(TIM15);
                     }
                     (TIM2, Event::Match(3)) => self.started = self.frame().map(|f| (at, f.0, f.1)),
-                    (TIM15, Event::Update) => self.driver_off(at),
                     _ => {}
                 }
             }
@@ -353,7 +358,7 @@ impl Soc {
 
     /// A burst that was driven from its first bit to its last is a frame.
     fn finish_burst(&mut self) {
-        let byte = self.usart.byte_cycles();
+        let byte = self.usart.sent_byte_cycles();
         if let Some((start, bytes)) = self.usart.take_burst() {
             let end = start + byte * bytes.len() as u64;
             let driven = self
@@ -368,12 +373,12 @@ impl Soc {
         }
     }
 
-    /// The one-shot of the driver ends; what still wants to go out is cut.
+    /// The one-shot of the driver ends. What still wants to go out goes nowhere: the
+    /// transmitter does not know of it.
     fn driver_off(&mut self, at: u64) {
-        if self.usart.next().is_some_and(|next| next > at) && self.usart.burst.is_some() {
-            self.usart.cut();
-            self.plan(USART);
-            self.driver_timeouts += 1;
+        if let Some((on, _)) = self.driver() {
+            let us = at.saturating_sub(on) * 1_000_000 / self.time.hz();
+            self.driver_on_us = self.driver_on_us.max(us as u32);
         }
     }
 

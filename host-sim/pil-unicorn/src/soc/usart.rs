@@ -54,6 +54,8 @@ pub(crate) struct Usart {
     /// Bytes that went out since the transmitter was last idle: start of the
     /// first, and all.
     pub(crate) burst: Option<(u64, Vec<u8>)>,
+    /// A byte that is sent takes this many times as long as it should.
+    pub(crate) stretch: u64,
 }
 
 impl Default for Usart {
@@ -71,6 +73,7 @@ impl Default for Usart {
             shifting_until: None,
             incoming: VecDeque::new(),
             burst: None,
+            stretch: 1,
         }
     }
 }
@@ -98,6 +101,11 @@ impl Usart {
     /// Duration of a byte in cycles.
     pub(crate) fn byte_cycles(&self) -> u64 {
         BITS * u64::from(self.brr)
+    }
+
+    /// Duration of a byte that is sent, in cycles.
+    pub(crate) fn sent_byte_cycles(&self) -> u64 {
+        self.byte_cycles() * self.stretch
     }
 
     /// Whether the program looks again and again and finds nothing received; once.
@@ -180,7 +188,7 @@ impl Usart {
             && let Some(byte) = self.waiting.pop_front()
         {
             self.isr &= !TC;
-            self.shifting_until = Some(cycle + self.byte_cycles());
+            self.shifting_until = Some(cycle + self.sent_byte_cycles());
             let (_, bytes) = self.burst.get_or_insert_with(|| (cycle, Vec::new()));
             bytes.push(byte);
         }
@@ -193,14 +201,6 @@ impl Usart {
         } else {
             None
         }
-    }
-
-    /// A reset or a driver that was switched off cuts what is under way.
-    pub(crate) fn cut(&mut self) -> bool {
-        let under_way = self.shifting_until.take().is_some();
-        self.waiting.clear();
-        self.burst = None;
-        under_way
     }
 
     /// A received byte waits for DMA.
