@@ -89,8 +89,11 @@ impl Tim {
                 if !known {
                     return Err(Refusal::Bits(value));
                 }
-                let count = self.count(cycle);
-                self.set_count(count, cycle);
+                // A counter of the clock goes on as it was, and a one-shot with it.
+                if self.encoder_mode() || value & 7 == 3 {
+                    let count = self.count(cycle);
+                    self.set_count(count, cycle);
+                }
                 self.smcr = value;
             }
             DIER => {
@@ -121,8 +124,10 @@ impl Tim {
                     0
                 };
                 only(0x3333 & !inverted)?;
-                let count = self.count(cycle);
-                self.set_count(count, cycle);
+                if self.encoder_mode() {
+                    let count = self.count(cycle);
+                    self.set_count(count, cycle);
+                }
                 self.ccer = value;
             }
             CNT => {

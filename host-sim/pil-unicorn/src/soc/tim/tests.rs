@@ -86,7 +86,11 @@ fn a_one_shot_ends_itself() {
     tim.trigger(0, 1000);
     assert!(!tim.runs(), "another input");
     tim.trigger(1, 1000);
-    assert_eq!(tim.pulse(tim.started_at()), Some((1170, 1000 + 14 * 170)));
+    let pulse = Some((1170, 1000 + 14 * 170));
+    assert_eq!(tim.pulse(tim.started_at()), pulse);
+    // The next trigger is not wanted: that of this one stays as it is.
+    tim.write(SMCR, 0, 1000 + 5 * 170 + 7).expect("modelled");
+    assert_eq!(tim.pulse(tim.started_at()), pulse);
     assert_eq!(tim.next(), Some((1000 + 14 * 170, Event::Update)));
     tim.happen(1000 + 14 * 170, Event::Update);
     assert!(!tim.runs());
