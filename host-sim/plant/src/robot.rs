@@ -374,7 +374,7 @@ impl Plant {
                 [sole.front, sole.left, sole.back, sole.right]
             }),
             supply_pressure_pa: self.assembly.supply.pressure_pa(core.supply.mass_kg),
-            pressure_switch: core.supply.pressure_switch,
+            pressure_switch: core.supply.pressure_switch(),
             dumping: core.supply.dump.is_open(),
             motor_current_a: std::array::from_fn(|i| core.motion.motors[i].current_a),
             wheel_torque_n_m: std::array::from_fn(|i| {

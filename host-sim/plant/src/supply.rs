@@ -4,6 +4,11 @@
 //! source ──► regulator ──► [dump valve] ──► reservoir ──► fill valves
 //! ```
 //!
+//! The pressure switch is a contact at the reservoir, which sees what the cylinders get and
+//! whether a dump empties it; a second contact at the source's connection may be in series
+//! with it, which sees a lost or sagging source before the reservoir is used up. Closed
+//! contacts mean pressure, so a broken wire reads like none.
+//!
 //! The dump valve is a 3/2 valve: while it dumps, the source is cut off and
 //! the reservoir is open to the atmosphere. The reservoir is isothermal (its
 //! wall is large against its gas). Mass is the only state of the gas.
@@ -33,10 +38,32 @@ pub struct SupplyParams {
     pub initial_pressure_pa: f64,
     /// Dump valve: its flow to the atmosphere and its switching times.
     pub dump_valve: ValveParams,
-    /// Pressure switch closes above this \[Pa absolute\], 1e4..2e6.
-    pub switch_on_pa: f64,
-    /// Pressure switch opens below this \[Pa absolute\], 1e4..switch_on.
-    pub switch_off_pa: f64,
+    /// Pressure switch at the reservoir.
+    pub switch: SwitchParams,
+    /// Contact in series with it, before the regulator.
+    pub source_switch: Option<SwitchParams>,
+}
+
+/// A pressure switch's contact.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SwitchParams {
+    /// Closes above this \[Pa absolute\], 1e4..3e7.
+    pub on_pa: f64,
+    /// Opens below this \[Pa absolute\], 1e4..on.
+    pub off_pa: f64,
+}
+
+impl SwitchParams {
+    fn validate(&self, [on, off]: [&'static str; 2]) -> Result<(), PlantError> {
+        check(on, self.on_pa, 1e4, 3e7)?;
+        check(off, self.off_pa, 1e4, self.on_pa)
+    }
+
+    /// The contact at `pressure_pa`, which was `closed`.
+    #[inline]
+    fn closed(&self, closed: bool, pressure_pa: f64) -> bool {
+        pressure_pa >= self.on_pa || (closed && pressure_pa >= self.off_pa)
+    }
 }
 
 impl SupplyParams {
@@ -60,13 +87,12 @@ impl SupplyParams {
             5e4,
             2e6,
         )?;
-        check("supply.switch_on_pa", self.switch_on_pa, 1e4, 2e6)?;
-        check(
-            "supply.switch_off_pa",
-            self.switch_off_pa,
-            1e4,
-            self.switch_on_pa,
-        )?;
+        self.switch
+            .validate(["supply.switch.on_pa", "supply.switch.off_pa"])?;
+        if let Some(source_switch) = &self.source_switch {
+            source_switch
+                .validate(["supply.source_switch.on_pa", "supply.source_switch.off_pa"])?;
+        }
         self.regulator_flow.validate()?;
         self.dump_valve.validate()
     }
@@ -83,21 +109,30 @@ pub struct SupplyState {
     pub dumped_mass_kg: f64,
     /// Dump valve; open means dumping.
     pub dump: ValveState,
-    /// Pressure switch contact.
-    pub pressure_switch: bool,
+    /// Contacts of the pressure switch at the reservoir and at the source; one that is not
+    /// there is closed.
+    pub contacts: [bool; 2],
     /// Pressure before the regulator \[Pa absolute\]; starts at the parameter's
     /// value, may be lowered to inject a lost supply.
     pub source_pressure_pa: f64,
 }
 
 impl SupplyState {
+    /// Pressure switch as it is read: its contacts in series.
+    #[must_use]
+    pub fn pressure_switch(&self) -> bool {
+        self.contacts == [true; 2]
+    }
+
     /// Adds the state to a hash in declaration order.
     pub fn feed(&self, hasher: &mut StateHasher) {
         hasher.f64(self.mass_kg);
         hasher.f64(self.source_mass_kg);
         hasher.f64(self.dumped_mass_kg);
         self.dump.feed(hasher);
-        hasher.bytes(&[u8::from(self.pressure_switch)]);
+        // A contact at the source that is not there is closed: 0.
+        let [reservoir, source] = self.contacts;
+        hasher.bytes(&[u8::from(reservoir) | u8::from(!source) << 1]);
         hasher.f64(self.source_pressure_pa);
     }
 }
@@ -144,15 +179,16 @@ impl SupplyModel {
     /// Supply at its starting pressure, not dumping.
     #[must_use]
     pub fn initial_state(&self) -> SupplyState {
-        let p = self.params.initial_pressure_pa;
-        SupplyState {
-            mass_kg: p / self.pascal_per_kg,
+        let mut state = SupplyState {
+            mass_kg: self.params.initial_pressure_pa / self.pascal_per_kg,
             source_mass_kg: 0.0,
             dumped_mass_kg: 0.0,
             dump: ValveState::default(),
-            pressure_switch: p >= self.params.switch_on_pa,
+            contacts: [false; 2],
             source_pressure_pa: self.params.source_pressure_pa,
-        }
+        };
+        self.update_switch(&mut state);
+        state
     }
 
     /// Reservoir pressure \[Pa absolute\] for a gas mass.
@@ -195,15 +231,17 @@ impl SupplyModel {
         }
     }
 
-    /// Updates the pressure switch from the reservoir pressure.
+    /// Updates the contacts of the pressure switch.
     #[inline]
     pub(crate) fn update_switch(&self, state: &mut SupplyState) {
-        let p = self.pressure_pa(state.mass_kg);
-        if p >= self.params.switch_on_pa {
-            state.pressure_switch = true;
-        } else if p < self.params.switch_off_pa {
-            state.pressure_switch = false;
-        }
+        let [reservoir, source] = state.contacts;
+        let pressure_pa = self.pressure_pa(state.mass_kg);
+        state.contacts = [
+            self.params.switch.closed(reservoir, pressure_pa),
+            self.params
+                .source_switch
+                .is_none_or(|switch| switch.closed(source, state.source_pressure_pa)),
+        ];
     }
 
     /// Refuses a state that is not finite or has left the model's range.

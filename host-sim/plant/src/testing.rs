@@ -16,7 +16,7 @@ use crate::ground::Ground;
 use crate::motor::MotorParams;
 use crate::robot::PlantParams;
 use crate::sensors::{AdcNoise, AdcParams, PotentiometerParams};
-use crate::supply::SupplyParams;
+use crate::supply::{SupplyParams, SwitchParams};
 use crate::valve::ValveParams;
 
 /// dm³/(s·bar) in m³/(s·Pa).
@@ -162,8 +162,14 @@ pub fn wheeleg_2003_supply() -> SupplyParams {
             t_on_s: 0.020,                            // s ASSUMED
             t_off_s: 0.020,                           // s ASSUMED
         },
-        switch_on_pa: 661_325.0,  // Pa ASSUMED 5.6 bar g
-        switch_off_pa: 641_325.0, // Pa ASSUMED 5.4 bar g
+        switch: SwitchParams {
+            on_pa: 661_325.0,  // Pa ASSUMED 5.6 bar g
+            off_pa: 641_325.0, // Pa ASSUMED 5.4 bar g
+        },
+        source_switch: Some(SwitchParams {
+            on_pa: 821_325.0,  // Pa ASSUMED 7.2 bar g
+            off_pa: 781_325.0, // Pa ASSUMED 6.8 bar g
+        }),
     }
 }
 

@@ -374,7 +374,7 @@ fn supply_sags_under_demand_recovers_and_dumps() {
         supply(&s)
     );
     assert!(supply(&s) <= p.supply.set_pressure_pa * (1.0 + 1e-9));
-    assert!(s.core.supply.pressure_switch);
+    assert!(s.core.supply.pressure_switch());
     let now = s.core.time_ns;
     let timing_on = 20_000_000;
     s.core.supply.dump.command(
@@ -387,10 +387,10 @@ fn supply_sags_under_demand_recovers_and_dumps() {
         },
     );
     run(&axis, &mut s, SHUT, 19);
-    assert!(s.core.supply.pressure_switch && !s.core.supply.dump.is_open());
+    assert!(s.core.supply.pressure_switch() && !s.core.supply.dump.is_open());
     run(&axis, &mut s, SHUT, 300);
     assert!(supply(&s) < 103_000.0, "{}", supply(&s));
-    assert!(!s.core.supply.pressure_switch);
+    assert!(!s.core.supply.pressure_switch());
     assert!(s.core.supply.dumped_mass_kg > 0.0);
     // Held cylinders keep their gas when the supply is dumped.
     assert!(axis.outputs(&s).pressure_pa[0] > 3e5);
@@ -406,14 +406,44 @@ fn pressure_switch_has_hysteresis() {
         let per_kg = p.supply.initial_pressure_pa / axis.initial_state(0).core.supply.mass_kg;
         s.core.supply.mass_kg = pa / per_kg;
         axis.tick(&mut s, SHUT).unwrap();
-        s.core.supply.pressure_switch
+        s.core.supply.pressure_switch()
     };
-    let middle = 0.5 * (p.supply.switch_on_pa + p.supply.switch_off_pa);
-    assert!(set(p.supply.switch_on_pa + 100.0));
+    let middle = 0.5 * (p.supply.switch.on_pa + p.supply.switch.off_pa);
+    assert!(set(p.supply.switch.on_pa + 100.0));
     assert!(set(middle));
-    assert!(!set(p.supply.switch_off_pa - 100.0));
+    assert!(!set(p.supply.switch.off_pa - 100.0));
     assert!(!set(middle));
-    assert!(set(p.supply.switch_on_pa + 100.0));
+    assert!(set(p.supply.switch.on_pa + 100.0));
+}
+
+/// The contact at the source is in series: it opens at once when the source is lost or sags,
+/// while the reservoir is still full, and closes again with hysteresis.
+#[test]
+fn the_contact_at_the_source_sees_a_lost_source_before_the_reservoir_is_used_up() {
+    let p = wheeleg_2003_axis();
+    let source = p.supply.source_switch.expect("fitted");
+    let alone = {
+        let mut p = wheeleg_2003_axis();
+        p.supply.source_switch = None;
+        p
+    };
+    for (p, seen) in [(p, true), (alone, false)] {
+        let axis = Axis::new(&p).unwrap();
+        let mut s = axis.initial_state(0);
+        let mut with_source = |pa: f64| {
+            s.core.supply.source_pressure_pa = pa;
+            axis.tick(&mut s, SHUT).unwrap();
+            s.core.supply.pressure_switch()
+        };
+        let middle = 0.5 * (source.on_pa + source.off_pa);
+        assert!(with_source(source.on_pa + 100.0));
+        assert!(with_source(middle));
+        assert_eq!(with_source(source.off_pa - 100.0), !seen);
+        assert_eq!(with_source(middle), !seen);
+        assert!(with_source(source.on_pa + 100.0));
+        assert_eq!(with_source(101_325.0), !seen);
+        assert!(axis.assembly.supply.pressure_pa(s.core.supply.mass_kg) > 7e5);
+    }
 }
 
 #[test]

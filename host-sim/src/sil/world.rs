@@ -332,7 +332,7 @@ impl World {
         let angle_rad = mechanics.wheel_angle_rad(&core.motion);
         let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
         let edges = self.faults.edges(wheel, edges);
-        (edges, core.supply.pressure_switch)
+        (edges, core.supply.pressure_switch())
     }
 
     fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {

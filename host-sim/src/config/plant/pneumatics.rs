@@ -7,19 +7,20 @@ use wheeleg_plant::endstop::EndStopParams;
 use wheeleg_plant::flow::{GasParams, Iso6358};
 use wheeleg_plant::friction::FrictionParams;
 use wheeleg_plant::sensors::{AdcNoise, AdcParams, PotentiometerParams};
-use wheeleg_plant::supply::SupplyParams;
+use wheeleg_plant::supply::{SupplyParams, SwitchParams};
 use wheeleg_plant::valve::ValveParams;
 
 use super::sections::{
     AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
-    LineSection, NumericsSection, PotentiometerSection, SupplySection, ValveSection,
+    LineSection, NumericsSection, PotentiometerSection, SupplySection, SwitchSection, ValveSection,
 };
 use crate::config::reader::Reader;
 
 /// Names of the sections that [`Pneumatics`] and [`Sensing`] read.
-pub(in crate::config) const SECTIONS: [&str; 12] = [
+pub(in crate::config) const SECTIONS: [&str; 13] = [
     "gas",
     "supply",
+    "source_switch",
     "regulator",
     "dump_valve",
     "fill_valve",
@@ -45,6 +46,10 @@ impl Pneumatics {
     pub(in crate::config) fn read(r: &mut Reader) -> Option<Self> {
         let gas = r.section::<GasSection>("gas");
         let supply = r.section::<SupplySection>("supply");
+        // A robot without the contact at the source has no such section.
+        let source_switch = r
+            .table("source_switch")
+            .map(|_| r.section::<SwitchSection>("source_switch"));
         let regulator = r.section::<FlowSection>("regulator");
         let dump_valve = r.section::<ValveSection>("dump_valve");
         let fill_valve = r.section::<ValveSection>("fill_valve");
@@ -55,7 +60,16 @@ impl Pneumatics {
         let end_stop = r.section::<EndStopSection>("end_stop");
         Some(Self {
             gas: gas_params(&gas?),
-            supply: supply_params(&supply?, &regulator?, &dump_valve?),
+            supply: supply_params(
+                &supply?,
+                source_switch
+                    .map(|s| s.ok_or(()))
+                    .transpose()
+                    .ok()?
+                    .as_ref(),
+                &regulator?,
+                &dump_valve?,
+            ),
             cylinder: cylinder_params(
                 &cylinder?,
                 &line?,
@@ -141,7 +155,12 @@ fn gas_params(s: &GasSection) -> GasParams {
     }
 }
 
-fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection) -> SupplyParams {
+fn supply_params(
+    s: &SupplySection,
+    source_switch: Option<&SwitchSection>,
+    regulator: &FlowSection,
+    dump: &ValveSection,
+) -> SupplyParams {
     SupplyParams {
         source_pressure_pa: s.source_pressure,
         set_pressure_pa: s.set_pressure,
@@ -155,8 +174,14 @@ fn supply_params(s: &SupplySection, regulator: &FlowSection, dump: &ValveSection
         reservoir_m3: s.reservoir,
         initial_pressure_pa: s.initial_pressure,
         dump_valve: valve(dump),
-        switch_on_pa: s.switch_on,
-        switch_off_pa: s.switch_off,
+        switch: SwitchParams {
+            on_pa: s.switch_on,
+            off_pa: s.switch_off,
+        },
+        source_switch: source_switch.map(|s| SwitchParams {
+            on_pa: s.on,
+            off_pa: s.off,
+        }),
     }
 }
 

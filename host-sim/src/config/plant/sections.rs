@@ -34,10 +34,19 @@ params! {
         reservoir: f64, "reservoir", Volume, 1e-6, 1.0;
         /// Reservoir pressure at the start, absolute.
         initial_pressure: f64, "initial_pressure", Pressure, 5e4, 2e6;
-        /// The pressure switch closes above this, absolute.
+        /// The pressure switch at the reservoir closes above this, absolute.
         switch_on: f64, "switch_on", Pressure, 1e4, 2e6;
-        /// The pressure switch opens below this, absolute.
+        /// The pressure switch at the reservoir opens below this, absolute.
         switch_off: f64, "switch_off", Pressure, 1e4, 2e6;
+    }
+
+    /// A second contact of the pressure switch, before the regulator, in series with the one
+    /// at the reservoir; may be left out.
+    SwitchSection {
+        /// It closes above this, absolute.
+        on: f64, "on", Pressure, 1e4, 3e7;
+        /// It opens below this, absolute.
+        off: f64, "off", Pressure, 1e4, 3e7;
     }
 
     /// A flow path after ISO 6358.

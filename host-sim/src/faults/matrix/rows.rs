@@ -158,14 +158,14 @@ pub const ROWS: &[Row] = &[
         stop_moving(3), &["joint 3:", "valve"]),
     // Supply.
     row("supply-sag", &[at("supply-sag=2", FOR_GOOD)], Phase::Flight,
-        stop([0.0, 100.0], 140.0), &["supply"]).of(Variant::Long).lasting(20.0)
-        .noted("the reservoir feeds the walk; the board has a pressure switch, and no gauge that would show the rate of fall"),
+        stop([0.0, 100.0], 140.0), &["supply"])
+        .noted("the contact before the regulator opens at 6.8 bar gauge"),
     row("supply-lost", &[at("supply-lost", FOR_GOOD)], Phase::Flight,
-        stop([0.0, 100.0], 140.0), &["supply"]).of(Variant::Long).lasting(20.0)
-        .noted("the reservoir feeds the walk; the board has a pressure switch, and no gauge that would show the rate of fall"),
+        stop([0.0, 100.0], 140.0), &["supply"])
+        .noted("the contact before the regulator opens at 6.8 bar gauge"),
     row("tube-burst", &[at("tube-burst", FOR_GOOD)], Phase::Flight,
         stop([0.0, 100.0], 140.0), &["supply"])
-        .noted("the switch opens at 5.4 bar gauge"),
+        .noted("the contact at the reservoir opens at 5.4 bar gauge"),
     // Load and ground.
     row("load-step", &[at("load-step:joint3=60", 0.5)], Phase::Flight, goes_on(60.0), &[]),
     row("foot-loses-contact", &[at("foot-loses-contact=0.03", FOR_GOOD)], Phase::Push, goes_on(40.0), &[]),
