@@ -268,6 +268,11 @@ impl Supervisor {
         {
             self.change(|own| own.exhaust = ExhaustKind::Commanded);
         }
+        // An axis that is at fault holds: in whatever order the two are found, a lost link
+        // or an E-stop does not let it exhaust later.
+        if event == Event::AxisFault && self.staged {
+            self.change(|own| own.staged = false);
+        }
         Ok(next)
     }
 

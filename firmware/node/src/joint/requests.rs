@@ -97,7 +97,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
                 .into());
             }
             Message::ParamSet(command) => {
-                self.set_parameter(command.id, command.value)?;
+                self.set_parameter(command.id, command.value, at)?;
                 return Ok(ParamValue {
                     id: command.id,
                     value: command.value,
@@ -145,7 +145,11 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     /// Sets one parameter, or changes nothing.
-    fn set_parameter(&mut self, id: u16, raw: i32) -> Result<(), NackReason> {
+    fn set_parameter(&mut self, id: u16, raw: i32, at: Micros) -> Result<(), NackReason> {
+        // With other units or limits the watches start anew; what they have found stands.
+        if let Some(fault) = self.found() {
+            self.axis_fault(fault, at);
+        }
         let disarmed = self.core.mode().is_disarmed();
         let trial = self.parameters.with(id, raw, disarmed)?;
         let settings = JointSettings::new(&trial).ok_or(NackReason::OutOfRange)?;

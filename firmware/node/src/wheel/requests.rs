@@ -8,7 +8,7 @@ use crate::hardware::{DumpValve, Encoder, MotorDrive, SwitchBank};
 use crate::mode::{Event, Mode, ModeRules};
 use wheeleg_protocol::param::WheelParam;
 use wheeleg_protocol::{
-    InputBits, LimitBits, Message, NackReason, ParamValue, Position, SlotReply, Sync,
+    Fault, InputBits, LimitBits, Message, NackReason, ParamValue, Position, SlotReply, Sync,
     WheelControlMode,
 };
 use wheeleg_units::Micros;
@@ -72,7 +72,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
         }
     }
 
-    fn request(&mut self, request: &Message, _at: Micros) -> Result<Message, NackReason> {
+    fn request(&mut self, request: &Message, at: Micros) -> Result<Message, NackReason> {
         use WheelParam as P;
         match request {
             Message::TransmitPosition(_) => return Ok(self.position().into()),
@@ -94,19 +94,22 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
             }
             Message::WheelMode(command) => self.select_mode(command.mode)?,
             Message::WheelMaxSpeed(command) => {
-                self.set_parameters(&[(P::MaxSpeed.id(), i32::from(command.speed.get()))])?;
+                self.set_parameters(&[(P::MaxSpeed.id(), i32::from(command.speed.get()))], at)?;
             }
             Message::WheelAcceleration(command) => {
                 let raw = i32::from(command.acceleration.raw());
-                self.set_parameters(&[(P::Acceleration.id(), raw)])?;
+                self.set_parameters(&[(P::Acceleration.id(), raw)], at)?;
             }
-            Message::WheelFilter(command) => self.set_parameters(&[
-                (P::FilterZero.id(), i32::from(command.zero)),
-                (P::FilterPole.id(), i32::from(command.pole)),
-                (P::FilterGain.id(), i32::from(command.gain)),
-            ])?,
+            Message::WheelFilter(command) => self.set_parameters(
+                &[
+                    (P::FilterZero.id(), i32::from(command.zero)),
+                    (P::FilterPole.id(), i32::from(command.pole)),
+                    (P::FilterGain.id(), i32::from(command.gain)),
+                ],
+                at,
+            )?,
             Message::WheelSampleTimer(command) => {
-                self.set_parameters(&[(P::SampleTimer.id(), i32::from(command.timer))])?;
+                self.set_parameters(&[(P::SampleTimer.id(), i32::from(command.timer))], at)?;
             }
             Message::ParamGet(command) => {
                 return Ok(ParamValue {
@@ -116,7 +119,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
                 .into());
             }
             Message::ParamSet(command) => {
-                self.set_parameters(&[(command.id, command.value)])?;
+                self.set_parameters(&[(command.id, command.value)], at)?;
                 return Ok(ParamValue {
                     id: command.id,
                     value: command.value,
@@ -197,7 +200,11 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     }
 
     /// Sets all of the parameters, or changes nothing.
-    fn set_parameters(&mut self, changes: &[(u16, i32)]) -> Result<(), NackReason> {
+    fn set_parameters(&mut self, changes: &[(u16, i32)], at: Micros) -> Result<(), NackReason> {
+        // Under other limits the error may be none; what was found stands.
+        if self.is_behind() {
+            self.axis_fault(Fault::FollowingError, at);
+        }
         let disarmed = self.core.mode().is_disarmed();
         let mut trial = self.parameters;
         for (id, raw) in changes {
