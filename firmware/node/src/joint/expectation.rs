@@ -17,7 +17,7 @@
 //! the last 0.1 s of sliding: load and errors of the account together. So neither a load
 //! nor a supply or valves other than told are taken for a fault: what the account has
 //! wrong when the piston comes to rest is taken off, and while it stands only such air
-//! counts as valves twice as slow as told let through for certain. A longer mean lags behind
+//! counts as valves nearly twice as slow as told let through for certain. A longer mean lags behind
 //! an account that goes wrong on the way, by as much as a valve that does not open for the
 //! short pulses at the end of a motion. Robots drawn off their data are walked by
 //! `tests/tests/off_data.rs`; what came of it stands in `host-sim/FAULTS.md`.
