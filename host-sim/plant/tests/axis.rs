@@ -398,7 +398,8 @@ fn supply_sags_under_demand_recovers_and_dumps() {
 
 #[test]
 fn pressure_switch_has_hysteresis() {
-    let p = wheeleg_2003_axis();
+    let mut p = wheeleg_2003_axis();
+    p.supply.source_switch = None;
     let axis = Axis::new(&p).unwrap();
     let mut s = axis.initial_state(0);
     s.core.supply.source_pressure_pa = 101_325.0; // supply lost
