@@ -232,7 +232,8 @@ impl Content {
         }
         let (fill, sure_fill, fills) = taken(open, model.slow);
         let (vent, sure_vent, vents) = taken(open.wrapping_shr(16), model.slow);
-        self.open = fills | vents.wrapping_shl(16);
+        // Of a valve of which nothing is ever certain the rounds begin anew after 15.
+        self.open = (fills & 0xFFFF) | vents.wrapping_shl(16);
         // Below 2^16.
         self.vented = self
             .vented
@@ -262,7 +263,7 @@ fn taken(open: u32, slow: u32) -> (u32, u32, u32) {
     let time = open & TIME;
     let whole = open & ROUNDS;
     let (sure, next) = if whole < slow {
-        (0, whole.wrapping_add(ONE).min(ROUNDS))
+        (0, whole.wrapping_add(ONE))
     } else {
         (time, whole)
     };
