@@ -325,6 +325,12 @@ fn cargo(way: Way, sub: &str, features: &str, image: &str) -> StepResult<Command
         // what it does to the code is nothing.
         .env("RUSTC_BOOTSTRAP", "1")
         .env("RUSTFLAGS", "-Zemit-stack-sizes");
+    give_linker(way, &mut command)?;
+    Ok(command)
+}
+
+/// Lets a build that links images find its linker.
+pub(crate) fn give_linker(way: Way, command: &mut Command) -> StepResult {
     if way == Way::DebianBuildStd {
         let linker = linker_folder()?;
         let path = std::env::var_os("PATH").unwrap_or_default();
@@ -332,7 +338,7 @@ fn cargo(way: Way, sub: &str, features: &str, image: &str) -> StepResult<Command
         let joined = std::env::join_paths(all).context("PATH with the linker's folder")?;
         command.env("PATH", joined);
     }
-    Ok(command)
+    Ok(())
 }
 
 /// A folder with the linker under the name by which Debian's compiler calls it.

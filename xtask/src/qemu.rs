@@ -86,6 +86,7 @@ pub(crate) fn images(way: Way) -> StepResult<PathBuf> {
         build
             .args(["--locked", "--package", PACKAGE, "--features", "image"])
             .args(["--profile", profile, "--target", TARGET, "--bin", image]);
+        firmware::give_linker(way, &mut build)?;
         run(&mut build)?;
         let (product, path) = (products.join(profile).join(image), folder.join(image));
         if product != path {
