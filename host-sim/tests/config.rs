@@ -246,6 +246,125 @@ fn unknown_missing_and_mistyped_fields() {
     assert_all(&text, &["`gait.steps` = 3.5", "whole number"]);
 }
 
+/// The robot with this in the place of its `[source_switch]`, at the top of the file.
+fn with_source_switch(instead: &str) -> String {
+    let begin = ROBOT.find("[source_switch]\n").expect("present");
+    let end = ROBOT.find("[regulator]\n").expect("present");
+    assert!(begin < end);
+    format!("{instead}\n{}{}", &ROBOT[..begin], &ROBOT[end..])
+}
+
+/// `[source_switch]` with these thresholds, Pa.
+fn contact(on: &str, off: &str) -> String {
+    let field = |name: &str, value: &str| {
+        format!("{name} = {{ value = {value}, unit = \"Pa\", source = \"ASSUMED\" }}")
+    };
+    let (on, off) = (field("on", on), field("off", off));
+    with_source_switch(&format!("source_switch = {{ {on}, {off} }}"))
+}
+
+#[test]
+fn a_robot_has_a_contact_at_the_source_or_leaves_it_out() {
+    let fitted = |text: &str| {
+        let robot =
+            RobotConfig::parse("my.toml", text).unwrap_or_else(|e| panic!("{}", report(&e)));
+        let switch = robot.plant.supply.source_switch;
+        switch.map(|s| [s.on_pa, s.off_pa].map(f64::to_bits))
+    };
+    let pa = |on: f64, off: f64| Some([on, off].map(f64::to_bits));
+    assert_eq!(fitted(ROBOT), pa(821_325.0, 781_325.0));
+    assert_eq!(fitted(&with_source_switch("")), None);
+    // Both limits themselves: a contact without hysteresis, at what the source has.
+    let highest = contact("1101325.0", "1101325.0");
+    assert_eq!(fitted(&highest), pa(1_101_325.0, 1_101_325.0));
+}
+
+#[test]
+fn a_contact_at_the_source_that_is_written_wrongly_is_never_ignored() {
+    let rejected = |text: &str, parts: &[&str]| {
+        let error = RobotConfig::parse("my.toml", text).expect_err("must be rejected");
+        let text = report(&error);
+        assert_eq!(error.problems().len(), 1, "{text}");
+        assert_all(&text, parts);
+    };
+    let section = "must be one section [source_switch]";
+    for (wrong, found) in [
+        ("source_switch = 5", "`source_switch` = 5"),
+        ("source_switch = \"8 bar\"", "`source_switch` = \"8 bar\""),
+        ("source_switch = []", "`source_switch` = []"),
+    ] {
+        let text = with_source_switch(wrong);
+        rejected(&text, &["my.toml:1:", found, section, "it holds: on, off"]);
+    }
+    let text = ROBOT.replace("[source_switch]\n", "[[source_switch]]\n");
+    let line = line_of("[source_switch]\n");
+    rejected(&text, &[&line, "a list of tables", section, "on, off"]);
+
+    for (field, lacks) in [
+        ("\non  = {", "lacks on (Pa)"),
+        ("\noff = {", "lacks off (Pa)"),
+    ] {
+        assert_eq!(ROBOT.matches(field).count(), 1, "{field}");
+        let text = ROBOT.replace(field, &field.replace('\n', "\n# "));
+        rejected(&text, &[&line, "[source_switch]", lacks]);
+    }
+
+    rejected(
+        &contact("781325.0", "821325.0"),
+        &[
+            "my.toml:1:",
+            "`source_switch.off` = 821325 Pa",
+            "up to 781325 Pa, which is `source_switch.on`",
+        ],
+    );
+    rejected(
+        &contact("1101326.0", "781325.0"),
+        &[
+            "my.toml:1:",
+            "`source_switch.on` = 1101326 Pa",
+            "up to 1101325 Pa, which is `supply.source_pressure`",
+            "never closes",
+        ],
+    );
+}
+
+#[test]
+fn the_contact_at_the_reservoir_opens_no_higher_than_it_closes() {
+    let text = robot_with(
+        "switch_off       = { value = 641325.0",
+        "switch_off = { value = 661326.0",
+    );
+    let line = line_of("switch_off ");
+    assert_all(
+        &text,
+        &[
+            &line,
+            "`supply.switch_off` = 661326 Pa",
+            "up to 661325 Pa",
+            "`supply.switch_on`",
+        ],
+    );
+}
+
+#[test]
+fn no_section_of_another_type_is_ignored() {
+    let own = robot_with_node("");
+    for (text, section) in [
+        (format!("node = 5\n{own}"), "node"),
+        (format!("commissioned = 5\n{own}"), "commissioned"),
+        (
+            format!("supply = 5\n{}", own.replace("[supply]", "[suply]")),
+            "supply",
+        ),
+        (format!("node.joint = 5\n{own}"), "node.joint"),
+        (robot_with_node("[[node.joint]]"), "node.joint"),
+    ] {
+        let error = RobotConfig::parse("my.toml", &text).expect_err("must be rejected");
+        let part = format!("must be one section [{section}]");
+        assert_all(&report(&error), &[&format!("`{section}` = "), &part]);
+    }
+}
+
 #[test]
 fn bare_values_and_missing_sources_are_refused() {
     let text = robot_with(

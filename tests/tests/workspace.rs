@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
+use wheeleg_identity::sources::{self, Images};
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
@@ -98,8 +99,9 @@ const LIBRARIES: [&str; 9] = [
     "wheeleg-units",
 ];
 
-const TESTED: [&str; 10] = [
+const TESTED: [&str; 11] = [
     "wheeleg-control",
+    "wheeleg-identity",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
@@ -248,6 +250,55 @@ fn arrows_point_one_way() {
             .collect();
         let extra: Vec<_> = found.difference(&allowed).collect();
         assert!(extra.is_empty(), "{name} must not depend on {extra:?}");
+    }
+}
+
+/// A crate of ours and all of ours that it is built from, optional ones and those of build
+/// scripts included, those of tests not.
+fn built_from(name: &str, packages: &BTreeMap<String, Value>, found: &mut BTreeSet<String>) {
+    if !found.insert(name.to_owned()) {
+        return;
+    }
+    let list = packages[name]["dependencies"].as_array();
+    for dependency in list.expect("dependencies") {
+        let name = text(&dependency["name"]);
+        if dependency["kind"] != "dev" && packages.contains_key(&name) {
+            built_from(&name, packages, found);
+        }
+    }
+}
+
+/// An image tells by a digest of its sources whether it is up to date: a crate that the list
+/// behind it lacks could change unseen, one too many would age images for nothing.
+#[test]
+fn digests_of_images_are_of_all_crates_that_they_are_made_of_and_no_others() {
+    let (packages, root) = (packages(), root().canonicalize().expect("the root"));
+    for (board, images) in [
+        ("wheeleg-board", Images::G431),
+        ("wheeleg-board-qemu", Images::Qemu),
+    ] {
+        let (_, files) = sources::digest(&root, images).expect("a digest");
+        let files: BTreeSet<PathBuf> = files.into_iter().collect();
+        let path = |value: &Value| {
+            let path = PathBuf::from(text(value));
+            path.canonicalize().expect("a file of the workspace")
+        };
+        let mut made_of = BTreeSet::new();
+        built_from(board, &packages, &mut made_of);
+        assert!(made_of.len() > 5, "{board}: {made_of:?}");
+        let digested = packages
+            .iter()
+            .filter(|(_, package)| files.contains(&path(&package["manifest_path"])))
+            .map(|(name, _)| name.clone());
+        assert_eq!(digested.collect::<BTreeSet<_>>(), made_of, "{board}");
+        for name in made_of {
+            for target in packages[&name]["targets"].as_array().expect("targets") {
+                let kind = target["kind"][0].as_str().expect("a kind");
+                let source = path(&target["src_path"]);
+                let in_an_image = !matches!(kind, "test" | "bench" | "example");
+                assert_eq!(files.contains(&source), in_an_image, "{}", source.display());
+            }
+        }
     }
 }
 

@@ -2,7 +2,10 @@
 //!
 //! It depends on names below the workspace's root and on contents, not on where the
 //! workspace lies, on times or on the way lines end. Images and host have the same one if
-//! and only if their firmware sources are the same; a change of the simulator leaves it.
+//! and only if the files listed here are the same. A change of the simulator's sources
+//! leaves it; one of the root `Cargo.toml` or `Cargo.lock` does not, even if it concerns the
+//! simulator alone (one of its dependencies, a member of the workspace), because versions and
+//! profiles of the images stand there, too.
 
 use std::ffi::OsStr;
 use std::io;
@@ -24,9 +27,11 @@ const COMMON: [&str; 8] = [
 ];
 /// The board link's wire types; `remote` speaks it.
 const LINK: &str = "host-sim/pil-link";
-/// Of a crate: its manifest, its build script, its sources. Tests and fuzz targets are
-/// in no image.
-const OF_A_CRATE: [&str; 3] = ["Cargo.toml", "build.rs", "src"];
+/// Of a crate: its manifest, its sources, its build script if it has one. Tests and fuzz
+/// targets are in no image.
+const MANIFEST: &str = "Cargo.toml";
+const SOURCES: &str = "src";
+const BUILD_SCRIPT: &str = "build.rs";
 
 /// Which images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +55,7 @@ impl Images {
 /// Digest and files of the sources of `images` below the workspace's `root`.
 ///
 /// # Errors
-/// A file that is missing or cannot be read.
+/// A file, a crate, its manifest or its sources that are missing or cannot be read.
 pub fn digest(root: &Path, images: Images) -> io::Result<(Digest, Vec<PathBuf>)> {
     let mut files = Vec::new();
     for name in COMMON.into_iter().chain([LINK]).chain(images.own()) {
@@ -59,13 +64,12 @@ pub fn digest(root: &Path, images: Images) -> io::Result<(Digest, Vec<PathBuf>)>
             files.push(path);
             continue;
         }
-        for part in OF_A_CRATE {
-            let part = path.join(part);
-            if part.is_dir() {
-                walk(&part, &mut files)?;
-            } else if part.is_file() {
-                files.push(part);
-            }
+        // What is neither file nor crate has no sources.
+        files.push(path.join(MANIFEST));
+        walk(&path.join(SOURCES), &mut files)?;
+        let script = path.join(BUILD_SCRIPT);
+        if script.is_file() {
+            files.push(script);
         }
     }
     let mut named: Vec<(String, PathBuf)> = files
@@ -75,8 +79,7 @@ pub fn digest(root: &Path, images: Images) -> io::Result<(Digest, Vec<PathBuf>)>
     named.sort();
     let mut hasher = blake3::Hasher::new();
     for (name, path) in &named {
-        let told = |e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", path.display()));
-        let mut text = fs::read(path).map_err(told)?;
+        let mut text = fs::read(path).map_err(|e| told(path, &e))?;
         text.retain(|byte| *byte != b'\r');
         for part in [name.as_bytes(), &text] {
             hasher.update(&(part.len() as u64).to_le_bytes());
@@ -100,7 +103,7 @@ pub fn emit(root: &Path, images: Images, name: &str) -> io::Result<()> {
     }
     // Files that come anew: a folder's time is that of its newest entry.
     for name in COMMON.into_iter().chain([LINK]).chain(images.own()) {
-        let sources = root.join(name).join("src");
+        let sources = root.join(name).join(SOURCES);
         if sources.is_dir() {
             println!("cargo:rerun-if-changed={}", sources.display());
         }
@@ -109,9 +112,14 @@ pub fn emit(root: &Path, images: Images, name: &str) -> io::Result<()> {
     fs::write(Path::new(&out).join(name), digest)
 }
 
-/// Rust and linker sources below a folder.
+/// The error, and which file it is about.
+fn told(path: &Path, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
+}
+
+/// Rust sources below a folder.
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
+    for entry in fs::read_dir(folder).map_err(|e| told(folder, &e))? {
         let path = entry?.path();
         if path.is_dir() {
             walk(&path, files)?;
@@ -210,6 +218,36 @@ mod tests {
             let changed = [0, 1].map(|i| other[i] != after[i]);
             assert_eq!(changed, [images == Images::G431, images == Images::Qemu]);
             fs::remove_file(root.join(own).join("src/new.rs")).expect("removed");
+        }
+    }
+
+    #[test]
+    fn what_is_missing_is_an_error_and_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let root = folder.path();
+        workspace(root);
+        let aside = root.join("aside");
+        for images in [Images::G431, Images::Qemu] {
+            let listed = COMMON.into_iter().chain([LINK]).chain(images.own());
+            let missing: Vec<String> = listed
+                .flat_map(|name| {
+                    let inside = [MANIFEST, SOURCES].map(|part| format!("{name}/{part}"));
+                    let inside = inside.into_iter().filter(|_| !name.contains('.'));
+                    [name.to_owned()].into_iter().chain(inside)
+                })
+                .collect();
+            // Three files, eight crates of which each has a manifest and sources.
+            assert_eq!(missing.len(), 3 + 3 * 8, "{missing:?}");
+            for name in missing {
+                let path = root.join(&name);
+                fs::rename(&path, &aside).expect("moved");
+                let error = digest(root, images).expect_err(&name);
+                assert_eq!(error.kind(), io::ErrorKind::NotFound, "{name}: {error}");
+                let text = error.to_string().replace('\\', "/");
+                assert!(text.contains(&name), "{name}: {text}");
+                fs::rename(&aside, &path).expect("back");
+            }
+            assert!(digest(root, images).is_ok(), "all is back");
         }
     }
 

@@ -21,7 +21,7 @@ fn parse(text: &str) -> Option<UniqueId> {
 /// Reads `[commissioned]`. A board that is not listed may be any.
 pub(super) fn read(r: &mut Reader) -> [Option<UniqueId>; 8] {
     let mut ids = [None; 8];
-    let Some(table) = r.table("commissioned") else {
+    let Some(table) = r.optional_table("commissioned", &NODE_NAMES) else {
         return ids;
     };
     r.reject_unknown(&table, &NODE_NAMES);

@@ -30,10 +30,11 @@ const JOINT_SECTIONS: [(&str, &[usize]); 4] = [
 /// and `[node.wheel]`. What is not set keeps the board's default.
 pub(super) fn read(r: &mut Reader) -> NodeParams {
     let mut params = NodeParams::default();
-    let Some(top) = r.table("node") else {
+    let sections = ["joint", "yaw", "horizontal", "vertical", "wheel"];
+    let Some(top) = r.optional_table("node", &sections) else {
         return params;
     };
-    r.reject_unknown(&top, &["joint", "yaw", "horizontal", "vertical", "wheel"]);
+    r.reject_unknown(&top, &sections);
     for (name, joints) in JOINT_SECTIONS {
         for (id, raw) in section(r, &format!("node.{name}"), JOINT_PARAMS) {
             for joint in joints {
@@ -110,10 +111,10 @@ fn set(list: &mut Vec<(u16, i32)>, id: u16, raw: i32) {
 }
 
 fn section(r: &mut Reader, path: &str, table: &'static [ParamInfo]) -> Vec<(u16, i32)> {
-    let Some(entry) = r.table(path) else {
+    let names: Vec<&str> = table.iter().map(|p| p.name).collect();
+    let Some(entry) = r.optional_table(path, &names) else {
         return Vec::new();
     };
-    let names: Vec<&str> = table.iter().map(|p| p.name).collect();
     r.reject_unknown(&entry, &names);
     table
         .iter()

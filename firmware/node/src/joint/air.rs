@@ -46,7 +46,8 @@ const ROUNDS: u32 = 0xF000;
 /// … of which this is one.
 const ONE: u32 = 0x1000;
 const _: () = assert!(WHOLE <= TIME, "a round fits its bits");
-/// More whole rounds than are counted: nothing is certain of valves that take longer.
+/// More whole rounds than are counted: nothing is certain of valves that take longer
+/// (see [`AirModel`]).
 const NEVER: u32 = ROUNDS + ONE;
 /// How often as long as told a valve may take to open, in fifths (ASSUMED: small
 /// direct-acting valves of one type differ by about twice with age, temperature and supply
@@ -96,6 +97,10 @@ fn time(length: i32, flow: i32) -> i64 {
 }
 
 /// What the air of an axis obeys.
+///
+/// Of valves that are told to take more than 25 ms to open (`valve_t_on`; up to 50 ms are
+/// allowed) nothing is ever certain: no chamber counts as vented, nothing is learnt, and missing
+/// motion (fault 44) is not watched for. Nine fifths of 25 ms are the 15 rounds that are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct AirModel {
     a: Chamber,
@@ -258,6 +263,10 @@ impl Content {
 
 /// Of one valve: for how long it was energised in this round, µs, for how long of that it was
 /// open for certain, and what the next round starts with.
+///
+/// Only the sum of a round is known. Where a valve that is open for certain is shut and energised
+/// again inside one round, the second pulse counts as certain, too: at most 2 ms of air that may
+/// not be there, in this round alone, because after one that is not whole the count begins anew.
 #[inline(always)]
 fn taken(open: u32, slow: u32) -> (u32, u32, u32) {
     let time = open & TIME;
@@ -523,7 +532,8 @@ mod tests {
     }
 
     /// However long valves are told to take, air counts as certain no sooner than after 9/5 of
-    /// that time, and from a round after it, as far as rounds are counted (45 ms).
+    /// that time, and at the latest from two rounds after it, as far as rounds are counted
+    /// (45 ms): one to which it is rounded up, one in which a pulse may begin.
     #[test]
     fn a_valve_is_open_for_certain_after_nearly_twice_what_it_is_told() {
         for told in [

@@ -14,6 +14,7 @@ use super::sections::{
     AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
     LineSection, NumericsSection, PotentiometerSection, SupplySection, SwitchSection, ValveSection,
 };
+use crate::config::quantity::pretty;
 use crate::config::reader::Reader;
 
 /// Names of the sections that [`Pneumatics`] and [`Sensing`] read.
@@ -47,9 +48,8 @@ impl Pneumatics {
         let gas = r.section::<GasSection>("gas");
         let supply = r.section::<SupplySection>("supply");
         // A robot without the contact at the source has no such section.
-        let source_switch = r
-            .table("source_switch")
-            .map(|_| r.section::<SwitchSection>("source_switch"));
+        let source_switch = r.optional_section::<SwitchSection>("source_switch");
+        check_contacts(r, supply.as_ref(), source_switch.as_ref());
         let regulator = r.section::<FlowSection>("regulator");
         let dump_valve = r.section::<ValveSection>("dump_valve");
         let fill_valve = r.section::<ValveSection>("fill_valve");
@@ -60,16 +60,7 @@ impl Pneumatics {
         let end_stop = r.section::<EndStopSection>("end_stop");
         Some(Self {
             gas: gas_params(&gas?),
-            supply: supply_params(
-                &supply?,
-                source_switch
-                    .map(|s| s.ok_or(()))
-                    .transpose()
-                    .ok()?
-                    .as_ref(),
-                &regulator?,
-                &dump_valve?,
-            ),
+            supply: supply_params(&supply?, source_switch?.as_ref(), &regulator?, &dump_valve?),
             cylinder: cylinder_params(
                 &cylinder?,
                 &line?,
@@ -119,6 +110,54 @@ impl Sensing {
             step_ns: (numerics?.step * 1e9).round() as u64,
         })
     }
+}
+
+/// A contact opens no higher than it closes, and the one at the source closes at what the
+/// source has.
+fn check_contacts(
+    r: &mut Reader,
+    supply: Option<&SupplySection>,
+    source_switch: Option<&Option<SwitchSection>>,
+) {
+    const OPENS: &str = "a contact opens at a lower pressure than it closes";
+    const NEVER: &str = "a contact that never closes: the robot would take its supply for lost";
+    if let Some(s) = supply {
+        let most = ("supply.switch_on", s.switch_on);
+        at_most(r, ["supply", "switch_off"], s.switch_off, most, OPENS);
+    }
+    let Some(Some(switch)) = source_switch else {
+        return;
+    };
+    let most = ("source_switch.on", switch.on);
+    at_most(r, ["source_switch", "off"], switch.off, most, OPENS);
+    if let Some(s) = supply {
+        let most = ("supply.source_pressure", s.source_pressure);
+        at_most(r, ["source_switch", "on"], switch.on, most, NEVER);
+    }
+}
+
+/// Holds a pressure (Pa) of a section against that of another field.
+fn at_most(
+    r: &mut Reader,
+    [section, key]: [&str; 2],
+    pressure_pa: f64,
+    (limit, most_pa): (&str, f64),
+    why: &str,
+) {
+    if pressure_pa <= most_pa {
+        return;
+    }
+    let field = r.table(section).and_then(|table| table.get(key));
+    r.problem(
+        field.and_then(|(key, item)| item.span().or(Some(key))),
+        format!(
+            "`{section}.{key}` = {} Pa is out of range: allowed up to {} Pa, which is `{limit}`",
+            pretty(pressure_pa),
+            pretty(most_pa)
+        ),
+        "out of range",
+        Some(why.to_owned()),
+    );
 }
 
 fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {

@@ -142,19 +142,52 @@ impl Reader {
         })
     }
 
+    /// The table at `path`, which a file may leave out; anything else there is a problem, with
+    /// the names that the table `holds` for help.
+    pub(crate) fn optional_table(&mut self, path: &str, holds: &[&str]) -> Option<Entry> {
+        let item = self.item(path)?;
+        let Some(table) = self.table(path) else {
+            let span = item.span();
+            let found = if item.is_array_of_tables() {
+                "a list of tables".to_owned()
+            } else {
+                item.to_string().trim().to_owned()
+            };
+            self.problem(
+                span,
+                format!("`{path}` = {found} must be one section [{path}]"),
+                "not a section",
+                Some(format!(
+                    "write one [{path}] heading; it holds: {}",
+                    holds.join(", ")
+                )),
+            );
+            return None;
+        };
+        Some(table)
+    }
+
+    /// Reads the section `[path]` of parameters, which a file may leave out: `Some(None)`.
+    pub(crate) fn optional_section<T: Params>(&mut self, path: &str) -> Option<Option<T>> {
+        if self.item(path).is_none() {
+            return Some(None);
+        }
+        self.section(path).map(Some)
+    }
+
     /// Reads the section `[path]` of parameters.
     pub(crate) fn section<T: Params>(&mut self, path: &str) -> Option<T> {
-        let Some(entry) = self.table(path) else {
-            let keys: Vec<&str> = T::FIELDS.iter().map(|f| f.key).collect();
+        let known: Vec<&str> = T::FIELDS.iter().map(|f| f.key).collect();
+        if self.item(path).is_none() {
             self.problem(
                 None,
                 format!("section [{path}] is missing"),
                 "expected somewhere in this file",
-                Some(format!("it holds: {}", keys.join(", "))),
+                Some(format!("it holds: {}", known.join(", "))),
             );
             return None;
-        };
-        let known: Vec<&str> = T::FIELDS.iter().map(|f| f.key).collect();
+        }
+        let entry = self.optional_table(path, &known)?;
         self.reject_unknown(&entry, &known);
         let missing: Vec<&FieldSpec> = T::FIELDS
             .iter()
