@@ -5,7 +5,9 @@
 mod bench;
 
 use bench::pil::{Board, edge};
+use bench::{delivery, numbered};
 use wheeleg_pil_link::{Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, Straps};
+use wheeleg_protocol::{Address, FaultReport};
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_sim::sil::BOARD_START_UP_NS;
 
@@ -248,6 +250,30 @@ fn without_figures(reply: &Reply) -> Ran {
             ..ran.clone()
         },
         other => panic!("{other:?}"),
+    }
+}
+
+/// The answer begins 100 µs later: a simulator that runs on to the next edge before it is
+/// told puts it on the line too late.
+#[test]
+fn the_answer_to_a_request_that_ends_with_a_tick_edge_is_told_with_that_edge() {
+    for (address, tick_ns) in [(2, TICK_NS), (7, SAMPLE_NS)] {
+        let mut bench = Bench::new(address);
+        let mut at_ns = 0;
+        for _ in 0..60 {
+            at_ns += tick_ns;
+            bench.ran(&edge(at_ns, Power::Good));
+        }
+        at_ns += tick_ns;
+        let node = Address::new(address).expect("a node");
+        let request = numbered(100, node, &FaultReport {}.into());
+        let heard = bench.ran(&delivery(&request, at_ns));
+        assert!(heard.sent.is_empty(), "it has not heard the end");
+        let sent = bench.ran(&edge(at_ns, Power::Good)).sent;
+        let [answer] = &sent[..] else {
+            panic!("{address}: one answer with the edge, not {sent:?}");
+        };
+        assert_eq!(answer.start_ns, at_ns + 100_000);
     }
 }
 

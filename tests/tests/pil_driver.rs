@@ -1,4 +1,4 @@
-//! The time limit of the bus driver, on images of a joint board: a transmission that
+//! The time limit of the bus driver, on images of both kinds: a transmission that
 //! takes too long loses its driver by hardware, when the frame that was asked for ought
 //! to be over, and the board latches that. An image without the limit is found.
 //! `cargo xtask pil` builds both and runs this.
@@ -15,10 +15,12 @@ use wheeleg_sim::pil::unicorn::image;
 
 /// Folder with one folder of images per mutation (firmware/board/src/g431/mutant.rs).
 const MUTANTS: &str = "WHEELEG_MUTANTS";
-const ADDRESS: u8 = 2;
-const MS: u64 = 1_000_000;
-/// Start-up with its self-test of ten readings, ms.
-const START_MS: u64 = 40;
+/// Kinds of boards: image, an address, tick in ns.
+type Kind = (&'static str, u8, u64);
+const JOINT: Kind = ("joint", 2, 1_000_000);
+const WHEEL: Kind = ("wheel", 7, 520_000);
+/// Start-up with its self-test of ten readings, ticks.
+const START: u64 = 40;
 /// Time of a byte on the line, µs.
 const BYTE_US: u32 = 10;
 /// The driver is on this much longer than the frame: 1 µs before it, 2 µs behind
@@ -28,6 +30,7 @@ const MARGIN_US: u32 = 3;
 /// An emulated joint board on a bus of its own.
 struct Bench {
     board: Board,
+    kind: Kind,
     now_ns: u64,
     sequence: u16,
     sent: Vec<Vec<u8>>,
@@ -35,16 +38,17 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(image: PathBuf) -> Self {
+    fn new(image: PathBuf, kind: Kind) -> Self {
         let mut bench = Self {
             board: Board::new(image),
+            kind,
             now_ns: 0,
             sequence: 100,
             sent: Vec::new(),
             figures: Figures::default(),
         };
-        bench.ran(&power_up(ADDRESS));
-        bench.ticks(START_MS);
+        bench.ran(&power_up(kind.1));
+        bench.ticks(START);
         bench
     }
 
@@ -56,9 +60,9 @@ impl Bench {
         ran
     }
 
-    fn ticks(&mut self, ms: u64) {
-        for _ in 0..ms {
-            self.now_ns += MS;
+    fn ticks(&mut self, count: u64) {
+        for _ in 0..count {
+            self.now_ns += self.kind.2;
             self.ran(&edge(self.now_ns, Power::Good));
         }
     }
@@ -71,12 +75,12 @@ impl Bench {
     /// Asks for the faults; gives the answer that the board wants to send.
     fn answer(&mut self) -> Vec<u8> {
         self.sequence += 1;
-        let address = Address::new(ADDRESS).expect("a joint");
+        let address = Address::new(self.kind.1).expect("a node");
         let bytes = numbered(self.sequence, address, &FaultReport {}.into());
         self.sent.clear();
-        self.ran(&delivery(&bytes, self.now_ns + MS / 2));
+        self.ran(&delivery(&bytes, self.now_ns + self.kind.2 / 2));
         // The longest frame, stretched, and a while.
-        self.ticks(100);
+        self.ticks(200);
         let [answer] = &self.sent[..] else {
             panic!("one answer, not {:?}", self.sent);
         };
@@ -99,8 +103,8 @@ impl Bench {
 
 /// Whether the driver of an image ends with the frame that was asked for, and the board
 /// says so, when its transmitter takes `times` as long; or what is wrong.
-fn limit(image: &Path, times: u8) -> Result<(), String> {
-    let mut bench = Bench::new(image.to_path_buf());
+fn limit(image: &Path, kind: Kind, times: u8) -> Result<(), String> {
+    let mut bench = Bench::new(image.to_path_buf(), kind);
     let length = bench.answer().len() as u32;
     let on_us = length * BYTE_US + MARGIN_US;
     let ensure = |bench: &Bench, timeouts: u16| {
@@ -117,7 +121,7 @@ fn limit(image: &Path, times: u8) -> Result<(), String> {
     };
     ensure(&bench, 0)?;
     bench.stretch(times);
-    // Its beginning is all that goes out.
+    // It stands ready as a whole; its beginning is all that goes out.
     assert_eq!(bench.answer().len() as u32, length);
     ensure(&bench, 1)?;
     // The transmitter is sound again: the board can still send, and tells.
@@ -132,30 +136,35 @@ fn limit(image: &Path, times: u8) -> Result<(), String> {
 
 #[test]
 fn hardware_ends_the_drive_of_a_transmission_that_takes_too_long_and_the_board_latches_it() {
-    let image = image("joint").expect("an image");
-    // A little, twice, and so much that no byte is over when the driver goes.
-    for times in [2, 3, 100] {
-        assert_eq!(limit(&image, times), Ok(()), "{times} times as long");
+    for kind in [JOINT, WHEEL] {
+        let image = image(kind.0).expect("an image");
+        // Twice, more, and so much that no byte is over when the driver goes.
+        for times in [2, 3, 100] {
+            let found = limit(&image, kind, times);
+            assert_eq!(found, Ok(()), "{}, {times} times as long", kind.0);
+        }
     }
 }
 
 #[test]
 fn a_sound_transmission_is_no_fault() {
-    let mut bench = Bench::new(image("joint").expect("an image"));
-    for _ in 0..3 {
-        let record = bench.faults();
-        assert!(record.active.is_empty(), "{record:?}");
+    for kind in [JOINT, WHEEL] {
+        let mut bench = Bench::new(image(kind.0).expect("an image"), kind);
+        for _ in 0..3 {
+            let record = bench.faults();
+            assert!(record.active.is_empty(), "{record:?}");
+        }
+        assert_eq!(bench.figures.driver_timeouts, 0);
+        let longest_us = MAX_ENCODED as u32 * BYTE_US + MARGIN_US;
+        assert!((1..longest_us).contains(&bench.figures.driver_on_us));
     }
-    assert_eq!(bench.figures.driver_timeouts, 0);
-    let longest_us = MAX_ENCODED as u32 * BYTE_US + MARGIN_US;
-    assert!((1..longest_us).contains(&bench.figures.driver_on_us));
 }
 
 #[test]
 fn an_image_without_the_limit_is_found() {
     let folder = std::env::var_os(MUTANTS).expect("run `cargo xtask pil`");
     let image = Path::new(&folder).join("mutant-driver-limit/joint.elf");
-    let found = limit(&image, 2).expect_err("the driver stays on");
+    let found = limit(&image, JOINT, 2).expect_err("the driver stays on");
     println!("{found}");
     assert!(found.starts_with("driver on for"), "{found}");
 }

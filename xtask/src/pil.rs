@@ -218,7 +218,7 @@ pub(crate) fn state_flips() -> StepResult<String> {
 }
 
 /// The whole suite with images of the second way of building: three steps, runs with
-/// faults, and boards of three kinds. It shares only the sources with the first: compiler,
+/// faults, the predictive law, and boards of three kinds. It shares only the sources with the first: compiler,
 /// `core` and flags are others.
 pub(crate) fn second_way() -> StepResult<String> {
     tools()?;
@@ -228,6 +228,7 @@ pub(crate) fn second_way() -> StepResult<String> {
     tests(&emulator, &images)?;
     let figures = figures(&emulator, &images.folder)?;
     let eventful = eventful(&emulator, &images.folder)?;
+    predictive(&emulator, &images.folder)?;
     let mixed = mixed(&emulator, &images.folder, way)?;
     let pil = &figures["pil"];
     let of = |image: &str| {

@@ -15,6 +15,16 @@ pub(crate) const SUPPLY: u32 = 12;
 pub(crate) const STRAPS: [u32; 4] = [0, 1, 2, 10];
 /// Port B: parity strap.
 pub(crate) const PARITY: u32 = 11;
+/// Port B: encoder A and B, TIM3_CH1 and CH2.
+pub(crate) const ENCODER: [u32; 2] = [4, 5];
+/// Alternate function of both.
+pub(crate) const ENCODER_FUNCTION: u32 = 2;
+/// Port B: bus, USART1_TX.
+pub(crate) const BUS_TX: u32 = 6;
+/// Port B: bus, USART1_RX.
+pub(crate) const BUS_RX: u32 = 7;
+/// Alternate function of both.
+pub(crate) const BUS_FUNCTION: u32 = 7;
 /// Port B: motor direction, high = backward.
 pub(crate) const DIRECTION: u32 = 13;
 /// Port B: bus driver enable, TIM15_CH1.

@@ -45,6 +45,8 @@ pub struct BoardFigures {
     pub late_bytes: u32,
     /// Frames that the emulator told of after their first byte.
     pub late_frames: u32,
+    /// Frames that did not leave whole: cut off by the driver's time limit, or not on the pins.
+    pub cut_frames: u16,
 }
 
 impl BoardFigures {
@@ -81,6 +83,7 @@ impl BoardFigures {
             resets: figures.resets,
             late_bytes: figures.late_bytes,
             late_frames,
+            cut_frames: figures.driver_timeouts,
         }
     }
 }

@@ -106,8 +106,8 @@ pub fn ensure_same_sources(nodes: &Nodes) -> Result<(), SimError> {
                 image.of_other_sources()
             ),
             format!(
-                "build image and program anew with: {}; or run without --compare-sil, which \
-                 compares the board at its pins",
+                "build the image anew with: {}, and this program with: cargo build --release; or \
+                 run without --compare-sil, which compares the board at its pins",
                 image.kind.build_command()
             ),
         )),

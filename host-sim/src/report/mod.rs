@@ -180,6 +180,7 @@ mod tests {
                     resets: 0,
                     late_bytes: 0,
                     late_frames: 0,
+                    cut_frames: 0,
                 }],
             });
             let (r, a) = (&recording, &analysis);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::process::{cargo, command, output, run, target_dir};
@@ -70,13 +70,16 @@ pub(crate) fn ensure_equal(pil: &Value) -> anyhow::Result<()> {
         "{compared} bits compared, {differ} differ: {}",
         pil["first_difference"]
     );
-    let late = |board: &&Value| board["late_frames"].as_u64() > Some(0);
-    if let Some(board) = pil["boards"].as_array().into_iter().flatten().find(late) {
-        bail!(
-            "{} frames of {} were told late",
-            board["late_frames"],
-            board["node"]
-        );
+    for board in pil["boards"].as_array().into_iter().flatten() {
+        for (key, what) in [("late_frames", "told late"), ("cut_frames", "cut off")] {
+            let count = board[key].as_u64();
+            ensure!(
+                count == Some(0),
+                "{}: {} {what}: {count:?}",
+                board["node"],
+                key
+            );
+        }
     }
     Ok(())
 }

@@ -258,7 +258,7 @@ impl Board {
         }
         levels |= u32::from(inputs.switches.supply()) << wiring::SUPPLY;
         soc.ports[0].outside = levels;
-        soc.encoder_timer().turn(inputs.encoder);
+        soc.turn(inputs.encoder);
         Ok(())
     }
 }

@@ -112,7 +112,8 @@ pub(crate) struct Soc {
     pub(crate) time: Time,
     /// Wiper of the potentiometer as latched at the newest edge.
     pub(crate) wiper: u16,
-    /// Transmissions that outlasted the driver's one-shot.
+    /// Transmissions that did not leave whole: they outlasted the driver's one-shot, or
+    /// their pin or the driver's is not switched to them.
     pub(crate) driver_timeouts: u16,
     /// Longest that the driver was on, whole µs.
     pub(crate) driver_on_us: u32,
@@ -299,6 +300,14 @@ impl Soc {
         self.usart.expects()
     }
 
+    /// The wheel stands at `edges` since power-up; what its pins do not carry is not counted.
+    pub(crate) fn turn(&mut self, edges: i32) {
+        let carries = |pin: &u32| self.ports[1].carries(*pin, wiring::ENCODER_FUNCTION);
+        if wiring::ENCODER.iter().all(carries) {
+            self.tim[TIM3].turn(edges);
+        }
+    }
+
     fn edge_at(&mut self, at: u64) {
         self.edge = Some(at);
         if self.tim[TIM1].triggers_on_update() {
@@ -329,8 +338,9 @@ impl Soc {
     fn usart_event(&mut self, at: u64) {
         let driver = self.driver();
         let drives = driver.is_some_and(|(on, off)| (on..off).contains(&at));
+        let hears = self.ports[1].carries(wiring::BUS_RX, wiring::BUS_FUNCTION);
         // DE and /RE are one line.
-        self.usart.happen(at, drives);
+        self.usart.happen(at, drives || !hears);
         if let Some(driver) = driver {
             self.burst_high = Some(driver);
         }
@@ -356,7 +366,7 @@ impl Soc {
         }
     }
 
-    /// A burst that was driven from its first bit to its last is a frame.
+    /// A burst that was driven from its first bit to its last, on its pin, is a frame.
     fn finish_burst(&mut self) {
         let byte = self.usart.sent_byte_cycles();
         if let Some((start, bytes)) = self.usart.take_burst() {
@@ -365,7 +375,7 @@ impl Soc {
                 .burst_high
                 .take()
                 .is_some_and(|(on, off)| on <= start && end <= off);
-            if driven {
+            if driven && self.ports[1].carries(wiring::BUS_TX, wiring::BUS_FUNCTION) {
                 self.gone.push((start, bytes));
             } else {
                 self.driver_timeouts += 1;
@@ -457,3 +467,6 @@ impl Soc {
             | line(self.serial.line(), IRQ_USART2)
     }
 }
+
+#[cfg(test)]
+mod pin_tests;
