@@ -35,6 +35,8 @@ pub struct Options {
     pub faults: Vec<FaultSpec>,
     /// Folder for the results instead of `runs/<scenario>-seed<N>`.
     pub out: Option<PathBuf>,
+    /// The run is to equal one with all nodes in this program ([`repeat_natively`]).
+    pub compared: bool,
 }
 
 /// A run with its files written.
@@ -76,6 +78,7 @@ pub fn repeat_natively(
     let options = Options {
         nodes: Nodes::default(),
         out: Some(out),
+        compared: false,
         ..options.clone()
     };
     run_on(&options, Some(&before.down_times))
@@ -85,6 +88,9 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, SimEr
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
     faults::check(&scenario, &options.nodes)?;
+    if options.compared {
+        faults::ensure_comparable(&scenario, &options.nodes)?;
+    }
     let robot = match &options.robot {
         Some(robot) => builtin::robot(robot)?,
         None => builtin::robot_of(&scenario.robot, &options.scenario)?,
@@ -195,6 +201,7 @@ mod tests {
             nodes,
             faults: Vec::new(),
             out: Some(folder.clone()),
+            compared: false,
         };
         let error = run(&options).expect_err("no such port").to_string();
         assert!(error.contains("no-port"), "{error}");

@@ -45,7 +45,7 @@ pub(super) struct RunArgs {
     node: Vec<NodeChoice>,
     /// Run the scenario once more with all nodes in this program; exit with code
     /// 2 unless both logs are the same to the bit. Images of other firmware sources
-    /// than this program's are refused.
+    /// than this program's are refused, as are faults of the line.
     #[arg(long)]
     compare_sil: bool,
     /// Print the summary as JSON on stdout.
@@ -87,6 +87,7 @@ pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
         out: args.out.clone(),
         faults: args.faults.clone(),
         nodes: Nodes::new(&args.nodes, &args.node)?,
+        compared: args.compare_sil,
     };
     if args.compare_sil {
         pil::ensure_same_sources(&options.nodes)?;
@@ -127,6 +128,7 @@ fn compare_sil(options: &Options, finished: &Finished) -> Result<(), SimError> {
     let folder = finished.report.parent().unwrap_or(Path::new("."));
     let native = run::repeat_natively(options, finished, folder.join(output::NATIVE))?;
     if native.summary.hash == finished.summary.hash {
+        eprintln!("the log is that of the native run, to the bit");
         return Ok(());
     }
     let here = folder.join(output::NATIVE).join("log.mcap");

@@ -75,6 +75,36 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
     ))
 }
 
+/// Whether a run with boards outside can be asked to equal one with all boards in this
+/// program: not on a disturbed line.
+///
+/// # Errors
+/// [`SimError::Simulation`] with the fault that stands against it.
+pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
+    use FaultKind as F;
+    let on_line = |fault: &&FaultSpec| {
+        matches!(
+            fault.kind,
+            F::BusFull
+                | F::BitErrors
+                | F::BytesLost
+                | F::BytesInserted
+                | F::FramesDelayed
+                | F::CycleJitter
+        )
+    };
+    match scenario.faults.iter().find(on_line) {
+        Some(fault) if !nodes.all_native() => Err(SimError::simulation(
+            format!(
+                "with the fault `{fault}`, boards outside of this program may differ from its \
+                 own: these get a frame as a whole, those byte by byte"
+            ),
+            "run without --compare-sil, which tells where boards differ at their pins",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// The same fault at the same place twice at a time has no meaning.
 fn no_twins(faults: &[FaultSpec]) -> Result<(), SimError> {
     for (i, a) in faults.iter().enumerate() {
@@ -144,5 +174,30 @@ mod tests {
         for fault in all() {
             assert!(admitted(fault, "joint4=qemu").is_ok(), "{fault}");
         }
+    }
+    #[test]
+    fn on_a_disturbed_line_boards_outside_are_not_asked_to_equal_those_here() {
+        let comparable = |fault: &str, choices: &[&str]| {
+            let mut scenario = builtin::scenario("three-step").expect("built in");
+            scenario.faults = vec![fault.parse().expect("a fault")];
+            let choices: Vec<_> = choices.iter().map(|c| c.parse().expect("one")).collect();
+            let nodes = Nodes::new(&NodeKind::Sil, &choices).expect("choices");
+            ensure_comparable(&scenario, &nodes)
+        };
+        for fault in [
+            "bus-full@1s",
+            "bit-errors=1e-4@1s..4s",
+            "bytes-lost@1s",
+            "bytes-inserted@1s",
+            "frames-delayed=15@1s",
+            "cycle-jitter@1s",
+        ] {
+            let refusal = comparable(fault, &["joint3=pil"]).expect_err(fault);
+            let name = fault.split(['@', '=']).next().expect("a name");
+            assert!(refusal.to_string().contains(name), "{refusal}");
+            assert!(comparable(fault, &[]).is_ok(), "all in this program");
+        }
+        assert!(comparable("brown-out:joint3@1s", &["joint3=pil"]).is_ok());
+        assert!(comparable("master-silent@1s", &["joint3=pil"]).is_ok());
     }
 }

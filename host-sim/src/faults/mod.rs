@@ -19,7 +19,7 @@ pub mod matrix;
 mod schedule;
 mod spec;
 
-pub use admission::check;
+pub use admission::{check, ensure_comparable};
 pub(crate) use injector::Injector;
 pub use kind::{FaultKind, KINDS, KindInfo, Place, ValueSpec};
 pub(crate) use schedule::Schedule;

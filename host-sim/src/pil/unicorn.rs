@@ -86,8 +86,12 @@ pub fn image(name: &str) -> Result<PathBuf, SimError> {
             } else {
                 BUILD
             };
+            let place = match std::env::var_os(IMAGES_VARIABLE) {
+                Some(folder) => format!("in {}, which {IMAGES_VARIABLE} names", folder.display()),
+                None => "where it is built".to_owned(),
+            };
             SimError::simulation(
-                format!("the firmware image `{name}` is not there"),
+                format!("the firmware image `{name}` is not there: no {name}.elf {place}"),
                 format!("{build}; or name its folder in {IMAGES_VARIABLE}"),
             )
         })
