@@ -28,6 +28,7 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
             "firmware/node/src/joint/air.rs",
             "firmware/node/src/joint/expectation.rs",
             "firmware/node/src/joint/outputs.rs",
+            "firmware/node/src/joint/requests.rs",
             "firmware/node/src/wheel/outputs.rs",
         ],
         &["wheeleg-node"],
@@ -39,8 +40,10 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
     (
         &[
             "firmware/master/src/layer0/line.rs",
+            "firmware/master/src/layer0/liveness.rs",
             "firmware/master/src/layer0/nodes.rs",
             "firmware/master/src/layer0/questions.rs",
+            "firmware/master/src/layer0/safety.rs",
         ],
         &["wheeleg-master"],
     ),

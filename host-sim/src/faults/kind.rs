@@ -89,7 +89,7 @@ const fn value(
 
 kinds! {
     MasterSilent = "master-silent", Robot, None,
-        "The master stops sending, in mid-cycle, and never comes back.";
+        "The master stops sending, in mid-cycle, for good unless an end is given.";
     MasterFrozen = "master-frozen", Robot, None,
         "The master repeats its last SYNC: it sends, but its counter stands.";
     MasterReset = "master-reset", Robot, value("ms", 1.0, 1000.0, 30.0, "time until it sends again"),
@@ -175,6 +175,20 @@ kinds! {
 }
 
 impl FaultKind {
+    /// Whether it is over by itself, at once or after its value: no end can be given.
+    #[must_use]
+    pub const fn ends_by_itself(self) -> bool {
+        matches!(
+            self,
+            Self::MasterReset
+                | Self::ClientReset
+                | Self::NodeReset
+                | Self::BrownOut
+                | Self::NodeHang
+                | Self::InvalidParameter
+        )
+    }
+
     /// Its row of the catalogue.
     #[must_use]
     pub fn info(self) -> &'static KindInfo {

@@ -201,6 +201,17 @@ impl FromStr for FaultSpec {
             text: owned(),
             reason,
         })?;
+        if until_s.is_some() && info.kind.ends_by_itself() {
+            let lasts = match info.value {
+                Some(v) if v.unit == "ms" => format!(
+                    "how long `{name}` lasts is its value, as in `{name}{}={}@{from_s}s`",
+                    target.map_or_else(String::new, |t| format!(":{t}")),
+                    v.default
+                ),
+                _ => format!("`{name}` is over by itself, so it takes no end"),
+            };
+            return Err(wrong(lasts));
+        }
         Ok(Self {
             kind: info.kind,
             victim,
@@ -299,6 +310,11 @@ mod tests {
             ("master-silent@-1s", "no time"),
             ("master-silent@3s..2s", "not after its begin"),
             ("valve-slow:joint1.fill@1s", "fill-a"),
+            (
+                "brown-out:joint3@3s..4s",
+                "its value, as in `brown-out:joint3=30@3s`",
+            ),
+            ("node-reset:wheel7@1s..2s", "takes no end"),
         ] {
             let message = parse(text).expect_err(text).to_string();
             assert!(
