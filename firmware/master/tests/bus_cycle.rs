@@ -2,13 +2,13 @@
 
 mod common;
 
-use common::{CYCLE_US, Rig, decode, emit};
+use common::{CYCLE_US, FakeNode, Rig, decode, emit};
 use fixed::types::I16F16;
 use proptest::prelude::*;
 use wheeleg_master::command::Command;
 use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::contact::{Sector, Side};
-use wheeleg_master::dispatcher::Refusal;
+use wheeleg_master::dispatcher::{Refusal, Ticket};
 use wheeleg_master::event::Event;
 use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::params::GaitParams;
@@ -172,6 +172,59 @@ fn one_refusal_while_arming_disarms_the_others() {
         assert_eq!(rig.node(node).mode, NodeMode::Idle, "{node}");
     }
     assert!(!rig.master.is_armed());
+}
+
+#[test]
+fn arming_waits_for_slow_answers_however_long_they_take_in_all() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    for node in &mut rig.nodes {
+        node.unanswered = 1;
+    }
+    let ticket = rig.submit(Command::Arm);
+    let mut cycles = 0;
+    while !rig.done(ticket) {
+        assert_eq!(rig.refusal(ticket), None, "after {cycles} cycles");
+        rig.cycle();
+        cycles += 1;
+    }
+    // Longer than what the boards have to show a closed loop once they were all asked.
+    assert!(cycles > 12, "{cycles}");
+    assert!(rig.master.is_armed());
+}
+
+/// Asks for arming; one board acknowledges it and does not close its loop. Gives the
+/// ticket in the cycle in which the last board has acknowledged.
+fn armed_but_for_one(rig: &mut Rig) -> Ticket {
+    rig.run(60);
+    rig.node(5).never_arms = true;
+    let ticket = rig.submit(Command::Arm);
+    let arm = |request: &Message| matches!(request, Message::Arm(_));
+    let asked = |node: &FakeNode| node.requests.iter().any(arm);
+    while !rig.nodes.iter().all(asked) {
+        rig.cycle();
+    }
+    ticket
+}
+
+#[test]
+fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged() {
+    let mut rig = Rig::new(MasterConfig::default());
+    let ticket = armed_but_for_one(&mut rig);
+    rig.run(10);
+    assert_eq!(rig.refusal(ticket), None);
+    rig.run(1);
+    assert_eq!(rig.refusal(ticket), Some(Refusal::NotConfirmed));
+    rig.run(2);
+    assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Idle));
+
+    // In the last of them it is not too late.
+    let mut rig = Rig::new(MasterConfig::default());
+    let ticket = armed_but_for_one(&mut rig);
+    rig.run(9);
+    rig.node(5).mode = NodeMode::Armed;
+    rig.run(2);
+    assert!(rig.done(ticket) && rig.master.is_armed());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Rig, emit};
+use common::{FakeNode, Rig, emit};
 use proptest::prelude::*;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
@@ -121,6 +121,69 @@ fn emergency_stop_sets_the_bit_until_cleared_and_never_queues() {
     assert_eq!(rig.refusal(ticket), Some(Refusal::Latched));
     rig.submit(Command::ClearFault);
     assert!(!rig.cycle().flags.contains(SyncFlags::ESTOP));
+}
+
+#[test]
+fn an_e_stop_is_the_bit_in_sync_alone_and_a_hold_asks_for_brakes() {
+    let brakes = |rig: &mut Rig| {
+        let asked = |node: &mut FakeNode| core::mem::take(&mut node.requests);
+        let requests = rig.nodes.iter_mut().flat_map(asked);
+        requests
+            .filter(|request| matches!(request, Message::EmergencyBrake(_)))
+            .count()
+    };
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    rig.submit(Command::EmergencyStop);
+    rig.run(20);
+    assert_eq!(brakes(&mut rig), 0, "the bit in SYNC does it");
+
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    rig.node(7).inputs = InputBits::NONE;
+    rig.run(20);
+    assert_eq!(rig.master.layer0().hold(), Some(HoldReason::SupplyLost));
+    assert_eq!(brakes(&mut rig), 8);
+
+    // Nobody drives: there is nothing to brake, and nothing to hold.
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    rig.node(7).inputs = InputBits::NONE;
+    rig.run(20);
+    assert_eq!(rig.master.layer0().hold(), None);
+    assert_eq!(brakes(&mut rig), 0);
+}
+
+#[test]
+fn a_silent_node_is_named_while_nobody_drives_too() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    rig.node(4).silent = true;
+    rig.run(4);
+    assert!(rig.saw(|event| *event == Event::NodeLost(4)));
+    assert_eq!(rig.master.layer0().hold(), None);
+}
+
+#[test]
+fn a_wheel_board_that_starts_anew_counts_from_a_new_origin_and_the_way_stays() {
+    let way = |rig: &Rig| rig.master.layer0().odometry().travel_um();
+    for wheel in [7, 8] {
+        let mut rig = Rig::new(MasterConfig::default());
+        rig.run(60);
+        rig.node(wheel).position += 50_000;
+        rig.run(2);
+        let before = way(&rig);
+        assert!(before > 200_000, "{before}");
+        rig.node(wheel).silent = true;
+        rig.run(5);
+        rig.node(wheel).position = 0;
+        rig.node(wheel).silent = false;
+        rig.run(2);
+        assert_eq!(way(&rig), before);
+        rig.node(wheel).position -= 50_000;
+        rig.run(2);
+        assert!(way(&rig).abs() <= 1, "{}", way(&rig));
+    }
 }
 
 #[test]

@@ -30,6 +30,10 @@ pub(crate) struct FakeNode {
     /// Largest change per cycle, raw.
     pub(crate) rate: i64,
     pub(crate) refuse_arm: bool,
+    /// Acknowledges arming and does not close its loop.
+    pub(crate) never_arms: bool,
+    /// Requests that it will leave without an answer.
+    pub(crate) unanswered: u8,
     pub(crate) echo_offset: u8,
     pub(crate) requests: Vec<Message>,
     pub(crate) unique_id: [u8; 12],
@@ -79,6 +83,8 @@ impl FakeNode {
                 5_000
             },
             refuse_arm: false,
+            never_arms: false,
+            unanswered: 0,
             echo_offset: 0,
             requests: Vec::new(),
             unique_id: [address.raw(); 12],
@@ -169,7 +175,9 @@ impl FakeNode {
                 nack(NackReason::VersionMismatch)
             }
             Message::Arm(_) => {
-                self.mode = NodeMode::Armed;
+                if !self.never_arms {
+                    self.mode = NodeMode::Armed;
+                }
                 Ack { request }.into()
             }
             Message::Disarm(_) => {
@@ -298,7 +306,9 @@ impl Rig {
             let (envelope, request) = decode(&bytes).expect("a request");
             let node = &mut self.nodes[envelope.destination.slot().unwrap()];
             t += 700;
-            if !node.silent && node.stall == 0 {
+            if node.unanswered > 0 {
+                node.unanswered -= 1;
+            } else if !node.silent && node.stall == 0 {
                 let answer = node.on_request(&request);
                 let bytes = emit(&answer, node.address, envelope.sequence);
                 self.master.on_bus_bytes(&bytes, t);
