@@ -237,6 +237,23 @@ mod tests {
     }
 
     #[test]
+    fn a_log_with_more_to_read_is_read_on_and_a_question_cut_off_is_asked_again() {
+        let busy = || Questions {
+            next_cycle: 100,
+            ..Questions::default()
+        };
+        let mut questions = busy();
+        questions.log(6);
+        assert_eq!(asked(&mut questions, 50), [(7, read_log())]);
+        let to = Address::of_slot(2).expect("a board");
+        for message in [FaultReport {}.into(), read_log(), LinkReport {}.into()] {
+            let mut questions = busy();
+            questions.again(to, &message);
+            assert_eq!(asked(&mut questions, 50), [(3, message)]);
+        }
+    }
+
+    #[test]
     fn a_board_that_starts_in_operation_or_comes_back_is_asked_why_but_not_at_first_sight() {
         let mut questions = Questions {
             next_cycle: 100,
