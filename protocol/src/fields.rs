@@ -127,6 +127,9 @@ wire_enum! {
         Parameter = 3, "Parameter {b} was set.";
         Saved = 4, "The parameters were stored; 1 if it went well: {a}.";
         Cleared = 5, "Faults were cleared: bits {b}.";
+        Precharged = 6, "Both chambers were precharged, in {b} ms.";
+        PrechargeMoved = 7, "The precharge ended after {b} ms because the piston moved: check the load of this axis; its law drives on.";
+        PrechargeLate = 8, "The precharge ended after {b} ms without its pressure: check supply, valves and tubes of this axis; its law drives on.";
     }
 }
 
