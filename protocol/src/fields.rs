@@ -10,7 +10,7 @@ wire_enum! {
     NodeMode {
         Boot = 0, "Starting; sensors not yet trusted.";
         Idle = 1, "Disarmed; nothing energised.";
-        Armed = 2, "Closed loop on the position found when arming.";
+        Armed = 2, "Precharge, if one is set, then closed loop on the position found when arming.";
         Tracking = 3, "Closed loop on the reference of the SYNC slot.";
         Hold = 4, "Latched stop: air trapped, or wheel ramped to standstill.";
         Exhaust = 5, "Inlets shut, outlets open.";

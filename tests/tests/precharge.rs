@@ -166,11 +166,8 @@ fn first_motion(axis: &AxisParams, bar: f64, travel_m: f64) -> (f64, f64) {
     let beyond = rows
         .iter()
         .map(|r| (r.stroke_m - from_m - travel_m) * travel_m.signum());
-    let end_m = rows[rows.len() - 1].stroke_m;
-    assert!(
-        (end_m - from_m - travel_m).abs() < 5e-3,
-        "it gets there: {end_m}"
-    );
+    let farthest = beyond.clone().fold(f64::NEG_INFINITY, f64::max);
+    assert!(farthest > -5e-3, "it gets there: {farthest}");
     (speed * 1e3, beyond.fold(0.0, f64::max) * 1e3)
 }
 
@@ -183,7 +180,18 @@ fn after_a_stop_the_first_motion_is_slower_than_without() {
             p.initial_stroke_m = from * stroke_m;
             let travel_m = travel * (0.4 * stroke_m).min(0.05);
             let [without, one, two] = [0.0, 1.0, 2.0].map(|bar| first_motion(&p, bar, travel_m));
-            println!("{name} {travel_m}: none {without:.1?}, 1 bar {one:.1?}, 2 bar {two:.1?}");
+            let what = format!(
+                "{name} by {:.0} mm, speed in mm/s and overshoot in mm: without {without:.1?}, \
+                 1 bar {one:.1?}, 2 bar {two:.1?}",
+                travel_m * 1e3
+            );
+            println!("{what}");
+            assert!(one.0 < 0.97 * without.0, "{what}");
+            assert!(two.0 < 0.95 * one.0 + 0.02 * without.0, "{what}");
+            assert!(one.1 < without.1, "{what}");
+            if name == "wheeleg-2003" {
+                assert!(one.0 < 0.9 * without.0 && one.1 < 0.6 * without.1, "{what}");
+            }
         }
     }
 }
