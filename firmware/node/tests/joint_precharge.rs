@@ -275,14 +275,14 @@ fn disarmed_in_the_middle_and_armed_again_it_goes_on_with_what_is_left() {
     let rest = ticks_to_drive(&mut rig, 2000, 100.0);
     let both = rest + 100;
     assert!(rest < whole && both + 40 > whole, "{rest} {whole}");
-    // At once again there is nothing to fill; after 100 s of rest all of it may have leaked out.
+    // At once again there is nothing to fill; after 30 s of rest all of it may have leaked out.
     rig.request(&DISARM);
     rig.run_cycles(1, None);
     rig.request(&ARM);
     let again = ticks_to_drive(&mut rig, 2000, 100.0);
-    assert!(again <= 21, "{again}");
+    assert!(again <= 41, "{again}");
     rig.request(&DISARM);
-    rig.run_cycles(10_000, None);
+    rig.run_cycles(3_000, None);
     rig.request(&ARM);
     assert_eq!(ticks_to_drive(&mut rig, 2000, 100.0), whole);
 }

@@ -17,7 +17,8 @@
 //!   law, with inlets and outlets; shut valves would leave it to what is in the chambers.
 //!
 //! What is in the chambers at power-up nobody knows; the account takes it for the atmosphere.
-//! They cannot be filled above the supply, which a cylinder bears. Where the account is wrong
+//! With valves shut it loses pressure faster than any sound seal, so that an axis that stood for a
+//! while is filled anew. Chambers cannot be filled above the supply, which a cylinder bears. Where the account is wrong
 //! the filling is out of balance, and the way of the piston bounds it. A board has no pressure
 //! sensor either: without supply it counts air that does not come, for no longer than with it, and that
 //! nothing moves is found under control.
