@@ -121,8 +121,9 @@ fn inlets_alone_are_pulsed_and_then_the_law_drives_from_where_the_piston_is() {
     assert_eq!([most[0], most[2]], [1000, 1000]);
     let snapshot = *rig.node.snapshot();
     let driven_mm = snapshot.reference.to_f64() - snapshot.measured.to_f64();
+    // 2000 mm/s for one tick.
     assert!(
-        (0.0..=2.1).contains(&driven_mm),
+        (driven_mm - 2.0).abs() < 0.05,
         "from the actual: {driven_mm}"
     );
     assert!((snapshot.measured.to_f64() - 101.0).abs() < 0.1);
