@@ -147,7 +147,7 @@ impl Precharge {
         // A period of the PWM has one pulse: 10 to 20 ticks.
         let period = settings.full_period;
         if self.next == 0 {
-            self.next = (period.get() / JOINT_TICK.get()) as u8;
+            self.next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) as u8;
             let force = motion.force(model).saturating_sub(self.balance);
             let force = force.saturating_add(model.given_way(moved));
             // The coarser pulse, of the smaller chamber, waits for room: never beyond balance.
