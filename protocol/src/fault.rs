@@ -232,7 +232,7 @@ fault_table!(
     DuplicateAddress = 43, bit 15, "Another board answers at this address.",
         "Set the address straps so that every board has its own address, then restart the boards.";
     NoMotion = 44, bit 3, "The valves gave the air for a motion of the axis, and it did not come.",
-        "Check the potentiometer, valves, tubes and load of this axis, then clear the fault.";
+        "Check the air supply, the potentiometer, valves, tubes and load of this axis, then clear the fault.";
 });
 
 fault_table!(
@@ -252,8 +252,8 @@ fault_table!(
         "Expected at rest.";
     RateLimited = 102, bit 6, "Speed or acceleration is at its limit.",
         "Expected in fast moves; otherwise raise the speed or acceleration parameter.";
-    DriveInhibited = 103, bit 7, "The drive was blanked for a change of direction.",
-        "Expected at direction changes of a wheel.";
+    DriveInhibited = 103, bit 7, "The drive waits: a wheel changes direction, or a cylinder that was armed fills its chambers (precharge).",
+        "Expected at direction changes of a wheel and for less than two seconds after arming.";
 });
 
 fault_table!(

@@ -10,7 +10,7 @@ wire_enum! {
     NodeMode {
         Boot = 0, "Starting; sensors not yet trusted.";
         Idle = 1, "Disarmed; nothing energised.";
-        Armed = 2, "Closed loop on the position found when arming.";
+        Armed = 2, "Precharge, if one is set, then closed loop on the position found when arming.";
         Tracking = 3, "Closed loop on the reference of the SYNC slot.";
         Hold = 4, "Latched stop: air trapped, or wheel ramped to standstill.";
         Exhaust = 5, "Inlets shut, outlets open.";
@@ -127,6 +127,9 @@ wire_enum! {
         Parameter = 3, "Parameter {b} was set.";
         Saved = 4, "The parameters were stored; 1 if it went well: {a}.";
         Cleared = 5, "Faults were cleared: bits {b}.";
+        Precharged = 6, "Both chambers were precharged, in {b} ms.";
+        PrechargeMoved = 7, "The precharge ended after {b} ms because the piston moved: check the load of this axis; its law drives on.";
+        PrechargeLate = 8, "The precharge ended after {b} ms without its pressure: check supply, valves and tubes of this axis; its law drives on.";
     }
 }
 

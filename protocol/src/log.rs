@@ -66,6 +66,10 @@ impl core::fmt::Display for LogEntry {
                 (LogEvent::Fault, "a") => {
                     f.write_str(Fault::from_code(a).map_or("?", Fault::name))?;
                 }
+                (
+                    LogEvent::Precharged | LogEvent::PrechargeMoved | LogEvent::PrechargeLate,
+                    "b",
+                ) => write!(f, "{b}")?,
                 (_, "a") => write!(f, "{a}")?,
                 _ => write!(f, "0x{b:04X}")?,
             }

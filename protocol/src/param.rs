@@ -395,6 +395,8 @@ parameters! {
             "Predictive law: at rest when the error is below this; awake again at three times it.";
         MotionMargin = 0x0137, "motion_margin", "N", I16F16, "0" ..= "10000", default "0", disarmed,
             "Force beyond what motions took at which a standing piston must move: above any load change; 0: half of the largest force.";
+        Precharge = 0x0138, "precharge", "bar", I16F16, "0" ..= "14", default "0", disarmed,
+            "Gauge pressure to which both chambers are filled after arming, before the first motion; 0: none; at most 7/8 of the supply, absolute.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

@@ -4,6 +4,7 @@ mod air;
 mod expectation;
 mod node;
 mod outputs;
+mod precharge;
 mod reference;
 mod requests;
 mod settings;

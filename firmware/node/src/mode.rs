@@ -9,8 +9,8 @@
 //! |---|---|---|---|
 //! | Boot | all valves shut | drive off | self-test |
 //! | Idle | all valves shut | drive off | arm, exhaust, faults |
-//! | Armed | closed loop on the position found when arming | closed loop at standstill | set-point, disarm, faults |
-//! | Tracking | closed loop on the bus reference | closed loop on the bus reference | set-point withdrawn, disarm, faults |
+//! | Armed | precharge, then closed loop on the position found when arming | closed loop at standstill | set-point, disarm, faults |
+//! | Tracking | rest of a precharge, then closed loop on the bus reference | closed loop on the bus reference | set-point withdrawn, disarm, faults |
 //! | Hold | all valves shut, air trapped | ramp to standstill, then drive off | clear fault, staged exhaust |
 //! | Exhaust | inlets shut, outlets open (PWM-limited when staged) | (never entered) | clear fault, emergency brake, E-stop |
 //! | Fault | all valves shut | drive off | clear fault |

@@ -102,7 +102,9 @@ fn raw(design: &Design, parameter: JointParam) -> Option<i32> {
         P::FrictionViscous => a.viscous.raw(),
         P::LineDelay => us(a.line_delay),
         P::RestBand => a.band.raw(),
-        P::WatchdogCycles | P::HoldTime | P::ExhaustDuty | P::MotionMargin => return None,
+        P::WatchdogCycles | P::HoldTime | P::ExhaustDuty | P::MotionMargin | P::Precharge => {
+            return None;
+        }
     })
 }
 

@@ -10,7 +10,9 @@ use std::num::NonZeroU8;
 
 use wheeleg_control::joint::JointConfig;
 use wheeleg_node::mode::ModeRules as _;
+use wheeleg_node::snapshot::JointSnapshot;
 use wheeleg_protocol::link::CYCLE_US;
+use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
     Address, Arm, Envelope, JointSetpoint, LinkLossAction, MAX_ENCODED, Message, NextReference,
     ResetCause, SCHEMA_HASH, Sync, SyncFlags, SyncSlots,
@@ -43,6 +45,10 @@ pub struct Node {
     cycle: u16,
     sequence: u16,
     running: bool,
+    /// The E-stop bit of the SYNC frames to come.
+    pub emergency_stop: bool,
+    /// What the slots of the SYNC frames to come allow after a stop.
+    pub on_link_loss: LinkLossAction,
 }
 
 impl Node {
@@ -52,10 +58,19 @@ impl Node {
     /// [`BenchError`] if a value of the design is outside the board's parameter
     /// table, or the board refuses the set.
     pub fn new(design: &Design) -> Result<Self, BenchError> {
+        Self::with(design, &[])
+    }
+
+    /// As [`Node::new`], with parameters (raw) that the design says nothing about.
+    ///
+    /// # Errors
+    /// As [`Node::new`].
+    pub fn with(design: &Design, others: &[(JointParam, i32)]) -> Result<Self, BenchError> {
         let address = Address::joint(JOINT).unwrap_or(Address::MASTER);
         JointConfig::new(&design.gains, TICK).map_err(BenchError::Design)?;
         let stored: Vec<(u16, i32)> = commission(design)?
             .into_iter()
+            .chain(others.iter().copied())
             .map(|(parameter, raw)| (parameter.id(), raw))
             .collect();
         let board = JointBoard::new(identity(address), &stored, ResetCause::PowerUp)
@@ -67,7 +82,20 @@ impl Node {
             cycle: 0,
             sequence: 0,
             running: false,
+            emergency_stop: false,
+            on_link_loss: LinkLossAction::Hold,
         })
+    }
+
+    /// A request of the master between two ticks. Nobody looks at the answer.
+    pub fn request(&mut self, message: &Message) {
+        self.send(self.address, message);
+    }
+
+    /// Internals of the board after its last tick.
+    #[must_use]
+    pub fn snapshot(&self) -> &JointSnapshot {
+        self.board.snapshot()
     }
 
     fn now(&self) -> Micros {
@@ -99,7 +127,11 @@ impl Node {
         let sync = Sync {
             cycle: self.cycle,
             master_time_us: self.now().get(),
-            flags: SyncFlags::NONE,
+            flags: if self.emergency_stop {
+                SyncFlags::ESTOP
+            } else {
+                SyncFlags::NONE
+            },
             slots,
         };
         self.cycle = self.cycle.wrapping_add(1);
@@ -124,7 +156,7 @@ impl Node {
         self.running = true;
     }
 
-    fn setpoint(sample: &Sample) -> JointSetpoint {
+    fn setpoint(&self, sample: &Sample) -> JointSetpoint {
         let next = sample.announced.and_then(|(reference, ticks)| {
             let cycles = u8::try_from(ticks.div_ceil(CYCLE_TICKS)).ok()?;
             Some(NextReference {
@@ -136,7 +168,7 @@ impl Node {
             reference: sample.reference,
             velocity: sample.reference_velocity.to_wire(),
             next,
-            on_link_loss: LinkLossAction::Hold,
+            on_link_loss: self.on_link_loss,
             track: true,
         }
     }
@@ -149,7 +181,7 @@ impl Board for Node {
             self.start(code);
         }
         if self.tick.is_multiple_of(CYCLE_TICKS) {
-            self.sync(Some(Self::setpoint(sample)));
+            self.sync(Some(self.setpoint(sample)));
         }
         let report = self.board.tick(self.now(), code, [false; 4]);
         self.tick = self.tick.wrapping_add(1);

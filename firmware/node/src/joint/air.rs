@@ -29,7 +29,7 @@ use wheeleg_control::pwm::OnTimes;
 use wheeleg_units::{Micros, PositionMm, divide_signed};
 
 /// Supply pressure in the unit of [`Air`].
-const SUPPLY: i32 = 1 << 17;
+pub(super) const SUPPLY: i32 = 1 << 17;
 /// Highest pressure that is followed: four times the supply.
 const MOST: i32 = 4 * SUPPLY;
 /// Ticks of a round: one for each chamber, one for what is made of them.
@@ -53,6 +53,8 @@ const NEVER: u32 = ROUNDS + ONE;
 /// direct-acting valves of one type differ by about twice with age, temperature and supply
 /// voltage; with twice exactly, faults after the first motions are found much later: FAULTS.md).
 const SLOWER_FIFTHS: u32 = 9;
+/// Pressure that a chamber with its valves shut may lose in a tick.
+const LEAK: i32 = 4;
 /// Vented times count in 64 µs.
 const VENTED_SHIFT: u32 = 6;
 
@@ -149,6 +151,31 @@ impl AirModel {
             (left.wrapping_mul(self.a.force as i64) >> 17) as i32,
             (left.wrapping_mul(self.b.force as i64) >> 17) as i32,
         ]
+    }
+
+    /// Absolute pressure of the atmosphere, 2^-17 of the supply pressure.
+    pub(super) const fn ambient(&self) -> i32 {
+        self.ambient
+    }
+
+    /// A pulse of the inlet of B or A with the piston at `position`: its opening, which fills a 64th
+    /// of the supply pressure in choked flow and is at least `shortest`, and its force, mN.
+    #[inline(never)]
+    pub(super) fn pulse(&self, b: bool, position: PositionMm, shortest: Micros) -> (Micros, i32) {
+        let (chamber, length) = if b {
+            (&self.b, self.stroke.wrapping_sub(position.raw()))
+        } else {
+            (&self.a, position.raw())
+        };
+        // Share of the supply = time · flow / (length · 2^16), lengths in 1/256 mm.
+        let length = (length >> 8).wrapping_add(chamber.lead).max(0);
+        let time = length.cast_unsigned().saturating_mul(1 << 10);
+        let time = time.checked_div(chamber.flow.cast_unsigned()).unwrap_or(0);
+        let opening = time.max(shortest.get());
+        // How many 64ths the shortest gives, in sixteenths, at most all of them.
+        let parts = opening.saturating_mul(16).checked_div(time);
+        let parts = parts.unwrap_or(u32::MAX).min(16 * 64).cast_signed();
+        (Micros(opening), (chamber.force >> 10).wrapping_mul(parts))
     }
 
     /// Pressure of a chamber of `length` (1/256 mm) after its valves were open for `fill`
@@ -351,6 +378,18 @@ impl Air {
     pub(super) const fn forget(&mut self) {
         self.a.vented = 0;
         self.b.vented = 0;
+    }
+
+    /// A tick in which all valves are shut: a chamber may have lost air. A bar in 4.7 s of a supply
+    /// of 7 bar (ASSUMED: twice what the seals of this project's cylinders let through where the
+    /// chamber is smallest; too much is filled again at the next arming, too little would be missing).
+    #[inline]
+    pub(super) fn leak(&mut self, model: &AirModel) {
+        for content in [&mut self.a, &mut self.b] {
+            if content.p > model.ambient {
+                content.p = content.p.wrapping_sub(LEAK);
+            }
+        }
     }
 
     /// Whether both chambers have been vented for long enough to compare forces with

@@ -127,6 +127,28 @@ impl MotionModel {
     }
 }
 
+impl MotionModel {
+    /// Absolute pressure of the atmosphere, 2^-17 of the supply pressure.
+    #[inline]
+    pub(super) const fn ambient(&self) -> i32 {
+        self.air.ambient()
+    }
+
+    /// A pulse of the inlet of B or A: its opening, at least `shortest`, and its force, mN.
+    #[inline]
+    pub(super) fn pulse(&self, b: bool, at: PositionMm, shortest: Micros) -> (Micros, i32) {
+        self.air.pulse(b, at, shortest)
+    }
+
+    /// Force by which a piston that has moved by `moved` (raw mm, a few millimetres) shifts the
+    /// balance of a precharge: an eighth of the largest per millimetre, mN.
+    #[inline]
+    pub(super) const fn given_way(&self, moved: i32) -> i32 {
+        let (out, _) = self.nearly_all;
+        (moved >> 8).wrapping_mul(out >> 3) >> 8
+    }
+}
+
 /// What an axis that is driven was to do, and did.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Driven {
@@ -202,18 +224,32 @@ impl MotionWatch {
         }
     }
 
-    /// A tick in which the valves are not the law's: the air is followed, nothing is
-    /// expected, and loads have to be learnt anew afterwards.
+    /// A tick in which the valves are not the law's, open for `on`: the air is followed, nothing
+    /// is expected, and loads have to be learnt anew afterwards.
     #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
         let _ = self.air.follow(on, position, &model.air, false);
         if *on == [0; 4] {
             self.air.forget();
+            self.air.leak(&model.air);
         }
         self.slid = 0;
         self.doubt = 0;
         self.stands = 0;
         self.from = position.raw();
+    }
+
+    /// Force of both chambers, mN, positive extends.
+    #[inline]
+    pub(super) fn force(&self, model: &MotionModel) -> i32 {
+        self.air.force(&model.air)
+    }
+
+    /// Lower pressure of the two chambers, 2^-17 of the supply pressure, absolute.
+    #[inline]
+    pub(super) fn least_pressure(&self) -> i32 {
+        let [a, b] = self.air.pressures();
+        a.min(b)
     }
 
     /// A tick under control sends `on`: the air takes two ticks of a round.

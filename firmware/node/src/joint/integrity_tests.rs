@@ -2,8 +2,10 @@
 //! next tick for what a tick changes, within [`PARTS`] ticks for the rest.
 
 use super::node::{JointNode, PARTS};
+use super::precharge::Precharge;
 use super::reference::Target;
 use crate::NodeIdentity;
+use crate::board::Application;
 use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, ValveBank};
 use crate::mode::{Event, Mode};
 use crate::parameters::JointParameters;
@@ -106,6 +108,32 @@ fn damaged_controller_valve_and_target_state_is_seen() {
     assert!(holds_after(|node| {
         node.target = Target::at(PositionMm::from_raw(1));
     }));
+}
+
+#[test]
+fn every_flipped_bit_of_a_precharge_is_seen() {
+    let filling = || {
+        let one_bar = 1 << 16;
+        let parameters = JointParameters::default()
+            .with(JointParam::Precharge.id(), one_bar, true)
+            .unwrap();
+        let mut node = armed_with(parameters);
+        Application::armed(&mut node);
+        node.tick(Micros(20_000));
+        assert!(node.state.precharge.is_under_way());
+        node
+    };
+    assert_eq!(ticks_to_hold(filling(), 5, |_| {}), None);
+    for (word, bits) in [(0, 25), (1, 32)] {
+        for bit in 0..bits {
+            let damage = |node: &mut Node| node.state.precharge.flip(word, bit);
+            assert_eq!(ticks_to_hold(filling(), 1, damage), Some(1), "{word} {bit}");
+        }
+    }
+    // So is one that was not asked for, and one that is forgotten.
+    assert!(holds_after(|node| node.state.precharge.flip(0, 3)));
+    let forgotten = |node: &mut Node| node.state.precharge = Precharge::default();
+    assert_eq!(ticks_to_hold(filling(), 1, forgotten), Some(1));
 }
 
 #[test]

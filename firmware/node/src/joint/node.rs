@@ -1,8 +1,9 @@
 //! The joint board application.
 
-use core::hash::Hash;
+use core::hash::{Hash, Hasher};
 
 use super::expectation::{MotionAccount, MotionWatch};
+use super::precharge::Precharge;
 use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
@@ -28,13 +29,36 @@ pub const PARTS: usize = PARAMETER_PARTS + JointConfig::PARTS;
 const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 
 /// State that only a tick changes, sealed between two ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TickState {
     pub(super) reference: PositionMm,
     pub(super) measured: PositionMm,
     pub(super) following: Ticks,
     pub(super) motion: MotionWatch,
+    pub(super) precharge: Precharge,
     boot_ticks: Ticks,
+}
+
+impl Hash for TickState {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here. Two fields in a word:
+        // a flipped bit of either flips one of it.
+        let Self {
+            reference,
+            measured,
+            following,
+            motion,
+            precharge,
+            boot_ticks,
+        } = self;
+        let (filling, balance) = precharge.words();
+        state.write_i32(reference.raw());
+        state.write_i32(measured.raw());
+        state.write_u32(following.get() ^ filling);
+        state.write_u32(boot_ticks.get() ^ balance.cast_unsigned());
+        motion.hash(state);
+    }
 }
 
 /// Application of one joint board: sense, control, valves.
@@ -112,6 +136,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 measured: PositionMm::ZERO,
                 following: Ticks::ZERO,
                 motion: MotionWatch::new(&settings.tick.motion, PositionMm::ZERO),
+                precharge: Precharge::default(),
                 boot_ticks: Ticks::ZERO,
             },
             fixed_seals: PartSeals::new(),
@@ -195,7 +220,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.axis_fault(fault, now);
         }
 
-        let on_times = if self.core.mode().may_drive() {
+        let drives = self.core.mode().may_drive() && !self.state.precharge.is_under_way();
+        let on_times = if drives {
             self.drive(now)
         } else {
             self.rest(now)

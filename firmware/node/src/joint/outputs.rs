@@ -2,10 +2,11 @@
 
 use super::expectation::Driven;
 use super::node::JointNode;
+use super::precharge::{Filling, Precharge};
 use super::reference::{Target, TickReference, advance};
 use crate::JOINT_TICK;
 use crate::hardware::{PinError, PositionSensor, SwitchBank, ValveBank};
-use crate::mode::Mode;
+use crate::mode::{Mode, ModeRules};
 use crate::supervisor::ExhaustKind;
 use wheeleg_control::joint::{JointInput, JointLimits};
 use wheeleg_control::pwm::OnTimes;
@@ -86,28 +87,69 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// No control: the valves do what the mode says, the reference follows the
-    /// measured stroke.
+    /// No control: the valves do what the mode says, or fill an axis that is armed. Disarmed,
+    /// the reference follows the measured stroke; while it fills, it stays at that of arming, and
+    /// set-points are taken.
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
-        self.state.reference = self.state.measured;
-        self.state.following = Ticks::ZERO;
-        self.target = Target::at(self.state.measured);
-        let velocity = self.controller.observe(self.state.measured);
-        let on_times = if self.core.mode() == Mode::Exhaust {
-            let openings = self.exhaust_openings();
-            self.pwm.tick(&openings)
+        let mode = self.core.mode();
+        let filling = mode.may_drive();
+        let filled = if filling {
+            self.fill(now)
         } else {
-            self.pwm.shut()
+            Filling::NONE
         };
+        let openings = if filling {
+            filled.openings
+        } else {
+            self.state.reference = self.state.measured;
+            self.state.precharge = Precharge::default();
+            self.target = Target::at(self.state.measured);
+            if mode == Mode::Exhaust {
+                self.exhaust_openings()
+            } else {
+                ValveOpenings::SHUT
+            }
+        };
+        self.state.following = Ticks::ZERO;
+        let velocity = self.controller.observe(self.state.measured);
+        let on_times = self.pwm.tick(&openings);
         self.controller.sent(on_times);
         let state = &mut self.state;
+        let open = if filling { &filled.open } else { &on_times };
         state
             .motion
-            .rest(&on_times, state.measured, &self.settings.motion);
+            .rest(open, state.measured, &self.settings.motion);
         self.record(now, velocity, Duty::ZERO, on_times);
-        self.snapshot.limits = LimitBits::NONE;
+        self.snapshot.limits = if filling {
+            const { Limit::DriveInhibited.mask() }
+        } else {
+            LimitBits::NONE
+        };
         self.snapshot.settled = false;
         on_times
+    }
+
+    /// A tick of precharge. At its end all valves are shut, and the next tick is controlled, from
+    /// where the piston is: reference := actual.
+    fn fill(&mut self, now: Micros) -> Filling {
+        self.target.grow_older();
+        let shortest = self.pwm.timing().shortest_opening();
+        let state = &mut self.state;
+        let filling = state.precharge.tick(
+            state.reference,
+            state.measured,
+            &state.motion,
+            &self.settings,
+            shortest,
+        );
+        match filling {
+            Ok(filling) => filling,
+            Err((end, after_ms)) => {
+                state.reference = state.measured;
+                self.core.supervisor.note(end, 0, after_ms, now);
+                Filling::NONE
+            }
+        }
     }
 
     fn exhaust_openings(&self) -> ValveOpenings {

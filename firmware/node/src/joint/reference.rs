@@ -92,12 +92,17 @@ impl Target {
         self.reference
     }
 
+    /// A tick that does not use it.
+    pub(super) const fn grow_older(&mut self) {
+        self.age = self.age.saturating_add(1);
+    }
+
     /// Wanted reference and velocity of this tick, then one tick older.
     fn advance(&mut self) -> (PositionMm, VelocityMmS) {
         let moving = self.age < CYCLE_TICKS;
         let ticks = self.age.min(CYCLE_TICKS);
         let travel = PositionMm::from_raw(travel(self.velocity.raw(), ticks));
-        self.age = self.age.saturating_add(1);
+        self.grow_older();
         let velocity = if moving {
             self.velocity
         } else {

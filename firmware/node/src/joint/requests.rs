@@ -2,6 +2,7 @@
 
 use super::expectation::MotionWatch;
 use super::node::JointNode;
+use super::precharge::Precharge;
 use super::reference::Target;
 use super::settings::JointSettings;
 use crate::board::{Application, BoardCore, ack};
@@ -25,7 +26,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     }
 
     fn armed(&mut self) {
-        self.change(|node| node.target = Target::at(node.state.measured));
+        self.change(|node| {
+            node.target = Target::at(node.state.measured);
+            node.state.precharge = Precharge::begin(&node.state.motion, &node.settings);
+        });
     }
 
     fn sync(&mut self, sync: &Sync, at: Micros) {

@@ -2,6 +2,7 @@
 
 use core::hash::{Hash, Hasher};
 
+use super::air::SUPPLY;
 use super::expectation::MotionModel;
 use crate::JOINT_TICK;
 use crate::parameters::JointParameters;
@@ -52,6 +53,9 @@ pub struct TickSettings {
     pub following_ticks: Ticks,
     /// What is expected of the piston.
     pub motion: MotionModel,
+    /// Absolute pressure to which both chambers are filled after arming, 2^-17 of the supply
+    /// pressure; 0: none.
+    pub precharge: i32,
     /// Outlet openings of a staged exhaust.
     pub staged_exhaust: ValveOpenings,
     /// Openings of a valve that stays open.
@@ -71,12 +75,13 @@ impl TickSettings {
             following_error,
             following_ticks,
             motion: _,
+            precharge,
             staged_exhaust,
             full_period,
         } = self;
         let [a, b, c, d] = &staged_exhaust.0;
         (sensor, correction, slew_step, slew_rate).hash(state);
-        (following_error, following_ticks).hash(state);
+        (following_error, following_ticks, precharge).hash(state);
         (a, b, c, d, full_period).hash(state);
     }
 }
@@ -113,6 +118,8 @@ impl JointSettings {
         if sensor.code_min >= sensor.code_max || sensor.travel_min >= sensor.travel_max {
             return None;
         }
+        let motion = MotionModel::new(&gains, position(P::MotionMargin))?;
+        let precharge = precharge(raw(P::Precharge), gains.axis.supply, &motion)?;
         let exhaust_duty = Duty::from_raw(raw(P::ExhaustDuty));
         let [opening, ..] = allocate(exhaust_duty, gains.pwm_period).0;
         // A pulse too short for the valve would never exhaust at all.
@@ -137,7 +144,8 @@ impl JointSettings {
                 slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
                 following_error: position(P::FollowingError),
                 following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
-                motion: MotionModel::new(&gains, position(P::MotionMargin))?,
+                motion,
+                precharge,
                 staged_exhaust: ValveMode::Exhaust.openings(opening),
                 full_period: gains.pwm_period,
             },
@@ -202,6 +210,20 @@ fn gains(parameters: &JointParameters) -> JointGains {
             stroke: position(P::StrokeMax),
         },
     }
+}
+
+/// Pressure of a precharge of so many raw bar (gauge) on this supply (raw kPa, absolute), in the
+/// unit of [`TickSettings::precharge`]; `None` if it is more than seven eighths of the supply, which
+/// no account of the air is sure to reach.
+fn precharge(bar: i32, supply: PositionMm, motion: &MotionModel) -> Option<i32> {
+    if bar == 0 {
+        return Some(0);
+    }
+    let share = i64::from(bar).saturating_mul(100 << 17);
+    let share = divide_signed(share, i64::from(supply.raw()));
+    let absolute = i64::from(motion.ambient()).saturating_add(share);
+    let absolute = i32::try_from(absolute).ok()?;
+    (absolute <= SUPPLY / 8 * 7).then_some(absolute)
 }
 
 /// A rate in raw mm/s as raw mm per joint tick, rounded down, at least one step.

@@ -1,0 +1,192 @@
+//! Filling both chambers after arming, before the control law drives.
+//!
+//! After a stop the chambers may be empty, and a law that meets an error then drives a
+//! piston that no air holds back: it jumps. So an axis that is armed first fills both chambers
+//! to the precharge pressure, outlets shut, with short pulses of one inlet at a time.
+//!
+//! * **The piston must not move.** The force of both chambers, as the account of the air
+//!   has it, is held where it was at arming: the next pulse goes to the chamber that pushes too
+//!   little, and where the two pulses are unequal to the larger chamber until there is room for the
+//!   coarser one. A piston that has moved all the same shifts that balance against its motion, so the
+//!   chamber that pushed it waits, and the other one is filled further.
+//! * **A pulse** lasts as long as its chamber takes for a 64th of the supply pressure, but
+//!   no shorter than the valve can be opened.
+//! * **It ends** when both chambers hold the pressure, when the piston has moved by more than
+//!   [`WAY`], or when the time is over ([`LONGEST`]). Then the closed loop takes over, from where
+//!   the piston is. Of what is left that is the safe answer: a leg that rises or sinks is held by its
+//!   law, with inlets and outlets; shut valves would leave it to what is in the chambers.
+//!
+//! What is in the chambers at power-up nobody knows; the account takes it for the atmosphere.
+//! With valves shut it loses pressure faster than any sound seal, so that an axis that stood for a
+//! while is filled anew. Chambers cannot be filled above the supply, which a cylinder bears. Where the account is wrong
+//! the filling is out of balance, and the way of the piston bounds it. A board has no pressure
+//! sensor either: without supply it counts air that does not come, for no longer than with it, and that
+//! nothing moves is found under control.
+
+use super::expectation::MotionWatch;
+use super::settings::TickSettings;
+use crate::JOINT_TICK;
+use wheeleg_control::pwm::OnTimes;
+use wheeleg_control::valve::ValveOpenings;
+use wheeleg_protocol::LogEvent;
+use wheeleg_units::{Micros, PositionMm};
+
+/// Longest precharge, ticks of 1 ms (ASSUMED: four times what the slowest axis of this
+/// project takes to 1 bar).
+const LONGEST: u16 = 2000;
+const _: () = assert!(JOINT_TICK.get() == 1000);
+/// Motion that ends it, raw mm (1.5 mm): the piston then stays below 2 mm (`tests/tests/precharge.rs`).
+const WAY: i32 = 3 << 15;
+
+/// A tick of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filling {
+    /// Openings for the PWM.
+    pub(super) openings: ValveOpenings,
+    /// For how much of the tick each valve counts as open, without its switching delays, µs.
+    pub(super) open: OnTimes,
+}
+
+impl Filling {
+    /// All valves shut.
+    pub(super) const NONE: Self = Self {
+        openings: ValveOpenings::SHUT,
+        open: [0; 4],
+    };
+}
+
+/// A precharge under way, or none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Precharge {
+    /// Ticks that it may still take; none is under way at 0.
+    left: u16,
+    /// Ticks until the next pulse is chosen.
+    next: u8,
+    /// The present pulse fills B, otherwise A.
+    fills_b: bool,
+    /// Force of the chambers that is to be held, mN.
+    balance: i32,
+}
+
+impl Precharge {
+    /// Begins one on an axis that has just been armed, unless its setting is none.
+    pub(super) fn begin(motion: &MotionWatch, settings: &TickSettings) -> Self {
+        if settings.precharge == 0 {
+            return Self::default();
+        }
+        Self {
+            left: LONGEST,
+            balance: motion.force(&settings.motion),
+            ..Self::default()
+        }
+    }
+
+    /// Whether one is under way.
+    #[inline]
+    pub(super) const fn is_under_way(&self) -> bool {
+        self.left > 0
+    }
+
+    /// All of it, for the seal.
+    #[inline]
+    pub(super) fn words(&self) -> (u32, i32) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            left,
+            next,
+            fills_b,
+            balance,
+        } = self;
+        let word = u32::from(*left)
+            | u32::from(*next).wrapping_shl(16)
+            | u32::from(*fills_b).wrapping_shl(24);
+        (word, *balance)
+    }
+
+    /// What the tick to come does to a piston at `position` that was at `from` when the axis was
+    /// armed; or how it ends, and after how many milliseconds.
+    #[inline(never)]
+    pub(super) fn tick(
+        &mut self,
+        from: PositionMm,
+        position: PositionMm,
+        motion: &MotionWatch,
+        settings: &TickSettings,
+        shortest: Micros,
+    ) -> Result<Filling, (LogEvent, u16)> {
+        let moved = position.saturating_sub(from).raw();
+        self.left = self.left.saturating_sub(1);
+        let end = if moved.wrapping_abs() > WAY {
+            LogEvent::PrechargeMoved
+        } else if self.next == 0 && motion.least_pressure() >= settings.precharge {
+            // Not within a pulse: cut short, it might not open its valve.
+            LogEvent::Precharged
+        } else if self.left == 0 {
+            LogEvent::PrechargeLate
+        } else {
+            return Ok(self.pulse(moved, position, motion, settings, shortest));
+        };
+        let taken = LONGEST.saturating_sub(self.left);
+        *self = Self::default();
+        Err((end, taken))
+    }
+
+    /// One inlet, for the time of a pulse; the other valves stay shut.
+    #[inline]
+    fn pulse(
+        &mut self,
+        moved: i32,
+        position: PositionMm,
+        motion: &MotionWatch,
+        settings: &TickSettings,
+        shortest: Micros,
+    ) -> Filling {
+        let model = &settings.motion;
+        let (time_a, push_a) = model.pulse(false, position, shortest);
+        let (time_b, push_b) = model.pulse(true, position, shortest);
+        // A period of the PWM has one pulse: 10 to 20 ticks.
+        let period = settings.full_period;
+        if self.next == 0 {
+            self.next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) as u8;
+            let force = motion.force(model).saturating_sub(self.balance);
+            let force = force.saturating_add(model.given_way(moved));
+            // The coarser pulse, of the smaller chamber, waits for room: never beyond balance.
+            self.fills_b = if push_a > push_b {
+                force.saturating_add(push_a) > 0
+            } else {
+                force >= push_b
+            };
+        }
+        self.next = self.next.saturating_sub(1);
+        let left = JOINT_TICK
+            .get()
+            .wrapping_mul(u32::from(self.next).wrapping_add(1));
+        let gone = period.get().saturating_sub(left);
+        let opening = if self.fills_b { time_b } else { time_a };
+        let open = opening.get().saturating_sub(gone).min(JOINT_TICK.get()) as u16;
+        if self.fills_b {
+            Filling {
+                openings: ValveOpenings([Micros::ZERO, Micros::ZERO, opening, Micros::ZERO]),
+                open: [0, 0, open, 0],
+            }
+        } else {
+            Filling {
+                openings: ValveOpenings([opening, Micros::ZERO, Micros::ZERO, Micros::ZERO]),
+                open: [open, 0, 0, 0],
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+impl Precharge {
+    /// Flips one bit of what [`Precharge::words`] gives.
+    pub(super) fn flip(&mut self, word: usize, bit: u32) {
+        match (word, bit) {
+            (0, 0..16) => self.left ^= 1 << bit,
+            (0, 16..24) => self.next ^= 1 << (bit - 16),
+            (0, _) => self.fills_b = !self.fills_b,
+            _ => self.balance ^= 1 << bit,
+        }
+    }
+}
