@@ -32,12 +32,17 @@ pub mod valves;
 pub use data::{AxisData, AxisField};
 pub use model::AxisModel;
 
-use wheeleg_units::saturate_i32;
-
-/// `a × b / 2^shift`, rounded down, saturating.
+/// `a × b / 2^shift`, rounded down, with a shift of 1…31; what does not fit becomes one of
+/// the 2^(32 − shift) largest or smallest numbers. It is the upper word of the product
+/// that is limited, in one instruction: a limit of all of it takes six.
 #[inline]
-pub(crate) const fn scaled(a: i32, b: i32, shift: u32) -> i32 {
-    saturate_i32((a as i64).wrapping_mul(b as i64).wrapping_shr(shift))
+pub(crate) fn scaled(a: i32, b: i32, shift: u32) -> i32 {
+    let product = i64::from(a).wrapping_mul(i64::from(b));
+    let left = 32_u32.wrapping_sub(shift);
+    let bound = i32::MAX.wrapping_shr(left);
+    let high = (product.wrapping_shr(32) as i32).max(!bound).min(bound);
+    let low = (product as u32).wrapping_shr(shift);
+    high.wrapping_shl(left) | low as i32
 }
 
 /// `a × b / 2^shift`, rounded down, of a quotient that is known to fit.
@@ -117,7 +122,7 @@ pub(crate) fn square_root(value: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{quotient, square_root};
+    use super::{quotient, scaled, square_root};
     use proptest::prelude::*;
 
     proptest! {
@@ -138,6 +143,20 @@ mod tests {
             let limited = exact.min(f64::from(i32::MAX));
             let difference = (f64::from(quotient(a, b, shift)) - limited).abs();
             prop_assert!(difference <= 1.0 + exact.abs() * 4e-5, "{difference} {exact}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn scaled_products_are_exact_where_they_fit(
+            a in any::<i32>(), b in any::<i32>(), b_bits in 0_u32..32, shift in 1_u32..32,
+        ) {
+            let b = b >> b_bits;
+            let exact = (i64::from(a) * i64::from(b)) >> shift;
+            let found = i64::from(scaled(a, b, shift));
+            let limited = exact.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+            let off = if exact == limited { 0 } else { (1_i64 << (32 - shift)) - 1 };
+            prop_assert!((found - limited).abs() <= off, "{found} {exact}");
         }
     }
 

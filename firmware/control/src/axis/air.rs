@@ -20,6 +20,8 @@ pub struct Air {
     now: u32,
     /// Flows of A and B at these pressures, as far as they are known.
     flows: [ChamberFlows; 2],
+    /// Stiffness of A and B where they were last followed or looked ahead to.
+    stiffness: [i32; 2],
 }
 
 impl Hash for Air {
@@ -34,6 +36,7 @@ impl Hash for Air {
             now,
             // Worked out anew in every tick.
             flows: _,
+            stiffness: _,
         } = self;
         (fill_a, vent_a, fill_b, vent_b).hash(state);
         state.write_i32(first ^ second.rotate_left(16));
@@ -56,6 +59,7 @@ impl Air {
             },
             now: 0,
             flows: [ChamberFlows::default(); 2],
+            stiffness: [0; 2],
         }
     }
 
@@ -116,24 +120,20 @@ impl Air {
         let (stiff_a, stiff_b) = (model.stiffness_a(stroke), model.stiffness_b(stroke));
         let change_a = flows_a.change([fill_a, vent_a], squeeze_a, span, stiff_a);
         let change_b = flows_b.change([fill_b, vent_b], squeeze_b, span, stiff_b);
+        self.stiffness = [stiff_a, stiff_b];
         Pressures {
             a: a.saturating_add(change_a),
             b: b.saturating_add(change_b),
         }
     }
 
-    /// On-times of the next tick that bring the chambers from `expected` to `target`
-    /// with the piston at `stroke`.
+    /// On-times of the next tick that bring the chambers from `expected`, where they were
+    /// last looked [`Air::ahead`] to, to `target`.
     #[inline]
-    pub fn pulses(
-        &mut self,
-        model: &AxisModel,
-        expected: Pressures,
-        target: Pressures,
-        stroke: i32,
-    ) -> OnTimes {
+    pub fn pulses(&mut self, model: &AxisModel, expected: Pressures, target: Pressures) -> OnTimes {
         let [fill_a, vent_a, fill_b, vent_b] = &self.valves;
         let [flows_a, flows_b] = &mut self.flows;
+        let [stiff_a, stiff_b] = self.stiffness;
         let change = target.a.saturating_sub(expected.a);
         flows_a.want(
             model,
@@ -141,7 +141,7 @@ impl Air {
             self.pressures.a,
             wanted(change, change.saturating_neg()),
         );
-        let needs = flows_a.needs(change, model.stiffness_a(stroke));
+        let needs = flows_a.needs(change, stiff_a);
         let [first, second] = pair(model, self.now, needs, fill_a, vent_a);
         let change = target.b.saturating_sub(expected.b);
         flows_b.want(
@@ -150,7 +150,7 @@ impl Air {
             self.pressures.b,
             wanted(change, change.saturating_neg()),
         );
-        let needs = flows_b.needs(change, model.stiffness_b(stroke));
+        let needs = flows_b.needs(change, stiff_b);
         let [third, fourth] = pair(model, self.now, needs, fill_b, vent_b);
         [first, second, third, fourth]
     }

@@ -273,7 +273,7 @@ impl Predictive {
             .min(model.force_out);
         let target = self.target(model, possible, expected);
         Drive {
-            on: self.air.pulses(model, expected, target, ahead.stroke),
+            on: self.air.pulses(model, expected, target),
             settled: false,
             limited: possible != force,
             force,

@@ -10,6 +10,10 @@ use core::hash::{Hash, Hasher};
 
 /// Changes that can be under way at once.
 const EDGES: usize = 4;
+/// Bits of a track's state: changes under way, the coil is on, the valve is open.
+const PENDING: u32 = 0xFF;
+const COIL: u32 = 1 << 8;
+const OPEN: u32 = 1 << 9;
 
 /// Timing of the valves, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -44,11 +48,10 @@ impl ValveTimes {
 /// long stays so for the shortest pulse.
 #[derive(Clone, Copy, Debug)]
 pub struct ValveTrack {
-    coil: bool,
-    open: bool,
-    /// Changes of the effect under way.
-    pending: u8,
-    /// Moment of each of them, oldest first; beyond `pending` without meaning.
+    /// How many changes of the effect are under way ([`PENDING`]), and whether the coil is
+    /// on ([`COIL`]) and the valve open ([`OPEN`]): one word, which is sealed as it is.
+    state: u32,
+    /// Moment of each change under way, oldest first; beyond those without meaning.
     edges: [u32; EDGES],
     /// When the coil changed.
     changed: u32,
@@ -66,20 +69,16 @@ impl Hash for ValveTrack {
         // Taken apart, so that a new field cannot be forgotten here. Fields share a
         // word such that a flipped bit of any flips one bit of it.
         let Self {
-            coil,
-            open,
-            pending,
+            state: own,
             edges: [first, second, third, fourth],
             changed,
         } = self;
-        let flags = u32::from(*coil)
-            | u32::from(*open).wrapping_shl(8)
-            | u32::from(*pending).wrapping_shl(16);
-        state.write_u32(changed ^ flags.rotate_right(8));
-        if *pending > 0 {
+        state.write_u32(changed ^ own);
+        let pending = own & PENDING;
+        if pending > 0 {
             state.write_u32(*first);
             state.write_u32(*second);
-            if *pending > 2 {
+            if pending > 2 {
                 state.write_u32(*third);
                 state.write_u32(*fourth);
             }
@@ -92,9 +91,7 @@ impl ValveTrack {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            coil: false,
-            open: false,
-            pending: 0,
+            state: 0,
             edges: [0; EDGES],
             changed: 1 << 31,
         }
@@ -103,30 +100,42 @@ impl ValveTrack {
     /// Whether the coil is on at the end of the ticks taken so far.
     #[must_use]
     pub const fn coil(&self) -> bool {
-        self.coil
+        self.state & COIL != 0
+    }
+
+    /// Changes under way.
+    #[inline]
+    const fn pending(&self) -> u32 {
+        self.state & PENDING
+    }
+
+    /// Whether the chamber sees the valve open.
+    #[inline]
+    const fn open(&self) -> bool {
+        self.state & OPEN != 0
     }
 
     /// The coil changes at the moment `at`.
     #[inline(never)]
     fn change(&mut self, at: u32, times: &ValveTimes) {
         let lasted = at.wrapping_sub(self.changed);
-        let (took, delay) = if self.coil {
+        let (took, delay) = if self.coil() {
             (times.on, times.off)
         } else {
             (times.off, times.on)
         };
-        self.coil = !self.coil;
+        self.state ^= COIL;
         self.changed = at;
-        if lasted < took as u32 && self.pending > 0 {
+        let pending = self.pending();
+        if lasted < took as u32 && pending > 0 {
             // Called back before it moved: the change under way does not happen.
-            self.pending = self.pending.wrapping_sub(1);
-        } else if let Some(next) = self.edges.get_mut(usize::from(self.pending)) {
+            self.state = self.state.wrapping_sub(1);
+        } else if let Some(next) = self.edges.get_mut(pending as usize) {
             *next = at.wrapping_add(delay.wrapping_add(times.line) as u32);
-            self.pending = self.pending.wrapping_add(1);
+            self.state = self.state.wrapping_add(1);
         } else {
             // More changes than a line can hold: only the end is known.
-            self.pending = 0;
-            self.open = self.coil;
+            self.state = if self.coil() { COIL | OPEN } else { 0 };
         }
     }
 
@@ -134,43 +143,43 @@ impl ValveTrack {
     /// how long the chamber sees the valve open in that tick, µs.
     #[inline]
     pub fn advance(&mut self, now: u32, on: i32, times: &ValveTimes) -> i32 {
-        if on > 0 && !self.coil {
+        if on > 0 && !self.coil() {
             self.change(now, times);
         }
-        if on < times.tick && self.coil {
+        if on < times.tick && self.coil() {
             self.change(now.wrapping_add(on as u32), times);
         }
-        if self.pending > 0 {
+        if self.pending() > 0 {
             let [first, ..] = self.edges;
             if first.wrapping_sub(now) as i32 <= times.tick {
                 return self.pass(now, times.tick);
             }
         }
-        if self.open { times.tick } else { 0 }
+        if self.open() { times.tick } else { 0 }
     }
 
     /// Takes the changes within `span` µs from `now`; gives the time open.
     #[inline(never)]
     fn pass(&mut self, now: u32, span: i32) -> i32 {
-        let (mut opened, mut from) = (0_i32, 0_i32);
-        while self.pending > 0 {
-            let [first, ..] = self.edges;
-            let first = first.wrapping_sub(now) as i32;
-            if first > span {
+        // The time open is that to the end of the span, if the valve is open then, less the
+        // moments of opening, plus those of closing.
+        let mut opened = 0_i32;
+        while self.pending() > 0 {
+            let [first, second, third, fourth] = self.edges;
+            let moment = first.wrapping_sub(now) as i32;
+            if moment > span {
                 break;
             }
-            if self.open {
-                opened = opened.wrapping_add(first.wrapping_sub(from));
-            }
-            from = first;
-            self.open = !self.open;
-            self.pending = self.pending.wrapping_sub(1);
-            self.edges.rotate_left(1);
+            opened = moment.wrapping_sub(opened);
+            // One change less, and the other way.
+            self.state = self.state.wrapping_sub(1) ^ OPEN;
+            self.edges = [second, third, fourth, first];
         }
-        if self.open {
-            opened = opened.wrapping_add(span.wrapping_sub(from));
+        if self.open() {
+            span.wrapping_sub(opened)
+        } else {
+            opened
         }
-        opened
     }
 
     /// What is left at `now` of the shortest pulse under way, µs.
@@ -188,7 +197,7 @@ impl ValveTrack {
     #[inline]
     #[must_use]
     pub fn committed(&self, now: u32, times: &ValveTimes) -> i32 {
-        if !self.coil && self.pending == 0 {
+        if self.state & (COIL | PENDING) == 0 {
             return 0;
         }
         self.under_way(now, times)
@@ -196,16 +205,26 @@ impl ValveTrack {
 
     #[inline(never)]
     fn under_way(&self, now: u32, times: &ValveTimes) -> i32 {
-        let mut sum = 0_i32;
-        for edge in self.edges.iter().take(usize::from(self.pending)) {
-            // The sum so far is that of an even or odd number of changes: each turns
-            // the sign of all before it.
-            sum = (edge.wrapping_sub(now) as i32).wrapping_sub(sum);
-        }
-        if !self.coil {
+        let [first, second, third, fourth] = self.edges;
+        // Without a loop: how many changes there are decides all that is to be done. The
+        // moments of an even number of changes need no present to be told from.
+        let sum = match self.pending() {
+            0 => 0,
+            1 => first.wrapping_sub(now),
+            2 => second.wrapping_sub(first),
+            3 => third
+                .wrapping_sub(second)
+                .wrapping_add(first)
+                .wrapping_sub(now),
+            _ => fourth
+                .wrapping_sub(third)
+                .wrapping_add(second)
+                .wrapping_sub(first),
+        } as i32;
+        if !self.coil() {
             return sum;
         }
-        if usize::from(self.pending) >= EDGES {
+        if self.pending() as usize >= EDGES {
             return 0;
         }
         // The fall is the last change, and closes.
@@ -221,7 +240,7 @@ impl ValveTrack {
     #[inline]
     #[must_use]
     pub fn on_time(&self, now: u32, need: i32, rival: bool, times: &ValveTimes) -> i32 {
-        let pulse = if self.coil {
+        let pulse = if self.coil() {
             // A few microseconds are not worth a tick.
             let need = if need < 20 { 0 } else { need };
             self.left(now, times).saturating_add(need)
@@ -286,7 +305,7 @@ mod tests {
         for (on, now) in on.into_iter().zip((0..).step_by(1000)) {
             track.advance(now, on, &TIMES);
         }
-        assert!(!track.open && track.pending == 0);
+        assert!(!track.open() && track.pending() == 0);
     }
 
     #[test]
@@ -326,7 +345,7 @@ mod tests {
                 now += 1000;
             }
             prop_assert_eq!(seen, committed);
-            prop_assert!(!track.coil && !track.open);
+            prop_assert!(!track.coil() && !track.open());
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
-use crate::axis::{part, saturate_i32, scaled};
+use crate::axis::{part, scaled};
+use wheeleg_units::saturate_i32;
 
 /// A chamber lags whose pressure is so much above its target (10 kPa in 1/256 Pa).
 const LAG: i32 = 10_000 << 8;
