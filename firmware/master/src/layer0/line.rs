@@ -335,6 +335,54 @@ mod tests {
     }
 
     #[test]
+    fn a_condition_is_told_in_the_cycle_in_which_it_has_lasted_and_is_over_after_ten() {
+        let mut lasting = Lasting::default();
+        for _ in 0..3 {
+            assert_eq!(lasting.cycle(true, 4), Edge::None);
+        }
+        assert_eq!(lasting.cycle(false, 4), Edge::None, "not in a row");
+        let edges: [Edge; 6] = core::array::from_fn(|_| lasting.cycle(true, 4));
+        assert_eq!(edges[3], Edge::Begins);
+        assert!(edges.iter().filter(|edge| **edge != Edge::None).count() == 1);
+        for _ in 1..QUIET_CYCLES {
+            assert_eq!(lasting.cycle(false, 4), Edge::None);
+        }
+        assert_eq!(lasting.cycle(false, 4), Edge::Ends);
+        assert_eq!(lasting.cycle(false, 4), Edge::None, "told once");
+    }
+
+    #[test]
+    fn rubbish_of_half_a_reply_spoils_a_slot_and_only_the_shape_of_a_reply_is_excused() {
+        let spoils = |bytes: &[u8]| {
+            let mut line = Line::default();
+            for _ in 0..SPOILT_CYCLES {
+                line.stretch(bytes, 1020 + 100 + 3 * 310);
+                line.end_cycle(|index| index != 2, |_| {});
+            }
+            line.is_spoilt(2)
+        };
+        let half = REPLY_BYTES / 2;
+        assert!(!spoils(&[7; REPLY_BYTES][..half - 1]) && spoils(&[7; REPLY_BYTES][..half]));
+        let shaped = |length: usize, first: u8, last: u8| {
+            let mut bytes = vec![7; length];
+            (bytes[0], bytes[length - 1]) = (first, last);
+            bytes
+        };
+        for (length, first, last, excused) in [
+            (REPLY_BYTES, 0, 0, true),
+            (REPLY_BYTES + 1, 0, 0, true),
+            (REPLY_BYTES - 1, 0, 0, true),
+            (REPLY_BYTES + 2, 0, 0, false),
+            (REPLY_BYTES - 2, 0, 0, false),
+            (REPLY_BYTES, 7, 0, false),
+            (REPLY_BYTES, 0, 7, false),
+        ] {
+            let bytes = shaped(length, first, last);
+            assert_eq!(spoils(&bytes), !excused, "{length} {first} {last}");
+        }
+    }
+
+    #[test]
     fn who_fills_the_line_is_named_once() {
         let mut line = Line::default();
         let mut found = Vec::new();

@@ -53,8 +53,8 @@ const NEVER: u32 = ROUNDS + ONE;
 /// direct-acting valves of one type differ by about twice with age, temperature and supply
 /// voltage; with twice exactly, faults after the first motions are found much later: FAULTS.md).
 const SLOWER_FIFTHS: u32 = 9;
-/// Pressure that a chamber with its valves shut may lose in a tick.
-const LEAK: i32 = 4;
+/// Pressure that a chamber with its valves shut may lose in a round.
+const LEAK: i32 = 4 * ROUND as i32;
 /// Vented times count in 64 µs.
 const VENTED_SHIFT: u32 = 6;
 
@@ -380,14 +380,14 @@ impl Air {
         self.b.vented = 0;
     }
 
-    /// A tick in which all valves are shut: a chamber may have lost air. A bar in 4.7 s of a supply
+    /// A round in which all valves are shut: a chamber may have lost air. A bar in 4.7 s of a supply
     /// of 7 bar (ASSUMED: twice what the seals of this project's cylinders let through where the
     /// chamber is smallest; too much is filled again at the next arming, too little would be missing).
     #[inline]
     pub(super) fn leak(&mut self, model: &AirModel) {
         for content in [&mut self.a, &mut self.b] {
             if content.p > model.ambient {
-                content.p = content.p.wrapping_sub(LEAK);
+                content.p = content.p.wrapping_sub(LEAK).max(model.ambient);
             }
         }
     }

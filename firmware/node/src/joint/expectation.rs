@@ -228,10 +228,13 @@ impl MotionWatch {
     /// is expected, and loads have to be learnt anew afterwards.
     #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
-        let _ = self.air.follow(on, position, &model.air, false);
+        let third = self.air.follow(on, position, &model.air, false);
         if *on == [0; 4] {
             self.air.forget();
-            self.air.leak(&model.air);
+            // In the tick that has no chamber to follow.
+            if third {
+                self.air.leak(&model.air);
+            }
         }
         self.slid = 0;
         self.doubt = 0;
