@@ -253,7 +253,7 @@ fault_table!(
     RateLimited = 102, bit 6, "Speed or acceleration is at its limit.",
         "Expected in fast moves; otherwise raise the speed or acceleration parameter.";
     DriveInhibited = 103, bit 7, "The drive waits: a wheel changes direction, or a cylinder that was armed fills its chambers (precharge).",
-        "Expected at direction changes of a wheel and for less than two seconds after arming.";
+        "Expected at direction changes of a wheel and for at most two seconds after arming.";
 });
 
 fault_table!(

@@ -28,6 +28,7 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
             "firmware/node/src/joint/air.rs",
             "firmware/node/src/joint/expectation.rs",
             "firmware/node/src/joint/outputs.rs",
+            "firmware/node/src/joint/precharge.rs",
             "firmware/node/src/joint/requests.rs",
             "firmware/node/src/wheel/outputs.rs",
         ],

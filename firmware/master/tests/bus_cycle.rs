@@ -14,7 +14,8 @@ use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::params::GaitParams;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{
-    Address, BoardKind, InputBits, Message, NackReason, NodeMode, SCHEMA_HASH, SyncFlags,
+    Address, BoardKind, InputBits, Limit, LimitBits, Message, NackReason, NodeMode, SCHEMA_HASH,
+    SyncFlags,
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -225,6 +226,30 @@ fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged()
     rig.node(5).mode = NodeMode::Armed;
     rig.run(2);
     assert!(rig.done(ticket) && rig.master.is_armed());
+}
+
+#[test]
+fn arming_is_done_when_no_joint_fills_any_more() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    // A wheel that waits for a change of direction delays nobody.
+    rig.node(7).limits = Limit::DriveInhibited.mask();
+    rig.node(4).limits = Limit::DriveInhibited.mask();
+    let ticket = rig.submit(Command::Arm);
+    rig.run(205);
+    assert!(!rig.done(ticket) && rig.refusal(ticket).is_none());
+    rig.node(4).limits = LimitBits::NONE;
+    rig.run(2);
+    assert!(rig.done(ticket) && rig.master.is_armed());
+
+    // One that fills for ever is not waited for.
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    rig.node(4).limits = Limit::DriveInhibited.mask();
+    let ticket = rig.submit(Command::Arm);
+    rig.run(240);
+    assert_eq!(rig.refusal(ticket), Some(Refusal::NotConfirmed));
+    assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Idle));
 }
 
 #[test]

@@ -27,7 +27,7 @@ pub struct JointSnapshot {
     /// Measured stroke.
     pub measured: PositionMm,
     /// Reference of the control law, after slew limit; the measured stroke while
-    /// not driving.
+    /// disarmed, and that of arming during a precharge.
     pub reference: PositionMm,
     /// Reference of the newest SYNC slot.
     pub commanded: PositionMm,

@@ -141,20 +141,48 @@ fn without_a_precharge_the_law_drives_at_once() {
 }
 
 #[test]
-fn a_reference_that_comes_meanwhile_counts_afterwards() {
+fn a_position_command_does_not_wait_for_the_end_of_it_beyond_its_deadline() {
     let mut rig = armed(1.0);
     rig.run_cycles(1, None);
-    let command = Message::PositionReference(PositionReference {
-        reference_raw: 140 << 16,
-        deadline_cycle: rig.cycle.wrapping_add(50),
-    });
-    assert!(matches!(rig.request(&command), Message::Ack(_)));
+    let command = |rig: &JointRig| {
+        Message::PositionReference(PositionReference {
+            reference_raw: 140 << 16,
+            deadline_cycle: rig.cycle.wrapping_add(50),
+        })
+    };
+    let early = command(&rig);
+    let answer = rig.request(&early);
+    assert_eq!(refusal(&answer), Some(NackReason::Busy));
     while fills(&rig) {
         rig.run_cycles(1, None);
     }
     rig.run_cycles(3, None);
-    let reference = rig.node.snapshot().reference.to_f64();
-    assert!((reference - 140.0).abs() < 0.1, "{reference}");
+    let reference = |rig: &JointRig| rig.node.snapshot().reference.to_f64();
+    assert!((reference(&rig) - 100.0).abs() < 0.1);
+    let late = command(&rig);
+    assert!(matches!(rig.request(&late), Message::Ack(_)));
+    rig.run_cycles(30, None);
+    assert!((reference(&rig) - 140.0).abs() < 0.1);
+}
+
+#[test]
+fn disarmed_and_armed_between_two_ticks_the_reference_is_the_actual_one_all_the_same() {
+    for bar in [0.0, 1.0] {
+        let mut rig = armed(bar);
+        while fills(&rig) || rig.node.snapshot().limits.contains(Limit::DriveInhibited) {
+            rig.run_cycles(1, None);
+        }
+        rig.run_cycles(40, Some(setpoint(140.0, Hold)));
+        let reference = |rig: &JointRig| rig.node.snapshot().reference.to_f64();
+        assert!(
+            (reference(&rig) - 140.0).abs() < 0.1,
+            "the piston stays at 100"
+        );
+        rig.request(&DISARM);
+        rig.request(&ARM);
+        rig.tick();
+        assert!((reference(&rig) - 100.0).abs() < 0.2, "{}", reference(&rig));
+    }
 }
 
 #[test]
@@ -256,11 +284,17 @@ fn nothing_of_it_is_left_after_a_stop() {
     rig.run_cycles(20, Some(setpoint(150.0, Hold)));
     assert!(!rig.any_open(), "a clear does not fill");
     // Elsewhere now: the way counts from where it is armed anew.
-    rig.sensor.set(Ok(code_at(100.4)));
-    rig.run(5);
+    for half_mm in 0..=10_u8 {
+        rig.sensor
+            .set(Ok(code_at(100.0 + 0.5 * f64::from(half_mm))));
+        rig.run(5);
+    }
     rig.request(&ARM);
-    rig.run_cycles(1, Some(setpoint(150.0, Hold)));
+    rig.run_cycles(5, Some(setpoint(150.0, Hold)));
     assert!(fills(&rig));
+    rig.sensor.set(Ok(code_at(106.7)));
+    rig.run(2);
+    assert!(!fills(&rig));
 }
 
 #[test]

@@ -129,8 +129,9 @@ fn listing(json: bool) -> String {
         let list: Vec<serde_json::Value> = KINDS.iter().map(row_json).collect();
         return format!("{:#}\n", serde_json::json!({ "faults": list }));
     }
-    let mut out =
-        String::from("Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]):\n");
+    let mut out = String::from(
+        "Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]);\nthose that are over by themselves take no second TIME:\n",
+    );
     for row in KINDS {
         let _ = writeln!(out, "\n  {}", row.name);
         let _ = writeln!(out, "      {}", row.doc);

@@ -1,6 +1,6 @@
 //! What layer 0 knows about each node: identity and last reply.
 
-use wheeleg_protocol::{Address, BoardKind, Identity, NodeMode, SlotReply};
+use wheeleg_protocol::{Address, BoardKind, Identity, Limit, NodeMode, SlotReply};
 
 use crate::config::UniqueId;
 use crate::dispatcher::Refusal;
@@ -262,7 +262,16 @@ impl Nodes {
         })
     }
 
-    /// Whether every node's last reply shows a closed loop.
+    /// Whether a joint is still filling its chambers: it has no closed loop yet.
+    #[must_use]
+    pub fn fills(&self) -> bool {
+        self.iter().any(|(address, node)| {
+            let waits = |reply: SlotReply| reply.limits.contains(Limit::DriveInhibited);
+            address.is_joint() && node.last.is_some_and(waits)
+        })
+    }
+
+    /// Whether every node's last reply shows that it is armed.
     #[must_use]
     pub fn all_armed(&self) -> bool {
         self.nodes.iter().all(|node| {

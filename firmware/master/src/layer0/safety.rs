@@ -13,8 +13,10 @@ use crate::finding::Finding;
 use crate::setpoint::Setpoints;
 
 /// Cycles that the nodes have to show a closed loop after the last of them
-/// acknowledged arming.
+/// acknowledged arming …
 const CONFIRM_CYCLES: u8 = 10;
+/// … and with a precharge, which joints end by themselves after 200 cycles.
+const FILL_CYCLES: u8 = 220;
 
 /// Index of the node with the supply-pressure switch: wheel board 7.
 const SUPPLY_NODE: usize = 6;
@@ -97,13 +99,16 @@ impl Layer0 {
         }
         group.waited = group.waited.saturating_add(1);
         let (ticket, waited) = (group.ticket, group.waited);
-        if self.nodes.all_armed() {
+        // A motion begun while a joint still fills would be made up for in one go.
+        let fills = self.nodes.fills();
+        let allowed = if fills { FILL_CYCLES } else { CONFIRM_CYCLES };
+        if self.nodes.all_armed() && !fills {
             self.group = None;
             self.power = Power::Armed;
             self.stale_cycles = 0;
             events.push(now_us, Event::Armed);
             events.push(now_us, Event::Done(ticket));
-        } else if waited > CONFIRM_CYCLES {
+        } else if waited > allowed {
             self.group = None;
             self.abort_arming(now_us, events);
             let reason = Refusal::NotConfirmed;

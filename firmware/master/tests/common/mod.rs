@@ -25,6 +25,7 @@ pub(crate) struct FakeNode {
     pub(crate) silent: bool,
     pub(crate) faults: FaultBits,
     pub(crate) inputs: InputBits,
+    pub(crate) limits: LimitBits,
     /// Joint: raw mm; wheel: counts.
     pub(crate) position: i64,
     /// Largest change per cycle, raw.
@@ -72,6 +73,7 @@ impl FakeNode {
             } else {
                 InputBits::NONE
             },
+            limits: LimitBits::NONE,
             position: if address.is_joint() {
                 i64::from(PositionMm::from_int(60).raw())
             } else {
@@ -151,7 +153,7 @@ impl FakeNode {
             effort_raw: 0,
             active_faults: self.faults,
             mode: self.mode,
-            limits: LimitBits::NONE,
+            limits: self.limits,
             inputs: self.inputs,
             sync_echo: (sync.cycle as u8).wrapping_add(self.echo_offset),
         }

@@ -159,9 +159,15 @@ impl AirModel {
     }
 
     /// A pulse of the inlet of B or A with the piston at `position`: its opening, which fills a 64th
-    /// of the supply pressure in choked flow and is at least `shortest`, and its force, mN.
+    /// of the supply pressure in choked flow and is `shortest` to `longest`, and its force, mN.
     #[inline(never)]
-    pub(super) fn pulse(&self, b: bool, position: PositionMm, shortest: Micros) -> (Micros, i32) {
+    pub(super) fn pulse(
+        &self,
+        b: bool,
+        position: PositionMm,
+        shortest: Micros,
+        longest: Micros,
+    ) -> (Micros, i32) {
         let (chamber, length) = if b {
             (&self.b, self.stroke.wrapping_sub(position.raw()))
         } else {
@@ -171,7 +177,7 @@ impl AirModel {
         let length = (length >> 8).wrapping_add(chamber.lead).max(0);
         let time = length.cast_unsigned().saturating_mul(1 << 10);
         let time = time.checked_div(chamber.flow.cast_unsigned()).unwrap_or(0);
-        let opening = time.max(shortest.get());
+        let opening = time.max(shortest.get()).min(longest.get());
         // How many 64ths the shortest gives, in sixteenths, at most all of them.
         let parts = opening.saturating_mul(16).checked_div(time);
         let parts = parts.unwrap_or(u32::MAX).min(16 * 64).cast_signed();
@@ -380,7 +386,7 @@ impl Air {
         self.b.vented = 0;
     }
 
-    /// A round in which all valves are shut: a chamber may have lost air. A bar in 4.7 s of a supply
+    /// A round that ends with all valves shut: a chamber may have lost air. A bar in 4.7 s of a supply
     /// of 7 bar (ASSUMED: twice what the seals of this project's cylinders let through where the
     /// chamber is smallest; too much is filled again at the next arming, too little would be missing).
     #[inline]

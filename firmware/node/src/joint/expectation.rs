@@ -125,19 +125,23 @@ impl MotionModel {
             high: gains.stroke_max.saturating_sub(NEAR_END),
         })
     }
-}
 
-impl MotionModel {
     /// Absolute pressure of the atmosphere, 2^-17 of the supply pressure.
     #[inline]
     pub(super) const fn ambient(&self) -> i32 {
         self.air.ambient()
     }
 
-    /// A pulse of the inlet of B or A: its opening, at least `shortest`, and its force, mN.
+    /// A pulse of the inlet of B or A: its opening, `shortest` to `longest`, and its force, mN.
     #[inline]
-    pub(super) fn pulse(&self, b: bool, at: PositionMm, shortest: Micros) -> (Micros, i32) {
-        self.air.pulse(b, at, shortest)
+    pub(super) fn pulse(
+        &self,
+        b: bool,
+        at: PositionMm,
+        shortest: Micros,
+        longest: Micros,
+    ) -> (Micros, i32) {
+        self.air.pulse(b, at, shortest, longest)
     }
 
     /// Force by which a piston that has moved by `moved` (raw mm, a few millimetres) shifts the
@@ -263,6 +267,7 @@ impl MotionWatch {
             // A minute at rest: seals leak.
             self.slid = 0;
             self.air.forget();
+            self.air.leak(&model.air);
         }
     }
 

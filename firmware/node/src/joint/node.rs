@@ -220,11 +220,12 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.axis_fault(fault, now);
         }
 
-        let drives = self.core.mode().may_drive() && !self.state.precharge.is_under_way();
-        let on_times = if drives {
-            self.drive(now)
-        } else {
+        let on_times = if !self.core.mode().may_drive() {
             self.rest(now)
+        } else if self.state.precharge.is_under_way() {
+            self.fill(now)
+        } else {
+            self.drive(now)
         };
         if self.write(on_times).is_err() {
             self.give_up(now);

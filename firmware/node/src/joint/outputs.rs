@@ -6,7 +6,7 @@ use super::precharge::{Filling, Precharge};
 use super::reference::{Target, TickReference, advance};
 use crate::JOINT_TICK;
 use crate::hardware::{PinError, PositionSensor, SwitchBank, ValveBank};
-use crate::mode::{Mode, ModeRules};
+use crate::mode::Mode;
 use crate::supervisor::ExhaustKind;
 use wheeleg_control::joint::{JointInput, JointLimits};
 use wheeleg_control::pwm::OnTimes;
@@ -87,51 +87,28 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// No control: the valves do what the mode says, or fill an axis that is armed. Disarmed,
-    /// the reference follows the measured stroke; while it fills, it stays at that of arming, and
-    /// set-points are taken.
+    /// No control: the valves do what the mode says, the reference follows the
+    /// measured stroke, and no precharge is under way.
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
-        let mode = self.core.mode();
-        let filling = mode.may_drive();
-        let filled = if filling {
-            self.fill(now)
+        self.state.reference = self.state.measured;
+        self.state.precharge = Precharge::default();
+        self.target = Target::at(self.state.measured);
+        let on_times = if self.core.mode() == Mode::Exhaust {
+            let openings = self.exhaust_openings();
+            self.pwm.tick(&openings)
         } else {
-            Filling::NONE
+            self.pwm.shut()
         };
-        let openings = if filling {
-            filled.openings
-        } else {
-            self.state.reference = self.state.measured;
-            self.state.precharge = Precharge::default();
-            self.target = Target::at(self.state.measured);
-            if mode == Mode::Exhaust {
-                self.exhaust_openings()
-            } else {
-                ValveOpenings::SHUT
-            }
-        };
-        self.state.following = Ticks::ZERO;
-        let velocity = self.controller.observe(self.state.measured);
-        let on_times = self.pwm.tick(&openings);
-        self.controller.sent(on_times);
-        let state = &mut self.state;
-        let open = if filling { &filled.open } else { &on_times };
-        state
-            .motion
-            .rest(open, state.measured, &self.settings.motion);
-        self.record(now, velocity, Duty::ZERO, on_times);
-        self.snapshot.limits = if filling {
-            const { Limit::DriveInhibited.mask() }
-        } else {
-            LimitBits::NONE
-        };
-        self.snapshot.settled = false;
+        self.rested(now, on_times, &on_times);
+        self.snapshot.limits = LimitBits::NONE;
         on_times
     }
 
-    /// A tick of precharge. At its end all valves are shut, and the next tick is controlled, from
-    /// where the piston is: reference := actual.
-    fn fill(&mut self, now: Micros) -> Filling {
+    /// A tick of precharge: an armed axis fills. The reference stays at that of arming, and
+    /// set-points are taken. At its end all valves are shut, and the next tick is controlled,
+    /// from where the piston is: reference := actual.
+    #[inline(never)]
+    pub(super) fn fill(&mut self, now: Micros) -> OnTimes {
         self.target.grow_older();
         let shortest = self.pwm.timing().shortest_opening();
         let state = &mut self.state;
@@ -142,14 +119,29 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             &self.settings,
             shortest,
         );
-        match filling {
-            Ok(filling) => filling,
-            Err((end, after_ms)) => {
-                state.reference = state.measured;
-                self.core.supervisor.note(end, 0, after_ms, now);
-                Filling::NONE
-            }
-        }
+        let filling = filling.unwrap_or_else(|(end, after_ms)| {
+            state.reference = state.measured;
+            self.core.supervisor.note(end, 0, after_ms, now);
+            Filling::NONE
+        });
+        let on_times = self.pwm.tick(&filling.openings);
+        self.rested(now, on_times, &filling.open);
+        self.snapshot.limits = const { Limit::DriveInhibited.mask() };
+        on_times
+    }
+
+    /// A tick that sends `on_times` without a law, by which the valves are `open` without their
+    /// switching delays, µs.
+    fn rested(&mut self, now: Micros, on_times: OnTimes, open: &OnTimes) {
+        self.state.following = Ticks::ZERO;
+        let velocity = self.controller.observe(self.state.measured);
+        self.controller.sent(on_times);
+        let state = &mut self.state;
+        state
+            .motion
+            .rest(open, state.measured, &self.settings.motion);
+        self.record(now, velocity, Duty::ZERO, on_times);
+        self.snapshot.settled = false;
     }
 
     fn exhaust_openings(&self) -> ValveOpenings {

@@ -33,7 +33,7 @@ use wheeleg_units::{Micros, PositionMm};
 
 /// Longest precharge, ticks of 1 ms (ASSUMED: four times what the slowest axis of this
 /// project takes to 1 bar).
-const LONGEST: u16 = 2000;
+const LONGEST: u32 = 2000;
 const _: () = assert!(JOINT_TICK.get() == 1000);
 /// Motion that ends it, raw mm (1.5 mm): the piston then stays below 2 mm (`tests/tests/precharge.rs`).
 const WAY: i32 = 3 << 15;
@@ -55,15 +55,19 @@ impl Filling {
     };
 }
 
+/// Bits of the state: ticks that it may still take, ticks until the next pulse is chosen, and
+/// whether the present pulse fills B, otherwise A.
+const LEFT: u32 = 0xFFFF;
+const NEXT: u32 = 0xFF << NEXT_SHIFT;
+const NEXT_SHIFT: u32 = 16;
+const FILLS_B: u32 = 1 << 24;
+
 /// A precharge under way, or none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Precharge {
-    /// Ticks that it may still take; none is under way at 0.
-    left: u16,
-    /// Ticks until the next pulse is chosen.
-    next: u8,
-    /// The present pulse fills B, otherwise A.
-    fills_b: bool,
+    /// [`LEFT`], [`NEXT`] and [`FILLS_B`]: one word, which is sealed as it is. All zero if
+    /// none is under way.
+    state: u32,
     /// Force of the chambers that is to be held, mN.
     balance: i32,
 }
@@ -75,32 +79,28 @@ impl Precharge {
             return Self::default();
         }
         Self {
-            left: LONGEST,
+            state: LONGEST,
             balance: motion.force(&settings.motion),
-            ..Self::default()
         }
     }
 
     /// Whether one is under way.
     #[inline]
     pub(super) const fn is_under_way(&self) -> bool {
-        self.left > 0
+        self.state & LEFT != 0
+    }
+
+    /// Ticks until the next pulse is chosen.
+    const fn next(self) -> u32 {
+        (self.state & NEXT).wrapping_shr(NEXT_SHIFT)
     }
 
     /// All of it, for the seal.
     #[inline]
     pub(super) fn words(&self) -> (u32, i32) {
         // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            left,
-            next,
-            fills_b,
-            balance,
-        } = self;
-        let word = u32::from(*left)
-            | u32::from(*next).wrapping_shl(16)
-            | u32::from(*fills_b).wrapping_shl(24);
-        (word, *balance)
+        let Self { state, balance } = self;
+        (*state, *balance)
     }
 
     /// What the tick to come does to a piston at `position` that was at `from` when the axis was
@@ -115,18 +115,21 @@ impl Precharge {
         shortest: Micros,
     ) -> Result<Filling, (LogEvent, u16)> {
         let moved = position.saturating_sub(from).raw();
-        self.left = self.left.saturating_sub(1);
+        // It is called only while some are left.
+        self.state = self.state.wrapping_sub(u32::from(self.is_under_way()));
+        let left = self.state & LEFT;
+        let full = motion.least_pressure() >= settings.precharge;
         let end = if moved.wrapping_abs() > WAY {
             LogEvent::PrechargeMoved
-        } else if self.next == 0 && motion.least_pressure() >= settings.precharge {
+        } else if full && (self.next() == 0 || left == 0) {
             // Not within a pulse: cut short, it might not open its valve.
             LogEvent::Precharged
-        } else if self.left == 0 {
+        } else if left == 0 {
             LogEvent::PrechargeLate
         } else {
             return Ok(self.pulse(moved, position, motion, settings, shortest));
         };
-        let taken = LONGEST.saturating_sub(self.left);
+        let taken = LONGEST.saturating_sub(left) as u16;
         *self = Self::default();
         Err((end, taken))
     }
@@ -142,29 +145,33 @@ impl Precharge {
         shortest: Micros,
     ) -> Filling {
         let model = &settings.motion;
-        let (time_a, push_a) = model.pulse(false, position, shortest);
-        let (time_b, push_b) = model.pulse(true, position, shortest);
         // A period of the PWM has one pulse: 10 to 20 ticks.
         let period = settings.full_period;
-        if self.next == 0 {
-            self.next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) as u8;
+        // The PWM makes nearly whole periods whole: half of one is far from that.
+        let longest = Micros(period.get() >> 1).max(shortest);
+        let (time_a, push_a) = model.pulse(false, position, shortest, longest);
+        let (time_b, push_b) = model.pulse(true, position, shortest, longest);
+        let mut next = self.next();
+        if next == 0 {
+            next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) & 0xFF;
             let force = motion.force(model).saturating_sub(self.balance);
             let force = force.saturating_add(model.given_way(moved));
             // The coarser pulse, of the smaller chamber, waits for room: never beyond balance.
-            self.fills_b = if push_a > push_b {
+            let fills_b = if push_a > push_b {
                 force.saturating_add(push_a) > 0
             } else {
                 force >= push_b
             };
+            self.state &= !FILLS_B;
+            self.state |= if fills_b { FILLS_B } else { 0 };
         }
-        self.next = self.next.saturating_sub(1);
-        let left = JOINT_TICK
-            .get()
-            .wrapping_mul(u32::from(self.next).wrapping_add(1));
+        let left = JOINT_TICK.get().wrapping_mul(next);
+        self.state = (self.state & !NEXT) | next.saturating_sub(1).wrapping_shl(NEXT_SHIFT);
         let gone = period.get().saturating_sub(left);
-        let opening = if self.fills_b { time_b } else { time_a };
+        let fills_b = self.state & FILLS_B != 0;
+        let opening = if fills_b { time_b } else { time_a };
         let open = opening.get().saturating_sub(gone).min(JOINT_TICK.get()) as u16;
-        if self.fills_b {
+        if fills_b {
             Filling {
                 openings: ValveOpenings([Micros::ZERO, Micros::ZERO, opening, Micros::ZERO]),
                 open: [0, 0, open, 0],
@@ -182,10 +189,8 @@ impl Precharge {
 impl Precharge {
     /// Flips one bit of what [`Precharge::words`] gives.
     pub(super) fn flip(&mut self, word: usize, bit: u32) {
-        match (word, bit) {
-            (0, 0..16) => self.left ^= 1 << bit,
-            (0, 16..24) => self.next ^= 1 << (bit - 16),
-            (0, _) => self.fills_b = !self.fills_b,
+        match word {
+            0 => self.state ^= 1 << bit,
             _ => self.balance ^= 1 << bit,
         }
     }

@@ -6,9 +6,9 @@
 //! ```
 //!
 //! When a SYNC is missed, the wanted reference stands still at the end of the
-//! cycle until the watchdog decides. While the joint does not drive, the
-//! reference follows the measured stroke; so the first reference after arming
-//! is the actual position, and from there the slew limit holds: no jump after
+//! cycle until the watchdog decides. While the joint is disarmed, the
+//! reference follows the measured stroke, and a precharge ends with the measured one; so the
+//! first reference of the law is the actual position, and from there the slew limit holds: no jump after
 //! an arm, wherever the set-point is.
 //!
 //! The next reference of a slot is counted down to the tick and handed to the

@@ -14,7 +14,7 @@ use wheeleg_protocol::{
     Correction as WireCorrection, InputBits, LimitBits, LinkLossAction, Message, NackReason,
     OpenMode, ParamValue, Position, PositionReference, SlotReply, Sync,
 };
-use wheeleg_units::Micros;
+use wheeleg_units::{Micros, Ticks};
 
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V, S, W> {
     fn core(&mut self) -> &mut BoardCore {
@@ -27,6 +27,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
 
     fn armed(&mut self) {
         self.change(|node| {
+            // Here, and not only in ticks at rest: disarming and arming may fall between two.
+            node.state.reference = node.state.measured;
+            node.state.following = Ticks::ZERO;
             node.target = Target::at(node.state.measured);
             node.state.precharge = Precharge::begin(&node.state.motion, &node.settings);
         });
@@ -132,6 +135,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// an armed axis that does not track.
     fn position_reference(&mut self, command: &PositionReference) -> Result<(), NackReason> {
         match self.core.mode() {
+            // It would wait beyond its deadline.
+            Mode::Armed if self.state.precharge.is_under_way() => return Err(NackReason::Busy),
             Mode::Armed => {}
             Mode::Tracking => return Err(NackReason::WrongMode),
             _ => return Err(NackReason::NotArmed),
