@@ -246,10 +246,17 @@ impl MotionWatch {
         self.from = position.raw();
     }
 
-    /// Force of both chambers, mN, positive extends.
+    /// Notes the force of both chambers as one to be held. It stands where learnt ones do: while
+    /// no law drives nothing is learnt, and afterwards all of it anew.
+    pub(super) fn hold_force(&mut self, model: &MotionModel) {
+        self.slid = 0;
+        self.learnt = self.air.force(&model.air);
+    }
+
+    /// What the force of both chambers exceeds the one to be held by, mN, positive extends.
     #[inline]
-    pub(super) fn force(&self, model: &MotionModel) -> i32 {
-        self.air.force(&model.air)
+    pub(super) fn unbalanced(&self, model: &MotionModel) -> i32 {
+        self.air.force(&model.air).saturating_sub(self.learnt)
     }
 
     /// Lower pressure of the two chambers, 2^-17 of the supply pressure, absolute.

@@ -1,6 +1,6 @@
 //! The joint board application.
 
-use core::hash::{Hash, Hasher};
+use core::hash::Hash;
 
 use super::expectation::{MotionAccount, MotionWatch};
 use super::precharge::Precharge;
@@ -29,36 +29,13 @@ pub const PARTS: usize = PARAMETER_PARTS + JointConfig::PARTS;
 const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 
 /// State that only a tick changes, sealed between two ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TickState {
     pub(super) reference: PositionMm,
     pub(super) measured: PositionMm,
     pub(super) following: Ticks,
     pub(super) motion: MotionWatch,
     pub(super) precharge: Precharge,
-    boot_ticks: Ticks,
-}
-
-impl Hash for TickState {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Two fields in a word:
-        // a flipped bit of either flips one of it.
-        let Self {
-            reference,
-            measured,
-            following,
-            motion,
-            precharge,
-            boot_ticks,
-        } = self;
-        let (filling, balance) = precharge.words();
-        state.write_i32(reference.raw());
-        state.write_i32(measured.raw());
-        state.write_u32(following.get() ^ filling);
-        state.write_u32(boot_ticks.get() ^ balance.cast_unsigned());
-        motion.hash(state);
-    }
 }
 
 /// Application of one joint board: sense, control, valves.
@@ -137,7 +114,6 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 following: Ticks::ZERO,
                 motion: MotionWatch::new(&settings.tick.motion, PositionMm::ZERO),
                 precharge: Precharge::default(),
-                boot_ticks: Ticks::ZERO,
             },
             fixed_seals: PartSeals::new(),
             seal: Seal::default(),
@@ -410,16 +386,15 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             None => None,
         };
         if self.core.mode() != Mode::Boot {
-            self.state.boot_ticks = Ticks::ZERO;
             if let Some(fault) = fault {
                 self.axis_fault(fault, now);
             }
             return;
         }
-        self.state.boot_ticks = self.state.boot_ticks.next();
+        let ticks = self.state.precharge.self_test();
         if self.monitor.is_settled() {
             let _ = self.core.supervisor.apply(Event::SelfTestPassed, now);
-        } else if self.state.boot_ticks >= SELF_TEST_TICKS {
+        } else if ticks >= SELF_TEST_TICKS {
             let fault = fault.unwrap_or(Fault::SensorRange);
             self.core
                 .supervisor

@@ -89,9 +89,13 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
 
     /// No control: the valves do what the mode says, the reference follows the
     /// measured stroke, and no precharge is under way.
+    #[cold]
+    #[inline(never)]
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
         self.state.reference = self.state.measured;
-        self.state.precharge = Precharge::default();
+        if self.core.mode() != Mode::Boot {
+            self.state.precharge = Precharge::default();
+        }
         self.target = Target::at(self.state.measured);
         let on_times = if self.core.mode() == Mode::Exhaust {
             let openings = self.exhaust_openings();
@@ -107,6 +111,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// A tick of precharge: an armed axis fills. The reference stays at that of arming, and
     /// set-points are taken. At its end all valves are shut, and the next tick is controlled,
     /// from where the piston is: reference := actual.
+    #[cold]
     #[inline(never)]
     pub(super) fn fill(&mut self, now: Micros) -> OnTimes {
         self.target.grow_older();

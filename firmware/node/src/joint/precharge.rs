@@ -29,7 +29,7 @@ use crate::JOINT_TICK;
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_control::valve::ValveOpenings;
 use wheeleg_protocol::LogEvent;
-use wheeleg_units::{Micros, PositionMm};
+use wheeleg_units::{Micros, PositionMm, Ticks};
 
 /// Longest precharge, ticks of 1 ms (ASSUMED: four times what the slowest axis of this
 /// project takes to 1 bar).
@@ -62,26 +62,29 @@ const NEXT: u32 = 0xFF << NEXT_SHIFT;
 const NEXT_SHIFT: u32 = 16;
 const FILLS_B: u32 = 1 << 24;
 
-/// A precharge under way, or none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A precharge under way, or none; in Boot, where there can be none, the ticks of the self-test.
+/// The force to be held is kept by the watch of motion, which learns none meanwhile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Precharge {
     /// [`LEFT`], [`NEXT`] and [`FILLS_B`]: one word, which is sealed as it is. All zero if
     /// none is under way.
     state: u32,
-    /// Force of the chambers that is to be held, mN.
-    balance: i32,
 }
 
 impl Precharge {
     /// Begins one on an axis that has just been armed, unless its setting is none.
-    pub(super) fn begin(motion: &MotionWatch, settings: &TickSettings) -> Self {
+    pub(super) fn begin(motion: &mut MotionWatch, settings: &TickSettings) -> Self {
         if settings.precharge == 0 {
             return Self::default();
         }
-        Self {
-            state: LONGEST,
-            balance: motion.force(&settings.motion),
-        }
+        motion.hold_force(&settings.motion);
+        Self { state: LONGEST }
+    }
+
+    /// One more tick in Boot; how many there were.
+    pub(super) fn self_test(&mut self) -> Ticks {
+        self.state = self.state.saturating_add(1);
+        Ticks(self.state)
     }
 
     /// Whether one is under way.
@@ -93,14 +96,6 @@ impl Precharge {
     /// Ticks until the next pulse is chosen.
     const fn next(self) -> u32 {
         (self.state & NEXT).wrapping_shr(NEXT_SHIFT)
-    }
-
-    /// All of it, for the seal.
-    #[inline]
-    pub(super) fn words(&self) -> (u32, i32) {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self { state, balance } = self;
-        (*state, *balance)
     }
 
     /// What the tick to come does to a piston at `position` that was at `from` when the axis was
@@ -154,7 +149,7 @@ impl Precharge {
         let mut next = self.next();
         if next == 0 {
             next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) & 0xFF;
-            let force = motion.force(model).saturating_sub(self.balance);
+            let force = motion.unbalanced(model);
             let force = force.saturating_add(model.given_way(moved));
             // The coarser pulse, of the smaller chamber, waits for room: never beyond balance.
             let fills_b = if push_a > push_b {
@@ -187,11 +182,8 @@ impl Precharge {
 
 #[cfg(test)]
 impl Precharge {
-    /// Flips one bit of what [`Precharge::words`] gives.
-    pub(super) fn flip(&mut self, word: usize, bit: u32) {
-        match word {
-            0 => self.state ^= 1 << bit,
-            _ => self.balance ^= 1 << bit,
-        }
+    /// Flips one bit.
+    pub(super) const fn flip(&mut self, bit: u32) {
+        self.state ^= 1 << bit;
     }
 }

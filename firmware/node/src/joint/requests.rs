@@ -31,7 +31,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
             node.state.reference = node.state.measured;
             node.state.following = Ticks::ZERO;
             node.target = Target::at(node.state.measured);
-            node.state.precharge = Precharge::begin(&node.state.motion, &node.settings);
+            node.state.precharge = Precharge::begin(&mut node.state.motion, &node.settings);
         });
     }
 
