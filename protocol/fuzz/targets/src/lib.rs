@@ -34,9 +34,9 @@ pub mod scenario;
 pub mod store;
 pub mod wheel;
 
-#[path = "../../../../firmware/node/tests/common/mod.rs"]
+#[path = "../../../../firmware/node/tests/suite/common/mod.rs"]
 mod boards;
-#[path = "../../../../firmware/master/tests/common/mod.rs"]
+#[path = "../../../../firmware/master/tests/suite/common/mod.rs"]
 #[allow(unreachable_pub, reason = "shared with test programs")]
 mod fakes;
 

@@ -1,8 +1,6 @@
 //! What stops the robot, how fast, and what it takes to go on.
 
-mod common;
-
-use common::{FakeNode, Rig, emit};
+use crate::common::{FakeNode, Rig, emit};
 use proptest::prelude::*;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;

@@ -1,10 +1,8 @@
 //! What a board tells about itself: why it started, what it heard, what it keeps,
 //! who else has its address.
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::{ARM, decode, frame, refusal};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::{ARM, decode, frame, refusal};
 use wheeleg_node::hardware::{ParameterStore, StoreError};
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;

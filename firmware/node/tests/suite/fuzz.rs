@@ -2,11 +2,9 @@
 //! sensor readings energises a valve or a motor of a disarmed board, and after
 //! the last valid cycle the safe state comes within its deadline.
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::wheel::WheelRig;
-use common::{ARM, frame};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::wheel::WheelRig;
+use crate::common::{ARM, frame};
 use proptest::prelude::*;
 use wheeleg_node::hardware::SensorError;
 use wheeleg_node::mode::{Mode, ModeRules};

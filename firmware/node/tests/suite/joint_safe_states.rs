@@ -1,10 +1,8 @@
 //! Safe states of a joint board: what the valve outputs do, how soon, and that
 //! nothing but an explicit clear ends them. Times are those of the fault matrix.
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::{ARM, frame_from, refusal};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::{ARM, frame_from, refusal};
 use wheeleg_node::hardware::SensorError;
 use wheeleg_node::mode::Mode;
 use wheeleg_protocol::LinkLossAction::{Hold, HoldThenExhaust};
@@ -184,7 +182,7 @@ fn sensor_faults_hold_in_the_second_bad_tick() {
         (Ok(AdcCode::MIN), Fault::SensorRange),
         (Ok(AdcCode::MAX), Fault::SensorRange),
         (Err(SensorError::Converter), Fault::SensorRange),
-        (Ok(common::joint::code_at(120.0)), Fault::SensorRate),
+        (Ok(crate::common::joint::code_at(120.0)), Fault::SensorRate),
         (Ok(AdcCode::new(1000)), Fault::OverTravel),
     ];
     for (bad, fault) in cases {

@@ -1,9 +1,7 @@
 //! The wheel board on a motor model: safe states, modes, services.
 
-mod common;
-
-use common::wheel::{WheelRig, setpoint};
-use common::{ARM, refusal};
+use crate::common::wheel::{WheelRig, setpoint};
+use crate::common::{ARM, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_protocol::param::WheelParam;
 use wheeleg_protocol::{

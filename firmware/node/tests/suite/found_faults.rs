@@ -1,11 +1,9 @@
 //! A fault is found in one tick and latched in the next: nothing that comes between the two,
 //! or with it, makes the board forget it or the safe state a laxer one.
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::wheel::{WheelRig, setpoint as wheel_setpoint};
-use common::{ARM, refusal};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::wheel::{WheelRig, setpoint as wheel_setpoint};
+use crate::common::{ARM, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_protocol::LinkLossAction::{Hold, HoldThenExhaust};
 use wheeleg_protocol::param::{JointParam, WheelParam};

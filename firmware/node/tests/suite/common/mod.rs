@@ -1,5 +1,5 @@
 //! Boards on mocks, with a master that speaks to them frame by frame.
-// Each test binary uses its own part of this.
+// The fuzz targets use a part of this.
 #![allow(dead_code, unreachable_pub)]
 
 pub mod joint;

@@ -2,11 +2,9 @@
 //! Each test is the answer to a mutation that no other test noticed
 //! (`cargo xtask mutants`).
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::wheel::WheelRig;
-use common::{ARM, wheel};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::wheel::WheelRig;
+use crate::common::{ARM, wheel};
 use wheeleg_node::hardware::SensorError;
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;

@@ -1,8 +1,6 @@
 //! Bus cycle, enumeration, arming, supervision and stops, against fake nodes.
 
-mod common;
-
-use common::{CYCLE_US, FakeNode, Rig, decode, emit};
+use crate::common::{CYCLE_US, FakeNode, Rig, decode, emit};
 use fixed::types::I16F16;
 use proptest::prelude::*;
 use wheeleg_master::command::Command;

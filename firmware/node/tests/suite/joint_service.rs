@@ -1,9 +1,7 @@
 //! What a joint board answers: replies, requests, parameters, switches.
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::{ARM, decode, frame, frame_from, refusal};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::{ARM, decode, frame, frame_from, refusal};
 use wheeleg_node::FIRMWARE_VERSION;
 use wheeleg_node::mode::Mode;
 use wheeleg_protocol::LinkLossAction::Hold;

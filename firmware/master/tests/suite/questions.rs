@@ -1,9 +1,7 @@
 //! What the master asks by itself, and what it says of boards and line: causes of
 //! faults and restarts, link counters, logs, commissioned boards, babble.
 
-mod common;
-
-use common::{NO_LOG, Rig, emit};
+use crate::common::{NO_LOG, Rig, emit};
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Refusal;

@@ -1,9 +1,7 @@
 //! The three-step test through dispatcher, layer 1, FIFOs, layer 0 and bus,
 //! against fake nodes.
 
-mod common;
-
-use common::Rig;
+use crate::common::Rig;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::config::WheelDrive;

@@ -1,10 +1,8 @@
 //! Precharge of a joint board on mocks: what the outputs do between arming and the first
 //! motion, and what ends it. What it makes of a cylinder is in `tests/tests/precharge.rs`.
 
-mod common;
-
-use common::joint::{JointRig, code_at, setpoint};
-use common::{ARM, refusal};
+use crate::common::joint::{JointRig, code_at, setpoint};
+use crate::common::{ARM, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_protocol::LinkLossAction::Hold;

@@ -1,9 +1,7 @@
 //! How a joint board moves: arming, references, slew, modes of the law.
 
-mod common;
-
-use common::joint::{JointRig, setpoint};
-use common::{ARM, refusal};
+use crate::common::joint::{JointRig, setpoint};
+use crate::common::{ARM, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_protocol::LinkLossAction::Hold;
