@@ -325,8 +325,8 @@ parameters! {
             "Lower end of the stroke that references are limited to.";
         StrokeMax = 0x0114, "stroke_max", "mm", I16F16, "-10" ..= "500", default "180", disarmed,
             "Upper end of the stroke that references are limited to.";
-        PwmPeriod = 0x0115, "pwm_period", "us", Integer, "10000" ..= "20000", default "20000", disarmed,
-            "Valve PWM period; 50-100 Hz.";
+        PwmPeriod = 0x0115, "pwm_period", "us", Integer, "10000" ..= "200000", default "20000", disarmed,
+            "Valve PWM period: at least twice the longer of t_on and t_off with the margin; 50-100 Hz for valves of a few ms.";
         Correction = 0x0116, "correction", "1", Flag, "0" ..= "1", default "0", any_time,
             "Fuzzy correction after start-up: 0 PD, 1 ID.";
         ValveOn = 0x0117, "valve_t_on", "us", Integer, "0" ..= "50000", default "3500", disarmed,

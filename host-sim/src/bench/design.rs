@@ -173,9 +173,13 @@ fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
         * axis.gas.gas_constant_j_kg_k
         * axis.gas.ambient_temperature_k;
     let us = |value: Micros| f64::from(value.get()) * 1e-6;
-    // 50 to 100 Hz: as fast as lets half of the period be used.
-    let delays_s = us(data.valve_on) + us(data.valve_off) + 2.0 * us(data.margin);
-    let period_s = (2.0 * delays_s * 1e3).ceil().clamp(10.0, 20.0) * 1e-3;
+    // As fast as lets half of the period be used, 100 Hz at most; slower than 50 Hz only
+    // where a pulse or a gap that acts would not fit half a period of 20 ms.
+    let (on_s, off_s, margin_s) = (us(data.valve_on), us(data.valve_off), us(data.margin));
+    let delays_s = on_s + off_s + 2.0 * margin_s;
+    let least_s = 2.0 * (on_s.max(off_s) + margin_s);
+    let period_ms = (2e3 * delays_s).min(20.0).max(1e3 * least_s);
+    let period_s = period_ms.clamp(10.0, 200.0).ceil() * 1e-3;
     Facts {
         stroke_mm: c.stroke_m * 1e3,
         speed_mm_s: flow * rho_r_t / area_m2 * 1e3,

@@ -90,7 +90,7 @@ pub struct JointGains {
     pub sliding_time: Micros,
     /// Data of the axis, for the predictive law.
     pub axis: AxisData,
-    /// Valve PWM period: 10…20 ms for 50…100 Hz (ASSUMED); any whole number of
+    /// Valve PWM period: 10…20 ms for 50…100 Hz (ASSUMED); slower valves take longer ones; a whole number of
     /// ticks in 1 ms…1 s.
     pub pwm_period: Micros,
 }
