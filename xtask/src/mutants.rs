@@ -114,7 +114,7 @@ fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> 
     let log = fs::File::create(out.join("log.txt"))?;
     let status = cargo()
         .args(["mutants", "--no-shuffle", "--jobs=1", "--colors=never"])
-        .args(["--timeout=120", "--test-workspace=false"])
+        .args(["--timeout=30", "--test-workspace=false"])
         .args(files.iter().flat_map(|file| ["--file", file]))
         .args(packages.iter().map(|name| format!("--test-package={name}")))
         .arg("--output")
