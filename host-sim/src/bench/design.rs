@@ -283,3 +283,66 @@ fn sensor(axis: &AxisParams) -> SensorConfig {
         step_max: PositionMm::from_int(10),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::{Delays, Node, design_with};
+    use crate::config::AxisConfig;
+
+    /// Valves of a few milliseconds and of forty: every controller's design is one that a
+    /// board accepts, as on the sheet and with the delays twice as long as told there.
+    #[test]
+    fn a_board_accepts_designs_for_fast_and_slow_valves() {
+        let mut sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        for (t_on_s, t_off_s) in [
+            (0.001, 0.0005),
+            (0.005, 0.003),
+            (0.006, 0.006),
+            (0.012, 0.008),
+            (0.004, 0.015),
+            (0.024, 0.02),
+        ] {
+            for valve in [
+                &mut sheet.cylinder.fill_valve,
+                &mut sheet.cylinder.vent_valve,
+            ] {
+                valve.t_on_s = t_on_s;
+                valve.t_off_s = t_off_s;
+            }
+            let twice = Delays {
+                t_on_s: 2.0 * t_on_s,
+                t_off_s: 2.0 * t_off_s,
+            };
+            for kind in Kind::ALL {
+                for delays in [None, Some(twice)] {
+                    let design = design_with(&sheet, delays, kind);
+                    let board = Node::new(&design);
+                    assert!(
+                        board.is_ok(),
+                        "{} {t_on_s} {t_off_s} {delays:?}: {:?}",
+                        kind.name(),
+                        board.err()
+                    );
+                }
+            }
+        }
+    }
+
+    /// Valves that fit a period of 10 to 20 ms have one.
+    #[test]
+    fn the_period_is_longer_than_20_ms_only_where_it_must_be() {
+        let sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        let period_ms = |t_on_s, t_off_s| {
+            let delays = Delays { t_on_s, t_off_s };
+            let period = design_with(&sheet, Some(delays), Kind::PwmP)
+                .gains
+                .pwm_period;
+            f64::from(period.get()) * 1e-3
+        };
+        assert!((period_ms(0.002, 0.001) - 10.0).abs() < 1e-9);
+        assert!((period_ms(0.009, 0.009) - 20.0).abs() < 1e-9);
+        let slow = period_ms(0.02, 0.01);
+        assert!((40.0..=46.0).contains(&slow), "{slow}");
+    }
+}

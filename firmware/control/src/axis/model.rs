@@ -97,7 +97,7 @@ const CHOKED_MM3_S: u64 = 997_162;
 /// Ambient pressure, Pa (ASSUMED: sea level).
 const AMBIENT_PA: u64 = 101_325;
 /// Polytropic exponent × 100 (ASSUMED: usual for small cylinders).
-const EXPONENT_PERCENT: u64 = 120;
+pub(super) const EXPONENT_PERCENT: u64 = 120;
 /// Slope of the speed law times the dead time, × 100.
 const SLOPE_PERCENT: u64 = 19;
 /// Gain of the speed error times the dead time, × 100.

@@ -108,13 +108,13 @@ impl Nodes {
             }
             *place = node.unique_id();
         }
-        match trial.bar_to_arming(alive, master) {
-            Some(bar) if !matches!(bar, Refusal::NodeFault { .. }) => Err(bar),
-            _ => {
-                *self = trial;
-                Ok(())
-            }
+        // A fault is no bar, and hides none at a board after it.
+        let bar = (0..NODES).find_map(|index| trial.misfit(index, alive(index), master));
+        if let Some(bar) = bar {
+            return Err(bar);
         }
+        *self = trial;
+        Ok(())
     }
 
     /// Node index 0..8.
@@ -211,26 +211,28 @@ impl Nodes {
     /// missing, incompatible, misplaced or faulty.
     #[must_use]
     pub fn bar_to_arming(&self, alive: impl Fn(usize) -> bool, master: u64) -> Option<Refusal> {
-        self.iter()
-            .enumerate()
-            .find_map(|(index, (address, node))| {
-                let address = address.raw();
-                match node.enumerated {
-                    Enumerated::Schema(identity) => Some(Refusal::SchemaMismatch {
-                        node: address,
-                        master,
-                        theirs: identity.schema_hash,
-                    }),
-                    Enumerated::Foreign(_) => Some(Refusal::ForeignBoard { node: address }),
-                    Enumerated::Role(_) => Some(Refusal::WrongRole { node: address }),
-                    Enumerated::Twins(_) => Some(Refusal::DuplicateAddress { node: address }),
-                    Enumerated::Unknown => Some(Refusal::NodeMissing { node: address }),
-                    Enumerated::Ready(_) if !alive(index) => {
-                        Some(Refusal::NodeMissing { node: address })
-                    }
-                    Enumerated::Ready(_) => self.fault_of(index),
-                }
-            })
+        (0..NODES).find_map(|index| {
+            let misfit = self.misfit(index, alive(index), master);
+            misfit.or_else(|| self.fault_of(index))
+        })
+    }
+
+    /// Why the board at an index is not the one that belongs there, if it is not.
+    fn misfit(&self, index: usize, alive: bool, master: u64) -> Option<Refusal> {
+        let (node, address) = self.get(index).zip(Address::of_slot(index))?;
+        let address = address.raw();
+        match node.enumerated {
+            Enumerated::Schema(identity) => Some(Refusal::SchemaMismatch {
+                node: address,
+                master,
+                theirs: identity.schema_hash,
+            }),
+            Enumerated::Foreign(_) => Some(Refusal::ForeignBoard { node: address }),
+            Enumerated::Role(_) => Some(Refusal::WrongRole { node: address }),
+            Enumerated::Twins(_) => Some(Refusal::DuplicateAddress { node: address }),
+            Enumerated::Unknown => Some(Refusal::NodeMissing { node: address }),
+            Enumerated::Ready(_) => (!alive).then_some(Refusal::NodeMissing { node: address }),
+        }
     }
 
     fn fault_of(&self, index: usize) -> Option<Refusal> {
@@ -300,6 +302,7 @@ fn judged(from: Option<Address>, identity: Identity, schema_hash: u64) -> Enumer
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_protocol::{FaultBits, InputBits, LimitBits};
 
     fn identity(id: u8) -> Identity {
         Identity {
@@ -308,6 +311,72 @@ mod tests {
             firmware: [0, 1, 0],
             schema_hash: 7,
             unique_id: [id; 12],
+        }
+    }
+
+    /// All eight boards, each in its place.
+    fn complete() -> Nodes {
+        let mut nodes = Nodes::default();
+        for (address, id) in Address::nodes().zip(1..) {
+            let board = if address.is_joint() {
+                BoardKind::Joint
+            } else {
+                BoardKind::Wheel
+            };
+            let identity = Identity {
+                board,
+                address,
+                ..identity(id)
+            };
+            nodes.identify(address, identity, 7);
+        }
+        nodes
+    }
+
+    #[test]
+    fn boards_are_commissioned_with_a_fault_but_it_hides_no_missing_board() {
+        let mut nodes = complete();
+        let faulty = SlotReply {
+            position_raw: 0,
+            velocity_raw: 0,
+            effort_raw: 0,
+            mode: NodeMode::Fault,
+            active_faults: FaultBits::from_raw(1),
+            inputs: InputBits::NONE,
+            limits: LimitBits::NONE,
+            sync_echo: 0,
+        };
+        let (first, last) = (Address::of_slot(0).unwrap(), Address::of_slot(7).unwrap());
+        nodes.store(first, faulty);
+        let bar = nodes.bar_to_arming(|_| true, 7);
+        assert_eq!(bar, Some(Refusal::NodeFault { node: 1, faults: 1 }));
+        let missing = Refusal::NodeMissing { node: 8 };
+        assert_eq!(nodes.commission(|index| index != 7, 7), Err(missing));
+        assert_eq!(nodes.commissioned(last), None, "nothing changed");
+        assert_eq!(nodes.commission(|_| true, 7), Ok(()));
+        assert_eq!(nodes.commissioned(last), Some([8; 12]));
+    }
+
+    #[test]
+    fn what_a_board_has_counted_is_not_compared_once_it_is_forgotten() {
+        let mut nodes = Nodes::default();
+        let address = Address::of_slot(2).unwrap();
+        assert!(!nodes.counted(address, 100), "nothing to compare with");
+        assert!(nodes.counted(address, 100) && nodes.counted(address, 101));
+        assert!(!nodes.counted(address, 100), "it began anew");
+        nodes.forget_count(address);
+        assert!(!nodes.counted(address, 200));
+        assert!(nodes.counted(address, 200));
+    }
+
+    #[test]
+    fn a_board_that_does_not_say_who_it_is_is_asked_by_turns() {
+        let mut nodes = Nodes::default();
+        let address = Address::of_slot(2).unwrap();
+        for turn in [true, false, true] {
+            nodes.in_vain(address);
+            assert_eq!(nodes.get(2).unwrap().in_vain, turn);
+            assert!(!nodes.get(3).unwrap().in_vain);
         }
     }
 

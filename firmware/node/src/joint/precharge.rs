@@ -140,7 +140,7 @@ impl Precharge {
         shortest: Micros,
     ) -> Filling {
         let model = &settings.motion;
-        // A period of the PWM has one pulse: 10 to 20 ticks.
+        // A period of the PWM has one pulse: 10 to 200 ticks.
         let period = settings.full_period;
         // The PWM makes nearly whole periods whole: half of one is far from that.
         let longest = Micros(period.get() >> 1).max(shortest);
@@ -151,14 +151,12 @@ impl Precharge {
             next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) & 0xFF;
             let force = motion.unbalanced(model);
             let force = force.saturating_add(model.given_way(moved));
-            // The coarser pulse, of the smaller chamber, waits for room: never beyond balance.
-            let fills_b = if push_a > push_b {
-                force.saturating_add(push_a) > 0
-            } else {
-                force >= push_b
-            };
             self.state &= !FILLS_B;
-            self.state |= if fills_b { FILLS_B } else { 0 };
+            self.state |= if b_is_next(force, push_a, push_b) {
+                FILLS_B
+            } else {
+                0
+            };
         }
         let left = JOINT_TICK.get().wrapping_mul(next);
         self.state = (self.state & !NEXT) | next.saturating_sub(1).wrapping_shl(NEXT_SHIFT);
@@ -185,5 +183,58 @@ impl Precharge {
     /// Flips one bit.
     pub(super) const fn flip(&mut self, bit: u32) {
         self.state ^= 1 << bit;
+    }
+}
+
+/// Whether B is to be filled next, where the force of both chambers is too large by `force` and
+/// a pulse adds `push_a` to it or takes `push_b` off, mN. The coarser pulse, of the smaller
+/// chamber, waits for room: it never goes beyond balance.
+#[inline]
+const fn b_is_next(force: i32, push_a: i32, push_b: i32) -> bool {
+    if push_a > push_b {
+        force.saturating_add(push_a) > 0
+    } else {
+        force >= push_b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::b_is_next;
+
+    /// Both chambers empty, until 32 pulses are given: the force stays between balance and
+    /// one coarse pulse, and fine pulses make up for coarse ones.
+    #[test]
+    fn the_coarser_pulse_never_goes_beyond_balance() {
+        for (push_a, push_b) in [(50, 50), (100, 30), (30, 100), (1, 7), (7, 1), (60, 59)] {
+            let (mut force, mut pulses_a, mut pulses_b) = (0, 0, 0);
+            for _ in 0..4000 {
+                if b_is_next(force, push_a, push_b) {
+                    force -= push_b;
+                    pulses_b += 1;
+                } else {
+                    force += push_a;
+                    pulses_a += 1;
+                }
+                let bounds = if push_a > push_b {
+                    // A is coarser: it waits until it ends at balance at most.
+                    -push_a - push_b..=0
+                } else {
+                    0..=push_a + push_b
+                };
+                assert!(bounds.contains(&force), "{push_a} {push_b}: {force}");
+            }
+            let balance: i32 = pulses_a * push_a - pulses_b * push_b;
+            assert!(balance.abs() <= push_a + push_b, "{push_a} {push_b}");
+        }
+    }
+
+    #[test]
+    fn room_for_just_one_pulse_is_used() {
+        // A is coarser: it just reaches balance, or would exceed it by 1 mN.
+        assert!(!b_is_next(-100, 100, 30) && b_is_next(-99, 100, 30));
+        // B is coarser, or as coarse.
+        assert!(b_is_next(100, 30, 100) && !b_is_next(99, 30, 100));
+        assert!(b_is_next(50, 50, 50) && !b_is_next(49, 50, 50) && !b_is_next(0, 50, 50));
     }
 }

@@ -336,3 +336,56 @@ fn a_pressure_that_the_supply_does_not_have_is_refused() {
     assert_eq!(set(-0.1), Some(NackReason::OutOfRange));
     assert_eq!(set(0.0), None);
 }
+
+/// Sums of each inlet's pulses, µs, in a precharge to its end.
+fn pulses(rig: &mut JointRig) -> Vec<u32> {
+    let (mut pulses, mut sums) = (Vec::new(), [0_u32; 4]);
+    for tick in 0..2001 {
+        if tick % 10 == 0 {
+            rig.sync(Some(setpoint(100.0, Hold)), false);
+        }
+        rig.tick();
+        let over = !fills(rig);
+        for (sum, duty) in sums.iter_mut().zip(rig.duty()) {
+            if *sum > 0 && (duty == 0 || over) {
+                pulses.push(core::mem::take(sum));
+            }
+            *sum += if over { 0 } else { u32::from(duty) };
+        }
+        if over {
+            return pulses;
+        }
+    }
+    panic!("still filling");
+}
+
+#[test]
+fn no_pulse_is_too_short_for_its_valve_not_even_the_last_one() {
+    for bar in [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 2.0] {
+        let mut rig = armed(bar);
+        let pulses = pulses(&mut rig);
+        assert!(pulses.len() >= 4, "{bar}: {pulses:?}");
+        // t_on of 3.5 ms and a tenth of it.
+        let shortest = pulses.iter().min().copied().unwrap();
+        assert!(shortest >= 3850, "{bar}: {pulses:?}");
+    }
+}
+
+#[test]
+fn a_pulse_lasts_for_half_a_period_at_most() {
+    // A small valve on the same cylinder: a 64th of the supply takes longer than that.
+    let bar = (0.5 * 65_536.0) as i32;
+    let conductance = (0.02 * f64::from(1 << 24)) as i32;
+    let parameters = JointParameters::default()
+        .with(JointParam::Precharge.id(), bar, true)
+        .unwrap()
+        .with(JointParam::Conductance.id(), conductance, true)
+        .unwrap();
+    let mut rig = JointRig::with(parameters);
+    rig.run_cycles(3, None);
+    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    let pulses = pulses(&mut rig);
+    let longest = pulses.iter().max().copied().unwrap();
+    // 10 ms open, and what the valve takes longer to open than to shut.
+    assert!((11_000..=11_600).contains(&longest), "{pulses:?}");
+}

@@ -25,13 +25,12 @@ const LEFT: i32 = 29_491;
 const RELEASE_TICKS: u16 = 20;
 /// … and with a new one.
 const START_TICKS: u16 = 4;
-/// Ticks for which the valves stay shut to see where the piston comes to rest: about
-/// one swing on the air of its chambers.
-const PAUSE: u8 = 150;
-/// Ticks of it that one counts for in which the piston stands beside the band.
-const PAUSE_SPENT: u8 = 8;
+/// Ticks of a pause that one counts for in which the piston stands beside the band.
+const PAUSE_SPENT: u16 = 8;
 /// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
 const GENTLE: i32 = 40 << 16;
+/// Nor does one that is further from its target than this, raw mm (2 mm).
+const FLED: i32 = 2 << 16;
 
 /// Rest at a target, and how long it has been tried.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,8 +39,8 @@ pub(super) struct Rest {
     held: u16,
     released: u16,
     near: u16,
-    /// What is left of the pause under way, ticks.
-    pause: u8,
+    /// What is left of the pause under way, ticks: below 2^12.
+    pause: u16,
     /// In the band at the last tick.
     inside: bool,
     /// The target has changed since the piston came to rest.
@@ -71,7 +70,7 @@ impl Hash for Rest {
                 | u32::from(*settled).wrapping_shl(16)
                 | u32::from(*inside).wrapping_shl(17)
                 | u32::from(*aimed).wrapping_shl(18)
-                | u32::from(*pause).wrapping_shl(24),
+                | u32::from(*pause).wrapping_shl(20),
         );
     }
 }
@@ -127,7 +126,7 @@ impl Rest {
         let catch = CATCH.wrapping_add(extra(CATCH));
 
         let inside = error < band;
-        let waits = self.waits(steps, inside, now.motion.speed.wrapping_abs());
+        let waits = self.waits(now, steps, inside, error);
         let slow = inside && now.motion.speed.wrapping_abs() < catch;
         let quiet = steps && (slow || now.stops_within(model, band));
         self.held = if quiet {
@@ -165,14 +164,16 @@ impl Rest {
     }
 
     /// Act and wait. Where acting alone has not brought the piston to rest for long,
-    /// each gentle entry into the band is followed by a pause with the valves shut: a
-    /// piston that swings on its air, or on the bristles of its friction, comes to
-    /// rest by itself, and every pulse meant to help would keep it going.
+    /// each gentle entry into the band is followed by a pause with the valves shut, about one
+    /// swing on the air of the chambers: a piston that swings on it, or on the bristles of
+    /// its friction, comes to rest by itself, and every pulse meant to help would keep it
+    /// going. One that flees, because the forces on it are not in balance, is not waited for.
     #[inline]
-    fn waits(&mut self, steps: bool, inside: bool, speed: i32) -> bool {
+    fn waits(&mut self, now: &Approach, steps: bool, inside: bool, error: i32) -> bool {
+        let speed = now.motion.speed.wrapping_abs();
         let entered = inside && !self.inside;
         self.inside = inside;
-        if !steps {
+        if !steps || speed > GENTLE || error > FLED {
             self.pause = 0;
         } else if self.pause > 0 {
             let spent = if inside || speed >= STILL {
@@ -181,8 +182,9 @@ impl Rest {
                 PAUSE_SPENT
             };
             self.pause = self.pause.saturating_sub(spent);
-        } else if entered && self.beyond() > 0 && speed < GENTLE {
-            self.pause = PAUSE;
+        } else if entered && self.beyond() > 0 {
+            // At most 1000.
+            self.pause = now.swing as u16;
         }
         self.pause > 0
     }
@@ -217,6 +219,8 @@ pub(super) struct Approach<'a> {
     pub(super) force: i32,
     /// kg × 2^16.
     pub(super) mass: i32,
+    /// A swing on the air of the chambers, ticks.
+    pub(super) swing: i32,
 }
 
 impl Approach<'_> {
