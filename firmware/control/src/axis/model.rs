@@ -88,6 +88,8 @@ pub struct AxisModel {
     pub stick_step: i32,
     /// Rest band, raw mm.
     pub band: i32,
+    /// Square of the period of a swing on the air of both chambers, ticks² per kg × 2^8.
+    pub swing: i32,
 }
 
 /// R T of air at 293.15 K, J/kg, times its density at the reference atmosphere
@@ -97,7 +99,7 @@ const CHOKED_MM3_S: u64 = 997_162;
 /// Ambient pressure, Pa (ASSUMED: sea level).
 const AMBIENT_PA: u64 = 101_325;
 /// Polytropic exponent × 100 (ASSUMED: usual for small cylinders).
-pub(super) const EXPONENT_PERCENT: u64 = 120;
+const EXPONENT_PERCENT: u64 = 120;
 /// Slope of the speed law times the dead time, × 100.
 const SLOPE_PERCENT: u64 = 19;
 /// Gain of the speed error times the dead time, × 100.
@@ -109,6 +111,10 @@ const TOP_PERCENT: u64 = 92;
 /// Bandwidth of the observer, rad/s: noise of a 12-bit converter with 16-fold
 /// oversampling gives 1 mm/s of speed.
 const OBSERVER: u64 = 150;
+/// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides
+/// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
+/// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
+const SWING: u64 = 11_751_714_000_000_000_000;
 /// π/4 × 2^30.
 const QUARTER_PI: u64 = 843_314_857;
 
@@ -176,6 +182,7 @@ impl AxisModel {
             observe_load,
             stick_step,
             band,
+            swing,
         } = self;
         match quarter {
             0 => {
@@ -204,6 +211,7 @@ impl AxisModel {
                     observe_load,
                     stick_step,
                     band,
+                    swing,
                 )
                     .hash(state);
             }
@@ -286,6 +294,9 @@ impl AxisModel {
             brake.wrapping_mul(slope_8),
         );
 
+        // Pa/mm times mm², in 1e-3 N/m: with the tick below 2^64.
+        let swings = both_8.wrapping_mul(area_a_16).wrapping_shr(24);
+
         let to_mn = |newton: PositionMm| raw(newton).wrapping_mul(1000).wrapping_shr(16);
         // 1/256 Pa per mN for an area in mm²: 256 000/area, × 2^12.
         let per_force_12 = |area_16: u64| divide((256_000 << 12) << 16, area_16);
@@ -355,6 +366,10 @@ impl AxisModel {
                 1_000_000,
             )),
             band: number(raw(data.band)),
+            swing: number(divide(
+                SWING,
+                swings.wrapping_mul(tick_us.wrapping_mul(tick_us)),
+            )),
         }
     }
 }

@@ -1,9 +1,8 @@
 //! Stroke, speed and load from the measured stroke and the pressure force.
 
-use super::model::{AxisModel, EXPONENT_PERCENT};
-use super::{clip, mix, part, quotient, scaled, square_root, within};
+use super::model::AxisModel;
+use super::{clip, mix, part, quotient, scaled, within};
 use core::hash::{Hash, Hasher};
-use wheeleg_units::divide;
 
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
 const STICK: i32 = 4 << 16;
@@ -40,8 +39,6 @@ pub struct Inertia {
     pub slides: i32,
     /// Coulomb friction below it, mN per raw mm/s × 2^18.
     pub grip: i32,
-    /// Ticks of a swing on the air of both chambers at mid stroke, 100…1000.
-    pub swing: i32,
     /// Sum of all these.
     check: u32,
 }
@@ -89,7 +86,6 @@ impl Inertia {
             brake: part(model.brake, squared, 16),
             linear: quotient(1 << 47, square, 0),
             load_gain: part(model.observe_load, mass, 16),
-            swing: swing(model, mass),
             check: 0,
         };
         Self {
@@ -111,7 +107,6 @@ impl Inertia {
             load_gain,
             slides,
             grip,
-            swing,
             check: _,
         } = *self;
         let sum = 0;
@@ -123,8 +118,7 @@ impl Inertia {
         let sum = mix(sum, linear);
         let sum = mix(sum, load_gain);
         let sum = mix(sum, slides);
-        let sum = mix(sum, grip);
-        mix(sum, swing)
+        mix(sum, grip)
     }
 
     /// Whether all of it is as it was made.
@@ -141,33 +135,6 @@ impl Inertia {
         // Forces below 2^25 mN (33 kN), 2^40 over the least mass below 2^30: it fits.
         clip::<23>(part(clip::<26>(force), self.per_force, 24))
     }
-}
-
-/// Ticks of one swing of a mass (kg × 2^16) on the air of both chambers, shut at mid stroke
-/// and mean pressure: 2 π √(m / k).
-#[cold]
-#[inline]
-fn swing(model: &AxisModel, mass: i32) -> i32 {
-    let half = model.stroke >> 1;
-    let stiffness_8 = |force: i32, lead: i32| {
-        // mN below 2^25, × 2^24 over raw mm: mN/mm × 2^8.
-        let force = u64::from(part(model.mean, force, 32).unsigned_abs());
-        let length = u64::from(half.saturating_add(lead).unsigned_abs());
-        let isothermal = divide(force.wrapping_shl(24), length);
-        divide(isothermal.wrapping_mul(EXPONENT_PERCENT), 100)
-    };
-    let both_8 = stiffness_8(model.force_a, model.lead_a)
-        .wrapping_add(stiffness_8(model.force_b, model.lead_b));
-    // kg × 2^16 over N/m × 2^8, and (2 π × 1000 ms/s)², below 2^26: ms² × 2^8.
-    let square_8 = divide(
-        u64::from(mass.unsigned_abs()).wrapping_mul(39_478_418),
-        both_8,
-    );
-    // ms × 2^4, below 2^16.
-    let root_4 = square_root(u32::try_from(square_8).unwrap_or(u32::MAX));
-    let us = root_4.wrapping_mul(1000).wrapping_shr(4);
-    let ticks = us.checked_div(model.times.tick.unsigned_abs()).unwrap_or(0);
-    ticks.clamp(100, 1000) as i32
 }
 
 /// Cube root of a share × 2^16 of at most one.
@@ -297,7 +264,7 @@ impl Motion {
 mod tests {
     use super::{Inertia, Motion, STICK, cube_root};
     use crate::axis::{AxisData, AxisModel};
-    use wheeleg_units::{Micros, PositionMm};
+    use wheeleg_units::Micros;
 
     #[test]
     fn a_light_piston_that_stands_is_seen_to_stand() {
@@ -328,7 +295,7 @@ mod tests {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
         let sound = Inertia::new(&model, 3 << 16);
         assert!(sound.is_sound());
-        let words: [fn(&mut Inertia) -> &mut i32; 10] = [
+        let words: [fn(&mut Inertia) -> &mut i32; 9] = [
             |own| &mut own.mass,
             |own| &mut own.per_force,
             |own| &mut own.slope,
@@ -338,7 +305,6 @@ mod tests {
             |own| &mut own.load_gain,
             |own| &mut own.slides,
             |own| &mut own.grip,
-            |own| &mut own.swing,
         ];
         for word in words {
             for bit in 0..32 {
@@ -374,36 +340,6 @@ mod tests {
                 );
             }
         }
-    }
-
-    /// Against the period of mass and air springs in SI units.
-    #[test]
-    fn a_swing_is_that_of_the_mass_on_the_air() {
-        let data = AxisData::default();
-        let model = AxisModel::new(&data, Micros(1000)).expect("the default");
-        let circle = |d_mm: f64| core::f64::consts::FRAC_PI_4 * d_mm * d_mm * 1e-6;
-        let area_a = circle(data.bore.to_f64());
-        let area_b = area_a - circle(data.rod.to_f64());
-        // What carries the name of a length is a volume here, cm³.
-        let volume = |dead: PositionMm, area: f64| {
-            dead.to_f64() * 1e-6 + 0.5e-3 * data.stroke.to_f64() * area
-        };
-        let mean_pa = 0.5 * (data.supply.to_f64() * 1e3 + 101_325.0);
-        let stiffness = 1.2
-            * mean_pa
-            * (area_a.powi(2) / volume(data.dead_a, area_a)
-                + area_b.powi(2) / volume(data.dead_b, area_b));
-        for mass_kg in [1.0, 1.5, 3.0, 10.0, 30.0] {
-            let period_ms = 2e3 * core::f64::consts::PI * f64::sqrt(mass_kg / stiffness);
-            let swing = Inertia::new(&model, (mass_kg * 65_536.0) as i32).swing;
-            let off = f64::from(swing) - period_ms;
-            assert!(
-                off.abs() < 2.0 + 0.02 * period_ms,
-                "{mass_kg}: {swing} {period_ms}"
-            );
-        }
-        assert_eq!(Inertia::new(&model, 1 << 14).swing, 100);
-        assert_eq!(Inertia::new(&model, i32::MAX).swing, 1000);
     }
 
     #[test]

@@ -224,7 +224,6 @@ impl Predictive {
                 motion: &self.motion,
                 force: model.pressure_force(self.air.pressures()),
                 mass: self.inertia.mass,
-                swing: self.inertia.swing,
             },
         );
         let stands = quiet || self.motion.speed.wrapping_abs() < STILL;

@@ -3,7 +3,7 @@
 use super::STILL;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::Motion;
-use crate::axis::part;
+use crate::axis::{part, scaled, square_root};
 use core::hash::{Hash, Hasher};
 
 /// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
@@ -126,7 +126,7 @@ impl Rest {
         let catch = CATCH.wrapping_add(extra(CATCH));
 
         let inside = error < band;
-        let waits = self.waits(now, steps, inside, error);
+        let waits = self.waits(model, now, steps, inside, error);
         let slow = inside && now.motion.speed.wrapping_abs() < catch;
         let quiet = steps && (slow || now.stops_within(model, band));
         self.held = if quiet {
@@ -169,7 +169,14 @@ impl Rest {
     /// its friction, comes to rest by itself, and every pulse meant to help would keep it
     /// going. One that flees, because the forces on it are not in balance, is not waited for.
     #[inline]
-    fn waits(&mut self, now: &Approach, steps: bool, inside: bool, error: i32) -> bool {
+    fn waits(
+        &mut self,
+        model: &AxisModel,
+        now: &Approach,
+        steps: bool,
+        inside: bool,
+        error: i32,
+    ) -> bool {
         let speed = now.motion.speed.wrapping_abs();
         let entered = inside && !self.inside;
         self.inside = inside;
@@ -183,8 +190,7 @@ impl Rest {
             };
             self.pause = self.pause.saturating_sub(spent);
         } else if entered && self.beyond() > 0 {
-            // At most 1000.
-            self.pause = now.swing as u16;
+            self.pause = swing(model, now.mass);
         }
         self.pause > 0
     }
@@ -205,6 +211,15 @@ impl Rest {
     }
 }
 
+/// Ticks of a swing of a mass (kg × 2^16) on the air of both chambers, 100…1000. The tick
+/// that asks for it keeps the valves shut, and has time.
+#[inline]
+fn swing(model: &AxisModel, mass: i32) -> u16 {
+    let square_8 = scaled(mass, model.swing, 16);
+    let ticks = square_root(square_8.unsigned_abs()).wrapping_shr(4);
+    ticks.clamp(100, 1000) as u16
+}
+
 /// How the piston comes to its target.
 pub(super) struct Approach<'a> {
     /// Raw mm.
@@ -219,8 +234,6 @@ pub(super) struct Approach<'a> {
     pub(super) force: i32,
     /// kg × 2^16.
     pub(super) mass: i32,
-    /// A swing on the air of the chambers, ticks.
-    pub(super) swing: i32,
 }
 
 impl Approach<'_> {
@@ -251,5 +264,53 @@ impl Approach<'_> {
         };
         let work = |way: i32| i64::from(stopping).wrapping_mul(i64::from(way));
         energy > work(ahead.saturating_sub(band)) && energy < work(ahead.saturating_add(band))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    use wheeleg_units::{Micros, PositionMm};
+
+    /// Against the period of mass and air springs in SI units, on cylinders of this project.
+    #[test]
+    fn a_swing_is_that_of_the_mass_on_the_air() {
+        // Bore, rod, stroke, mm; dead volumes, cm³; supply, kPa.
+        for (bore, rod, stroke, dead, supply) in [
+            (20, 8, 180, 3, 701),
+            (12, 6, 50, 2, 701),
+            (16, 6, 400, 4, 601),
+            (40, 16, 250, 12, 701),
+        ] {
+            let data = AxisData {
+                bore: PositionMm::from_int(bore),
+                rod: PositionMm::from_int(rod),
+                stroke: PositionMm::from_int(stroke),
+                dead_a: PositionMm::from_int(dead),
+                dead_b: PositionMm::from_int(dead),
+                supply: PositionMm::from_int(supply),
+                ..AxisData::default()
+            };
+            let circle = |d: PositionMm| core::f64::consts::FRAC_PI_4 * d.to_f64().powi(2) * 1e-6;
+            let area_a = circle(data.bore);
+            let area_b = area_a - circle(data.rod);
+            let spring = |area: f64| {
+                let volume = f64::from(dead) * 1e-6 + 0.5e-3 * data.stroke.to_f64() * area;
+                area * area / volume
+            };
+            let mean_pa = 0.5 * (f64::from(supply) * 1e3 + 101_325.0);
+            let stiffness = 1.2 * mean_pa * (spring(area_a) + spring(area_b));
+            for tick_us in [1000, 500] {
+                let model = AxisModel::new(&data, Micros(tick_us)).expect("in range");
+                for mass_kg in [0.5, 1.5, 10.0, 60.0] {
+                    let period_s = core::f64::consts::TAU * f64::sqrt(mass_kg / stiffness);
+                    let exact = (period_s * 1e6 / f64::from(tick_us)).clamp(100.0, 1000.0);
+                    let ticks = f64::from(swing(&model, (mass_kg * 65_536.0) as i32));
+                    let off = (ticks - exact).abs();
+                    assert!(off < 1.0 + 0.1 * exact, "{bore} {mass_kg}: {ticks} {exact}");
+                }
+            }
+        }
     }
 }
