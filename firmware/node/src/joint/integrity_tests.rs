@@ -1,6 +1,7 @@
 //! A flipped bit in what a joint board keeps between two ticks means Hold: at the
 //! next tick for what a tick changes, within [`PARTS`] ticks for the rest.
 
+use super::expectation::MotionWatch;
 use super::node::{JointNode, PARTS};
 use super::precharge::Precharge;
 use super::reference::Target;
@@ -9,11 +10,12 @@ use crate::board::Application;
 use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, ValveBank};
 use crate::mode::{Event, Mode};
 use crate::parameters::JointParameters;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use wheeleg_control::joint::{Correction, JointConfig, JointGains};
 use wheeleg_control::pwm::PwmTiming;
 use wheeleg_control::valve::ValveMode;
 use wheeleg_protocol::param::JointParam;
-use wheeleg_protocol::{Address, Fault};
+use wheeleg_protocol::{Address, Fault, Message, ParamSet};
 use wheeleg_units::{AdcCode, Micros, PositionMm};
 
 struct Valves([u16; 4]);
@@ -219,4 +221,42 @@ fn the_predictive_law_is_watched_as_well() {
         node.reseal();
     });
     assert!(found.is_some());
+}
+
+/// What the watch of motion has learnt holds for a stroke and an axis as they were told.
+#[test]
+fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
+    let sum = |motion: &MotionWatch| {
+        let mut hasher = DefaultHasher::new();
+        motion.hash(&mut hasher);
+        hasher.finish()
+    };
+    let set = |param: JointParam, value: i32| {
+        let mut node = armed();
+        for tick in 0..100 {
+            node.change(|node| node.target = Target::at(PositionMm::from_int(150)));
+            node.tick(Micros(21_000 + tick * 1000));
+        }
+        let event = Event::Disarm;
+        node.core.supervisor.apply(event, Micros(121_000)).unwrap();
+        node.tick(Micros(121_000));
+        assert_eq!(node.mode(), Mode::Idle);
+        let before = sum(&node.state.motion);
+        let fresh = |node: &Node| {
+            sum(&MotionWatch::new(
+                &node.settings.motion,
+                node.state.measured,
+            ))
+        };
+        assert_ne!(before, fresh(&node), "it has followed the valves");
+        let id = param.id();
+        let command = Message::ParamSet(ParamSet { id, value });
+        node.request(&command, Micros(121_500)).unwrap();
+        let after = sum(&node.state.motion);
+        assert!(after == before || after == fresh(&node));
+        after != before
+    };
+    assert!(set(JointParam::SensorZero, 3300), "the calibration alone");
+    assert!(set(JointParam::MotionMargin, 20 << 16), "the axis alone");
+    assert!(!set(JointParam::SlewRate, 1000 << 16), "neither");
 }

@@ -10,8 +10,8 @@ use wheeleg_protocol::LinkLossAction::Hold;
 use wheeleg_protocol::link::{SlotTiming, TURNAROUND_US};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
-    Address, Discover, Fault, FaultReport, LinkReport, LogEvent, LogRead, Message, NackReason,
-    NodeMode, ParamSave, ParamSet, ResetCause, SlotReply, Sync, SyncFlags, SyncSlots,
+    Address, Discover, Fault, FaultReport, Limit, LinkReport, LogEvent, LogRead, Message,
+    NackReason, NodeMode, ParamSave, ParamSet, ResetCause, SlotReply, Sync, SyncFlags, SyncSlots,
 };
 use wheeleg_units::Micros;
 
@@ -336,4 +336,13 @@ fn a_driver_that_was_cut_off_is_a_fault() {
     rig.tick();
     assert_eq!(rig.node.mode(), Mode::Hold);
     assert!(rig.node.faults().contains(Fault::SlotOverrun));
+}
+
+#[test]
+fn a_fault_record_tells_the_limits_in_force() {
+    let mut rig = JointRig::tracking(Hold);
+    rig.run_cycles(10, Some(setpoint(150.0, Hold)));
+    assert!(!record(&mut rig).limits.contains(Limit::SettledShut));
+    rig.run_cycles(50, Some(setpoint(100.2, Hold)));
+    assert!(record(&mut rig).limits.contains(Limit::SettledShut));
 }

@@ -7,7 +7,7 @@ use wheeleg_node::parameters::JointParameters;
 use wheeleg_protocol::LinkLossAction::Hold;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
-    Arm, Correction, Disarm, Limit, Message, NackReason, PositionReference, SCHEMA_HASH,
+    Arm, Correction, Disarm, Limit, Message, NackReason, ParamSet, PositionReference, SCHEMA_HASH,
     SelectCorrection,
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -179,23 +179,58 @@ fn position_reference_obeys_mode_range_and_deadline() {
 }
 
 #[test]
+fn position_references_reach_from_end_to_end_of_the_stroke_and_no_further() {
+    let mut rig = JointRig::armed();
+    let mut answer = |raw: i32| {
+        let command = Message::PositionReference(PositionReference {
+            reference_raw: raw,
+            deadline_cycle: rig.cycle.wrapping_add(2),
+        });
+        refusal(&rig.request(&command))
+    };
+    let far = PositionMm::from_int(180).raw();
+    for (raw, refused) in [
+        (0, false),
+        (-1, true),
+        (-70_000, true),
+        (far, false),
+        (far + 1, true),
+    ] {
+        assert_eq!(
+            answer(raw),
+            refused.then_some(NackReason::OutOfRange),
+            "{raw}"
+        );
+    }
+}
+
+#[test]
 fn change_of_correction_is_bumpless() {
-    let mut rig = JointRig::tracking(Hold);
-    rig.run_cycles(10, Some(setpoint(108.0, Hold)));
-    let before = rig.node.snapshot().duty.to_f64();
     let select = Message::SelectCorrection(SelectCorrection {
         correction: Correction::Id,
     });
-    assert!(matches!(rig.request(&select), Message::Ack(_)));
-    rig.tick();
-    let after = rig.node.snapshot().duty.to_f64();
-    assert!((after - before).abs() < 0.02, "{before} to {after}");
-    rig.run_cycles(12, Some(setpoint(108.0, Hold)));
-    let later = rig.node.snapshot().duty.to_f64();
-    assert!(
-        (later - before).abs() > 0.02,
-        "the other law acts after the fade"
-    );
+    let parameter = |id: JointParam, value| Message::ParamSet(ParamSet { id: id.id(), value });
+    for change in [select, parameter(JointParam::Correction, 1)] {
+        let mut rig = JointRig::tracking(Hold);
+        rig.run_cycles(10, Some(setpoint(108.0, Hold)));
+        let before = rig.node.snapshot().duty.to_f64();
+        assert!(refusal(&rig.request(&change)).is_none());
+        rig.tick();
+        let after = rig.node.snapshot().duty.to_f64();
+        assert!((after - before).abs() < 0.02, "{before} to {after}");
+        rig.run_cycles(12, Some(setpoint(108.0, Hold)));
+        let later = rig.node.snapshot().duty.to_f64();
+        assert!(
+            (later - before).abs() > 0.02,
+            "the other law acts after the fade"
+        );
+        // Another parameter, set to what it is, does not take it back.
+        let band = (0.8 * 65_536.0) as i32;
+        rig.request(&parameter(JointParam::SettleBand, band));
+        rig.run_cycles(12, Some(setpoint(108.0, Hold)));
+        let last = rig.node.snapshot().duty.to_f64();
+        assert!((last - before).abs() > 0.02, "{before} {later} {last}");
+    }
 }
 
 #[test]

@@ -245,11 +245,21 @@ fn joint_that_reads_like_one_at_rest_is_held_once_it_had_the_air_for_a_motion() 
 fn joint_that_creeps_is_a_following_error_after_its_time() {
     let mut rig = JointRig::tracking(Hold);
     let start = rig.now;
+    let mut open = [false; 2];
     while rig.node.mode() == Mode::Tracking {
         // 5 mm/s: too slow, but a motion.
         rig.move_to(100.0 + f64::from(rig.now - start) * 5e-6);
-        rig.run_cycles(1, Some(setpoint(175.0, Hold)));
+        if (rig.now - start).is_multiple_of(10_000) {
+            rig.sync(Some(setpoint(175.0, Hold)), false);
+        }
+        open = [open[1], rig.any_open()];
+        rig.tick();
     }
+    assert_eq!(
+        open,
+        [true, false],
+        "shut in the tick that finds it, latched in the next"
+    );
     let took_ms = (rig.now - start) / 1000;
     // 1500 ms beyond 60 mm, which the 2000 mm/s slew reaches in 30 ms.
     assert!((1500..=1550).contains(&took_ms), "{took_ms}");
