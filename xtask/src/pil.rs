@@ -28,7 +28,7 @@ pub(crate) use runs::{ensure_equal, three_steps};
 
 use further::{eventful, mixed, predictive};
 use runs::{most, put_most};
-use speed::{SPEED_LEAST, speed_verdict, watched};
+use speed::{SPEED_LEAST, is_met, speed_verdict, watched};
 
 const PACKAGE: &str = "wheeleg-pil-unicorn";
 /// What building the Unicorn engine takes, as Debian packages.
@@ -264,8 +264,18 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     let (second, others_second) = watched("pil-run/second", &environment)?;
     let native = three_steps("sil", "pil-run/native", &environment, &[])?;
     let pil = &first["pil"];
-    let speeds = [&first, &second].map(|run| run["realtime_factor"].as_f64().unwrap_or(0.0));
-    let worse = speeds[0].min(speeds[1]);
+    let speed = |run: &Value| run["realtime_factor"].as_f64().unwrap_or(0.0);
+    let mut runs = vec![
+        (speed(&first), others_first),
+        (speed(&second), others_second),
+    ];
+    // Slower than it must be: was it us, or the machine?
+    while !is_met(&runs) && runs.len() < 4 {
+        let (again, others) = watched("pil-run/again", &environment)?;
+        runs.push((speed(&again), others));
+    }
+    let speeds: Vec<f64> = runs.iter().map(|run| run.0).collect();
+    let worse = speeds.iter().copied().fold(f64::INFINITY, f64::min);
     let mut figures = json!({
         "hash": first["hash"],
         "compared_bits": pil["compared_bits"],
@@ -273,14 +283,13 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
         "realtime_factors": speeds,
         "realtime_factor": worse,
         "realtime_factor_least": SPEED_LEAST,
-        "cores_used_by_others": [others_first, others_second],
+        "cores_used_by_others": runs.iter().map(|run| run.1).collect::<Vec<_>>(),
     });
     put_most(&mut figures, &[pil]);
     let within_budget = sizes::check_run(images, &mut figures);
     figures["qemu"] = qemu::counts();
     println!("    {figures}");
-    let runs = [(speeds[0], others_first), (speeds[1], others_second)];
-    let verdict = speed_verdict(runs);
+    let verdict = speed_verdict(&runs);
     println!("    {}", verdict.as_ref().unwrap_or_else(|line| line));
     ensure_equal(pil)?;
     if first["hash"] != native["hash"] {

@@ -21,23 +21,33 @@ fn was_alone((_, others): Speed) -> bool {
     others.is_some_and(|cores| cores <= OTHERS_MOST)
 }
 
-/// The speeds against the target. A run that was alone on the machine must meet it. One
-/// that was not says nothing about us, and is not shown as met, either.
+/// Whether the target was met by a run that nobody is known to have disturbed.
+pub(super) fn is_met(runs: &[Speed]) -> bool {
+    runs.iter()
+        .any(|run| run.0 >= SPEED_LEAST && was_alone(*run))
+}
+
+/// The speeds against the target: the fastest of the runs that were alone on the machine must
+/// meet it. What disturbs a run only takes time, and some of it, as a virtual machine's
+/// neighbours, is seen by nobody; so every speed stands in the line. Where no run was alone
+/// nothing is judged, and not shown as met, either.
 ///
 /// # Errors
 /// The same line, if the target is missed.
-pub(super) fn speed_verdict(runs: [Speed; 2]) -> Result<String, String> {
-    let each = runs.map(|(factor, others)| {
-        let others = others.map_or("unknown".to_owned(), |cores| format!("{cores:.2} cores"));
-        format!("{factor:.2} (others used {others})")
-    });
-    let missed = |run: &Speed| run.0 < SPEED_LEAST;
-    let verdict = if runs.iter().any(|run| missed(run) && was_alone(*run)) {
-        "MISSED"
-    } else if runs.iter().any(missed) {
-        "NOT JUDGED: run it again while nobody else is at work"
-    } else {
+pub(super) fn speed_verdict(runs: &[Speed]) -> Result<String, String> {
+    let each: Vec<_> = runs
+        .iter()
+        .map(|(factor, others)| {
+            let others = others.map_or("unknown".to_owned(), |cores| format!("{cores:.2} cores"));
+            format!("{factor:.2} (others used {others})")
+        })
+        .collect();
+    let verdict = if is_met(runs) {
         "met"
+    } else if runs.iter().any(|run| was_alone(*run)) {
+        "MISSED"
+    } else {
+        "NOT JUDGED: run it again while nobody else is at work"
     };
     let line = format!(
         "speed: {} times real time, target at least {SPEED_LEAST:.1} where others use at most \
@@ -68,21 +78,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_alone_must_be_fast_and_a_disturbed_one_is_never_shown_as_met() {
+    fn the_fastest_run_alone_must_be_fast_and_a_disturbed_one_is_never_shown_as_met() {
         let alone = |factor| (factor, Some(0.05));
         let disturbed = |factor| (factor, Some(0.8));
-        let said = |runs| match speed_verdict(runs) {
-            Ok(line) | Err(line) => line,
-        };
-        assert!(said([alone(2.0), disturbed(3.0)]).ends_with(": met"));
-        for runs in [[alone(2.5), alone(1.98)], [alone(1.2), disturbed(3.0)]] {
-            let line = speed_verdict(runs).expect_err("too slow");
-            assert!(line.ends_with("MISSED"), "{line}");
+        for runs in [[alone(2.0), disturbed(1.0)], [alone(1.7), alone(2.1)]] {
+            let line = speed_verdict(&runs).expect("met");
+            assert!(line.ends_with(": met") && is_met(&runs), "{line}");
         }
-        for slow in [disturbed(1.2), (1.2, None)] {
-            let line = speed_verdict([alone(2.5), slow]).expect("nobody's fault");
+        for runs in [[alone(1.9), alone(1.98)], [alone(1.2), disturbed(3.0)]] {
+            let line = speed_verdict(&runs).expect_err("too slow");
+            assert!(line.ends_with("MISSED") && !is_met(&runs), "{line}");
+        }
+        for runs in [
+            [disturbed(2.5), disturbed(1.2)],
+            [disturbed(2.5), (1.2, None)],
+        ] {
+            let line = speed_verdict(&runs).expect("nobody's fault");
             assert!(
-                line.contains("NOT JUDGED") && line.contains("2.50"),
+                line.contains("NOT JUDGED") && line.contains("1.20"),
                 "{line}"
             );
         }
