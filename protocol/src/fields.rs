@@ -129,7 +129,7 @@ wire_enum! {
         Cleared = 5, "Faults were cleared: bits {b}.";
         Precharged = 6, "Both chambers were precharged, in {b} ms.";
         PrechargeMoved = 7, "The precharge ended after {b} ms because the piston moved: check the load of this axis; its law drives on.";
-        PrechargeLate = 8, "The precharge ended after {b} ms without its pressure: check supply, valves and tubes of this axis; its law drives on.";
+        PrechargeLate = 8, "The precharge ended after {b} ms without its pressure: these valves take longer to fill these chambers; lower the parameter precharge. The law drives on.";
     }
 }
 

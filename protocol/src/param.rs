@@ -325,8 +325,8 @@ parameters! {
             "Lower end of the stroke that references are limited to.";
         StrokeMax = 0x0114, "stroke_max", "mm", I16F16, "-10" ..= "500", default "180", disarmed,
             "Upper end of the stroke that references are limited to.";
-        PwmPeriod = 0x0115, "pwm_period", "us", Integer, "10000" ..= "200000", default "20000", disarmed,
-            "Valve PWM period: at least twice the longer of t_on and t_off with the margin; 50-100 Hz for valves of a few ms.";
+        PwmPeriod = 0x0115, "pwm_period", "us", Integer, "10000" ..= "120000", default "20000", disarmed,
+            "Valve PWM period: at least twice the longer of t_on and t_off and 0.35 ms, which for 50 ms is 101 ms; 50-100 Hz for valves of a few ms.";
         Correction = 0x0116, "correction", "1", Flag, "0" ..= "1", default "0", any_time,
             "Fuzzy correction after start-up: 0 PD, 1 ID.";
         ValveOn = 0x0117, "valve_t_on", "us", Integer, "0" ..= "50000", default "3500", disarmed,
@@ -396,7 +396,7 @@ parameters! {
         MotionMargin = 0x0137, "motion_margin", "N", I16F16, "0" ..= "10000", default "0", disarmed,
             "Force beyond what motions took at which a standing piston must move: above any load change; 0: half of the largest force.";
         Precharge = 0x0138, "precharge", "bar", I16F16, "0" ..= "14", default "0", disarmed,
-            "Gauge pressure to which both chambers are filled after arming, before the first motion; 0: none; at most 7/8 of the supply, absolute.";
+            "Gauge pressure to which both chambers are filled after arming, before the first motion; 0: none; at most 7/8 of the supply, absolute, and only with a PWM period of at most 60 ms.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

@@ -2,7 +2,7 @@
 //!
 //! A hardware timer runs with a period of one control tick (1000 µs), and its
 //! compare values take effect at the next tick edge. The pulse of the slower
-//! valve period (10…20 ms) is spread over ticks here: 7350 µs are seven full
+//! valve period (10…20 ms, more for slow valves) is spread over ticks here: 7350 µs are seven full
 //! ticks and one of 350 µs, always starting at the tick edge.
 //!
 //! **Switching delays.** A valve opens t_on after its coil is energised and shuts

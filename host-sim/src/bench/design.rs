@@ -179,7 +179,7 @@ fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
     let delays_s = on_s + off_s + 2.0 * margin_s;
     let least_s = 2.0 * (on_s.max(off_s) + margin_s);
     let period_ms = (2e3 * delays_s).min(20.0).max(1e3 * least_s);
-    let period_s = period_ms.clamp(10.0, 200.0).ceil() * 1e-3;
+    let period_s = period_ms.clamp(10.0, 120.0).ceil() * 1e-3;
     Facts {
         stroke_mm: c.stroke_m * 1e3,
         speed_mm_s: flow * rho_r_t / area_m2 * 1e3,

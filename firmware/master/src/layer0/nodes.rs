@@ -93,7 +93,7 @@ impl Nodes {
     /// Takes the boards as they are for the commissioned ones.
     ///
     /// # Errors
-    /// The first board that bars it: not identified, of another version or role, or
+    /// The first board that bars it: missing, not identified, of another version or role, or
     /// one of two at its address. Then nothing changed.
     pub fn commission(
         &mut self,

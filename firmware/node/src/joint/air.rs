@@ -386,14 +386,16 @@ impl Air {
         self.b.vented = 0;
     }
 
-    /// A round that ends with all valves shut: a chamber may have lost air. A bar in 4.7 s of a supply
+    /// So many rounds with all valves shut: a chamber may have lost air. A bar in 4.7 s of a supply
     /// of 7 bar (ASSUMED: twice what the seals of this project's cylinders let through where the
     /// chamber is smallest; too much is filled again at the next arming, too little would be missing).
     #[inline]
-    pub(super) fn leak(&mut self, model: &AirModel) {
+    pub(super) fn leak(&mut self, model: &AirModel, rounds: u16) {
+        // At most some bars a minute: it fits.
+        let lost = LEAK.wrapping_mul(i32::from(rounds));
         for content in [&mut self.a, &mut self.b] {
             if content.p > model.ambient {
-                content.p = content.p.wrapping_sub(LEAK).max(model.ambient);
+                content.p = content.p.wrapping_sub(lost).max(model.ambient);
             }
         }
     }

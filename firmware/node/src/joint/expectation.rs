@@ -235,10 +235,11 @@ impl MotionWatch {
         let third = self.air.follow(on, position, &model.air, false);
         if *on == [0; 4] {
             self.air.forget();
-            // In the tick that has no chamber to follow.
-            if third {
-                self.air.leak(&model.air);
-            }
+            // What may have leaked while it stood under control and was not counted then; and
+            // now, in the tick that has no chamber to follow.
+            let stood = self.stands.min(MINUTE);
+            self.air
+                .leak(&model.air, stood.wrapping_add(u16::from(third)));
         }
         self.slid = 0;
         self.doubt = 0;
@@ -274,7 +275,7 @@ impl MotionWatch {
             // A minute at rest: seals leak.
             self.slid = 0;
             self.air.forget();
-            self.air.leak(&model.air);
+            self.air.leak(&model.air, 1);
         }
     }
 

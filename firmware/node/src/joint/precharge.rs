@@ -10,15 +10,15 @@
 //!   coarser one. A piston that has moved all the same shifts that balance against its motion, so the
 //!   chamber that pushed it waits, and the other one is filled further.
 //! * **A pulse** lasts as long as its chamber takes for a 64th of the supply pressure, but
-//!   no shorter than the valve can be opened.
+//!   no shorter than the valve can be opened, and no longer than half a PWM period, of which each has one.
 //! * **It ends** when both chambers hold the pressure, when the piston has moved by more than
 //!   [`WAY`], or when the time is over ([`LONGEST`]). Then the closed loop takes over, from where
 //!   the piston is. Of what is left that is the safe answer: a leg that rises or sinks is held by its
 //!   law, with inlets and outlets; shut valves would leave it to what is in the chambers.
 //!
 //! What is in the chambers at power-up nobody knows; the account takes it for the atmosphere.
-//! With valves shut it loses pressure faster than any sound seal, so that an axis that stood for a
-//! while is filled anew. Chambers cannot be filled above the supply, which a cylinder bears. Where the account is wrong
+//! With valves shut it loses pressure faster than any sound seal, at the latest when the axis is
+//! disarmed, so that an axis that stood for a while is filled anew. Chambers cannot be filled above the supply, which a cylinder bears. Where the account is wrong
 //! the filling is out of balance, and the way of the piston bounds it. A board has no pressure
 //! sensor either: without supply it counts air that does not come, for no longer than with it, and that
 //! nothing moves is found under control.
@@ -140,15 +140,20 @@ impl Precharge {
         shortest: Micros,
     ) -> Filling {
         let model = &settings.motion;
-        // A period of the PWM has one pulse: 10 to 200 ticks.
+        // A period of the PWM has one pulse: 10 to 60 ticks.
         let period = settings.full_period;
-        // The PWM makes nearly whole periods whole: half of one is far from that.
+        // The PWM makes nearly whole periods whole. The coil of a valve that is half a period
+        // open is still off for longer than the shortest gap: t_on is less than half of one.
         let longest = Micros(period.get() >> 1).max(shortest);
         let (time_a, push_a) = model.pulse(false, position, shortest, longest);
         let (time_b, push_b) = model.pulse(true, position, shortest, longest);
         let mut next = self.next();
         if next == 0 {
-            next = period.get().checked_div(JOINT_TICK.get()).unwrap_or(0) & 0xFF;
+            next = period
+                .get()
+                .checked_div(JOINT_TICK.get())
+                .unwrap_or(0)
+                .min(0xFF);
             let force = motion.unbalanced(model);
             let force = force.saturating_add(model.given_way(moved));
             self.state &= !FILLS_B;

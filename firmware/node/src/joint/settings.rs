@@ -19,6 +19,10 @@ use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS, divid
 /// a tenth of the VQ110's 3.5 ms).
 const PULSE_MARGIN: Micros = Micros(350);
 
+/// Longest PWM period with which chambers are filled: a pulse of a 64th of the supply in each makes
+/// 1 bar in 1.6 of the 2 s that a precharge may take (`joint_precharge.rs`).
+const PRECHARGE_PERIOD: Micros = Micros(60_000);
+
 /// Longest literal blow-through (ASSUMED: empties a 2 l reservoir).
 const BLOW_THROUGH_TIME: Micros = Micros::from_millis(5000);
 
@@ -119,7 +123,7 @@ impl JointSettings {
             return None;
         }
         let motion = MotionModel::new(&gains, position(P::MotionMargin))?;
-        let precharge = precharge(raw(P::Precharge), gains.axis.supply, &motion)?;
+        let precharge = precharge(raw(P::Precharge), &gains, &motion)?;
         let exhaust_duty = Duty::from_raw(raw(P::ExhaustDuty));
         let [opening, ..] = allocate(exhaust_duty, gains.pwm_period).0;
         // A pulse too short for the valve would never exhaust at all.
@@ -214,11 +218,15 @@ fn gains(parameters: &JointParameters) -> JointGains {
 
 /// Pressure of a precharge of so many raw bar (gauge) on this supply (raw kPa, absolute), in the
 /// unit of [`TickSettings::precharge`]; `None` if it is more than seven eighths of the supply, which
-/// no account of the air is sure to reach.
-fn precharge(bar: i32, supply: PositionMm, motion: &MotionModel) -> Option<i32> {
+/// no account of the air is sure to reach, or if the pulses come too seldom to reach 1 bar in time.
+fn precharge(bar: i32, gains: &JointGains, motion: &MotionModel) -> Option<i32> {
     if bar == 0 {
         return Some(0);
     }
+    if gains.pwm_period > PRECHARGE_PERIOD {
+        return None;
+    }
+    let supply = gains.axis.supply;
     let share = i64::from(bar).saturating_mul(100 << 17);
     let share = divide_signed(share, i64::from(supply.raw()));
     let absolute = i64::from(motion.ambient()).saturating_add(share);

@@ -389,3 +389,40 @@ fn a_pulse_lasts_for_half_a_period_at_most() {
     // 10 ms open, and what the valve takes longer to open than to shut.
     assert!((11_000..=11_600).contains(&longest), "{pulses:?}");
 }
+
+#[test]
+fn what_may_have_leaked_while_it_stood_under_control_is_filled_anew() {
+    let mut rig = armed(1.0);
+    let whole = ticks_to_drive(&mut rig, 2000, 100.0);
+    rig.run_cycles(3000, Some(setpoint(100.0, Hold)));
+    assert!(rig.node.snapshot().settled);
+    rig.request(&DISARM);
+    rig.run_cycles(1, None);
+    rig.request(&ARM);
+    let again = ticks_to_drive(&mut rig, 2000, 100.0);
+    assert!(again.abs_diff(whole) <= 20, "{again} {whole}");
+}
+
+/// A slow valve, with the shortest PWM period that it may have.
+#[test]
+fn with_a_long_period_the_pressure_is_reached_in_time_or_refused() {
+    let with = |bar: f64, period_ms: i32| {
+        let parameters = JointParameters::default()
+            .with(JointParam::PwmPeriod.id(), period_ms * 1000, true)
+            .unwrap();
+        let mut rig = JointRig::with(parameters);
+        rig.run_cycles(3, None);
+        read(&mut rig);
+        let id = JointParam::Precharge.id();
+        let value = (bar * 65_536.0) as i32;
+        let answer = rig.request(&Message::ParamSet(ParamSet { id, value }));
+        (rig, refusal(&answer))
+    };
+    let (mut rig, refused) = with(1.0, 60);
+    assert_eq!(refused, None);
+    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    ticks_to_drive(&mut rig, 2001, 100.0);
+    assert_eq!(end(&mut rig).0, LogEvent::Precharged);
+    assert_eq!(with(1.0, 61).1, Some(NackReason::OutOfRange));
+    assert_eq!(with(0.0, 120).1, None);
+}

@@ -29,7 +29,7 @@ const START_TICKS: u16 = 4;
 const PAUSE_SPENT: u16 = 8;
 /// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
 const GENTLE: i32 = 40 << 16;
-/// Nor does one that is further from its target than this, raw mm (2 mm).
+/// Nor does one that is further from its target than this, raw mm (2 mm), and outside its band.
 const FLED: i32 = 2 << 16;
 
 /// Rest at a target, and how long it has been tried.
@@ -39,7 +39,7 @@ pub(super) struct Rest {
     held: u16,
     released: u16,
     near: u16,
-    /// What is left of the pause under way, ticks: below 2^12.
+    /// What is left of the pause under way, ticks.
     pause: u16,
     /// In the band at the last tick.
     inside: bool,
@@ -52,7 +52,7 @@ impl Hash for Rest {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here. Fields that are
-        // narrower than a word share one, each in its own bits.
+        // narrower than a word share one, such that a flipped bit of any flips one bit of it.
         let Self {
             target,
             held,
@@ -67,10 +67,10 @@ impl Hash for Rest {
         state.write_u32(u32::from(*held) | u32::from(*released).wrapping_shl(16));
         state.write_u32(
             u32::from(*near)
-                | u32::from(*settled).wrapping_shl(16)
-                | u32::from(*inside).wrapping_shl(17)
-                | u32::from(*aimed).wrapping_shl(18)
-                | u32::from(*pause).wrapping_shl(20),
+                ^ u32::from(*pause).wrapping_shl(16)
+                ^ u32::from(*settled).wrapping_shl(16)
+                ^ u32::from(*inside).wrapping_shl(17)
+                ^ u32::from(*aimed).wrapping_shl(18),
         );
     }
 }
@@ -126,7 +126,7 @@ impl Rest {
         let catch = CATCH.wrapping_add(extra(CATCH));
 
         let inside = error < band;
-        let waits = self.waits(model, now, steps, inside, error);
+        let waits = self.waits(model, now, steps, error, band);
         let slow = inside && now.motion.speed.wrapping_abs() < catch;
         let quiet = steps && (slow || now.stops_within(model, band));
         self.held = if quiet {
@@ -174,13 +174,14 @@ impl Rest {
         model: &AxisModel,
         now: &Approach,
         steps: bool,
-        inside: bool,
         error: i32,
+        band: i32,
     ) -> bool {
+        let inside = error < band;
         let speed = now.motion.speed.wrapping_abs();
         let entered = inside && !self.inside;
         self.inside = inside;
-        if !steps || speed > GENTLE || error > FLED {
+        if !steps || speed > GENTLE || (error > FLED && !inside) {
             self.pause = 0;
         } else if self.pause > 0 {
             let spent = if inside || speed >= STILL {
@@ -212,7 +213,7 @@ impl Rest {
 }
 
 /// Ticks of a swing of a mass (kg × 2^16) on the air of both chambers, 100…1000. The tick
-/// that asks for it keeps the valves shut, and has time.
+/// that asks for it keeps the valves shut, unless a move is announced.
 #[inline]
 fn swing(model: &AxisModel, mass: i32) -> u16 {
     let square_8 = scaled(mass, model.swing, 16);
@@ -272,6 +273,59 @@ mod tests {
     use super::*;
     use crate::axis::AxisData;
     use wheeleg_units::{Micros, PositionMm};
+
+    /// The words that are sealed.
+    #[derive(Default, PartialEq, Eq, Debug)]
+    struct Words([u32; 4], usize);
+
+    impl Hasher for Words {
+        fn finish(&self) -> u64 {
+            0
+        }
+
+        fn write(&mut self, bytes: &[u8]) {
+            self.0[self.1] = u32::from_ne_bytes(bytes.try_into().expect("whole words"));
+            self.1 += 1;
+        }
+    }
+
+    #[test]
+    fn every_flipped_bit_of_the_rest_state_flips_one_that_is_sealed() {
+        let sealed = |rest: &Rest| {
+            let mut words = Words::default();
+            rest.hash(&mut words);
+            words.0
+        };
+        let some = Rest {
+            target: 0x12_3456,
+            held: 77,
+            released: 5,
+            near: 501,
+            pause: 150,
+            inside: true,
+            aimed: false,
+            settled: true,
+        };
+        let flips_one = |flip: &dyn Fn(&mut Rest)| {
+            let mut flipped = some;
+            flip(&mut flipped);
+            let pairs = sealed(&flipped).into_iter().zip(sealed(&some));
+            let bits: u32 = pairs.map(|(a, b)| (a ^ b).count_ones()).sum();
+            assert_eq!(bits, 1, "{flipped:?}");
+        };
+        for bit in 0..32 {
+            flips_one(&|rest| rest.target ^= 1 << bit);
+        }
+        for bit in 0..16 {
+            flips_one(&|rest| rest.held ^= 1 << bit);
+            flips_one(&|rest| rest.released ^= 1 << bit);
+            flips_one(&|rest| rest.near ^= 1 << bit);
+            flips_one(&|rest| rest.pause ^= 1 << bit);
+        }
+        flips_one(&|rest| rest.inside ^= true);
+        flips_one(&|rest| rest.aimed ^= true);
+        flips_one(&|rest| rest.settled ^= true);
+    }
 
     /// Against the period of mass and air springs in SI units, on cylinders of this project.
     #[test]
