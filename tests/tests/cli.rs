@@ -187,6 +187,44 @@ fn an_unknown_scenario_is_named_with_what_there_is() {
     assert!(!out.exists(), "a run that never began leaves nothing");
 }
 
+/// Each value is within its limits; together the board refuses them.
+#[test]
+fn parameters_that_contradict_each_other_are_named_with_their_place() {
+    let dir = folder();
+    let out = dir.path().join("out");
+    let robot = source("robots/wheeleg-2003.toml");
+    let too_much = r#"precharge = { value = 5.5, unit = "bar", source = "ASSUMED: test" }"#;
+    let empty = r#"stroke_min = { value = 200.0, unit = "mm", source = "ASSUMED: test" }"#;
+    let none = robot.lines().find(|line| line.starts_with("precharge "));
+    let head = "[node.vertical]\n";
+    assert!(robot.contains(head));
+    for (text, name) in [
+        (
+            robot.replace(none.expect("the robot tells it"), too_much),
+            "node.joint.precharge",
+        ),
+        (
+            robot.replace(head, &format!("{head}{empty}\n")),
+            "node.vertical.stroke_min",
+        ),
+    ] {
+        let file = dir.path().join("robot.toml");
+        fs::write(&file, text).expect("written");
+        let mut command = wheeleg();
+        command
+            .args(["run", "stand", "--robot"])
+            .args([&file, &PathBuf::from("--out"), &out])
+            .assert()
+            .code(2)
+            .stderr(
+                contains("robot.toml")
+                    .and(contains(name))
+                    .and(contains("contradicts")),
+            );
+        assert!(!out.exists(), "a run that never began leaves nothing");
+    }
+}
+
 #[test]
 fn a_missing_file_is_named() {
     let dir = folder();

@@ -67,8 +67,10 @@ impl Node {
     /// As [`Node::new`].
     pub fn with(design: &Design, others: &[(JointParam, i32)]) -> Result<Self, BenchError> {
         let address = Address::joint(JOINT).unwrap_or(Address::MASTER);
+        // First what its parameter table does not hold: that has a name and limits.
+        let commissioned = commission(design)?;
         JointConfig::new(&design.gains, TICK).map_err(BenchError::Design)?;
-        let stored: Vec<(u16, i32)> = commission(design)?
+        let stored: Vec<(u16, i32)> = commissioned
             .into_iter()
             .chain(others.iter().copied())
             .map(|(parameter, raw)| (parameter.id(), raw))

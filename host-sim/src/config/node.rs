@@ -1,11 +1,13 @@
 //! Board parameters set by a robot file, by the names of the protocol's tables.
 
 use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
+use wheeleg_protocol::{Address, ResetCause};
 
 use super::params::ParameterInfo;
 use super::quantity::pretty;
 use super::reader::{Entry, Reader};
 use super::scenario::ParameterChoice;
+use crate::sil::{JointBoard, WheelBoard, identity};
 
 /// Parameters that the master sends to the boards before arming, as raw
 /// numbers of the wire format.
@@ -49,7 +51,81 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
     }
     list_defaults(r, "node.joint", JOINT_PARAMS);
     list_defaults(r, "node.wheel", WHEEL_PARAMS);
+    contradictions(r, &params);
     params
+}
+
+/// What a board refuses though every value is within its own limits. Named is each parameter
+/// without which, left at its default, the board takes the rest.
+fn contradictions(r: &mut Reader, params: &NodeParams) {
+    let wheels = params.wheels.iter().map(|stored| (stored, WHEEL_PARAMS));
+    let joints = params.joints.iter().map(|stored| (stored, JOINT_PARAMS));
+    let mut boards = Address::nodes().zip(joints.chain(wheels));
+    let refused = |(address, (stored, _)): &(Address, (&Vec<_>, _))| !accepts(*address, stored);
+    // One board is enough: what its section sets, others have as well.
+    let Some((address, (stored, table))) = boards.find(refused) else {
+        return;
+    };
+    let index = usize::from(address.raw()).saturating_sub(1);
+    let sections: Vec<&str> = if address.is_joint() {
+        let own = JOINT_SECTIONS.iter().rev();
+        own.filter(|(_, joints)| joints.contains(&index))
+            .map(|(name, _)| *name)
+            .collect()
+    } else {
+        vec!["wheel"]
+    };
+    let mut named = false;
+    for (place, (id, raw)) in stored.iter().enumerate() {
+        let mut without = stored.clone();
+        without.remove(place);
+        let Some(info) = table.iter().find(|info| info.id == *id) else {
+            continue;
+        };
+        if !accepts(address, &without) {
+            continue;
+        }
+        let found = sections.iter().find_map(|name| {
+            let path = format!("node.{name}");
+            let (span, _) = r.table(&path)?.get(info.name)?;
+            Some((span, path))
+        });
+        let Some((span, path)) = found else { continue };
+        let value = tidy(f64::from(*raw) / scale(info.format));
+        r.problem(
+            Some(span),
+            format!(
+                "`{path}.{}` = {} {} contradicts other parameters: the board of {address} \
+                 refuses them together",
+                info.name,
+                pretty(value),
+                info.unit
+            ),
+            "not with the others",
+            Some(format!("{path}.{}: {}", info.name, info.text)),
+        );
+        named = true;
+    }
+    if !named {
+        r.problem(
+            None,
+            format!("the board of {address} refuses its parameters together"),
+            "",
+            Some(format!(
+                "see the sections [node.{}]",
+                sections.join("], [node.")
+            )),
+        );
+    }
+}
+
+fn accepts(address: Address, stored: &[(u16, i32)]) -> bool {
+    let (who, cause) = (identity(address), ResetCause::PowerUp);
+    if address.is_joint() {
+        JointBoard::new(who, stored, cause).is_ok()
+    } else {
+        WheelBoard::new(who, stored, cause).is_ok()
+    }
 }
 
 /// Reads `parameter`, by its name in the table of `board`, and `value`, a number in

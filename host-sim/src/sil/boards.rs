@@ -223,7 +223,7 @@ macro_rules! each_wheel {
 }
 
 /// One wheel board.
-pub(super) struct WheelBoard {
+pub(crate) struct WheelBoard {
     application: WheelApplication,
     encoder: CounterInput,
     /// Quadrature edges at which the counter stood at 0.
@@ -239,7 +239,7 @@ impl WheelBoard {
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
-    pub(super) fn new(
+    pub(crate) fn new(
         who: NodeIdentity,
         stored: &[(u16, i32)],
         cause: ResetCause,

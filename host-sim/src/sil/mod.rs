@@ -33,7 +33,7 @@ use wheeleg_plant::assembly::CylinderOutputs;
 use wheeleg_protocol::LinkQuality;
 
 pub use self::audit::LineAudit;
-pub(crate) use self::boards::{JointBoard, identity};
+pub(crate) use self::boards::{JointBoard, WheelBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::power::BOARD_START_UP_NS;
 pub(crate) use self::words::hex;

@@ -131,7 +131,10 @@ fn hold_reason(reason: &HoldReason) -> String {
         HoldReason::NodeDisarmed(node) => {
             format!("{} is no longer armed: it has restarted", board(node))
         }
-        HoldReason::SupplyLost => "supply pressure lost".to_owned(),
+        HoldReason::SupplyLost => {
+            "supply pressure lost. Check compressor, hose and regulator, then clear and arm."
+                .to_owned()
+        }
         HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
         HoldReason::EmergencyStop => "E-stop".to_owned(),
     }
