@@ -7,7 +7,7 @@ use super::params::ParameterInfo;
 use super::quantity::pretty;
 use super::reader::{Entry, Reader};
 use super::scenario::ParameterChoice;
-use crate::sil::{JointBoard, WheelBoard, identity};
+use crate::sil::{JointBoard, WheelBoard, identity, parameter_row};
 
 /// Parameters that the master sends to the boards before arming, as raw
 /// numbers of the wire format.
@@ -58,20 +58,17 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
 /// What a board refuses though every value is within its own limits. Named is each parameter
 /// without which, left at its default, the board takes the rest.
 fn contradictions(r: &mut Reader, params: &NodeParams) {
-    let wheels = params.wheels.iter().map(|stored| (stored, WHEEL_PARAMS));
-    let joints = params.joints.iter().map(|stored| (stored, JOINT_PARAMS));
-    let mut boards = Address::nodes().zip(joints.chain(wheels));
-    let refused = |(address, (stored, _)): &(Address, (&Vec<_>, _))| !accepts(*address, stored);
+    let stored = params.joints.iter().chain(&params.wheels);
     // One board is enough: what its section sets, others have as well.
-    let Some((address, (stored, table))) = boards.find(refused) else {
+    let mut refused = (Address::nodes().zip(stored)).filter(|(to, stored)| !accepts(*to, stored));
+    let Some((address, stored)) = refused.next() else {
         return;
     };
-    let index = usize::from(address.raw()).saturating_sub(1);
+    let of_joint =
+        |(_, joints): &&(_, &[usize])| address.slot().is_some_and(|i| joints.contains(&i));
     let sections: Vec<&str> = if address.is_joint() {
-        let own = JOINT_SECTIONS.iter().rev();
-        own.filter(|(_, joints)| joints.contains(&index))
-            .map(|(name, _)| *name)
-            .collect()
+        let own = JOINT_SECTIONS.iter().rev().filter(of_joint);
+        own.map(|(name, _)| *name).collect()
     } else {
         vec!["wheel"]
     };
@@ -79,12 +76,10 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
     for (place, (id, raw)) in stored.iter().enumerate() {
         let mut without = stored.clone();
         without.remove(place);
-        let Some(info) = table.iter().find(|info| info.id == *id) else {
+        let info = parameter_row(address.raw(), *id);
+        let Some(info) = info.filter(|_| accepts(address, &without)) else {
             continue;
         };
-        if !accepts(address, &without) {
-            continue;
-        }
         let found = sections.iter().find_map(|name| {
             let path = format!("node.{name}");
             let (span, _) = r.table(&path)?.get(info.name)?;

@@ -36,7 +36,7 @@ pub use self::audit::LineAudit;
 pub(crate) use self::boards::{JointBoard, WheelBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::power::BOARD_START_UP_NS;
-pub(crate) use self::words::hex;
+pub(crate) use self::words::{hex, parameter_row};
 
 use self::observe::Observer;
 use self::operator::Operator;

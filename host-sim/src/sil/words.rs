@@ -206,17 +206,17 @@ fn diagnosis(node: u8, record: &FaultRecord) -> String {
 }
 
 /// Row of a board's parameter.
-fn row(node: u8, id: u16) -> Option<&'static ParamInfo> {
+pub(crate) fn parameter_row(node: u8, id: u16) -> Option<&'static ParamInfo> {
     params_at(node).iter().find(|row| row.id == id)
 }
 
 fn parameter(node: u8, id: u16) -> String {
-    row(node, id).map_or_else(|| format!("0x{id:04X}"), |row| row.name.to_owned())
+    parameter_row(node, id).map_or_else(|| format!("0x{id:04X}"), |row| row.name.to_owned())
 }
 
 /// Value of a parameter in its unit.
 fn value(node: u8, id: u16, raw: i32) -> String {
-    row(node, id).map_or_else(
+    parameter_row(node, id).map_or_else(
         || raw.to_string(),
         |row| {
             let scale = f64::from(row.format.fraction_bits()).exp2();

@@ -126,7 +126,7 @@ impl Rest {
         let catch = CATCH.wrapping_add(extra(CATCH));
 
         let inside = error < band;
-        let waits = self.waits(model, now, steps, error, band);
+        let waits = self.waits(model, now, steps, error, inside);
         let slow = inside && now.motion.speed.wrapping_abs() < catch;
         let quiet = steps && (slow || now.stops_within(model, band));
         self.held = if quiet {
@@ -175,9 +175,8 @@ impl Rest {
         now: &Approach,
         steps: bool,
         error: i32,
-        band: i32,
+        inside: bool,
     ) -> bool {
-        let inside = error < band;
         let speed = now.motion.speed.wrapping_abs();
         let entered = inside && !self.inside;
         self.inside = inside;
