@@ -120,7 +120,8 @@ fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> 
         .arg("--output")
         .arg(&out)
         .env("CARGO_TARGET_DIR", folder.join("build"))
-        // Short builds: there are some five hundred of them.
+        // Short builds: there are some five hundred of them, each of one changed line.
+        .env("CARGO_PROFILE_TEST_INCREMENTAL", "true")
         .env("CARGO_PROFILE_TEST_OPT_LEVEL", "1")
         .env("CARGO_PROFILE_TEST_DEBUG", "false")
         .env("CARGO_PROFILE_DEV_DEBUG", "false")

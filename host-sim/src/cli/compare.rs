@@ -73,6 +73,54 @@ fn chosen<T: Clone + PartialEq>(given: &[T], all: &[T]) -> Vec<T> {
     list
 }
 
+/// Columns on the terminal: the heading, the cell of [`Comparison::table`], and whether
+/// it is shown if no moves were chosen.
+const COLUMNS: [(&str, usize, bool); 12] = [
+    ("error mm", 0, true),
+    ("20 mm", 1, false),
+    ("overshoot", 2, true),
+    ("settled s", 4, true),
+    ("worst s", 5, true),
+    ("ratio", 6, true),
+    ("S-curve", 7, true),
+    ("sinusoid", 9, false),
+    ("rest sw.", 11, true),
+    ("recovery", 13, true),
+    ("helped", 14, false),
+    ("cycles", 15, false),
+];
+
+/// The table of an axis: of the moves that were chosen, columns with figures.
+fn axis_table(comparison: &Comparison, axis: &str) -> String {
+    let table = comparison.table(axis);
+    let is_played = |index: usize| table.iter().any(|(_, cells)| cells[index] != "–");
+    let by_default = comparison.options.moves.is_none();
+    let columns: Vec<(&str, usize)> = COLUMNS
+        .into_iter()
+        .filter(|&(_, index, default)| {
+            if by_default {
+                default
+            } else {
+                is_played(index)
+            }
+        })
+        .map(|(heading, index, _)| (heading, index))
+        .collect();
+    let line = |name: &str, cells: &mut dyn Iterator<Item = &str>| {
+        let cells: String = cells.map(|cell| format!("{cell:>10}")).collect();
+        format!("  {name:<12}{cells}\n")
+    };
+    let mut text = format!("{axis}\n");
+    text += &line("", &mut columns.iter().map(|(heading, _)| *heading));
+    for (kind, cells) in &table {
+        text += &line(
+            kind.name(),
+            &mut columns.iter().map(|&(_, index)| &*cells[index]),
+        );
+    }
+    text
+}
+
 /// Plays, writes and prints.
 pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, SimError> {
     let built_in: Vec<String> = AXES.iter().map(|(name, ..)| (*name).to_owned()).collect();
@@ -99,35 +147,7 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, SimError> {
     }
     let mut out = String::new();
     for axis in &comparison.axes {
-        let name = &axis.config.name;
-        let _ = writeln!(
-            out,
-            "{name}\n  {:<12}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}{:>10}{:>10}",
-            "",
-            "error mm",
-            "overshoot",
-            "settled s",
-            "worst s",
-            "ratio",
-            "S-curve",
-            "rest sw.",
-            "recovery"
-        );
-        for (kind, cells) in comparison.table(name) {
-            let _ = writeln!(
-                out,
-                "  {:<12}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}{:>10}{:>10}",
-                kind.name(),
-                cells[0],
-                cells[2],
-                cells[4],
-                cells[5],
-                cells[6],
-                cells[7],
-                cells[11],
-                cells[13]
-            );
-        }
+        out.push_str(&axis_table(comparison, &axis.config.name));
     }
     let alarms = comparison.false_alarms().count();
     let infeasible = comparison.infeasible().len();

@@ -76,6 +76,14 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, SimError> {
         }
         text.push('\n');
     }
+    for (when, names) in [
+        ("before", tuned.stopped(|test| &test.before)),
+        ("after", tuned.stopped(|test| &test.after)),
+    ] {
+        if !names.is_empty() {
+            let _ = writeln!(text, "stopped by supervision {when}: {}", names.join(", "));
+        }
+    }
     let valve = &tuned.config.axis.cylinder.fill_valve;
     let found = tuned.delays.map_or_else(
         || "not found".to_owned(),

@@ -208,6 +208,16 @@ impl Tuned {
         })
     }
 
+    /// Moves that the board's supervision stopped, by name, of either column.
+    #[must_use]
+    pub fn stopped(&self, figures: fn(&Test) -> &Figures) -> Vec<&'static str> {
+        let stopped = self
+            .tests
+            .iter()
+            .filter(|test| figures(test).stopped == Some(true));
+        stopped.map(|test| test.motion.name()).collect()
+    }
+
     /// Summary as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {

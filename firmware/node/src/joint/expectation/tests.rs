@@ -1,0 +1,260 @@
+//! Tests of the watch for motion that does not come.
+
+use super::*;
+use wheeleg_control::axis::AxisData;
+
+/// A tick under control that sends `on`.
+fn sample(watch: &mut MotionWatch, on: &OnTimes, driven: &Driven, model: &MotionModel) -> bool {
+    let overdue = watch.judge(driven, model);
+    watch.follow(on, driven.position, model);
+    overdue
+}
+
+const PUSH: OnTimes = [1000, 0, 0, 1000];
+const PULL: OnTimes = [0, 1000, 1000, 0];
+const SHUT: OnTimes = [0; 4];
+
+fn model(margin: i16) -> MotionModel {
+    let gains = JointGains {
+        axis: AxisData::default(),
+        ..JointGains::default()
+    };
+    MotionModel::new(&gains, PositionMm::from_int(margin)).unwrap()
+}
+
+const fn driven(reference: i16, position: i16) -> Driven {
+    Driven {
+        reference: PositionMm::from_int(reference),
+        position: PositionMm::from_int(position),
+        velocity: VelocityMmS::ZERO,
+    }
+}
+
+/// A watch that knows both chambers and a load of `learnt` mN.
+fn knowing(learnt: i32, position: i16, model: &MotionModel) -> MotionWatch {
+    let mut watch = MotionWatch::new(model, PositionMm::from_int(position));
+    for on in [PUSH, PULL, [0, 1000, 0, 1000]] {
+        for _ in 0..1500 {
+            watch
+                .air
+                .follow(&on, PositionMm::from_int(position), &model.air, false);
+        }
+    }
+    assert!(watch.air.is_comparable(&model.air));
+    (watch.slid, watch.learnt) = (MEMORY, learnt);
+    watch
+}
+
+/// Tick of the fault, and the force on the piston 34 ticks before it, N.
+fn fault(
+    mut watch: MotionWatch,
+    on: OnTimes,
+    driven: Driven,
+    model: &MotionModel,
+) -> Option<(u32, f64)> {
+    let mut forces = [0; 5000];
+    (1..5000).find_map(|tick| {
+        let found = sample(&mut watch, &on, &driven, model);
+        forces[tick] = watch.air.force(&model.air);
+        found.then(|| (tick as u32, f64::from(forces[tick - 33]) / 1e3))
+    })
+}
+
+#[test]
+fn a_piston_that_should_move_for_all_that_was_learnt_is_at_fault() {
+    // The margin as told, or half of 158 N; then break-away friction of 15 N.
+    for (margin, bound) in [(50, 65.0), (0, 94.0)] {
+        let model = model(margin);
+        for load in [-30_000, 0, 30_000] {
+            let watch = knowing(load, 90, &model);
+            let (_, at) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
+            let over = at - f64::from(load) / 1e3 - bound;
+            assert!((0.0..2.0).contains(&over), "{margin} {load} {over}");
+            let (_, at) = fault(watch, PULL, driven(60, 90), &model).unwrap();
+            let over = -at + f64::from(load) / 1e3 - bound;
+            assert!((0.0..2.0).contains(&over), "{margin} {load} {over}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_expected_near_the_reference_away_from_it_or_against_an_end() {
+    let model = model(50);
+    for (on, reference, position) in [
+        (PUSH, 93, 90),
+        (PULL, 120, 90),
+        (PUSH, 60, 90),
+        (PUSH, 200, 178),
+        (PULL, -20, 2),
+    ] {
+        let watch = knowing(0, position, &model);
+        let found = fault(watch, on, driven(reference, position), &model);
+        assert_eq!(found, None, "{reference} {position}");
+    }
+    let watch = knowing(0, 2, &model);
+    assert!(fault(watch, PUSH, driven(60, 2), &model).is_some());
+}
+
+#[test]
+fn a_piston_that_moves_is_not_and_one_that_shakes_is() {
+    let model = model(50);
+    let run = |position: &dyn Fn(u32) -> i32, speed: i16| {
+        let mut watch = knowing(0, 90, &model);
+        (0..3000).any(|tick| {
+            let driven = Driven {
+                position: PositionMm::from_raw((90 << 16) + position(tick)),
+                velocity: VelocityMmS::from_int(speed),
+                ..driven(120, 90)
+            };
+            sample(&mut watch, &PUSH, &driven, &model)
+        })
+    };
+    // 0.55 mm in 30 ms, and half as much.
+    assert!(!run(&|tick| (tick / 30 * 36_000) as i32 % (20 << 16), 0));
+    assert!(run(&|tick| (tick / 60 * 30_000) as i32 % (20 << 16), 0));
+    assert!(run(&|tick| (tick % 2 * 30_000) as i32, 0));
+    // One that turns back has a speed.
+    assert!(!run(&|_| 0, 12));
+}
+
+#[test]
+fn without_knowledge_it_takes_the_largest_force_for_200_ms() {
+    let model = model(50);
+    let watch = MotionWatch::new(&model, PositionMm::from_int(90));
+    // B is known to be empty after 1.17 s.
+    let (tick, _) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
+    assert!((1360..1400).contains(&tick), "{tick}");
+    // One open valve of two leaves the other chamber unknown.
+    let one = fault(watch, [1000, 0, 0, 0], driven(120, 90), &model);
+    assert_eq!(one, None);
+    // Being disarmed, or a minute at rest, is forgetting.
+    for minute in [false, true] {
+        let mut watch = knowing(0, 90, &model);
+        if minute {
+            for _ in 0..=u16::MAX {
+                sample(&mut watch, &SHUT, &driven(90, 90), &model);
+            }
+        } else {
+            watch.rest(&SHUT, PositionMm::from_int(90), &model);
+        }
+        let (tick, _) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
+        assert!((1360..1400).contains(&tick), "{minute} {tick}");
+    }
+}
+
+#[test]
+fn a_chamber_that_should_hold_more_than_any_supply_has_lost_its_air() {
+    let model = model(0);
+    let mut watch = knowing(0, 20, &model);
+    for _ in 0..2000 {
+        sample(&mut watch, &[0, 0, 1000, 0], &driven(20, 20), &model);
+    }
+    // B at supply; 130 mm further in it would have 27 bar.
+    let mut found = None;
+    for tick in 0..2000_i32 {
+        let moved = (tick * 13_107).min(130 << 16);
+        let driven = Driven {
+            position: PositionMm::from_raw((20 << 16) + moved),
+            velocity: if moved < 130 << 16 {
+                VelocityMmS::from_int(200)
+            } else {
+                VelocityMmS::ZERO
+            },
+            ..driven(150, 20)
+        };
+        if sample(&mut watch, &SHUT, &driven, &model) {
+            found = Some(tick);
+            break;
+        }
+    }
+    // While it moves it may be a blow; 34 ticks after it has come to rest it is not.
+    assert!(
+        found.is_some_and(|tick| (680..690).contains(&tick)),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn the_load_is_the_force_of_a_sliding_piston_less_its_friction() {
+    let model = model(0);
+    let mut watch = knowing(0, 90, &model);
+    (watch.slid, watch.learnt) = (0, 0);
+    let force = watch.air.force(&model.air);
+    for (ticks, speed, friction) in [(400, 100, 14_000), (4000, -100, -14_000)] {
+        for _ in 0..ticks {
+            let driven = Driven {
+                velocity: VelocityMmS::from_int(speed),
+                ..driven(90, 90)
+            };
+            sample(&mut watch, &SHUT, &driven, &model);
+        }
+        // 10 N of Coulomb and 4 N of viscous friction.
+        assert!(
+            (watch.learnt - (force - friction)).abs() < 500,
+            "{}",
+            watch.learnt
+        );
+    }
+    // Standing teaches nothing, nor do the cushions: 6 mm before either end.
+    let before = watch.learnt;
+    for (at, speed, teaches) in [
+        (90, 0, false),
+        (5, 100, false),
+        (5, -100, false),
+        (175, 100, false),
+        (175, -100, false),
+        (7, 100, true),
+        (173, 100, true),
+    ] {
+        let mut watch = watch;
+        for _ in 0..3 {
+            let driven = Driven {
+                velocity: VelocityMmS::from_int(speed),
+                ..driven(at, at)
+            };
+            sample(&mut watch, &SHUT, &driven, &model);
+        }
+        assert_eq!(watch.learnt != before, teaches, "{at} {speed}");
+    }
+}
+
+/// Slides with the chambers as they are for so many ticks.
+fn slide(watch: &mut MotionWatch, ticks: u32, speed: i16, model: &MotionModel) {
+    for _ in 0..ticks {
+        let driven = Driven {
+            velocity: VelocityMmS::from_int(speed),
+            ..driven(90, 90)
+        };
+        sample(watch, &SHUT, &driven, model);
+    }
+}
+
+#[test]
+fn what_was_learnt_counts_after_100_ms_of_sliding() {
+    let model = model(50);
+    // Rounds of three ticks: 32 of them, and 33. Without knowledge rule 2 waits for nine
+    // tenths of 188 N, and 200 ms more.
+    for (ticks, least, most) in [(96, 142.0, 200.0), (99, 60.0, 70.0)] {
+        let mut watch = knowing(0, 90, &model);
+        (watch.slid, watch.learnt) = (0, 0);
+        let forward = (ticks / 2) / 3 * 3;
+        slide(&mut watch, forward, 100, &model);
+        slide(&mut watch, ticks - forward, -100, &model);
+        watch.learnt = 0;
+        let (_, at) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
+        assert!((least..most).contains(&at), "{ticks} {at}");
+    }
+}
+
+#[test]
+fn the_mean_is_over_the_last_100_ms_of_sliding() {
+    let model = model(0);
+    let mut watch = knowing(0, 90, &model);
+    slide(&mut watch, 3000, 100, &model);
+    let old = f64::from(watch.learnt);
+    // The other way friction has the other sign: 28 N of change, of which 33 rounds leave
+    // (32/33)^33.
+    slide(&mut watch, 99, -100, &model);
+    let left = (old + 28_000.0 - f64::from(watch.learnt)) / 28_000.0;
+    assert!((left - 0.362).abs() < 0.02, "{left}");
+}
