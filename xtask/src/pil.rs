@@ -28,7 +28,7 @@ pub(crate) use runs::{ensure_equal, three_steps};
 
 use further::{eventful, mixed, predictive};
 use runs::{most, put_most};
-use speed::{SPEED_LEAST, is_met, speed_verdict, watched};
+use speed::{SPEED_LEAST, Speed, is_met, speed_verdict, watched};
 
 const PACKAGE: &str = "wheeleg-pil-unicorn";
 /// What building the Unicorn engine takes, as Debian packages.
@@ -266,7 +266,7 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<Value> {
     ];
     let native = three_steps("sil", "pil-run/native", &environment, &[])?;
     let speed = |run: &Value| run["realtime_factor"].as_f64().unwrap_or(0.0);
-    let rated = |played: &[(Value, f64)]| -> Vec<(f64, f64)> {
+    let rated = |played: &[(Value, Option<f64>)]| -> Vec<Speed> {
         played
             .iter()
             .map(|(run, others)| (speed(run), *others))
