@@ -221,6 +221,29 @@ fn a_case_can_be_played_alone_and_gives_its_row_again() {
 }
 
 #[test]
+fn the_terminal_shows_the_figures_of_the_moves_that_were_chosen() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let assert = wheeleg(&["compare", "--axis", AXIS, "--controller", "pwm-p"])
+        .args(["--move", "sine", "--move", "step-20"])
+        .args(["--seeds", "1", "--combinations", "0", "--out"])
+        .arg(folder.path().join("out"))
+        .assert()
+        .success();
+    let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
+    let lines: Vec<Vec<&str>> = stdout
+        .lines()
+        .map(|line| line.split_whitespace().collect())
+        .collect();
+    assert_eq!(lines[1], ["20", "mm", "sinusoid", "cycles"]);
+    let [name, error, worst, _] = lines[2][..] else {
+        panic!("{stdout}");
+    };
+    assert_eq!(name, "pwm-p");
+    let mm = |text: &str| text.parse::<f64>().expect("a number");
+    assert!(mm(error) < 20.0 && mm(worst) > 1.0, "{stdout}");
+}
+
+#[test]
 fn wrong_input_is_refused_by_name() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let out = folder.path().join("out").to_string_lossy().into_owned();

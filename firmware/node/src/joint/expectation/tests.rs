@@ -1,6 +1,7 @@
 //! Tests of the watch for motion that does not come.
 
 use super::*;
+use std::hash::DefaultHasher;
 use wheeleg_control::axis::AxisData;
 
 /// A tick under control that sends `on`.
@@ -257,4 +258,56 @@ fn the_mean_is_over_the_last_100_ms_of_sliding() {
     slide(&mut watch, 99, -100, &model);
     let left = (old + 28_000.0 - f64::from(watch.learnt)) / 28_000.0;
     assert!((left - 0.362).abs() < 0.02, "{left}");
+}
+
+#[test]
+fn every_flipped_bit_of_what_the_watch_keeps_changes_its_seal() {
+    let sum = |watch: &MotionWatch| {
+        let mut hasher = DefaultHasher::new();
+        watch.hash(&mut hasher);
+        hasher.finish()
+    };
+    let model = model(0);
+    let mut watch = knowing(0, 90, &model);
+    // A word of many bits and one of none: whatever joins two fields must keep both.
+    for (slid, doubt) in [(0, 0), (0x55AA, 0xA55A)] {
+        (watch.slid, watch.doubt) = (slid, doubt);
+        let sound = sum(&watch);
+        for bit in 0..32 {
+            let mut damaged = [watch; 5];
+            damaged[0].from ^= 1 << bit;
+            damaged[1].learnt ^= 1 << bit;
+            damaged[2].slid ^= 1 << (bit % 16);
+            damaged[3].doubt ^= 1 << (bit % 16);
+            damaged[4].stands ^= 1 << (bit % 16);
+            for (field, damaged) in damaged.iter().enumerate() {
+                assert_ne!(sum(damaged), sound, "{field} {bit}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_precharge_holds_the_force_that_it_found() {
+    let model = model(0);
+    let at = PositionMm::from_int(90);
+    let mut watch = knowing(0, 90, &model);
+    let fill = |watch: &mut MotionWatch, on: OnTimes| {
+        for _ in 0..60 {
+            watch.rest(&on, at, &model);
+        }
+    };
+    fill(&mut watch, [1000, 0, 0, 0]);
+    let force = watch.air.force(&model.air);
+    assert!(force > 20_000, "{force}");
+    assert_eq!(watch.unbalanced(&model), force);
+    watch.hold_force(&model);
+    assert_eq!((watch.unbalanced(&model), watch.slid), (0, 0));
+    // More in B pushes back, by as much as it changes the force.
+    fill(&mut watch, [0, 0, 1000, 0]);
+    let change = watch.air.force(&model.air) - force;
+    assert!(change < -20_000, "{change}");
+    assert_eq!(watch.unbalanced(&model), change);
+    let [a, b] = watch.air.pressures();
+    assert_eq!(watch.least_pressure(), a.min(b));
 }
