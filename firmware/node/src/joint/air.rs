@@ -46,9 +46,6 @@ const ROUNDS: u32 = 0xF000;
 /// … of which this is one.
 const ONE: u32 = 0x1000;
 const _: () = assert!(WHOLE <= TIME, "a round fits its bits");
-/// More whole rounds than are counted: nothing is certain of valves that take longer
-/// (see [`AirModel`]).
-const NEVER: u32 = ROUNDS + ONE;
 /// How often as long as told a valve may take to open, in fifths (ASSUMED: small
 /// direct-acting valves of one type differ by about twice with age, temperature and supply
 /// voltage; with twice exactly, faults after the first motions are found much later: FAULTS.md).
@@ -117,8 +114,8 @@ pub(super) struct AirModel {
     rod: i32,
     /// Time after which a vented chamber is known, in 64 µs.
     known: u16,
-    /// Whole rounds after which an energised valve is open for certain, in [`ONE`], at most
-    /// [`NEVER`].
+    /// Whole rounds after which an energised valve is open for certain, in [`ONE`]; never, if
+    /// they are more than are counted.
     slow: u32,
 }
 
@@ -140,7 +137,7 @@ impl AirModel {
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
             rod: axis.force_rod,
             known: u16::try_from(known).unwrap_or(u16::MAX),
-            slow: slow.div_ceil(WHOLE).saturating_mul(ONE).min(NEVER),
+            slow: slow.div_ceil(WHOLE).saturating_mul(ONE),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::JOINT_TICK;
+use std::hash::DefaultHasher;
 use wheeleg_control::axis::AxisData;
 
 const MIDDLE: PositionMm = PositionMm::from_int(90);
@@ -217,6 +218,49 @@ fn extremes_of_the_parameters_stay_in_their_bounds() {
             air.follow(&on, at, &model, false);
             let bounds = (model.ambient >> 1)..=MOST;
             assert!(bounds.contains(&air.a.p) && bounds.contains(&air.b.p));
+        }
+    }
+}
+
+#[test]
+fn a_chamber_may_lose_a_bar_in_4_7_s_down_to_the_atmosphere() {
+    let model = model();
+    let mut air = Air::unknown(&model, MIDDLE);
+    let bar = |p: i32| f64::from(p) / f64::from(SUPPLY) * 7.01325;
+    (air.a.p, air.b.p) = (SUPPLY, model.ambient + 100);
+    air.leak(&model, 4700 / ROUND);
+    assert!((bar(air.a.p) - 6.01).abs() < 0.02, "{}", bar(air.a.p));
+    assert_eq!(air.b.p, model.ambient);
+    // What is below it stays.
+    air.b.p = model.ambient / 2;
+    air.leak(&model, 1);
+    assert_eq!(air.b.p, model.ambient / 2);
+    air.leak(&model, u16::MAX);
+    assert_eq!(air.a.p, model.ambient);
+}
+
+#[test]
+fn every_flipped_bit_of_the_account_changes_its_seal() {
+    let sum = |air: &Air| {
+        let mut hasher = DefaultHasher::new();
+        air.hash(&mut hasher);
+        hasher.finish()
+    };
+    let model = model();
+    let mut air = Air::unknown(&model, MIDDLE);
+    for (p, vented) in [(0, 0), (0x7_5A5A, 0xA5A5)] {
+        (air.a.p, air.a.vented) = (p, vented);
+        let sound = sum(&air);
+        for bit in 0..32 {
+            let mut damaged = [air; 5];
+            damaged[0].a.p ^= 1 << bit;
+            damaged[1].a.length ^= 1 << bit;
+            damaged[2].a.open ^= 1 << bit;
+            damaged[3].a.vented ^= 1 << (bit % 16);
+            damaged[4].b.p ^= 1 << bit;
+            for (field, damaged) in damaged.iter().enumerate() {
+                assert_ne!(sum(damaged), sound, "{field} {bit}");
+            }
         }
     }
 }

@@ -201,6 +201,8 @@ fn the_load_is_the_force_of_a_sliding_piston_less_its_friction() {
     for (at, speed, teaches) in [
         (90, 0, false),
         (5, 100, false),
+        (6, 100, false),
+        (174, 100, false),
         (5, -100, false),
         (175, 100, false),
         (175, -100, false),
@@ -310,4 +312,66 @@ fn a_precharge_holds_the_force_that_it_found() {
     assert_eq!(watch.unbalanced(&model), change);
     let [a, b] = watch.air.pressures();
     assert_eq!(watch.least_pressure(), a.min(b));
+}
+
+#[test]
+fn each_bound_of_the_rules_is_where_it_is_told() {
+    let model = model(50);
+    // 4 mm from the reference and 3 mm before the ends motion is expected.
+    for (on, reference, position) in [
+        (PUSH, 94, 90),
+        (PULL, 86, 90),
+        (PUSH, 200, 177),
+        (PULL, -20, 3),
+    ] {
+        let watch = knowing(0, position, &model);
+        let found = fault(watch, on, driven(reference, position), &model);
+        assert!(found.is_some(), "{reference} {position}");
+    }
+    // The margin itself is allowed, a millinewton more is not.
+    let mut watch = knowing(0, 90, &model);
+    let force = watch.air.force(&model.air);
+    let rule = |watch: &MotionWatch, reference: i16, model: &MotionModel| {
+        let [reference, position] = [reference, 90].map(PositionMm::from_int);
+        watch.rule(reference, position, model)
+    };
+    for (reference, sign) in [(120, 1), (60, -1)] {
+        watch.learnt = force - sign * model.margin;
+        assert_eq!(rule(&watch, reference, &model), Rule::None);
+        watch.learnt -= sign;
+        assert_eq!(rule(&watch, reference, &model), Rule::Pushed);
+        // So are nine tenths of the largest for a watch that has learnt nothing.
+        let (slid, mut model) = (watch.slid, model);
+        watch.slid = 0;
+        let least = sign * force;
+        model.nearly_all = (least, least);
+        assert_eq!(rule(&watch, reference, &model), Rule::None);
+        model.nearly_all = (least - 1, least - 1);
+        assert_eq!(rule(&watch, reference, &model), Rule::Largest);
+        watch.slid = slid;
+    }
+}
+
+#[test]
+fn of_short_pulses_only_those_of_a_piston_that_moves_count() {
+    let model = model(50);
+    // 6 ms every 20 ms: a valve told to open in 3.5 ms may not do so.
+    let gain = |moves: bool| {
+        let mut watch = knowing(0, 90, &model);
+        let driven = Driven {
+            velocity: VelocityMmS::from_int(if moves { 12 } else { 0 }),
+            ..driven(90, 90)
+        };
+        for _ in 0..3 {
+            sample(&mut watch, &SHUT, &driven, &model);
+        }
+        let before = watch.air.force(&model.air);
+        for tick in 0..200 {
+            let on = if tick % 20 < 6 { [1000, 0, 0, 0] } else { SHUT };
+            sample(&mut watch, &on, &driven, &model);
+        }
+        watch.air.force(&model.air) - before
+    };
+    assert_eq!(gain(false), 0);
+    assert!(gain(true) > 20_000, "{}", gain(true));
 }
