@@ -264,3 +264,31 @@ fn every_flipped_bit_of_the_account_changes_its_seal() {
         }
     }
 }
+
+#[test]
+fn a_pulse_fills_a_64th_of_the_supply_or_what_its_shortest_opening_gives() {
+    let model = model();
+    for (b, supply_n) in [(false, 0.701_325 * 314.16), (true, 0.701_325 * 263.9)] {
+        let (least, none) = (Micros::ZERO, Micros(u32::MAX));
+        let (time, force) = model.pulse(b, MIDDLE, least, none);
+        assert!((f64::from(force) / 1e3 - supply_n / 64.0).abs() < 0.02);
+        // What the account makes of it: a 64th in choked flow, in ticks of a millisecond.
+        let ticks = time.get().div_ceil(1000);
+        let mut on = [0; 4];
+        on[if b { 2 } else { 0 }] = 1000;
+        let [a0, b0] = after(0, on, [1.2, 1.2], &model);
+        let [a1, b1] = after(ticks, on, [1.2, 1.2], &model);
+        let rise =
+            if b { b1 - b0 } else { a1 - a0 } * f64::from(time.get()) / f64::from(ticks * 1000);
+        assert!((rise / (7.01325 / 64.0) - 1.0).abs() < 0.03, "{rise}");
+        // Longer ones give more, up to all of the supply; bounds hold.
+        for (times, parts) in [(10, 10), (50, 50), (64, 64), (100, 64)] {
+            let shortest = Micros(time.get() * times);
+            let (opening, longer) = model.pulse(b, MIDDLE, shortest, none);
+            assert_eq!((opening, longer), (shortest, force * parts));
+        }
+        let (opening, half) = model.pulse(b, MIDDLE, least, Micros(time.get() / 2));
+        assert_eq!(opening.get(), time.get() / 2);
+        assert!((half - force / 2).abs() <= force / 16, "{half} {force}");
+    }
+}
