@@ -281,3 +281,22 @@ proptest! {
         prop_assert_eq!(loaded(&flash), (None, Vec::new()));
     }
 }
+
+#[test]
+fn a_page_has_room_for_254_records_and_a_board_saves_every_parameter_that_it_has() {
+    let full = set(3, 254);
+    let mut store = Store::new(Mock::new());
+    assert_eq!(store.save(&full), Ok(0));
+    assert_eq!(loaded(&store.flash), (Some(0), full));
+    assert_eq!(store.save(&set(4, 255)), Err(SaveError::TooMany));
+
+    let ids = |ids: Vec<u16>| ids.into_iter().map(|id| (id, i32::from(id) - 300));
+    let joint: Vec<u16> = JointParam::ALL.iter().map(|param| param.id()).collect();
+    let wheel: Vec<u16> = WheelParam::ALL.iter().map(|param| param.id()).collect();
+    for all in [joint, wheel] {
+        let mut store = Store::new(Mock::new());
+        ParameterStore::save(&mut store, ids(all.clone())).unwrap();
+        let records: Vec<Record> = ids(all).map(|(id, raw)| Record { id, raw }).collect();
+        assert_eq!(loaded(&store.flash), (Some(0), records));
+    }
+}
