@@ -292,3 +292,35 @@ fn a_pulse_fills_a_64th_of_the_supply_or_what_its_shortest_opening_gives() {
         assert!((half - force / 2).abs() <= force / 16, "{half} {force}");
     }
 }
+
+#[test]
+fn what_moves_the_air_is_more_than_noise_and_no_more_than_a_piston_can() {
+    let model = model();
+    // Lengths and pressures after three ticks at a stroke that is off by so much.
+    let moved = |off: i32| {
+        let mut air = Air::unknown(&model, MIDDLE);
+        let at = PositionMm::from_raw(MIDDLE.raw() + off);
+        for _ in 0..ROUND {
+            air.follow(&[0; 4], at, &model, false);
+        }
+        let lengths = [air.a.length - MIDDLE.raw(), MIDDLE.raw() - air.b.length];
+        let ambient = model.ambient;
+        (lengths, [air.a.p - ambient, air.b.p - ambient])
+    };
+    // An eighth of a millimetre.
+    for off in [8191, -8191, 0] {
+        assert_eq!(moved(off), ([0, 0], [0, 0]));
+    }
+    for off in [8192, STEP] {
+        let (lengths, [a, b]) = moved(off);
+        assert_eq!(lengths, [off, off]);
+        assert!(a < 0 && b > 0, "{a} {b}");
+        let (lengths, [a, b]) = moved(-off);
+        assert_eq!(lengths, [-off, -off]);
+        assert!(a > 0 && b < 0, "{a} {b}");
+    }
+    // Beyond 4 mm it is another calibration: the length is taken over, the air stays.
+    for off in [STEP + 1, -STEP - 1, 80 << 16] {
+        assert_eq!(moved(off), ([off, off], [0, 0]));
+    }
+}
