@@ -12,7 +12,7 @@ mod timing;
 pub use duplicate::{DuplicateFilter, Verdict};
 pub use requester::{GiveUp, Outcome, Refusal, Requester, RequesterConfig, Step};
 pub use supervisor::{
-    ClearError, LinkLoss, LinkState, LinkSupervisor, NodeMonitor, WatchdogCycles,
+    ADVANCE_MOST, ClearError, LinkLoss, LinkState, LinkSupervisor, NodeMonitor, WatchdogCycles,
 };
 pub use timing::{
     BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, DISCOVERY_SLOTS, DUPLICATE_WINDOW_US, GAP_US,

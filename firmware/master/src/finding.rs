@@ -48,6 +48,8 @@ findings! {
         "Unplug the boards one by one until the line is quiet: the last one unplugged babbles.";
     Babbler: "It heard nothing of the rubbish that all others heard: it babbled itself, and its driver-enable guard is broken.",
         "Switch the robot off and replace this board.";
+    LeftArmed: "It was still armed while nobody was, and has been asked to disarm.",
+        "Find out why the master started again, or why its request did not arrive.";
     LineFull: "It fills the line with frames that nobody asked for.",
         "Unplug this board or tool, or flash it with the master's version.";
 }

@@ -451,6 +451,34 @@ mod tests {
         own
     }
 
+    /// A tick has room for eight notes; with more of them the first are worked off at once.
+    #[test]
+    fn no_note_is_lost_however_many_a_tick_makes() {
+        let mut own = Supervisor::new();
+        own.read_log(1000, Micros(0));
+        for n in 0..16 {
+            own.note(LogEvent::Parameter, 0, n, Micros(5000));
+        }
+        let mut numbers = Vec::new();
+        for _ in 0..4 {
+            let records = own.read_log(1000, Micros(6000));
+            assert_eq!(records.lost, 0);
+            numbers.extend(records.iter().map(|entry| entry.b));
+        }
+        assert_eq!(numbers, (0..16).collect::<Vec<u16>>());
+    }
+
+    #[test]
+    fn the_counter_of_the_newest_sync_is_compared_while_the_link_is_up() {
+        let mut own = Supervisor::new();
+        assert!(own.agrees(5), "nothing is certain yet");
+        own.sync(7, false, Micros(0));
+        own.sync(8, false, Micros(10_000));
+        assert!(own.agrees(8) && !own.agrees(7) && !own.agrees(9));
+        own.sync(8, false, Micros(20_000));
+        assert!(own.agrees(7), "a stale one came since");
+    }
+
     /// Only a fresh SYNC takes an E-stop back; a repeated one proves nothing.
     #[test]
     fn a_stale_sync_does_not_take_an_emergency_stop_back() {

@@ -142,7 +142,7 @@ impl<'p> Board<'p> for RemoteJoint<'p> {
             mask,
         };
         let sensor = Potentiometer(&pins.code);
-        let node = JointNode::from_store(identity, parameters, valves, sensor, switches)?;
+        let node = JointNode::from_store(identity, Some(parameters), valves, sensor, switches)?;
         Ok(Self { node, pins, mask })
     }
 
@@ -248,7 +248,8 @@ impl<'p> Board<'p> for RemoteWheel<'p> {
         };
         let encoder = Quadrature(&pins.count);
         let dump = DumpPin(Output(&pins.dump));
-        let node = WheelNode::from_store(identity, parameters, bridge, encoder, supply, dump)?;
+        let node =
+            WheelNode::from_store(identity, Some(parameters), bridge, encoder, supply, dump)?;
         Ok(Self {
             node,
             pins,

@@ -75,7 +75,7 @@ impl Node {
             .chain(others.iter().copied())
             .map(|(parameter, raw)| (parameter.id(), raw))
             .collect();
-        let board = JointBoard::new(identity(address), &stored, ResetCause::PowerUp)
+        let board = JointBoard::new(identity(address), Some(&stored), ResetCause::PowerUp)
             .map_err(|e| BenchError::Board(e.to_string()))?;
         Ok(Self {
             board,

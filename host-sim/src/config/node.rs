@@ -117,9 +117,9 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
 fn accepts(address: Address, stored: &[(u16, i32)]) -> bool {
     let (who, cause) = (identity(address), ResetCause::PowerUp);
     if address.is_joint() {
-        JointBoard::new(who, stored, cause).is_ok()
+        JointBoard::new(who, Some(stored), cause).is_ok()
     } else {
-        WheelBoard::new(who, stored, cause).is_ok()
+        WheelBoard::new(who, Some(stored), cause).is_ok()
     }
 }
 

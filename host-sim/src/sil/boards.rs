@@ -12,8 +12,8 @@ use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::{JointParameters, WheelParameters};
 use wheeleg_node::snapshot::TickReport;
 use wheeleg_node::wheel::WheelNode;
-use wheeleg_node::{NodeIdentity, Transmission};
-use wheeleg_protocol::{Address, NackReason, ResetCause};
+use wheeleg_node::{ConfigError, NodeIdentity, Transmission};
+use wheeleg_protocol::{Address, Fault, FaultBits, NackReason, ResetCause};
 use wheeleg_units::Micros;
 
 use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
@@ -68,7 +68,12 @@ pub(super) fn twin_identity(address: Address) -> NodeIdentity {
     }
 }
 
-fn rejected(address: Address, error: wheeleg_node::ConfigError) -> SimError {
+/// Whether a board has refused the parameters that it was given.
+const fn is_refused(faults: FaultBits) -> bool {
+    faults.contains(Fault::ParameterCorrupt)
+}
+
+fn rejected(address: Address, error: ConfigError) -> SimError {
     SimError::simulation(
         format!("the board of {address} refuses its configuration: {error:?}"),
         "see the sections [node.…] of the robot file",
@@ -78,11 +83,14 @@ fn rejected(address: Address, error: wheeleg_node::ConfigError) -> SimError {
 /// The board's parameters: its defaults with the commissioned values on top.
 fn stored_parameters<P>(
     address: Address,
-    stored: &[(u16, i32)],
+    stored: Option<&[(u16, i32)]>,
     defaults: P,
     with: impl Fn(&P, u16, i32) -> Result<P, NackReason>,
-) -> Result<P, SimError> {
-    stored.iter().try_fold(defaults, |parameters, (id, raw)| {
+) -> Result<Option<P>, SimError> {
+    let Some(stored) = stored else {
+        return Ok(None);
+    };
+    let set = stored.iter().try_fold(defaults, |parameters, (id, raw)| {
         with(&parameters, *id, *raw).map_err(|reason| {
             SimError::simulation(
                 format!(
@@ -92,19 +100,20 @@ fn stored_parameters<P>(
                 "see the sections [node.…] of the robot file",
             )
         })
-    })
+    });
+    set.map(Some)
 }
 
 impl JointBoard {
     /// The board `who`, in boot, all valves off. `stored` are the parameters
-    /// (number, raw value) that commissioning left in its memory, `cause` why its
+    /// (number, raw value) that its memory holds, none if it is damaged, `cause` why its
     /// processor starts.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(crate) fn new(
         who: NodeIdentity,
-        stored: &[(u16, i32)],
+        stored: Option<&[(u16, i32)]>,
         cause: ResetCause,
     ) -> Result<Self, SimError> {
         let address = who.address;
@@ -125,13 +134,16 @@ impl JointBoard {
         let application = if address.raw().is_multiple_of(3) {
             let [front, left, rear, right] = foot.clone();
             let switches = FootSwitches(front, left, rear, right);
-            JointNode::new(who, parameters, bank, sensor.clone(), switches)
+            JointNode::from_store(who, parameters, bank, sensor.clone(), switches)
                 .map(JointApplication::WithFoot)
         } else {
-            JointNode::new(who, parameters, bank, sensor.clone(), NoSwitches)
+            JointNode::from_store(who, parameters, bank, sensor.clone(), NoSwitches)
                 .map(JointApplication::Plain)
         };
         let mut application = application.map_err(|e| rejected(address, e))?;
+        if stored.is_some() && each!(&application, node => is_refused(node.faults())) {
+            return Err(rejected(address, ConfigError::Parameters));
+        }
         each!(&mut application, node => node.started_by(cause));
         Ok(Self {
             application,
@@ -241,7 +253,7 @@ impl WheelBoard {
     /// [`SimError::Simulation`] if the application refuses its parameters.
     pub(crate) fn new(
         who: NodeIdentity,
-        stored: &[(u16, i32)],
+        stored: Option<&[(u16, i32)]>,
         cause: ResetCause,
     ) -> Result<Self, SimError> {
         let address = who.address;
@@ -259,10 +271,10 @@ impl WheelBoard {
         let application = if address.raw() == 7 {
             let switch = SupplySwitch(supply.clone());
             let valve = DumpPin(dump.clone());
-            WheelNode::new(who, parameters, bridge, encoder.clone(), switch, valve)
+            WheelNode::from_store(who, parameters, bridge, encoder.clone(), switch, valve)
                 .map(WheelApplication::WithSupply)
         } else {
-            WheelNode::new(
+            WheelNode::from_store(
                 who,
                 parameters,
                 bridge,
@@ -273,6 +285,9 @@ impl WheelBoard {
             .map(WheelApplication::Plain)
         };
         let mut application = application.map_err(|e| rejected(address, e))?;
+        if stored.is_some() && each_wheel!(&application, node => is_refused(node.faults())) {
+            return Err(rejected(address, ConfigError::Parameters));
+        }
         each_wheel!(&mut application, node => node.started_by(cause));
         Ok(Self {
             application,

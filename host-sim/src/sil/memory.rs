@@ -1,6 +1,8 @@
 //! The parameter memory of a board: two pages of flash that keep their contents
 //! without power, take their time, and stop where the power does.
 
+use std::convert::Infallible;
+
 use wheeleg_node::hardware::ParameterStore;
 use wheeleg_node::store::{Flash, FlashError, PAGES, RECORDS_MAX, Store, WORDS};
 
@@ -85,17 +87,18 @@ impl Memory {
         memory
     }
 
-    /// The newest whole set, in the order in which it was stored.
-    pub(super) fn records(&self) -> Vec<(u16, i32)> {
+    /// The newest whole set, in the order in which it was stored, or that of a blank memory;
+    /// `None` if what it holds is damaged.
+    pub(super) fn records(&self) -> Option<Vec<(u16, i32)>> {
         let mut pages = self.pages.clone();
         let store = Store::new(&mut pages);
-        let begin = [None; RECORDS_MAX];
-        let set = store.load((begin, 0_usize), |(records, count), record| {
-            records[*count] = Some((record.id, record.raw));
-            *count += 1;
+        let begin = ([None; RECORDS_MAX], 0_usize);
+        let set = store.parameters(begin, |(records, count), id, raw| {
+            let mut records = *records;
+            records[*count] = Some((id, raw));
+            Ok::<_, Infallible>((records, count + 1))
         });
-        let records = set.map(|((records, _), _)| records);
-        records.into_iter().flatten().flatten().collect()
+        set.map(|(records, _)| records.into_iter().flatten().collect())
     }
 
     /// Writes a set; the power fails after `left_ns`. Gives the time it took, ns.
@@ -157,15 +160,15 @@ mod tests {
 
     #[test]
     fn a_set_is_kept_and_a_blank_memory_has_none() {
-        assert!(Memory::new(&[]).records().is_empty());
-        assert_eq!(Memory::new(&set(7)).records(), set(7));
+        assert_eq!(Memory::new(&[]).records(), Some(Vec::new()));
+        assert_eq!(Memory::new(&set(7)).records(), Some(set(7)));
         let mut memory = Memory::new(&set(7));
         let end_ns = memory.begin(set(100), 5_000);
         memory.end();
         // One page, the head, the records, the checksum.
         assert_eq!(end_ns, 5_000 + ERASE_NS + 22 * PROGRAM_NS);
         memory.power_fails(end_ns + 1);
-        assert_eq!(memory.records(), set(100));
+        assert_eq!(memory.records(), Some(set(100)));
     }
 
     /// A cut in every unit and between all of them: the old set or the new one.
@@ -181,7 +184,7 @@ mod tests {
             let mut memory = Memory::new(&set(7));
             memory.begin(set(100), 0);
             memory.power_fails(cut_ns);
-            let found = memory.records();
+            let found = memory.records().expect("a whole set");
             let new = found == set(100);
             assert!(new || found == set(7), "after {cut_ns} ns: {found:?}");
             assert_eq!(new, cut_ns >= ERASE_NS + 22 * PROGRAM_NS, "{cut_ns}");
@@ -189,7 +192,7 @@ mod tests {
             // What the cut left behind does not spoil the next save.
             memory.begin(set(300), 0);
             memory.end();
-            assert_eq!(memory.records(), set(300), "after {cut_ns} ns");
+            assert_eq!(memory.records(), Some(set(300)), "after {cut_ns} ns");
         }
         assert!(news > 0);
     }

@@ -220,9 +220,9 @@ impl World {
         let who = identity(address);
         let stored = self.memories[i].records();
         if i < 6 {
-            self.joints[i] = JointBoard::new(who, &stored, cause)?;
+            self.joints[i] = JointBoard::new(who, stored.as_deref(), cause)?;
         } else {
-            self.wheels[i - 6] = WheelBoard::new(who, &stored, cause)?;
+            self.wheels[i - 6] = WheelBoard::new(who, stored.as_deref(), cause)?;
         }
         self.clock_zero_ns[i] = self.now_ns + self.tick_ns(address.raw());
         Ok(())

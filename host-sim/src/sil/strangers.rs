@@ -59,10 +59,10 @@ impl Strangers {
             return Ok(());
         };
         if i < 6 {
-            let board = JointBoard::new(who, &stored.joints[i], ResetCause::PowerUp)?;
+            let board = JointBoard::new(who, Some(&stored.joints[i]), ResetCause::PowerUp)?;
             self.joints.push((address, board));
         } else {
-            let board = WheelBoard::new(who, &stored.wheels[i - 6], ResetCause::PowerUp)?;
+            let board = WheelBoard::new(who, Some(&stored.wheels[i - 6]), ResetCause::PowerUp)?;
             self.wheels.push((address, board));
         }
         Ok(())

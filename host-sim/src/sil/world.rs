@@ -152,14 +152,14 @@ impl World {
         let joint = |n: u8| {
             JointBoard::new(
                 who(n)?,
-                &stored.joints[usize::from(n) - 1],
+                Some(&stored.joints[usize::from(n) - 1]),
                 ResetCause::PowerUp,
             )
         };
         let wheel = |n: u8| {
             WheelBoard::new(
                 who(n)?,
-                &stored.wheels[usize::from(n) - 7],
+                Some(&stored.wheels[usize::from(n) - 7]),
                 ResetCause::PowerUp,
             )
         };

@@ -38,6 +38,11 @@ impl Default for WatchdogCycles {
     }
 }
 
+/// Largest step of the counter that is an advance: what the longest watchdog lets be lost, and one.
+/// A master that starts again counts from 1; with a wider window half of all restarts would look
+/// as if the old one went on.
+pub const ADVANCE_MOST: u16 = 11;
+
 /// Why a link was declared lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LinkLoss {
@@ -81,8 +86,8 @@ impl core::fmt::Display for ClearError {
 
 /// A node's watch over SYNC.
 ///
-/// The counter of SYNC must advance (by 1–32767 modulo 2^16: lost frames are
-/// fine, repeats and steps back are not) at least once within the watchdog
+/// The counter of SYNC must advance (by 1 to [`ADVANCE_MOST`] modulo 2^16: lost frames are
+/// fine, repeats, steps back and jumps are not) at least once within the watchdog
 /// time, otherwise the link is lost. On from the first advancing SYNC; latched.
 ///
 /// The time is an argument: microseconds of a clock that does not wrap. Call
@@ -118,7 +123,7 @@ impl LinkSupervisor {
             self.counter = Some(cycle);
             return false;
         };
-        let advanced = matches!(cycle.wrapping_sub(last), 1..=0x7FFF);
+        let advanced = matches!(cycle.wrapping_sub(last), 1..=ADVANCE_MOST);
         if advanced {
             self.counter = Some(cycle);
             self.advanced_at_us = Some(now_us);
@@ -273,8 +278,8 @@ mod tests {
     }
 
     #[test]
-    fn frozen_and_backward_counters_are_stale() {
-        for step in [0_u16, u16::MAX, 0x8000] {
+    fn frozen_backward_and_jumping_counters_are_stale() {
+        for step in [0_u16, u16::MAX, 0x8000, 0x7FFF, 1000, 12] {
             let mut link = up_at(1_000_000);
             for k in 1..=5 {
                 let now = 1_000_000 + k * 10_000;
@@ -297,6 +302,31 @@ mod tests {
             cycle = cycle.wrapping_add(5);
             now += 50_000;
             assert_eq!(link.poll(now - 1), None);
+        }
+    }
+
+    /// The longest watchdog lets ten be lost.
+    #[test]
+    fn a_step_of_eleven_is_an_advance() {
+        let mut link = up_at(1_000_000);
+        link.set_watchdog(WatchdogCycles::new(10).unwrap());
+        assert!(link.on_sync(101 + 11, 1_100_000));
+        assert_eq!(link.poll(1_100_001), None);
+    }
+
+    /// Whatever the old one had counted to: a new master counts from 1.
+    #[test]
+    fn a_master_that_starts_again_is_stale_at_any_uptime() {
+        for last in (20..=u16::MAX).step_by(997) {
+            let mut link = LinkSupervisor::default();
+            link.on_sync(last - 1, 990_000);
+            assert!(link.on_sync(last, 1_000_000));
+            for k in 1..=5_u16 {
+                let now = 1_000_000 + u64::from(k) * 10_000;
+                assert!(!link.on_sync(k, now), "{last} {k}");
+                assert_eq!(link.poll(now), None);
+            }
+            assert_eq!(link.poll(1_051_000), Some(LinkLoss::Stale), "{last}");
         }
     }
 

@@ -12,15 +12,10 @@ pub(super) unsafe fn store() -> Store<ParameterPages> {
     Store::new(unsafe { ParameterPages::steal() })
 }
 
-/// Puts the stored values over `defaults`, one by one. A value that the
-/// application refuses, because it is from another version, keeps its default.
-pub fn load<P: Copy, R>(defaults: P, with: impl Fn(&P, u16, i32) -> Result<P, R>) -> P {
+/// The stored values over `defaults`; `None` if they are damaged, or the application refuses
+/// one of them, because it is from another version.
+pub fn load<P: Copy, R>(defaults: P, with: impl Fn(&P, u16, i32) -> Result<P, R>) -> Option<P> {
     // SAFETY: the one use of the pages; it ends here.
     let store = unsafe { store() };
-    let loaded = store.load(defaults, |parameters, record| {
-        if let Ok(changed) = with(parameters, record.id, record.raw) {
-            *parameters = changed;
-        }
-    });
-    loaded.map_or(defaults, |(parameters, _)| parameters)
+    store.parameters(defaults, with)
 }

@@ -59,6 +59,22 @@ pub struct Job {
     pub message: Message,
     /// On whose behalf.
     pub purpose: Purpose,
+    /// Latest time at which it may be sent first, µs: requests wait while a silent board is
+    /// asked again, and what moves an axis must not come long after it was wanted.
+    pub until_us: u64,
+}
+
+impl Job {
+    /// One that may wait.
+    #[must_use]
+    pub const fn new(to: Address, message: Message, purpose: Purpose) -> Self {
+        Self {
+            to,
+            message,
+            purpose,
+            until_us: u64::MAX,
+        }
+    }
 }
 
 /// Waiting requests, in order; stops overtake everything else.
@@ -92,6 +108,12 @@ impl Jobs {
         self.queue.pop_front()
     }
 
+    /// Whether none waits.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+
     /// Drops all waiting requests, and calls `dropped` for the ticket of each
     /// user command among them.
     pub fn clear(&mut self, mut dropped: impl FnMut(Ticket)) {
@@ -109,11 +131,7 @@ impl Jobs {
             for to in Address::nodes() {
                 if to.slot().is_some_and(|index| alive(index) == wanted) {
                     // Eight of them fit the queue, which the caller has cleared.
-                    let _fits = self.push(Job {
-                        to,
-                        message,
-                        purpose: Purpose::Stop,
-                    });
+                    let _fits = self.push(Job::new(to, message, Purpose::Stop));
                 }
             }
         }

@@ -184,11 +184,8 @@ impl Layer0 {
                     return Err(Refusal::Busy);
                 }
                 // What it has counted before and after tells whether it was reset.
-                let _fits = self.jobs.push(Job {
-                    to,
-                    message: proto::LinkReport {}.into(),
-                    purpose: Purpose::Report,
-                });
+                let look = Job::new(to, proto::LinkReport {}.into(), Purpose::Report);
+                let _fits = self.jobs.push(look);
                 self.ask(accepted, to, proto::ParamSave {}.into())
             }
             // The E-stop does not queue, and commands of layer 1 are never routed here.
@@ -217,11 +214,10 @@ impl Layer0 {
     }
 
     fn ask(&mut self, accepted: &Accepted, to: Address, message: Message) -> Result<bool, Refusal> {
-        let job = Job {
-            to,
-            message,
-            purpose: Purpose::User(accepted.ticket),
-        };
+        let mut job = Job::new(to, message, Purpose::User(accepted.ticket));
+        if matches!(message, Message::OpenAllValves(_)) {
+            job.until_us = accepted.deadline_us;
+        }
         if self.jobs.push(job) {
             Ok(false)
         } else {
@@ -262,11 +258,7 @@ impl Layer0 {
         for to in Address::nodes() {
             let setup = wheel_setup.iter().filter(|_| to.is_wheel());
             for message in setup.chain(core::iter::once(&arm)) {
-                let job = Job {
-                    to,
-                    message: *message,
-                    purpose: Purpose::Group,
-                };
+                let job = Job::new(to, *message, Purpose::Group);
                 // They fit: see above.
                 left = left.saturating_add(u8::from(self.jobs.push(job)));
             }
@@ -314,11 +306,7 @@ impl Layer0 {
         for to in Address::nodes().filter(|node| node.is_wheel()) {
             for message in self.profile_messages() {
                 // They fit: see above.
-                let _fits = self.jobs.push(Job {
-                    to,
-                    message,
-                    purpose: Purpose::Profile,
-                });
+                let _fits = self.jobs.push(Job::new(to, message, Purpose::Profile));
             }
         }
     }
@@ -336,11 +324,7 @@ impl Layer0 {
                 if to.slot().is_none_or(|index| !self.liveness.alive(index)) {
                     continue;
                 }
-                let job = Job {
-                    to,
-                    message: *message,
-                    purpose: Purpose::Group,
-                };
+                let job = Job::new(to, *message, Purpose::Group);
                 if self.jobs.push(job) {
                     left = left.saturating_add(1);
                 }

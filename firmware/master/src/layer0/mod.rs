@@ -103,6 +103,8 @@ pub struct Layer0 {
     /// Profile of the wheels' pushes, as last told to their boards.
     push: PushProfile,
     stale_cycles: u16,
+    /// Cycles for which a board has been armed while nobody is.
+    left_behind_cycles: u8,
     /// Strokes at which all joints are kept after a stop.
     frozen: Option<[Option<PositionMm>; JOINTS]>,
     /// References of the user, one joint at a time.
@@ -151,6 +153,7 @@ impl Layer0 {
             group: None,
             setpoints: Setpoints::idle(0),
             stale_cycles: 0,
+            left_behind_cycles: 0,
             frozen: None,
             direct: [None; JOINTS],
             direct_travel: None,

@@ -217,6 +217,20 @@ mod tests {
     }
 
     #[test]
+    fn rounds_on_a_noisy_line_follow_each_other() {
+        let mut questions = Questions::default();
+        let mut errors = 5;
+        let mut next = |cycle| {
+            errors += 1;
+            questions.next(cycle, errors, |_| true)
+        };
+        let found: Vec<_> = (0..480).filter_map(&mut next).collect();
+        assert_eq!(found.len(), 48);
+        assert_eq!(found[..16], found[16..32]);
+        assert_eq!(found[..16], found[32..]);
+    }
+
+    #[test]
     fn a_new_fault_is_asked_for_at_once_and_once() {
         let mut questions = Questions {
             next_cycle: 100,

@@ -37,7 +37,7 @@ impl Layer0 {
                 }
                 Step::GaveUp(reason) => self.gave_up(reason, now_us, events),
                 Step::Idle => {
-                    let job = self.next_job()?;
+                    let job = self.next_job(now_us, events)?;
                     if self.requester.start(job.to, job.message).is_ok() {
                         self.in_flight = Some(job);
                     }
@@ -49,9 +49,15 @@ impl Layer0 {
 
     /// Waiting requests first, then the master's own questions; otherwise asks a
     /// present node that is not known.
-    fn next_job(&mut self) -> Option<Job> {
-        if let Some(job) = self.jobs.pop() {
-            return Some(job);
+    fn next_job(&mut self, now_us: u64, events: &mut Events) -> Option<Job> {
+        while let Some(job) = self.jobs.pop() {
+            match job.purpose.ticket() {
+                Some(ticket) if now_us > job.until_us => {
+                    let reason = Refusal::Expired;
+                    events.push(now_us, Event::Refused { ticket, reason });
+                }
+                _ => return Some(job),
+            }
         }
         let liveness = &self.liveness;
         let errors = self.decoder.quality().errors();
@@ -59,24 +65,17 @@ impl Layer0 {
             .questions
             .next(self.cycle, errors, |index| liveness.alive(index));
         if let Some((to, message)) = question {
-            return Some(Job {
-                to,
-                message,
-                purpose: Purpose::Report,
-            });
+            return Some(Job::new(to, message, Purpose::Report));
         }
         let to = self.nodes.next_unknown(self.ask_from)?;
         self.ask_from = usize::from(to.raw());
         let node = to.slot().and_then(|index| self.nodes.get(index));
-        Some(Job {
-            to,
-            message: if node.is_some_and(|node| node.in_vain) {
-                Discover {}.into()
-            } else {
-                Identify {}.into()
-            },
-            purpose: Purpose::Identify,
-        })
+        let message = if node.is_some_and(|node| node.in_vain) {
+            Discover {}.into()
+        } else {
+            Identify {}.into()
+        };
+        Some(Job::new(to, message, Purpose::Identify))
     }
 
     fn gave_up(&mut self, reason: GiveUp, now_us: u64, events: &mut Events) {
@@ -318,11 +317,7 @@ impl Layer0 {
     ) {
         match result {
             Ok(_) if matches!(job.message, Message::ParamSave(_)) => {
-                let look = Job {
-                    to: job.to,
-                    message: LinkReport {}.into(),
-                    purpose: Purpose::Saved(ticket),
-                };
+                let look = Job::new(job.to, LinkReport {}.into(), Purpose::Saved(ticket));
                 if !self.jobs.push(look) {
                     let reason = Refusal::Busy;
                     events.push(now_us, Event::Refused { ticket, reason });

@@ -1,6 +1,6 @@
 //! Stops: E-stop, HOLD of all axes, and what triggers them.
 
-use wheeleg_protocol::{Address, EmergencyBrake, InputBits, Message};
+use wheeleg_protocol::{Address, Disarm, EmergencyBrake, InputBits, Message};
 
 use super::acyclic::{Job, Purpose};
 use super::line::Found;
@@ -18,6 +18,10 @@ const CONFIRM_CYCLES: u8 = 10;
 /// … and with a precharge, which joints end by themselves after 200 cycles.
 const FILL_CYCLES: u8 = 220;
 
+/// Cycles for which a board may show that it is armed while nobody is: its answer to the last
+/// request, and that of the slowest other.
+const LEFT_BEHIND_CYCLES: u8 = 3;
+
 /// Index of the node with the supply-pressure switch: wheel board 7.
 const SUPPLY_NODE: usize = 6;
 
@@ -25,6 +29,8 @@ impl Layer0 {
     /// E-stop: the bit goes out with the next SYNC and stays until cleared.
     pub fn emergency_stop(&mut self, now_us: u64, events: &mut Events) {
         self.emergency_stop = true;
+        // Where all is held already: what waits must not open a valve after the stop.
+        self.drop_requests(now_us, events);
         self.hold_all(HoldReason::EmergencyStop, now_us, events);
     }
 
@@ -57,6 +63,7 @@ impl Layer0 {
                 purpose: Purpose::Report,
                 to,
                 message,
+                ..
             }) => self.questions.again(to, &message),
             Some(job) => {
                 if let Some(ticket) = job.purpose.ticket() {
@@ -165,6 +172,25 @@ impl Layer0 {
         });
     }
 
+    /// A board that stays armed while nobody is: the master has started again without the
+    /// board's noticing, or the request to disarm was lost. It is told, and asked to disarm.
+    fn disarm_left_behind(&mut self, now_us: u64, events: &mut Events) {
+        let busy = self.group.is_some() || !self.jobs.is_empty();
+        let Some(node) = self.nodes.first_armed().filter(|_| !busy) else {
+            self.left_behind_cycles = 0;
+            return;
+        };
+        self.left_behind_cycles = self.left_behind_cycles.saturating_add(1);
+        if self.left_behind_cycles >= LEFT_BEHIND_CYCLES {
+            self.left_behind_cycles = 0;
+            let (node, finding) = (Some(node), Finding::LeftArmed);
+            events.push(now_us, Event::Found { node, finding });
+            let liveness = &self.liveness;
+            self.jobs
+                .ask_all(Disarm {}.into(), |index| liveness.alive(index));
+        }
+    }
+
     /// Ends a cycle for the supervision of the nodes.
     pub(super) fn supervise(&mut self, now_us: u64, events: &mut Events) {
         if self.cycle == 0 {
@@ -208,6 +234,7 @@ impl Layer0 {
             }
         }
         if self.power == Power::Disarmed {
+            self.disarm_left_behind(now_us, events);
             return;
         }
         self.confirm_arming(now_us, events);

@@ -1,11 +1,12 @@
 //! What stops the robot, how fast, and what it takes to go on.
 
-use crate::common::{FakeNode, Rig, emit};
+use crate::common::{CYCLE_US, FakeNode, Rig, emit};
 use proptest::prelude::*;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::{Event, HoldReason};
+use wheeleg_master::finding::Finding;
 use wheeleg_master::setpoint::Phase;
 use wheeleg_protocol::{
     Address, Fault, InputBits, LimitBits, Message, NodeMode, SlotReply, SyncFlags,
@@ -343,4 +344,73 @@ proptest! {
             held = hold;
         }
     }
+}
+
+/// The master has started again without the board's noticing: no request of this one armed it.
+#[test]
+fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
+    let left = |event: &Event| match event {
+        Event::Found { node, finding } => (*finding == Finding::LeftArmed).then_some(*node),
+        _ => None,
+    };
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    rig.node(4).mode = NodeMode::Armed;
+    rig.run(30);
+    assert_eq!(rig.node(4).mode, NodeMode::Idle);
+    let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
+    assert_eq!(told, [Some(4)]);
+    // Arming and disarming on request are no such thing, whoever is slow.
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    rig.node(6).unanswered = 2;
+    let ticket = rig.submit(Command::Disarm);
+    rig.run(60);
+    assert!(rig.done(ticket) && !rig.saw(|event| left(event).is_some()));
+}
+
+/// Behind a board that does not answer, requests wait for its repetitions.
+#[test]
+fn a_valve_is_not_opened_long_after_it_was_asked_for() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    let open = |rig: &mut Rig, unanswered: u8| {
+        rig.node(2).unanswered = unanswered;
+        for _ in 0..20 {
+            rig.submit(Command::TransmitPosition { joint: 2 });
+            rig.cycle();
+        }
+        let ticket = rig.submit(Command::OpenAllValves { joint: 3 });
+        rig.run(400);
+        let opened = rig.node(3).requests.iter();
+        let opened = opened.filter(|m| matches!(m, Message::OpenAllValves(_)));
+        let opened = opened.count();
+        (rig.done(ticket), rig.refusal(ticket), opened)
+    };
+    assert_eq!(open(&mut rig, 0), (true, None, 1));
+    let late = open(&mut rig, 200);
+    assert_eq!(late, (false, Some(Refusal::Expired), 1));
+}
+
+/// With the robot held already, an E-stop still drops what waits.
+#[test]
+fn an_e_stop_of_a_held_robot_drops_what_was_asked_before() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    rig.node(2).faults = Fault::SensorRange.into();
+    rig.run(20);
+    assert!(rig.master.layer0().hold().is_some());
+    let open = rig.submit(Command::OpenAllValves { joint: 3 });
+    rig.master.cycle(rig.now_us);
+    rig.now_us += CYCLE_US;
+    rig.submit(Command::EmergencyStop);
+    rig.run(20);
+    assert_eq!(rig.refusal(open), Some(Refusal::Interrupted));
+    let opened = rig.node(3).requests.iter();
+    assert_eq!(
+        opened
+            .filter(|m| matches!(m, Message::OpenAllValves(_)))
+            .count(),
+        0
+    );
 }

@@ -129,8 +129,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         node
     }
 
-    /// A board with the parameters that its memory kept. Those that contradict each
-    /// other are not used: the board starts with its defaults and a latched
+    /// A board with the parameters that its memory kept. Those that are damaged (`None`) or
+    /// contradict each other are not used: the board starts with its defaults and a latched
     /// fault, so that it can be reached and told better ones.
     ///
     /// # Errors
@@ -138,7 +138,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     #[inline(always)]
     pub fn from_store(
         identity: NodeIdentity,
-        stored: JointParameters,
+        stored: Option<JointParameters>,
         valves: V,
         sensor: S,
         switches: W,
@@ -147,12 +147,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             return Err(ConfigError::Address);
         }
         // Looked at and made again: a copy less on the stack than to keep them.
-        let sound = JointSettings::new(&stored).is_some();
-        let parameters = if sound {
-            stored
-        } else {
-            JointParameters::default()
-        };
+        let stored = stored.filter(|stored| JointSettings::new(stored).is_some());
+        let sound = stored.is_some();
+        let parameters = stored.unwrap_or_default();
         let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
         let mut node = Self::with(identity, parameters, &settings, valves, sensor, switches);
         if !sound {

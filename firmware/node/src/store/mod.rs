@@ -153,6 +153,30 @@ impl<F: Flash> Store<F> {
         })
     }
 
+    /// The parameters of a board: the newest whole set over `defaults`, or those of a blank
+    /// store; `None` if what it holds is damaged, or a record is one that `with` refuses.
+    ///
+    /// A newest set that was damaged later cannot be told from one whose save a power cut
+    /// ended: the older set counts.
+    pub fn parameters<T: Copy, R>(
+        &self,
+        defaults: T,
+        with: impl Fn(&T, u16, i32) -> Result<T, R>,
+    ) -> Option<T> {
+        let put = |set: &mut Option<T>, record: Record| {
+            *set = set.and_then(|set| with(&set, record.id, record.raw).ok());
+        };
+        match self.load(Some(defaults), put) {
+            Some((set, _)) => set,
+            None => self.is_blank().then_some(defaults),
+        }
+    }
+
+    /// Whether no save was ever begun.
+    fn is_blank(&self) -> bool {
+        (0..PAGES).all(|page| self.flash.read(page, 0) == Some(u64::MAX))
+    }
+
     /// Saves a set. Erasing takes about 22 ms on the board's part, in which the
     /// processor stands still.
     ///

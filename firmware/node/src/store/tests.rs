@@ -300,3 +300,74 @@ fn a_page_has_room_for_254_records_and_a_board_saves_every_parameter_that_it_has
         assert_eq!(loaded(&store.flash), (Some(0), records));
     }
 }
+
+/// What a board makes of its memory: records of numbers below 0x0105 it takes, their number
+/// and their sum.
+fn board(flash: &Mock) -> Option<(i32, i32)> {
+    let with = |(count, sum): &(i32, i32), id: u16, raw: i32| {
+        let known = id < 0x0105;
+        known.then_some((count + 1, sum + raw)).ok_or(())
+    };
+    Store::new(flash.clone()).parameters((0, 0), with)
+}
+
+#[test]
+fn a_board_tells_a_blank_memory_from_a_damaged_one() {
+    let records: Vec<Record> = (0..4)
+        .map(|n| Record {
+            id: 0x0101 + n,
+            raw: 7,
+        })
+        .collect();
+    assert_eq!(board(&Mock::new()), Some((0, 0)), "blank: the defaults");
+    let mut store = Store::new(Mock::new());
+    store.save(&records).unwrap();
+    assert_eq!(board(&store.flash), Some((4, 28)));
+    // Every flipped bit and every torn word of the only set there is.
+    for word in 0..=5 {
+        let mut torn = store.flash.clone();
+        torn.pages[0][word] = None;
+        assert_eq!(board(&torn), None, "{word}");
+        for bit in 0..64 {
+            let mut damaged = store.flash.clone();
+            damaged.pages[0][word] = damaged.pages[0][word].map(|value| value ^ (1 << bit));
+            assert_eq!(board(&damaged), None, "{word} {bit}");
+        }
+    }
+    // With an older one that is whole, that one.
+    let older = store.flash.clone();
+    store.save(&[records[0]]).unwrap();
+    assert_eq!(board(&store.flash), Some((1, 7)));
+    store.flash.pages[1][1] = None;
+    assert_eq!(board(&store.flash), board(&older));
+    // A record that the board refuses is no set of this board.
+    store.save(&[Record { id: 0x0109, raw: 1 }]).unwrap();
+    assert_eq!(board(&store.flash), None);
+}
+
+/// A page with these words and the checksum that belongs to them.
+fn page(words: &[u64]) -> Mock {
+    let mut flash = Mock::new();
+    let mut digest = Checksum::default();
+    for (index, word) in words.iter().enumerate() {
+        digest.update(&word.to_le_bytes());
+        flash.pages[0][index] = Some(*word);
+    }
+    let crc = digest.finalize();
+    flash.pages[0][words.len()] = Some(u64::from(crc) | u64::from(!crc) << 32);
+    flash
+}
+
+#[test]
+fn a_page_that_is_not_of_this_format_is_none_whatever_its_checksum_says() {
+    let header = u64::from(MAGIC) | 1 << 16 | 7 << 32;
+    let record = 0x0102 | 5 << 32;
+    let sound = loaded(&page(&[header, record]));
+    assert_eq!(sound, (Some(7), vec![Record { id: 0x0102, raw: 5 }]));
+    // Another magic, and each of the bits between number and value.
+    assert_eq!(loaded(&page(&[header ^ 0x100, record])).0, None);
+    for bit in 16..32 {
+        let found = loaded(&page(&[header, record | 1 << bit]));
+        assert_eq!(found, (None, Vec::new()), "{bit}");
+    }
+}

@@ -113,26 +113,24 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         Ok(node)
     }
 
-    /// A board with the parameters that its memory kept. Those that contradict each
-    /// other are not used: the board starts with its defaults and a latched
+    /// A board with the parameters that its memory kept. Those that are damaged (`None`) or
+    /// contradict each other are not used: the board starts with its defaults and a latched
     /// fault, so that it can be reached and told better ones.
     ///
     /// # Errors
     /// [`ConfigError::Address`], as [`Self::new`].
     pub fn from_store(
         identity: NodeIdentity,
-        stored: WheelParameters,
+        stored: Option<WheelParameters>,
         motor: M,
         encoder: E,
         supply_switch: P,
         dump_valve: D,
     ) -> Result<Self, ConfigError> {
-        let sound = WheelSettings::new(&stored, WheelControlMode::Position).is_some();
-        let parameters = if sound {
-            stored
-        } else {
-            WheelParameters::default()
-        };
+        let mode = WheelControlMode::Position;
+        let stored = stored.filter(|stored| WheelSettings::new(stored, mode).is_some());
+        let sound = stored.is_some();
+        let parameters = stored.unwrap_or_default();
         let mut node = Self::new(
             identity,
             parameters,

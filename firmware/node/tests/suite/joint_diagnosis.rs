@@ -153,19 +153,20 @@ fn nothing_is_stored_by_a_board_that_was_armed_meanwhile() {
 }
 
 #[test]
-fn a_stored_set_that_contradicts_itself_gives_defaults_and_a_fault() {
+fn a_stored_set_that_is_damaged_or_contradicts_itself_gives_defaults_and_a_fault() {
     // The stroke ends before it begins; each value alone is permitted.
     let crossed = JointParameters::default()
         .with(JointParam::StrokeMin.id(), 150 << 16, true)
         .and_then(|p| p.with(JointParam::StrokeMax.id(), 20 << 16, true))
         .unwrap();
-    let mut rig = JointRig::stored(crossed);
-    rig.run_cycles(3, None);
-    assert_eq!(*rig.node.parameters(), JointParameters::default());
-    assert!(rig.node.faults().contains(Fault::ParameterCorrupt));
-    assert_eq!(refusal(&rig.request(&ARM)), Some(NackReason::FaultLatched));
-    assert!(matches!(rig.clear(), Message::Ack(_)));
-    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    for mut rig in [JointRig::stored(crossed), JointRig::damaged()] {
+        rig.run_cycles(3, None);
+        assert_eq!(*rig.node.parameters(), JointParameters::default());
+        assert!(rig.node.faults().contains(Fault::ParameterCorrupt));
+        assert_eq!(refusal(&rig.request(&ARM)), Some(NackReason::FaultLatched));
+        assert!(matches!(rig.clear(), Message::Ack(_)));
+        assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    }
 
     let sound = JointParameters::default()
         .with(JointParam::StrokeMax.id(), 120 << 16, true)

@@ -280,3 +280,27 @@ fn microsecond_counter_may_wrap_while_tracking() {
     assert_eq!(rig.node.mode(), Mode::Tracking);
     assert!(rig.node.faults().is_empty());
 }
+
+/// A timer that counts faster than in microseconds opens the valves for as long.
+#[test]
+fn pulses_are_scaled_to_the_counts_of_the_timer() {
+    let mut rig = JointRig::tracking(Hold);
+    let mut fine = JointRig::tracking(Hold);
+    for valve in &fine.valves {
+        valve.more.set(3250);
+    }
+    let mut parts = 0;
+    for n in 0..40 {
+        for rig in [&mut rig, &mut fine] {
+            rig.sync(Some(setpoint(100.0 + f64::from(n), Hold)), false);
+        }
+        for _ in 0..10 {
+            rig.tick();
+            fine.tick();
+            let scaled = rig.duty().map(|on| (u32::from(on) * 4250 / 1000) as u16);
+            assert_eq!(fine.duty(), scaled);
+            parts += usize::from(scaled.iter().any(|on| (1..4250).contains(on)));
+        }
+    }
+    assert!(parts > 0, "whole ticks only");
+}

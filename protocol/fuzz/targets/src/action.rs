@@ -1,6 +1,7 @@
 //! What can happen to a board: frames of a master on a bad line, time, sensors.
 
 use arbitrary::{Arbitrary, Unstructured};
+use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
 use wheeleg_protocol::{Address, MessageType, SCHEMA_HASH};
 
 use crate::reference::{self, Sound};
@@ -75,6 +76,12 @@ const FREQUENT: [MessageType; 8] = [
     MessageType::ParamSet,
 ];
 
+/// Low byte of the largest number of a parameter, of either kind of board.
+fn last_param() -> u8 {
+    let rows = JOINT_PARAMS.iter().chain(WHEEL_PARAMS);
+    rows.map(|row| row.id.to_le_bytes()[0]).max().unwrap_or(0)
+}
+
 /// A frame to the board at `address`; any type and content, sound more often than not.
 fn any_frame(u: &mut Unstructured<'_>, address: Address) -> arbitrary::Result<Sound> {
     let pick: u8 = u.arbitrary()?;
@@ -92,7 +99,7 @@ fn any_frame(u: &mut Unstructured<'_>, address: Address) -> arbitrary::Result<So
             payload.copy_from_slice(&SCHEMA_HASH.to_le_bytes());
         }
         (MessageType::ParamSet, 6) => {
-            payload[0] = u.int_in_range(0..=0x2A)?;
+            payload[0] = u.int_in_range(0..=last_param().saturating_add(2))?;
             payload[1] = u.int_in_range(1..=2)?;
             u.fill_buffer(&mut payload[2..])?;
         }

@@ -324,3 +324,19 @@ fn what_moves_the_air_is_more_than_noise_and_no_more_than_a_piston_can() {
         assert_eq!(moved(off), ([off, off], [0, 0]));
     }
 }
+
+#[test]
+fn more_than_eleven_eighths_of_the_supply_are_impossible_in_either_chamber() {
+    let model = model();
+    let most = 11 * SUPPLY / 8;
+    for (a, b, impossible) in [
+        (most, most, false),
+        (most + 1, 0, true),
+        (0, most + 1, true),
+        (SUPPLY, SUPPLY, false),
+    ] {
+        let mut air = Air::unknown(&model, MIDDLE);
+        (air.a.p, air.b.p) = (a, b);
+        assert_eq!(air.is_impossible(), impossible, "{a} {b}");
+    }
+}

@@ -375,3 +375,36 @@ fn of_short_pulses_only_those_of_a_piston_that_moves_count() {
     assert_eq!(gain(false), 0);
     assert!(gain(true) > 20_000, "{}", gain(true));
 }
+
+/// The first rounds of sliding count no more than one of six, so that one reading does not
+/// stand for a load.
+#[test]
+fn the_first_round_of_sliding_is_a_sixth_of_the_mean() {
+    let model = model(0);
+    let mut watch = knowing(0, 90, &model);
+    (watch.slid, watch.learnt) = (0, 0);
+    let taken = watch.air.force(&model.air) - 14_000;
+    slide(&mut watch, 3, 100, &model);
+    assert!((watch.learnt - taken / 6).abs() < 100, "{}", watch.learnt);
+}
+
+#[test]
+fn tools_are_told_what_the_watch_makes_of_the_axis() {
+    let model = model(50);
+    let mut watch = knowing(1234, 90, &model);
+    let at = |mm: i16| PositionMm::from_int(mm);
+    while watch.doubt < 3 * STRONG {
+        sample(&mut watch, &PUSH, &driven(120, 90), &model);
+    }
+    // Every doubt of rule 1 is a round of 3 ms.
+    let account = watch.account(at(120), at(90), &model);
+    assert_eq!(account.rule, 1);
+    let rounds = u32::from(watch.doubt / STRONG);
+    assert!(rounds > 0);
+    let off = i64::from(account.overdue.get()) - i64::from(rounds * 3000);
+    assert!(off.abs() <= 12 * i64::from(rounds), "{account:?}");
+    assert_eq!(account.force, watch.air.force(&model.air));
+    assert_eq!((account.learnt, account.slid_ms), (1234, 99));
+    assert_eq!(account.pressures, watch.air.pressures());
+    assert_eq!(watch.account(at(91), at(90), &model).rule, 0);
+}

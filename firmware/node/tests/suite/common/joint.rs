@@ -59,7 +59,24 @@ impl JointRig {
 
     /// With parameters from the board's memory.
     pub fn stored(parameters: JointParameters) -> Self {
-        Self::made(Node::from_store, parameters, [3; 12])
+        Self::made(
+            |identity, parameters, valves, sensor, feet| {
+                Node::from_store(identity, Some(parameters), valves, sensor, feet)
+            },
+            parameters,
+            [3; 12],
+        )
+    }
+
+    /// With a memory that is damaged.
+    pub fn damaged() -> Self {
+        Self::made(
+            |identity, _, valves, sensor, feet| {
+                Node::from_store(identity, None, valves, sensor, feet)
+            },
+            JointParameters::default(),
+            [3; 12],
+        )
     }
 
     /// With another processor.

@@ -23,9 +23,10 @@ impl digital::Error for MockError {
     }
 }
 
-/// PWM channel of 1000 counts; clones share their state.
+/// PWM channel of 1000 counts and `more`; clones share their state.
 #[derive(Clone, Default)]
 pub struct Pwm {
+    pub more: Rc<Cell<u16>>,
     pub duty: Rc<Cell<u16>>,
     pub writes: Rc<Cell<u32>>,
     pub fails: Rc<Cell<bool>>,
@@ -37,11 +38,12 @@ impl pwm::ErrorType for Pwm {
 
 impl SetDutyCycle for Pwm {
     fn max_duty_cycle(&self) -> u16 {
-        1000
+        1000 + self.more.get()
     }
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), MockError> {
-        assert!(duty <= 1000, "duty {duty} beyond the maximum");
+        let max = self.max_duty_cycle();
+        assert!(duty <= max, "duty {duty} beyond the maximum");
         self.writes.set(self.writes.get() + 1);
         if self.fails.get() {
             return Err(MockError);
