@@ -253,6 +253,20 @@ fn parameters_are_read_written_and_saved_and_a_save_is_no_loss() {
     assert_eq!(rig.refusal(ticket), Some(Refusal::NotDisarmed));
 }
 
+/// Only the board that saves is not missed meanwhile.
+#[test]
+fn another_board_that_falls_silent_during_a_save_is_missed_at_once() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(20);
+    rig.node(3).save_cycles = 30;
+    rig.submit(Command::SaveParameters { node: 3 });
+    rig.run(4);
+    rig.node(5).silent = true;
+    rig.run(4);
+    let lost = |node| rig.saw(|event| *event == Event::NodeLost(node));
+    assert!(lost(5) && !lost(3));
+}
+
 #[test]
 fn a_board_reset_in_mid_save_has_not_saved_whatever_it_says_afterwards() {
     let mut rig = Rig::new(MasterConfig::default());

@@ -426,3 +426,20 @@ fn with_a_long_period_the_pressure_is_reached_in_time_or_refused() {
     assert_eq!(with(1.0, 61).1, Some(NackReason::OutOfRange));
     assert_eq!(with(0.0, 120).1, None);
 }
+
+/// A pulse is never cut short: it ends with a period, however full the chambers are before.
+#[test]
+fn it_ends_between_two_pulses() {
+    for tenths in 5..25 {
+        let mut rig = armed(f64::from(tenths) / 10.0);
+        ticks_to_drive(&mut rig, 1990, 100.0);
+        let period_ms = JointParameters::default().get(JointParam::PwmPeriod) / 1000;
+        let (event, taken_ms) = end(&mut rig);
+        assert_eq!(event, LogEvent::Precharged);
+        assert_eq!(
+            (i32::from(taken_ms) - 1) % period_ms,
+            0,
+            "{tenths} {taken_ms}"
+        );
+    }
+}
