@@ -108,7 +108,7 @@ const TRACK: u8 = 1 << 3;
 const RESERVED: u8 = 0xF0;
 
 /// A coming change of the reference, for control ahead of a known move. The
-/// boards of this version count it down and do not act on it.
+/// boards count it down; the predictive law acts on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NextReference {
     /// The reference after the change: I10F6 mm.

@@ -4,10 +4,10 @@
 
 mod sil;
 
-use sil::{at, command, energised, gait, range, robot, run, story, window};
+use sil::{at, command, energised, gait, range, robot, run, stand, story, window};
 use wheeleg_sim::config::{EventAction, LegChoice};
 use wheeleg_sim::pil::Nodes;
-use wheeleg_sim::telemetry::Recording;
+use wheeleg_sim::telemetry::{JointSample, Recording, Row};
 
 /// The wheels push, the horizontal cylinder moves.
 const FIRST_S: f64 = 2.5;
@@ -114,6 +114,28 @@ fn every_order_of_restarts_recovers_disarmed_within_a_second() {
             }
         }
     }
+}
+
+/// After five and a half minutes the counter of SYNC is past half of its range, and a new master
+/// counts from 1.
+#[test]
+fn a_master_that_starts_again_after_minutes_is_noticed_as_well() {
+    let mut scenario = stand(331.5, &[]);
+    let fault = "master-reset=30@331s";
+    scenario.faults.push(fault.parse().expect("a fault"));
+    let recording = run(&scenario, &robot(), 1);
+    let told = story(&recording);
+    for rows in &recording.joints {
+        assert!(DRIVING.contains(&at(rows, 330.9).mode), "{told}");
+        let after = window(rows, 331.0 + 0.06 + 0.03, f64::INFINITY);
+        let safe = |r: &Row<JointSample>| !DRIVING.contains(&r.v.mode) && !energised(&r.v);
+        assert!(after.iter().all(safe), "{told}");
+    }
+    for rows in &recording.wheels {
+        let after = window(rows, 331.0 + 0.06 + 0.03, f64::INFINITY);
+        assert!(after.iter().all(|r| !DRIVING.contains(&r.v.mode)), "{told}");
+    }
+    assert!(told.contains("cycle counter does not advance"), "{told}");
 }
 
 /// The user's program may come back alone: the robot goes on, and listens to it.
