@@ -393,9 +393,11 @@ fn tools_are_told_what_the_watch_makes_of_the_axis() {
     let model = model(50);
     let mut watch = knowing(1234, 90, &model);
     let at = |mm: i16| PositionMm::from_int(mm);
-    while watch.doubt < 3 * STRONG {
+    let begun = (0..1000).any(|_| {
         sample(&mut watch, &PUSH, &driven(120, 90), &model);
-    }
+        watch.doubt >= 3 * STRONG
+    });
+    assert!(begun);
     // Every doubt of rule 1 is a round of 3 ms.
     let account = watch.account(at(120), at(90), &model);
     assert_eq!(account.rule, 1);
