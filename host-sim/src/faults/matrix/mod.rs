@@ -51,6 +51,12 @@ pub fn count(outcomes: &[Outcome], verdict: Verdict) -> usize {
     outcomes.iter().filter(|o| o.verdict == verdict).count()
 }
 
+/// Rows that cannot be run, each with the reason.
+pub fn not_implemented() -> impl Iterator<Item = (&'static str, &'static str)> {
+    ROWS.iter()
+        .filter_map(|row| Some((row.id, row.not_implemented()?)))
+}
+
 /// Runs rows and writes `report.html` and `summary.json` into `folder`. Results of an
 /// earlier run in it are set aside in its folders `previous`, `previous-2`, …
 ///
