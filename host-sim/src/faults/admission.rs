@@ -112,11 +112,15 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
     let (what, unit, sound) = match fault.kind {
         FaultKind::SupplySag => {
             let supply_pa = plant.supply.source_pressure_pa - plant.gas.ambient_pressure_pa;
-            ("air source", " bar", supply_pa * 1e-5)
+            ("source pressure", " bar", supply_pa * 1e-5)
         }
         FaultKind::FootSlips => {
             let contact = &plant.contact;
-            ("friction", "", contact.mu_static.max(contact.mu_kinetic))
+            (
+                "coefficient of friction",
+                "",
+                contact.mu_static.max(contact.mu_kinetic),
+            )
         }
         _ => return Ok(()),
     };
@@ -124,7 +128,7 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
         return Ok(());
     }
     Err(SimError::simulation(
-        format!("the fault `{fault}` does nothing: the {what} of the robot has {sound:.2}{unit}"),
+        format!("the fault `{fault}` does nothing: the {what} of the robot is {sound:.2}{unit}"),
         "choose a value below that",
     ))
 }
@@ -345,9 +349,15 @@ mod tests {
             check(&scenario, &robot, &Nodes::default())
         };
         for (fault, words) in [
-            ("supply-sag=8@1s", "air source of the robot has 8.00 bar"),
-            ("supply-sag=9.9@1s", "air source of the robot has 8.00 bar"),
-            ("foot-slips=0.8@1s", "friction of the robot has 0.80"),
+            (
+                "supply-sag=8@1s",
+                "source pressure of the robot is 8.00 bar",
+            ),
+            (
+                "supply-sag=9.9@1s",
+                "source pressure of the robot is 8.00 bar",
+            ),
+            ("foot-slips=0.8@1s", "friction of the robot is 0.80"),
         ] {
             let refusal = outcome(fault).expect_err(fault).to_string();
             assert!(refusal.contains(words), "{refusal}");

@@ -115,4 +115,16 @@ mod tests {
         let refused = one("ui-replay").expect_err("not implemented").to_string();
         assert!(refused.contains("not implemented"), "{refused}");
     }
+
+    /// A second board at an address is found as fast as one that is missing.
+    #[test]
+    fn duplicate_addresses_have_the_limits_of_a_board_that_is_silent() {
+        let expected = |id: &str| select(&[id.to_owned()]).expect("a row")[0].expect;
+        for place in ["joint", "wheel"] {
+            assert_eq!(
+                expected(&format!("duplicate-address/{place}")),
+                expected(&format!("node-silent/{place}"))
+            );
+        }
+    }
 }
