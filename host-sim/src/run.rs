@@ -87,14 +87,14 @@ pub fn repeat_natively(
 fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, SimError> {
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
-    faults::check(&scenario, &options.nodes)?;
-    if options.compared {
-        faults::ensure_comparable(&scenario, &options.nodes)?;
-    }
     let robot = match &options.robot {
         Some(robot) => builtin::robot(robot)?,
         None => builtin::robot_of(&scenario.robot, &options.scenario)?,
     };
+    faults::check(&scenario, &robot, &options.nodes)?;
+    if options.compared {
+        faults::ensure_comparable(&scenario, &options.nodes)?;
+    }
     let seed = options.seed.unwrap_or(scenario.seed);
     let folder = options
         .out

@@ -65,7 +65,7 @@ fn restart(order: [Who; 3], gap_s: f64) -> (Recording, f64) {
             scenario.faults.push(text.parse().expect("a fault"));
         }
     }
-    wheeleg_sim::faults::check(&scenario, &Nodes::default()).expect("faults that can be");
+    wheeleg_sim::faults::check(&scenario, &robot(), &Nodes::default()).expect("faults that can be");
     (run(&scenario, &robot(), 1), last_s)
 }
 

@@ -127,7 +127,11 @@ fn verdicts(finished: &matrix::Finished) -> String {
 fn listing(json: bool) -> String {
     if json {
         let list: Vec<serde_json::Value> = KINDS.iter().map(row_json).collect();
-        return format!("{:#}\n", serde_json::json!({ "faults": list }));
+        let missing: Vec<serde_json::Value> = matrix::not_implemented()
+            .map(|(name, reason)| serde_json::json!({ "name": name, "reason": reason }))
+            .collect();
+        let lists = serde_json::json!({ "faults": list, "not_implemented": missing });
+        return format!("{lists:#}\n");
     }
     let mut out = String::from(
         "Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]);\nthose that are over by themselves take no second TIME:\n",
@@ -146,6 +150,10 @@ fn listing(json: bool) -> String {
             );
         }
     }
+    out.push_str("\nNot implemented, refused by name:\n\n");
+    for (name, reason) in matrix::not_implemented() {
+        let _ = writeln!(out, "  {name:26} {reason}");
+    }
     out
 }
 
@@ -155,7 +163,7 @@ fn row_json(row: &KindInfo) -> serde_json::Value {
         "description": row.doc,
         "strikes": row.place.expected(),
         "value": row.value.map(|v| serde_json::json!({
-            "unit": v.unit, "min": v.min, "max": v.max, "default": v.default, "description": v.doc,
+            "unit": v.unit, "min": v.min, "max": v.max, "gap": v.gap, "default": v.default, "description": v.doc,
         })),
     })
 }
@@ -176,5 +184,25 @@ mod tests {
         }
         let json: serde_json::Value = serde_json::from_str(&listing(true)).expect("JSON");
         assert_eq!(json["faults"].as_array().map(Vec::len), Some(KINDS.len()));
+    }
+
+    #[test]
+    fn what_is_not_implemented_is_listed_apart() {
+        let text = listing(false);
+        let (faults, missing) = text.split_once("\nNot implemented").expect("a section");
+        let json: serde_json::Value = serde_json::from_str(&listing(true)).expect("JSON");
+        let list = json["not_implemented"].as_array().expect("a list");
+        let rows = matrix::ROWS
+            .iter()
+            .filter(|r| r.not_implemented().is_some());
+        assert!(list.len() == 9 && rows.clone().count() == 9, "{list:?}");
+        for (row, listed) in rows.zip(list) {
+            assert_eq!(listed["name"], row.id);
+            let line = format!("  {:26} {}\n", row.id, row.not_implemented().unwrap_or(""));
+            assert!(
+                missing.contains(&line) && !faults.contains(row.id),
+                "{line}"
+            );
+        }
     }
 }

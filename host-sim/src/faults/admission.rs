@@ -3,17 +3,18 @@
 
 use super::{FaultKind, FaultSpec, Victim};
 use crate::SimError;
-use crate::config::Scenario;
+use crate::config::{RobotConfig, Scenario};
 use crate::pil::{NodeKind, Nodes};
 
-/// Checks the faults of a scenario against its duration, each other, and where the
-/// nodes run.
+/// Checks the faults of a scenario against its duration, the robot, each other, and
+/// where the nodes run.
 ///
 /// # Errors
 /// [`SimError::Simulation`] with the first fault that cannot be, and why.
-pub fn check(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
+pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<(), SimError> {
     for fault in &scenario.faults {
         can_be_there(fault, nodes)?;
+        does_something(fault, robot)?;
         if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
             return Err(SimError::simulation(
                 format!("the fault `{fault}` cannot begin or end while the robot runs"),
@@ -34,7 +35,7 @@ pub fn check(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
             ));
         }
     }
-    no_twins(&scenario.faults)
+    no_rivals(&scenario.faults)
 }
 
 /// What strikes a board itself must be possible where that board runs: an image has a
@@ -105,17 +106,87 @@ pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimEr
     }
 }
 
-/// The same fault at the same place twice at a time has no meaning.
-fn no_twins(faults: &[FaultSpec]) -> Result<(), SimError> {
+/// What would leave this robot as it is, is no fault.
+fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError> {
+    let plant = &robot.plant;
+    let (what, unit, sound) = match fault.kind {
+        FaultKind::SupplySag => {
+            let supply_pa = plant.supply.source_pressure_pa - plant.gas.ambient_pressure_pa;
+            ("source pressure", " bar", supply_pa * 1e-5)
+        }
+        FaultKind::FootSlips => {
+            let contact = &plant.contact;
+            (
+                "coefficient of friction",
+                "",
+                contact.mu_static.max(contact.mu_kinetic),
+            )
+        }
+        _ => return Ok(()),
+    };
+    if fault.value < sound {
+        return Ok(());
+    }
+    Err(SimError::simulation(
+        format!("the fault `{fault}` does nothing: the {what} of the robot is {sound:.2}{unit}"),
+        "choose a value below that",
+    ))
+}
+
+/// Parts of the robot, each with where it is, that a fault takes for itself as long as it
+/// lasts: the simulation keeps one fault of such a part, and its end restores the sound part.
+fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
+    use FaultKind as F;
+    let part = match fault.kind {
+        F::MasterSilent | F::MasterFrozen => "transmitter of the master",
+        F::NodeSilent | F::Babble | F::BabbleUnguarded => "transmitter",
+        F::NodeOff | F::NodeReset | F::BrownOut | F::NodeHang => "power and program",
+        F::PotOpen | F::PotShort | F::PotFrozen | F::PotNoisy => "potentiometer",
+        F::SwitchStuckOn | F::SwitchStuckOff => "foot switch",
+        F::EncoderLost | F::EncoderReversed => "encoder",
+        F::ValveStuckOpen | F::ValveStuckShut | F::ValveSlow => "valve",
+        F::ValveLeak => "cylinder",
+        F::SupplySag | F::SupplyLost => "air source",
+        F::InvalidParameter => return vec![("service tool", Victim::Robot)],
+        _ => return Vec::new(),
+    };
+    let mut parts = vec![(part, fault.victim)];
+    if let (F::ValveSlow, Victim::Valve(joint, _)) = (fault.kind, fault.victim) {
+        parts.push(("cylinder", Victim::Board(joint as u8 + 1)));
+    }
+    parts
+}
+
+/// What two faults at a time cannot both act on, in words.
+fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
+    let others = parts(b);
+    let (part, place) = parts(a).into_iter().find(|part| others.contains(part))?;
+    Some(match place {
+        Victim::Robot => format!("the {part}"),
+        _ => format!(
+            "the {part} of {}",
+            place.to_string().trim_start_matches(':')
+        ),
+    })
+}
+
+/// Two faults of one part at a time: the end of one would undo the other. The same fault
+/// at the same place twice at a time has no meaning.
+fn no_rivals(faults: &[FaultSpec]) -> Result<(), SimError> {
     for (i, a) in faults.iter().enumerate() {
-        let twin = faults[i + 1..].iter().find(|b| {
-            let overlap = a.from_s < b.until_s.unwrap_or(f64::INFINITY)
-                && b.from_s < a.until_s.unwrap_or(f64::INFINITY);
-            a.kind == b.kind && a.victim == b.victim && overlap
-        });
-        if let Some(b) = twin {
+        for b in &faults[i + 1..] {
+            if a.from_s >= b.over_s() || b.from_s >= a.over_s() {
+                continue;
+            }
+            let why = if a.kind == b.kind && a.victim == b.victim {
+                "are the same at the same time".to_owned()
+            } else if let Some(part) = contested(a, b) {
+                format!("both act on {part} at the same time, which cannot be combined")
+            } else {
+                continue;
+            };
             return Err(SimError::simulation(
-                format!("the faults `{a}` and `{b}` are the same at the same time"),
+                format!("the faults `{a}` and `{b}` {why}"),
                 "leave one of them out, or end the first before the second begins",
             ));
         }
@@ -128,14 +199,179 @@ mod tests {
     use super::*;
     use crate::config::builtin;
 
+    /// Admits faults to a run of the built-in robot with these nodes.
+    fn admitted(faults: &[&str], nodes: &Nodes) -> Result<(), SimError> {
+        let mut scenario = builtin::scenario("three-step").expect("built in");
+        let robot = builtin::robot(&scenario.robot).expect("built in");
+        scenario.faults = faults.iter().map(|f| f.parse().expect(f)).collect();
+        check(&scenario, &robot, nodes)
+    }
+
+    #[test]
+    fn faults_of_one_part_at_a_time_are_refused_with_both_names() {
+        for (a, b, part) in [
+            (
+                "valve-slow:joint3.fill-a=8@1s",
+                "valve-leak:joint3=10000@1.1s..1.2s",
+                "cylinder of joint3",
+            ),
+            (
+                "valve-slow:joint3.fill-a=8@1s",
+                "valve-slow:joint3.vent-b=2@1.1s..1.2s",
+                "cylinder of joint3",
+            ),
+            (
+                "valve-stuck-shut:joint3.fill-a@1s",
+                "valve-stuck-open:joint3.fill-a@0.9s..1.001s",
+                "valve of joint3.fill-a",
+            ),
+            (
+                "valve-stuck-shut:joint3.fill-a@1s",
+                "valve-slow:joint3.fill-a=2@1s",
+                "valve of joint3.fill-a",
+            ),
+            (
+                "pot-open:joint2@1s",
+                "pot-short:joint2@0s..2s",
+                "potentiometer of joint2",
+            ),
+            (
+                "pot-frozen:joint2@1s",
+                "pot-noisy:joint2=5@2s",
+                "potentiometer of joint2",
+            ),
+            (
+                "foot-switch-on:left.back@1s",
+                "foot-switch-off:left.back@1s",
+                "foot switch of left.back",
+            ),
+            (
+                "encoder-lost:wheel7@1s",
+                "encoder-reversed:wheel7@2s",
+                "encoder of wheel7",
+            ),
+            ("supply-sag=3@1s", "supply-lost@2s..3s", "the air source"),
+            (
+                "master-silent@1s",
+                "master-frozen@2s..3s",
+                "transmitter of the master",
+            ),
+            (
+                "node-silent:joint1@1s",
+                "babble:joint1@1s",
+                "transmitter of joint1",
+            ),
+            (
+                "node-off:joint1@1s",
+                "node-reset:joint1@2s",
+                "power and program of joint1",
+            ),
+            (
+                "node-hang:joint1@1s",
+                "brown-out:joint1=30@1.049s",
+                "power and program of joint1",
+            ),
+            (
+                "brown-out:joint1=30@1s",
+                "node-reset:joint1@1.029s",
+                "power and program of joint1",
+            ),
+            (
+                "invalid-parameter:joint1@1s",
+                "invalid-parameter:wheel7@1.1s",
+                "the service tool",
+            ),
+            (
+                "supply-lost@1s",
+                "supply-lost@2s",
+                "are the same at the same time",
+            ),
+            (
+                "brown-out:joint1=30@1s",
+                "brown-out:joint1=40@1.02s",
+                "are the same at the same time",
+            ),
+        ] {
+            for pair in [[a, b], [b, a]] {
+                let refusal = admitted(&pair, &Nodes::default()).expect_err(a).to_string();
+                for fault in pair {
+                    let name = fault.split('=').next().expect("a name");
+                    assert!(refusal.contains(name), "{refusal}");
+                }
+                assert!(refusal.contains(part), "{refusal}");
+            }
+        }
+    }
+
+    #[test]
+    fn faults_one_after_the_other_or_of_different_parts_stay() {
+        for pair in [
+            [
+                "valve-slow:joint3.fill-a=8@1s..2s",
+                "valve-leak:joint3=10000@2s..3s",
+            ],
+            [
+                "valve-slow:joint3.fill-a=8@1s",
+                "valve-leak:joint2=10000@1s",
+            ],
+            [
+                "valve-stuck-open:joint3.fill-a@1s",
+                "valve-stuck-shut:joint3.vent-a@1s",
+            ],
+            [
+                "valve-stuck-open:joint3.fill-a@1s",
+                "valve-leak:joint3=100@1s..2s",
+            ],
+            ["pot-open:joint2@1s..2s", "pot-open:joint2@2s..3s"],
+            ["pot-open:joint2@1s", "pot-short:joint3@1s"],
+            ["encoder-lost:wheel7@1s", "encoder-reversed:wheel8@1s"],
+            ["encoder-lost:wheel7@1s", "node-silent:wheel7@2s..3s"],
+            ["supply-sag=3@1s", "tube-burst@2s"],
+            ["foot-slips=0.05@1s", "foot-loses-contact=0.03@2s..3s"],
+            ["bit-errors=1e-4@1s", "bytes-lost=1e-3@1s..2s"],
+            ["node-hang:joint1@1s", "brown-out:joint1=30@1.05s"],
+            ["brown-out:joint1=30@1s", "brown-out:joint1=30@2s"],
+            ["node-silent:joint1@1s", "node-reset:joint1@2s"],
+            ["invalid-parameter:joint1@1s", "invalid-parameter:wheel7@2s"],
+        ] {
+            let outcome = admitted(&pair, &Nodes::default());
+            assert!(outcome.is_ok(), "{pair:?}: {outcome:?}");
+        }
+    }
+
+    #[test]
+    fn what_leaves_this_robot_as_it_is_is_refused() {
+        let mut scenario = builtin::scenario("three-step").expect("built in");
+        let mut robot = builtin::robot(&scenario.robot).expect("built in");
+        robot.plant.supply.source_pressure_pa = 8e5 + robot.plant.gas.ambient_pressure_pa;
+        let mut outcome = |fault: &str| {
+            scenario.faults = vec![fault.parse().expect("a fault")];
+            check(&scenario, &robot, &Nodes::default())
+        };
+        for (fault, words) in [
+            (
+                "supply-sag=8@1s",
+                "source pressure of the robot is 8.00 bar",
+            ),
+            (
+                "supply-sag=9.9@1s",
+                "source pressure of the robot is 8.00 bar",
+            ),
+            ("foot-slips=0.8@1s", "friction of the robot is 0.80"),
+        ] {
+            let refusal = outcome(fault).expect_err(fault).to_string();
+            assert!(refusal.contains(words), "{refusal}");
+        }
+        assert!(outcome("supply-sag=7.9@1s").is_ok());
+        assert!(outcome("foot-slips=0.75@1s").is_ok());
+    }
+
     #[test]
     fn what_a_board_cannot_suffer_where_it_runs_is_refused() {
         let admitted = |fault: &str, there: &str| {
-            let mut scenario = builtin::scenario("three-step").expect("built in");
-            scenario.faults = vec![fault.parse().expect("a fault")];
             let choice = there.parse().expect("a choice");
             let nodes = Nodes::new(&NodeKind::Sil, &[choice]).expect("one choice");
-            check(&scenario, &nodes)
+            admitted(&[fault], &nodes)
         };
         let power = [
             "brown-out:joint3@1s",

@@ -75,7 +75,9 @@ impl Injector {
         on_sensors(fault, begin, plant, state);
         on_air(fault, begin, plant, state);
         on_ground(fault, begin, plant);
-        if let Victim::Board(n @ 7..=8) = fault.victim {
+        if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, Victim::Board(n)) =
+            (fault.kind, fault.victim)
+        {
             self.encoder_at[usize::from(n) - 7] = None;
         }
     }
@@ -324,14 +326,12 @@ fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantSt
     }
 }
 
-/// A cylinder with changed parameters, or the sound one again.
+/// A cylinder with changed parameters, or the sound one again: one fault at a time.
 ///
-/// The catalogue's ranges keep every changed parameter in the plant's own, so
-/// a refusal means that two faults together leave it: then the first stands.
+/// The catalogue's ranges keep every changed parameter in the plant's own.
 fn rebuild(plant: &mut Plant, joint: usize, begin: bool, change: impl FnOnce(&mut CylinderParams)) {
     let mut params = plant.params().cylinders[joint].clone();
     if begin {
-        params = plant.assembly.cylinders[joint].params().clone();
         change(&mut params);
     }
     let gas = plant.params().gas;
@@ -369,5 +369,33 @@ fn on_ground(fault: &FaultSpec, begin: bool, plant: &mut Plant) {
             }
         }
         _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::builtin;
+
+    /// An encoder counts from where its own fault began, whatever else strikes its board.
+    #[test]
+    fn another_fault_of_the_board_leaves_a_faulty_encoder_where_it_stood() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let mut plant = Plant::new(&robot.plant).expect("a plant");
+        let mut state = plant.initial_state(1).expect("a state");
+        let mut injector = Injector::new(1);
+        let mut strike = |injector: &mut Injector, text: &str, begin| {
+            let fault = text.parse().expect(text);
+            injector.strike(&fault, begin, 0, &mut plant, &mut state);
+        };
+        strike(&mut injector, "encoder-lost:wheel7@1s", true);
+        assert_eq!(injector.edges(0, 100), 100);
+        strike(&mut injector, "node-silent:wheel7@2s..3s", true);
+        assert_eq!(injector.edges(0, 250), 100);
+        strike(&mut injector, "encoder-lost:wheel7@1s", false);
+        assert_eq!(injector.edges(0, 300), 300);
+        strike(&mut injector, "encoder-reversed:wheel7@4s", true);
+        assert_eq!(injector.edges(0, 400), 400);
+        assert_eq!(injector.edges(0, 430), 370);
     }
 }

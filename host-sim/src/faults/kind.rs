@@ -1,5 +1,7 @@
 //! The catalogue of faults that a run can be given.
 
+use crate::sil::{JOINT_TICK_NS, SERVICE_NS, WATCHDOG_NS};
+
 /// Where a fault strikes, and so what its target is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
@@ -26,6 +28,8 @@ pub struct ValueSpec {
     pub min: f64,
     /// Largest.
     pub max: f64,
+    /// Nearer to 0 than this it does nothing; 0 where all of the range does something.
+    pub gap: f64,
     /// Where none is given.
     pub default: f64,
     /// Meaning.
@@ -36,10 +40,22 @@ impl ValueSpec {
     /// Allowed range with its unit.
     #[must_use]
     pub fn range(&self) -> String {
-        match self.unit {
-            "1" => format!("{} to {}", self.min, self.max),
-            unit => format!("{} to {} {unit}", self.min, self.max),
+        let unit = match self.unit {
+            "1" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let range = format!("{} to {}{unit}", self.min, self.max);
+        if self.gap > 0.0 {
+            format!("{range}, and not between -{0} and {0}{unit}", self.gap)
+        } else {
+            range
         }
+    }
+
+    /// Whether `x` is in the range.
+    #[must_use]
+    pub fn allows(&self, x: f64) -> bool {
+        (self.min..=self.max).contains(&x) && x.abs() >= self.gap
     }
 }
 
@@ -82,6 +98,25 @@ const fn value(
         unit,
         min,
         max,
+        gap: 0.0,
+        default,
+        doc,
+    })
+}
+
+/// A number of either sign, that does something from `gap` on.
+const fn signed(
+    unit: &'static str,
+    max: f64,
+    gap: f64,
+    default: f64,
+    doc: &'static str,
+) -> Option<ValueSpec> {
+    Some(ValueSpec {
+        unit,
+        min: -max,
+        max,
+        gap,
         default,
         doc,
     })
@@ -120,17 +155,17 @@ kinds! {
         "Another board with the same address straps is plugged in.";
     OtherInterface = "other-interface", Board, None,
         "A board was built from another interface definition (from power-up on).";
-    BitErrors = "bit-errors", Robot, value("1", 0.0, 0.1, 1e-4, "share of wrong bits"),
+    BitErrors = "bit-errors", Robot, value("1", 1e-9, 0.1, 1e-4, "share of wrong bits"),
         "Bits on the line flip at random.";
-    BytesLost = "bytes-lost", Robot, value("1", 0.0, 1.0, 1e-3, "share of lost bytes"),
+    BytesLost = "bytes-lost", Robot, value("1", 1e-9, 1.0, 1e-3, "share of lost bytes"),
         "Bytes on the line are lost at random.";
-    BytesInserted = "bytes-inserted", Robot, value("1", 0.0, 1.0, 1e-3, "share of bytes after which one is inserted"),
+    BytesInserted = "bytes-inserted", Robot, value("1", 1e-9, 1.0, 1e-3, "share of bytes after which one is inserted"),
         "Random bytes appear on the line.";
-    FramesDelayed = "frames-delayed", Robot, value("us", 0.0, 20_000.0, 500.0, "longest delay; uniform from 0"),
+    FramesDelayed = "frames-delayed", Robot, value("us", 0.1, 20_000.0, 500.0, "longest delay; uniform from 0"),
         "Every transmission reaches its receivers late, by a random time.";
-    CycleJitter = "cycle-jitter", Robot, value("ms", 0.0, 5.0, 1.0, "largest deviation to either side"),
+    CycleJitter = "cycle-jitter", Robot, value("ms", 1e-3, 5.0, 1.0, "largest deviation to either side"),
         "The master's cycle starts early or late, at random.";
-    ClockDrift = "clock-drift", Board, value("ppm", -50_000.0, 50_000.0, 200.0, "too fast is positive"),
+    ClockDrift = "clock-drift", Board, signed("ppm", 50_000.0, 1.0, 200.0, "too fast is positive"),
         "A board's clock runs wrong.";
     PotOpen = "pot-open", Joint, None,
         "The potentiometer's wiper is open: the converter input floats up to its reference.";
@@ -152,21 +187,21 @@ kinds! {
         "A valve stays open whatever its coil does.";
     ValveStuckShut = "valve-stuck-shut", Valve, None,
         "A valve stays shut whatever its coil does.";
-    ValveSlow = "valve-slow", Valve, value("1", 1.0, 8.0, 5.0, "factor on t_on and t_off"),
+    ValveSlow = "valve-slow", Valve, value("1", 1.1, 8.0, 5.0, "factor on t_on and t_off"),
         "A valve opens and shuts too late.";
-    ValveLeak = "valve-leak", Joint, value("1", 1.0, 1e4, 1000.0, "factor on the leakage past piston and rod"),
+    ValveLeak = "valve-leak", Joint, value("1", 1.1, 1e4, 1000.0, "factor on the leakage past piston and rod"),
         "Seals of a cylinder leak.";
-    SupplySag = "supply-sag", Robot, value("bar", 0.5, 10.0, 3.0, "source pressure over ambient"),
-        "The air source gives less pressure than the regulator is set to.";
+    SupplySag = "supply-sag", Robot, value("bar", 0.5, 9.9, 3.0, "source pressure over ambient, below the source of the robot"),
+        "The air source gives less pressure.";
     SupplyLost = "supply-lost", Robot, None,
         "The air source fails.";
     TubeBurst = "tube-burst", Robot, None,
         "The tube behind the reservoir bursts: it empties to the atmosphere, the source is cut off.";
-    LoadStep = "load-step", Joint, value("N", -200.0, 200.0, 60.0, "force, positive extends"),
+    LoadStep = "load-step", Joint, signed("N", 200.0, 1.0, 60.0, "force, positive extends"),
         "A force acts on a piston from one instant to the next.";
     FootLosesContact = "foot-loses-contact", Robot, value("m", 0.001, 0.2, 0.03, "how far the ground falls"),
         "The ground under the feet falls away.";
-    FootSlips = "foot-slips", Robot, value("1", 0.0, 1.0, 0.05, "coefficient of friction from then on"),
+    FootSlips = "foot-slips", Robot, value("1", 0.0, 1.0, 0.05, "coefficient of friction from then on, below that of the robot"),
         "Feet and wheels stand on ice.";
     InvalidParameter = "invalid-parameter", Board, None,
         "A service tool writes parameters of a board: a value above its limit, an unknown number, a value of another type.";
@@ -187,6 +222,19 @@ impl FaultKind {
                 | Self::NodeHang
                 | Self::InvalidParameter
         )
+    }
+
+    /// How long it lasts with this value where no end is given, s; infinite: for good.
+    #[must_use]
+    pub(super) fn lasts_s(self, value: f64) -> f64 {
+        let seconds = |ns: u64| ns as f64 * 1e-9;
+        match self {
+            Self::MasterReset | Self::BrownOut => value * 1e-3,
+            Self::ClientReset | Self::NodeReset => seconds(JOINT_TICK_NS),
+            Self::NodeHang => seconds(WATCHDOG_NS),
+            Self::InvalidParameter => seconds(SERVICE_NS),
+            _ => f64::INFINITY,
+        }
     }
 
     /// Its row of the catalogue.
@@ -219,8 +267,9 @@ mod tests {
             assert_eq!(row.kind as usize, i);
             assert_eq!(row.kind.info().name, row.name);
             assert!(KINDS.iter().filter(|k| k.name == row.name).count() == 1);
+            assert_eq!(row.kind.ends_by_itself(), row.kind.lasts_s(1.0).is_finite());
             if let Some(v) = row.value {
-                assert!(v.min <= v.default && v.default <= v.max, "{}", row.name);
+                assert!(v.allows(v.default), "{}", row.name);
             }
         }
     }

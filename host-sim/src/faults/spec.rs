@@ -8,6 +8,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::kind::{FaultKind, KINDS, Place};
+use super::matrix;
 
 /// What a fault strikes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +38,15 @@ pub struct FaultSpec {
     pub until_s: Option<f64>,
 }
 
+impl FaultSpec {
+    /// When it is over, s of scenario time; infinite: never.
+    #[must_use]
+    pub fn over_s(&self) -> f64 {
+        let lasts_s = self.kind.lasts_s(self.value);
+        self.until_s.unwrap_or(self.from_s + lasts_s)
+    }
+}
+
 /// Why a text is no fault.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SpecError {
@@ -49,6 +59,16 @@ pub enum SpecError {
         name: String,
         /// A name that is spelt almost so.
         nearest: Option<&'static str>,
+    },
+    /// The fault is one of the matrix that cannot be injected.
+    #[error("`{text}`: the fault `{name}` is not implemented: {reason}")]
+    NotImplemented {
+        /// The whole text.
+        text: String,
+        /// The name in it.
+        name: &'static str,
+        /// Why.
+        reason: &'static str,
     },
     /// The target is missing or not of the right kind.
     #[error("`{text}`: `{name}` strikes {expected}{}", got(.found))]
@@ -166,11 +186,7 @@ impl FromStr for FaultSpec {
         let info = KINDS
             .iter()
             .find(|k| k.name == name)
-            .ok_or_else(|| SpecError::Name {
-                text: owned(),
-                name: name.to_owned(),
-                nearest: crate::config::closest(name, KINDS.iter().map(|k| k.name)),
-            })?;
+            .ok_or_else(|| no_such(text, name))?;
         let victim = info.place.victim(target).ok_or_else(|| SpecError::Target {
             text: owned(),
             name: info.name,
@@ -185,17 +201,18 @@ impl FromStr for FaultSpec {
             (None, None) => 0.0,
             (None, Some(n)) => return Err(wrong(format!("`{name}` takes no value, not `{n}`"))),
             (Some(v), None) => v.default,
-            (Some(v), Some(n)) => n
-                .parse::<f64>()
-                .ok()
-                .filter(|x| (v.min..=v.max).contains(x))
-                .ok_or_else(|| {
-                    wrong(format!(
-                        "the value `{n}` is not a number from {} ({})",
-                        v.range(),
-                        v.doc
-                    ))
-                })?,
+            (Some(v), Some(n)) => {
+                n.parse::<f64>()
+                    .ok()
+                    .filter(|x| v.allows(*x))
+                    .ok_or_else(|| {
+                        wrong(format!(
+                            "the value `{n}` is not a number from {} ({})",
+                            v.range(),
+                            v.doc
+                        ))
+                    })?
+            }
         };
         let (from_s, until_s) = times(time).map_err(|reason| SpecError::Time {
             text: owned(),
@@ -219,6 +236,20 @@ impl FromStr for FaultSpec {
             from_s,
             until_s,
         })
+    }
+}
+
+/// Why no fault has this name.
+fn no_such(text: &str, name: &str) -> SpecError {
+    let text = text.to_owned();
+    let missing = matrix::not_implemented().find(|(row, _)| *row == name);
+    match missing {
+        Some((name, reason)) => SpecError::NotImplemented { text, name, reason },
+        None => SpecError::Name {
+            text,
+            name: name.to_owned(),
+            nearest: crate::config::closest(name, KINDS.iter().map(|k| k.name)),
+        },
     }
 }
 
@@ -294,6 +325,17 @@ mod tests {
     }
 
     #[test]
+    fn smallest_values_are_faults() {
+        for text in [
+            "clock-drift:joint1=-1@1s",
+            "load-step:joint1=1@1s",
+            "foot-slips=0@1s",
+        ] {
+            assert_eq!(parse(text).expect(text).to_string(), text);
+        }
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         for (text, words) in [
             ("master-silent", "time is missing"),
@@ -303,8 +345,25 @@ mod tests {
             ("pot-open:wheel7@1s", "`:joint1` to `:joint6`, not `wheel7`"),
             ("pot-open:joint9@1s", "joint9"),
             ("node-silent:wheel3@1s", "wheel3"),
-            ("bit-errors=2@1s", "from 0 to 0.1"),
+            ("bit-errors=2@1s", "from 0.000000001 to 0.1"),
             ("bit-errors=NaN@1s", "NaN"),
+            // What can do nothing is no fault.
+            ("bit-errors=0@1s", "`0` is not a number from"),
+            ("bytes-lost=0@1s", "`0` is not a number from"),
+            ("bytes-inserted=0@1s", "`0` is not a number from"),
+            ("frames-delayed=0@1s", "from 0.1 to 20000 us"),
+            ("cycle-jitter=0@1s", "from 0.001 to 5 ms"),
+            ("clock-drift:joint1=0@1s", "and not between -1 and 1 ppm"),
+            ("load-step:joint1=-0.5@1s", "and not between -1 and 1 N"),
+            ("valve-slow:joint1.fill-a=1@1s", "from 1.1 to 8"),
+            ("valve-leak:joint1=1@1s", "from 1.1 to 10000"),
+            ("supply-sag=10@1s", "from 0.5 to 9.9 bar"),
+            ("ui-replay@1s", "not implemented: there is no Ethernet"),
+            ("foot-sinks@1s", "not implemented: there is no soft terrain"),
+            (
+                "brown-out/update:joint3@1s",
+                "not implemented: there is no firmware update",
+            ),
             ("master-silent=3@1s", "takes no value"),
             ("master-silent@3", "no time"),
             ("master-silent@-1s", "no time"),

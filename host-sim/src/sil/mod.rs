@@ -36,7 +36,10 @@ pub use self::audit::LineAudit;
 pub(crate) use self::boards::{JointBoard, WheelBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::power::BOARD_START_UP_NS;
+pub(crate) use self::power::WATCHDOG_NS;
+pub(crate) use self::strangers::SERVICE_NS;
 pub(crate) use self::words::{hex, parameter_row};
+pub(crate) use self::world::JOINT_TICK_NS;
 
 use self::observe::Observer;
 use self::operator::Operator;

@@ -18,7 +18,7 @@ use crate::faults::{FaultKind, FaultSpec, Victim};
 
 /// A stopped program is reset after this, ns: the independent watchdog of the
 /// boards (firmware/board/BOARD.md).
-const WATCHDOG_NS: u64 = 50_000_000;
+pub(crate) const WATCHDOG_NS: u64 = 50_000_000;
 /// From power-up to the first tick edge, ns: a joint board's, and a wheel board's.
 /// Memory, clock, converter and parameters as the shipped images set them up, measured on
 /// emulated boards (tests/tests/pil.rs). A crystal that is slow to swing makes it longer.

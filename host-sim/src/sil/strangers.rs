@@ -12,7 +12,7 @@ use wheeleg_protocol::{
 
 use super::boards::{JointBoard, WheelBoard, twin_identity};
 use super::bus::{Bus, Delivery, Driver};
-use super::traffic::micros;
+use super::traffic::{NS_PER_US, micros};
 use crate::SimError;
 use crate::config::NodeParams;
 
@@ -161,6 +161,9 @@ const STEPS: [Write; 7] = [
     Write::OtherType,
     Write::Read,
 ];
+
+/// How long the service tool takes at most, if every request is answered in time, ns.
+pub(crate) const SERVICE_NS: u64 = STEPS.len() as u64 * PATIENCE_US * NS_PER_US;
 
 /// A tool that speaks on the master's behalf, between its requests.
 struct Service {

@@ -29,7 +29,7 @@ use crate::faults::{FaultKind, FaultSpec, Injector, Victim};
 use crate::pil::Outside;
 
 /// Joint tick, ns.
-pub(super) const JOINT_TICK_NS: u64 = 1_000_000;
+pub(crate) const JOINT_TICK_NS: u64 = 1_000_000;
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -177,6 +177,11 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, m: &Measured) {
         expected.all_ms + WHEEL_STOP_MS,
     );
     f.check(m.latched, || "not latched".to_owned());
+    if let Some(limit) = row.held_mm {
+        f.check(m.held_mm.is_some_and(|mm| mm <= limit), || {
+            format!("a held joint moves by {:?} mm, allowed {limit}", m.held_mm)
+        });
+    }
     if row.estop {
         f.within("supply dump commanded", m.dump_ms, expected.all_ms);
     }
@@ -234,5 +239,39 @@ fn degrades(f: &mut Failures, m: &Measured) {
                 detected + REACTION_MS,
             );
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::builtin;
+    use crate::faults::matrix::select;
+    use crate::sil::LineAudit;
+    use crate::telemetry::Recording;
+
+    #[test]
+    fn a_held_joint_that_moves_too_far_fails_its_row() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["valve-stuck-open/vent".to_owned()]).expect("a row")[0];
+        let ran = Ran {
+            at_s: 0.0,
+            faults: Vec::new(),
+            recording: Recording::default(),
+            line: LineAudit::default(),
+            arming_asked: true,
+            error: None,
+        };
+        let moved = |held_mm| {
+            let measured = Measured {
+                held_mm,
+                ..Measured::default()
+            };
+            let outcome = judge(*row, &robot, &ran, measured);
+            outcome.failures.iter().any(|f| f.contains("held joint"))
+        };
+        let limit = row.held_mm.expect("a limit");
+        assert!(!moved(Some(limit)));
+        assert!(moved(Some(limit + 0.1)) && moved(None));
     }
 }

@@ -51,6 +51,12 @@ pub fn count(outcomes: &[Outcome], verdict: Verdict) -> usize {
     outcomes.iter().filter(|o| o.verdict == verdict).count()
 }
 
+/// Rows that cannot be run, each with the reason.
+pub fn not_implemented() -> impl Iterator<Item = (&'static str, &'static str)> {
+    ROWS.iter()
+        .filter_map(|row| Some((row.id, row.not_implemented()?)))
+}
+
 /// Runs rows and writes `report.html` and `summary.json` into `folder`. Results of an
 /// earlier run in it are set aside in its folders `previous`, `previous-2`, …
 ///
@@ -108,5 +114,17 @@ mod tests {
         assert!(unknown.contains("did you mean `pot-open`"), "{unknown}");
         let refused = one("ui-replay").expect_err("not implemented").to_string();
         assert!(refused.contains("not implemented"), "{refused}");
+    }
+
+    /// A second board at an address is found as fast as one that is missing.
+    #[test]
+    fn duplicate_addresses_have_the_limits_of_a_board_that_is_silent() {
+        let expected = |id: &str| select(&[id.to_owned()]).expect("a row")[0].expect;
+        for place in ["joint", "wheel"] {
+            assert_eq!(
+                expected(&format!("duplicate-address/{place}")),
+                expected(&format!("node-silent/{place}"))
+            );
+        }
     }
 }

@@ -53,6 +53,7 @@ fn expected_json(row: &Row) -> serde_json::Value {
             "axis": (stop.axis > 0).then_some(stop.axis),
             "own_ms": stop.own_ms,
             "all_ms": stop.all_ms,
+            "held_mm": row.held_mm,
             "latched": true,
         }),
         Expect::GoesOn { deviation_mm } => json!({
@@ -98,9 +99,11 @@ fn limits(row: &Row) -> String {
             } else {
                 String::new()
             };
+            let held = row.held_mm.map(|mm| format!(", held within {mm:.0} mm"));
             format!(
-                "detected {from:.0} to {to:.0}{own}, all {:.0} ms",
-                stop.all_ms
+                "detected {from:.0} to {to:.0}{own}, all {:.0} ms{}",
+                stop.all_ms,
+                held.unwrap_or_default()
             )
         }
         Expect::GoesOn { deviation_mm } => format!("deviation {deviation_mm} mm"),

@@ -149,6 +149,9 @@ pub struct Row {
     pub expect: Expect,
     /// Boards that must go on answering in their slots.
     pub answering: u8,
+    /// Largest movement of a held joint in the half second after the stop, mm, where
+    /// that is judged.
+    pub held_mm: Option<f64>,
     /// What the user must be able to read: all of it.
     pub reads: &'static [&'static str],
     /// Anything that the numbers do not tell.
@@ -190,6 +193,7 @@ pub(super) const fn row(
         variant: Variant::Plain,
         expect,
         answering: 0,
+        held_mm: None,
         reads,
         note: "",
     }
@@ -218,6 +222,11 @@ impl Row {
 
     pub(super) const fn answering(mut self, boards: u8) -> Self {
         self.answering = boards;
+        self
+    }
+
+    pub(super) const fn holding(mut self, held_mm: f64) -> Self {
+        self.held_mm = Some(held_mm);
         self
     }
 

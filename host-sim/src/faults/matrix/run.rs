@@ -137,7 +137,7 @@ impl Robots {
                 .events
                 .push(event(duration_s - ARM_S, EventAction::command("Arm")));
         }
-        check(&scenario, &Nodes::default())?;
+        check(&scenario, robot, &Nodes::default())?;
         let (recording, line, error) = simulate(&scenario, robot, self.seed);
         let ran = Ran {
             at_s,
