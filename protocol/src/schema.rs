@@ -2,7 +2,8 @@
 //!
 //! The text lists everything that changes the meaning of bytes: message
 //! numbers, field names, types, sizes, Q-formats and units, enumeration values,
-//! bits, fault and limit numbers, parameters with their formats and limits.
+//! bits, fault and limit numbers, parameters with their formats and limits. And what lets boards
+//! share the line: its speed, the cycle, the times of the slots.
 //! Sentences for people are not part of it: correcting a word does not
 //! separate boards. The hash is FNV-1a (64 bit) over exactly this text, worked
 //! out at compile time, and compared when a board is identified and armed.
@@ -13,6 +14,7 @@ use crate::fields::{
     ResetCause, WheelControlMode,
 };
 use crate::frame::VERSION;
+use crate::link::{ADVANCE_MOST, BAUD, CYCLE_US, GAP_US, SETTING_US, TURNAROUND_US};
 use crate::message::MESSAGES;
 use crate::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
 use crate::sync::{LinkLossAction, SYNC_SLOT_FIELDS, SyncFlags};
@@ -38,6 +40,8 @@ pub struct Interface<'a> {
     pub limits: &'a [FaultSchema],
     /// Parameter tables, board by board.
     pub parameters: &'a [&'a [ParamInfo]],
+    /// Times of the line, by name.
+    pub timing: &'a [(&'a str, u32)],
 }
 
 /// The interface of this build.
@@ -62,6 +66,14 @@ pub const INTERFACE: Interface<'static> = Interface {
     faults: FAULTS,
     limits: LIMITS,
     parameters: &[JOINT_PARAMS, WHEEL_PARAMS],
+    timing: &[
+        ("baud", BAUD),
+        ("cycle_us", CYCLE_US),
+        ("turnaround_us", TURNAROUND_US),
+        ("setting_us", SETTING_US),
+        ("gap_us", GAP_US),
+        ("advance_most", ADVANCE_MOST as u32),
+    ],
 };
 
 /// FNV-1a, 64 bit, in a form that constants can use.
@@ -206,6 +218,11 @@ impl Interface<'_> {
             hash = hash.parameters(table);
             tables = tail;
         }
+        let mut timing = self.timing;
+        while let [(name, value), tail @ ..] = timing {
+            hash = hash.text("timing").word(name).number(*value as i64).line();
+            timing = tail;
+        }
         hash.0
     }
 
@@ -252,6 +269,9 @@ impl Interface<'_> {
                 row.max,
                 row.default
             )?;
+        }
+        for (name, value) in self.timing {
+            writeln!(out, "timing {name} {value}")?;
         }
         Ok(())
     }

@@ -37,6 +37,7 @@ fn the_text_names_formats_and_units() {
         "parameter 257 proportional 1/mm I8F24 0 67108864 335544",
         "fault 32 4 SensorRange",
         "value 13 FaultLatched",
+        "timing turnaround_us 100",
     ] {
         assert!(text.contains(part), "{part}");
     }
@@ -412,4 +413,18 @@ fn addresses_exist_or_do_not() {
         assert_eq!(node.is_wheel(), index >= 6);
     }
     assert_eq!(Address::of_slot(8), None);
+}
+
+/// Boards whose slots begin at other times talk over each other.
+#[test]
+fn every_time_of_the_line_counts() {
+    for index in 0..INTERFACE.timing.len() {
+        let mut timing = INTERFACE.timing.to_vec();
+        timing[index].1 += 1;
+        let other = Interface {
+            timing: &timing,
+            ..INTERFACE
+        };
+        assert_ne!(other.hash(), SCHEMA_HASH, "{:?}", timing[index]);
+    }
 }
