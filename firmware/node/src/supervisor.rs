@@ -6,7 +6,8 @@
 //! Link loss and E-stop of an armed axis put it in Hold at once. After the hold
 //! time the axis goes on to Exhaust, if the link-loss action of the newest
 //! SYNC slot allows it (the gait phase: a swing leg may go limp, a stance leg
-//! may not). An emergency brake, a sensor or state fault stays in Hold.
+//! may not). A master that lives lets no axis go on: the slots of a robot that it holds say
+//! Hold, and every SYNC with the bit of an E-stop begins the Hold anew. An emergency brake, a sensor or state fault stays in Hold.
 
 use crate::clock::Clock;
 use crate::faults::FaultLog;
