@@ -14,7 +14,9 @@ use crate::fields::{
     ResetCause, WheelControlMode,
 };
 use crate::frame::VERSION;
-use crate::link::{ADVANCE_MOST, BAUD, CYCLE_US, GAP_US, SETTING_US, TURNAROUND_US};
+use crate::link::{
+    ADVANCE_MOST, BAUD, CYCLE_US, DISCOVERY_SLOTS, GAP_US, SETTING_US, TURNAROUND_US,
+};
 use crate::message::MESSAGES;
 use crate::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
 use crate::sync::{LinkLossAction, SYNC_SLOT_FIELDS, SyncFlags};
@@ -72,6 +74,7 @@ pub const INTERFACE: Interface<'static> = Interface {
         ("turnaround_us", TURNAROUND_US),
         ("setting_us", SETTING_US),
         ("gap_us", GAP_US),
+        ("discovery_slots", DISCOVERY_SLOTS),
         ("advance_most", ADVANCE_MOST as u32),
     ],
 };

@@ -6,8 +6,9 @@
 //! Link loss and E-stop of an armed axis put it in Hold at once. After the hold
 //! time the axis goes on to Exhaust, if the link-loss action of the newest
 //! SYNC slot allows it (the gait phase: a swing leg may go limp, a stance leg
-//! may not). A master that lives lets no axis go on: the slots of a robot that it holds say
-//! Hold, and every SYNC with the bit of an E-stop begins the Hold anew. An emergency brake, a sensor or state fault stays in Hold.
+//! may not). While the master lives no axis goes on: the slots of a robot that it holds say
+//! Hold, and a SYNC with the bit of an E-stop takes an axis back to it. An emergency
+//! brake, a sensor or state fault stays in Hold.
 
 use crate::clock::Clock;
 use crate::faults::FaultLog;

@@ -38,9 +38,9 @@ impl Default for WatchdogCycles {
     }
 }
 
-/// Largest step of the counter that is an advance: what the longest watchdog lets be lost, and one.
-/// A master that starts again counts from 1; with a wider window half of all restarts would look
-/// as if the old one went on.
+/// Largest step of the counter that is an advance: the longest watchdog, and one more. A master
+/// that starts again counts from 1; with a window of half the range half of all restarts would
+/// look as if the old one went on, with this one those within 11 counts before the wrap.
 pub const ADVANCE_MOST: u16 = 11;
 
 /// Why a link was declared lost.
@@ -305,7 +305,7 @@ mod tests {
         }
     }
 
-    /// The longest watchdog lets ten be lost.
+    /// Ten, the longest watchdog, and one more.
     #[test]
     fn a_step_of_eleven_is_an_advance() {
         let mut link = up_at(1_000_000);
@@ -314,10 +314,17 @@ mod tests {
         assert_eq!(link.poll(1_100_001), None);
     }
 
-    /// Whatever the old one had counted to: a new master counts from 1.
+    /// A new master counts from 1. Just before the wrap the counter cannot tell it from the old
+    /// one; the master itself finds that a board is armed that it has not armed.
     #[test]
-    fn a_master_that_starts_again_is_stale_at_any_uptime() {
-        for last in (20..=u16::MAX).step_by(997) {
+    fn a_master_that_starts_again_is_stale_but_for_eleven_counts_before_the_wrap() {
+        for last in 65_526..=u16::MAX {
+            let mut link = LinkSupervisor::default();
+            link.on_sync(last - 1, 990_000);
+            assert!(link.on_sync(last, 1_000_000));
+            assert!(link.on_sync(1, 1_010_000), "{last}");
+        }
+        for last in (20..=u16::MAX).step_by(997).chain([6, 65_525]) {
             let mut link = LinkSupervisor::default();
             link.on_sync(last - 1, 990_000);
             assert!(link.on_sync(last, 1_000_000));

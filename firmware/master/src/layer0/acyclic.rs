@@ -59,7 +59,7 @@ pub struct Job {
     pub message: Message,
     /// On whose behalf.
     pub purpose: Purpose,
-    /// Latest time at which it may be sent first, µs: requests wait while a silent board is
+    /// Latest time at which it may leave the queue, µs: requests wait while a silent board is
     /// asked again, and what moves an axis must not come long after it was wanted.
     pub until_us: u64,
 }
@@ -108,10 +108,25 @@ impl Jobs {
         self.queue.pop_front()
     }
 
-    /// Whether none waits.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.queue.is_empty()
+    /// The requests that wait, in order.
+    pub fn iter(&self) -> impl Iterator<Item = &Job> {
+        self.queue.iter()
+    }
+
+    /// Drops the waiting requests that are `unwanted`, and calls `dropped` for the ticket of
+    /// each user command among them.
+    pub fn drop_where(&mut self, unwanted: impl Fn(&Job) -> bool, mut dropped: impl FnMut(Ticket)) {
+        for _ in 0..self.queue.len() {
+            let Some(job) = self.queue.pop_front() else {
+                return;
+            };
+            if !unwanted(&job) {
+                // There is room: it has just been taken out.
+                let _fits = self.push(job);
+            } else if let Some(ticket) = job.purpose.ticket() {
+                dropped(ticket);
+            }
+        }
     }
 
     /// Drops all waiting requests, and calls `dropped` for the ticket of each

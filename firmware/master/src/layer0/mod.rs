@@ -13,6 +13,7 @@ pub mod acyclic;
 mod commands;
 mod cycle;
 pub mod feet;
+mod left_behind;
 pub mod line;
 pub mod liveness;
 pub mod nodes;
@@ -35,6 +36,7 @@ use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, TravelSetpoi
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
 use feet::FootWatch;
+use left_behind::LeftBehind;
 use line::Line;
 use liveness::Liveness;
 use nodes::Nodes;
@@ -103,8 +105,7 @@ pub struct Layer0 {
     /// Profile of the wheels' pushes, as last told to their boards.
     push: PushProfile,
     stale_cycles: u16,
-    /// Cycles for which a board has been armed while nobody is.
-    left_behind_cycles: u8,
+    left_behind: LeftBehind,
     /// Strokes at which all joints are kept after a stop.
     frozen: Option<[Option<PositionMm>; JOINTS]>,
     /// References of the user, one joint at a time.
@@ -153,7 +154,7 @@ impl Layer0 {
             group: None,
             setpoints: Setpoints::idle(0),
             stale_cycles: 0,
-            left_behind_cycles: 0,
+            left_behind: LeftBehind::default(),
             frozen: None,
             direct: [None; JOINTS],
             direct_travel: None,

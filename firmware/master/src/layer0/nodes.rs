@@ -264,16 +264,6 @@ impl Nodes {
         })
     }
 
-    /// The first node whose newest reply shows that it is armed.
-    #[must_use]
-    pub fn first_armed(&self) -> Option<u8> {
-        self.iter().find_map(|(address, node)| {
-            node.reply
-                .filter(|reply| matches!(reply.mode, NodeMode::Armed | NodeMode::Tracking))
-                .map(|_| address.raw())
-        })
-    }
-
     /// Whether a joint is still filling its chambers: it has no closed loop yet.
     #[must_use]
     pub fn fills(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Stops: E-stop, HOLD of all axes, and what triggers them.
 
-use wheeleg_protocol::{Address, Disarm, EmergencyBrake, InputBits, Message};
+use wheeleg_protocol::{Address, EmergencyBrake, InputBits, Message};
 
 use super::acyclic::{Job, Purpose};
 use super::line::Found;
@@ -18,10 +18,6 @@ const CONFIRM_CYCLES: u8 = 10;
 /// … and with a precharge, which joints end by themselves after 200 cycles.
 const FILL_CYCLES: u8 = 220;
 
-/// Cycles for which a board may show that it is armed while nobody is: its answer to the last
-/// request, and that of the slowest other.
-const LEFT_BEHIND_CYCLES: u8 = 3;
-
 /// Index of the node with the supply-pressure switch: wheel board 7.
 const SUPPLY_NODE: usize = 6;
 
@@ -29,8 +25,8 @@ impl Layer0 {
     /// E-stop: the bit goes out with the next SYNC and stays until cleared.
     pub fn emergency_stop(&mut self, now_us: u64, events: &mut Events) {
         self.emergency_stop = true;
-        // Where all is held already: what waits must not open a valve after the stop.
-        self.drop_requests(now_us, events);
+        // Where all is held already: nothing that waits may open a valve after the stop.
+        self.drop_openings(now_us, events);
         self.hold_all(HoldReason::EmergencyStop, now_us, events);
     }
 
@@ -49,6 +45,20 @@ impl Layer0 {
             let liveness = &self.liveness;
             self.jobs
                 .ask_all(EmergencyBrake {}.into(), |index| liveness.alive(index));
+        }
+    }
+
+    /// Ends the requests to open valves, waiting or under way.
+    fn drop_openings(&mut self, now_us: u64, events: &mut Events) {
+        let opens = |job: &Job| matches!(job.message, Message::OpenAllValves(_));
+        let reason = Refusal::Interrupted;
+        let mut refuse = |ticket| events.push(now_us, Event::Refused { ticket, reason });
+        self.jobs.drop_where(opens, &mut refuse);
+        if let Some(job) = self.in_flight.take_if(|job| opens(job)) {
+            self.requester.cancel();
+            if let Some(ticket) = job.purpose.ticket() {
+                refuse(ticket);
+            }
         }
     }
 
@@ -170,25 +180,6 @@ impl Layer0 {
             };
             events.push(now_us, Event::Found { node, finding });
         });
-    }
-
-    /// A board that stays armed while nobody is: the master has started again without the
-    /// board's noticing, or the request to disarm was lost. It is told, and asked to disarm.
-    fn disarm_left_behind(&mut self, now_us: u64, events: &mut Events) {
-        let busy = self.group.is_some() || !self.jobs.is_empty();
-        let Some(node) = self.nodes.first_armed().filter(|_| !busy) else {
-            self.left_behind_cycles = 0;
-            return;
-        };
-        self.left_behind_cycles = self.left_behind_cycles.saturating_add(1);
-        if self.left_behind_cycles >= LEFT_BEHIND_CYCLES {
-            self.left_behind_cycles = 0;
-            let (node, finding) = (Some(node), Finding::LeftArmed);
-            events.push(now_us, Event::Found { node, finding });
-            let liveness = &self.liveness;
-            self.jobs
-                .ask_all(Disarm {}.into(), |index| liveness.alive(index));
-        }
     }
 
     /// Ends a cycle for the supervision of the nodes.

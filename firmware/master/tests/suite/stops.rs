@@ -353,13 +353,23 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
         Event::Found { node, finding } => (*finding == Finding::LeftArmed).then_some(*node),
         _ => None,
     };
-    let mut rig = Rig::new(MasterConfig::default());
-    rig.run(60);
-    rig.node(4).mode = NodeMode::Armed;
-    rig.run(30);
-    assert_eq!(rig.node(4).mode, NodeMode::Idle);
-    let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
-    assert_eq!(told, [Some(4)]);
+    for boards in [&[4][..], &[1, 2, 3, 4, 5, 6, 7, 8], &[8]] {
+        let mut rig = Rig::new(MasterConfig::default());
+        rig.run(60);
+        for board in boards {
+            rig.node(*board).mode = NodeMode::Armed;
+        }
+        let before: Vec<usize> = rig.nodes.iter().map(|n| n.requests.len()).collect();
+        rig.run(30);
+        let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
+        assert_eq!(told, boards.iter().map(|b| Some(*b)).collect::<Vec<_>>());
+        for (node, before) in rig.nodes.iter().zip(before) {
+            assert_eq!(node.mode, NodeMode::Idle);
+            let disarms = |m: &&Message| matches!(m, Message::Disarm(_));
+            let asked = node.requests[before..].iter().filter(disarms).count();
+            assert_eq!(asked, usize::from(boards.contains(&node.address.raw())));
+        }
+    }
     // Arming and disarming on request are no such thing, whoever is slow.
     for slow in [6, 8] {
         let mut rig = Rig::new(MasterConfig::default());
@@ -368,6 +378,16 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
         let ticket = rig.submit(Command::Disarm);
         rig.run(60);
         assert!(rig.done(ticket) && !rig.saw(|event| left(event).is_some()));
+        // Nor is an arming that is given up.
+        let mut rig = Rig::new(MasterConfig::default());
+        rig.run(60);
+        rig.node(2).never_arms = true;
+        rig.submit(Command::Arm);
+        rig.run(12);
+        rig.node(slow).unanswered = 3;
+        rig.run(100);
+        assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Idle));
+        assert!(!rig.saw(|event| left(event).is_some()));
     }
 }
 
@@ -402,12 +422,17 @@ fn an_e_stop_of_a_held_robot_drops_what_was_asked_before() {
     rig.node(2).faults = Fault::SensorRange.into();
     rig.run(20);
     assert!(rig.master.layer0().hold().is_some());
+    let read = rig.submit(Command::ReadParameter {
+        node: 5,
+        id: 0x0101,
+    });
     let open = rig.submit(Command::OpenAllValves { joint: 3 });
     rig.master.cycle(rig.now_us);
     rig.now_us += CYCLE_US;
     rig.submit(Command::EmergencyStop);
     rig.run(20);
     assert_eq!(rig.refusal(open), Some(Refusal::Interrupted));
+    assert!(rig.done(read), "what opens no valve goes on");
     let opened = rig.node(3).requests.iter();
     assert_eq!(
         opened

@@ -12,7 +12,8 @@
 //!
 //! A save goes to the page that does not hold the newest set: erase, records,
 //! and last of all the word with the CRC. So a power cut at any instant leaves
-//! either the old set or the new one. Words torn by the cut are unreadable or
+//! either the old set or the new one; in the first save of a blank store, which has no old set, one
+//! that counts as damaged. Words torn by the cut are unreadable or
 //! anything at all; the CRC decides.
 
 #[cfg(test)]

@@ -1,0 +1,82 @@
+//! Boards that stay armed while nobody is: the master has started again without their
+//! noticing, or a request to disarm was lost. They are named, and asked to disarm.
+
+use wheeleg_protocol::{Address, Disarm, Message, NodeMode};
+
+use super::Layer0;
+use super::acyclic::{Job, Purpose};
+use crate::event::{Event, Events};
+use crate::finding::Finding;
+use crate::setpoint::NODES;
+
+/// Cycles for which a board may show that it is armed: its replies until it has heard the
+/// request to disarm, once repeated.
+const PATIENCE: u8 = 5;
+/// Cycles until it is asked again.
+const AGAIN: u8 = 100;
+
+/// For how many cycles each board has been armed while nobody was.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LeftBehind([u8; NODES]);
+
+/// What is to be done about a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Measure {
+    /// It is named, and asked to disarm.
+    Name,
+    /// It is asked again.
+    Ask,
+}
+
+impl LeftBehind {
+    /// Takes whether the newest reply of node index 0..8 shows that it is armed; a missing reply
+    /// tells nothing.
+    fn shows(&mut self, index: usize, armed: Option<bool>) -> Option<Measure> {
+        let cycles = self.0.get_mut(index)?;
+        if !armed? {
+            *cycles = 0;
+            return None;
+        }
+        *cycles = cycles.saturating_add(1);
+        match *cycles {
+            PATIENCE => Some(Measure::Name),
+            AGAIN => {
+                // Named once.
+                *cycles = PATIENCE;
+                Some(Measure::Ask)
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Layer0 {
+    /// A cycle in which nobody is armed.
+    pub(super) fn disarm_left_behind(&mut self, now_us: u64, events: &mut Events) {
+        let disarms = |job: &Job| matches!(job.message, Message::Disarm(_));
+        let under_way = self.in_flight.as_ref().is_some_and(disarms);
+        if self.group.is_some() || under_way || self.jobs.iter().any(disarms) {
+            // They are just being asked.
+            self.left_behind = LeftBehind::default();
+            return;
+        }
+        for to in Address::nodes() {
+            let index = to.slot().unwrap_or(NODES);
+            let reply = self.nodes.get(index).and_then(|node| node.reply);
+            let armed = |mode| matches!(mode, NodeMode::Armed | NodeMode::Tracking);
+            let measure = self
+                .left_behind
+                .shows(index, reply.map(|reply| armed(reply.mode)));
+            if measure == Some(Measure::Name) {
+                let (node, finding) = (Some(to.raw()), Finding::LeftArmed);
+                events.push(now_us, Event::Found { node, finding });
+            }
+            if measure.is_some() {
+                // Where the queue is full it is asked the next time.
+                let _fits = self
+                    .jobs
+                    .push(Job::new(to, Disarm {}.into(), Purpose::Stop));
+            }
+        }
+    }
+}
