@@ -382,3 +382,23 @@ impl WheelBoard {
         each_wheel!(&self.application, node => node.snapshot())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_protocol::param::JointParam;
+
+    #[test]
+    fn a_damaged_memory_is_a_fault_and_contradicting_parameters_are_refused() {
+        let who = identity(Address::new(2).expect("a joint"));
+        let new = |stored: Option<&[(u16, i32)]>| JointBoard::new(who, stored, ResetCause::PowerUp);
+        let faults = |board: &JointBoard| each!(&board.application, node => node.faults());
+        let damaged = new(None).expect("it starts");
+        assert!(faults(&damaged).contains(Fault::ParameterCorrupt));
+        let blank = new(Some(&[])).expect("it starts");
+        assert!(faults(&blank).is_empty());
+        let (low, high) = (JointParam::StrokeMin.id(), JointParam::StrokeMax.id());
+        let crossed = new(Some(&[(low, 150 << 16), (high, 20 << 16)]));
+        assert!(crossed.is_err());
+    }
+}

@@ -196,4 +196,26 @@ mod tests {
         }
         assert!(news > 0);
     }
+
+    /// Without an old set there is nothing to go back to: what the cut leaves is damaged.
+    #[test]
+    fn a_power_cut_in_the_first_save_leaves_a_blank_memory_a_damaged_one_or_the_set() {
+        let mut left = [0; 3];
+        for n in 0..=24 {
+            let cut_ns = 2 * ERASE_NS + n * PROGRAM_NS - PROGRAM_NS / 2;
+            let mut memory = Memory::new(&[]);
+            memory.begin(set(100), 0);
+            memory.power_fails(cut_ns);
+            match memory.records() {
+                Some(records) if records.is_empty() => left[0] += 1,
+                None => left[1] += 1,
+                records => {
+                    assert_eq!(records, Some(set(100)));
+                    left[2] += 1;
+                }
+            }
+        }
+        // Before the header, within the 22 words, after them.
+        assert_eq!(left, [1, 22, 2]);
+    }
 }
