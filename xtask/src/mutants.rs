@@ -40,6 +40,7 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
     ),
     (
         &[
+            "firmware/master/src/layer0/left_behind.rs",
             "firmware/master/src/layer0/line.rs",
             "firmware/master/src/layer0/liveness.rs",
             "firmware/master/src/layer0/nodes.rs",
