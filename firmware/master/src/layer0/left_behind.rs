@@ -57,7 +57,6 @@ impl Layer0 {
         let under_way = self.in_flight.as_ref().is_some_and(disarms);
         if self.group.is_some() || under_way || self.jobs.iter().any(disarms) {
             // They are just being asked.
-            self.left_behind = LeftBehind::default();
             return;
         }
         for to in Address::nodes() {

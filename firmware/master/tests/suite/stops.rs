@@ -370,6 +370,20 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
             assert_eq!(asked, usize::from(boards.contains(&node.address.raw())));
         }
     }
+    // One that does not hear is asked again, and named once.
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    rig.node(4).mode = NodeMode::Armed;
+    rig.node(4).unanswered = 5;
+    rig.run(60);
+    assert_eq!(
+        (rig.node(4).mode, rig.node(4).unanswered),
+        (NodeMode::Armed, 0)
+    );
+    rig.run(120);
+    assert_eq!(rig.node(4).mode, NodeMode::Idle);
+    let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
+    assert_eq!(told, [Some(4)]);
     // Arming and disarming on request are no such thing, whoever is slow.
     for slow in [6, 8] {
         let mut rig = Rig::new(MasterConfig::default());
