@@ -285,4 +285,31 @@ mod tests {
         }
         assert!(monitor.is_settled());
     }
+
+    #[test]
+    fn every_flipped_bit_of_what_the_monitor_keeps_changes_its_seal() {
+        let sum = |monitor: &SensorMonitor| {
+            let mut hasher = std::hash::DefaultHasher::new();
+            monitor.hash(&mut hasher);
+            hasher.finish()
+        };
+        for (rejected, good_in_row, has_last) in [(0, 0, false), (0x5A, 0xA5, true)] {
+            let sound = SensorMonitor {
+                last: PositionMm::from_int(90),
+                rejected,
+                good_in_row,
+                has_last,
+            };
+            for bit in 0..32 {
+                let mut damaged = [sound; 4];
+                damaged[0].last = PositionMm::from_raw(sound.last.raw() ^ (1 << bit));
+                damaged[1].rejected ^= 1 << (bit % 8);
+                damaged[2].good_in_row ^= 1 << (bit % 8);
+                damaged[3].has_last = !has_last;
+                for (field, damaged) in damaged.iter().enumerate() {
+                    assert_ne!(sum(damaged), sum(&sound), "{field} {bit}");
+                }
+            }
+        }
+    }
 }
