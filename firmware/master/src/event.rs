@@ -66,6 +66,8 @@ pub enum Event {
         master: u64,
         /// The node's schema hash.
         theirs: u64,
+        /// The node's firmware version: major, minor, patch.
+        firmware: [u8; 3],
     },
     /// A node is not the kind of board its address stands for.
     WrongRole(

@@ -19,9 +19,12 @@ pub(crate) fn describe(event: &Event) -> String {
             node,
             master,
             theirs,
+            firmware: [major, minor, patch],
         } => format!(
-            "{} has interface {theirs:016x}, the master has {master:016x}: will not arm. {}",
+            "{} has interface {theirs:016x} (firmware {major}.{minor}.{patch}), the master has \
+             {master:016x} ({}): will not arm. {}",
             board(node),
+            env!("CARGO_PKG_VERSION"),
             Finding::OtherInterface
         ),
         Event::ForeignBoard {

@@ -161,6 +161,7 @@ impl Layer0 {
                     node,
                     master: self.schema_hash,
                     theirs: identity.schema_hash,
+                    firmware: identity.firmware,
                 },
             ),
             Enumerated::Foreign(identity) => {

@@ -115,6 +115,7 @@ fn schema_mismatch_refuses_arming_and_names_both() {
         node: 5,
         master: SCHEMA_HASH,
         theirs: 0x1234,
+        firmware: [1, 0, 0],
     };
     assert!(rig.saw(|event| *event == mismatch));
     let ticket = rig.submit(Command::Arm);
