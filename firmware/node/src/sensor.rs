@@ -188,6 +188,7 @@ impl SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::seal::Seal;
 
     /// 4096 code steps per 16 mm: 1 mm = 256 codes.
     const CONFIG: SensorConfig = SensorConfig {
@@ -288,11 +289,6 @@ mod tests {
 
     #[test]
     fn every_flipped_bit_of_what_the_monitor_keeps_changes_its_seal() {
-        let sum = |monitor: &SensorMonitor| {
-            let mut hasher = std::hash::DefaultHasher::new();
-            monitor.hash(&mut hasher);
-            hasher.finish()
-        };
         for (rejected, good_in_row, has_last) in [(0, 0, false), (0x5A, 0xA5, true)] {
             let sound = SensorMonitor {
                 last: PositionMm::from_int(90),
@@ -307,7 +303,7 @@ mod tests {
                 damaged[2].good_in_row ^= 1 << (bit % 8);
                 damaged[3].has_last = !has_last;
                 for (field, damaged) in damaged.iter().enumerate() {
-                    assert_ne!(sum(damaged), sum(&sound), "{field} {bit}");
+                    assert_ne!(Seal::of(damaged), Seal::of(&sound), "{field} {bit}");
                 }
             }
         }

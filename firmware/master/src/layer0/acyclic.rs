@@ -131,12 +131,8 @@ impl Jobs {
 
     /// Drops all waiting requests, and calls `dropped` for the ticket of each
     /// user command among them.
-    pub fn clear(&mut self, mut dropped: impl FnMut(Ticket)) {
-        while let Some(job) = self.queue.pop_front() {
-            if let Some(ticket) = job.purpose.ticket() {
-                dropped(ticket);
-            }
-        }
+    pub fn clear(&mut self, dropped: impl FnMut(Ticket)) {
+        self.drop_where(|_| true, dropped);
     }
 
     /// Asks every node the same, for nobody: first those that are `alive` (a

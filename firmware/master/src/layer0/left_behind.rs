@@ -1,10 +1,11 @@
 //! Boards that stay armed while nobody is: the master has started again without their
 //! noticing, or a request to disarm was lost. They are named, and asked to disarm.
 
-use wheeleg_protocol::{Address, Disarm, Message, NodeMode};
+use wheeleg_protocol::{Address, Disarm, Message};
 
 use super::Layer0;
 use super::acyclic::{Job, Purpose};
+use super::nodes::is_armed;
 use crate::event::{Event, Events};
 use crate::finding::Finding;
 use crate::setpoint::NODES;
@@ -62,10 +63,8 @@ impl Layer0 {
         for to in Address::nodes() {
             let index = to.slot().unwrap_or(NODES);
             let reply = self.nodes.get(index).and_then(|node| node.reply);
-            let armed = |mode| matches!(mode, NodeMode::Armed | NodeMode::Tracking);
-            let measure = self
-                .left_behind
-                .shows(index, reply.map(|reply| armed(reply.mode)));
+            let armed = reply.map(|reply| is_armed(reply.mode));
+            let measure = self.left_behind.shows(index, armed);
             if measure == Some(Measure::Name) {
                 let (node, finding) = (Some(to.raw()), Finding::LeftArmed);
                 events.push(now_us, Event::Found { node, finding });

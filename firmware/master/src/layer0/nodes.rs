@@ -276,11 +276,15 @@ impl Nodes {
     /// Whether every node's last reply shows that it is armed.
     #[must_use]
     pub fn all_armed(&self) -> bool {
-        self.nodes.iter().all(|node| {
-            node.last
-                .is_some_and(|reply| matches!(reply.mode, NodeMode::Armed | NodeMode::Tracking))
-        })
+        self.nodes
+            .iter()
+            .all(|node| node.last.is_some_and(|reply| is_armed(reply.mode)))
     }
+}
+
+/// Whether the outputs of a board in this mode are its law's.
+pub(super) const fn is_armed(mode: NodeMode) -> bool {
+    matches!(mode, NodeMode::Armed | NodeMode::Tracking)
 }
 
 /// What a board is by what it says of itself.

@@ -10,7 +10,7 @@ use crate::board::Application;
 use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, ValveBank};
 use crate::mode::{Event, Mode};
 use crate::parameters::JointParameters;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use crate::seal::Seal;
 use wheeleg_control::joint::{Correction, JointConfig, JointGains};
 use wheeleg_control::pwm::PwmTiming;
 use wheeleg_control::valve::ValveMode;
@@ -226,11 +226,6 @@ fn the_predictive_law_is_watched_as_well() {
 /// What the watch of motion has learnt holds for a stroke and an axis as they were told.
 #[test]
 fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
-    let sum = |motion: &MotionWatch| {
-        let mut hasher = DefaultHasher::new();
-        motion.hash(&mut hasher);
-        hasher.finish()
-    };
     let set = |param: JointParam, value: i32| {
         let mut node = armed();
         for tick in 0..100 {
@@ -241,9 +236,9 @@ fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
         node.core.supervisor.apply(event, Micros(121_000)).unwrap();
         node.tick(Micros(121_000));
         assert_eq!(node.mode(), Mode::Idle);
-        let before = sum(&node.state.motion);
+        let before = Seal::of(&node.state.motion);
         let fresh = |node: &Node| {
-            sum(&MotionWatch::new(
+            Seal::of(&MotionWatch::new(
                 &node.settings.motion,
                 node.state.measured,
             ))
@@ -252,7 +247,7 @@ fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
         let id = param.id();
         let command = Message::ParamSet(ParamSet { id, value });
         node.request(&command, Micros(121_500)).unwrap();
-        let after = sum(&node.state.motion);
+        let after = Seal::of(&node.state.motion);
         assert!(after == before || after == fresh(&node));
         after != before
     };

@@ -76,7 +76,8 @@ const FREQUENT: [MessageType; 8] = [
     MessageType::ParamSet,
 ];
 
-/// Low byte of the largest number of a parameter, of either kind of board.
+/// Low byte of the largest number of a parameter, of either kind of board. Two more are drawn,
+/// which no board has.
 fn last_param() -> u8 {
     let rows = JOINT_PARAMS.iter().chain(WHEEL_PARAMS);
     rows.map(|row| row.id.to_le_bytes()[0]).max().unwrap_or(0)

@@ -1,7 +1,7 @@
 //! Tests of the watch for motion that does not come.
 
 use super::*;
-use std::hash::DefaultHasher;
+use crate::seal::Seal;
 use wheeleg_control::axis::AxisData;
 
 /// A tick under control that sends `on`.
@@ -182,13 +182,7 @@ fn the_load_is_the_force_of_a_sliding_piston_less_its_friction() {
     (watch.slid, watch.learnt) = (0, 0);
     let force = watch.air.force(&model.air);
     for (ticks, speed, friction) in [(400, 100, 14_000), (4000, -100, -14_000)] {
-        for _ in 0..ticks {
-            let driven = Driven {
-                velocity: VelocityMmS::from_int(speed),
-                ..driven(90, 90)
-            };
-            sample(&mut watch, &SHUT, &driven, &model);
-        }
+        slide(&mut watch, ticks, speed, &model);
         // 10 N of Coulomb and 4 N of viscous friction.
         assert!(
             (watch.learnt - (force - friction)).abs() < 500,
@@ -264,17 +258,12 @@ fn the_mean_is_over_the_last_100_ms_of_sliding() {
 
 #[test]
 fn every_flipped_bit_of_what_the_watch_keeps_changes_its_seal() {
-    let sum = |watch: &MotionWatch| {
-        let mut hasher = DefaultHasher::new();
-        watch.hash(&mut hasher);
-        hasher.finish()
-    };
     let model = model(0);
     let mut watch = knowing(0, 90, &model);
     // A word of many bits and one of none: whatever joins two fields must keep both.
     for (slid, doubt) in [(0, 0), (0x55AA, 0xA55A)] {
         (watch.slid, watch.doubt) = (slid, doubt);
-        let sound = sum(&watch);
+        let sound = Seal::of(&watch);
         for bit in 0..32 {
             let mut damaged = [watch; 5];
             damaged[0].from ^= 1 << bit;
@@ -283,7 +272,7 @@ fn every_flipped_bit_of_what_the_watch_keeps_changes_its_seal() {
             damaged[3].doubt ^= 1 << (bit % 16);
             damaged[4].stands ^= 1 << (bit % 16);
             for (field, damaged) in damaged.iter().enumerate() {
-                assert_ne!(sum(damaged), sound, "{field} {bit}");
+                assert_ne!(Seal::of(damaged), sound, "{field} {bit}");
             }
         }
     }
