@@ -84,6 +84,17 @@ mod tests {
     }
 
     #[test]
+    fn half_a_round_ahead_is_ahead_and_more_is_behind() {
+        let ahead = Micros(i32::MAX as u32 + 10);
+        let mut clock = Clock::default();
+        clock.unwrap(Micros(10));
+        assert_eq!(clock.unwrap(ahead), u64::from(ahead.get()));
+        let mut clock = Clock::default();
+        clock.unwrap(Micros(10));
+        assert_eq!(clock.unwrap(Micros(ahead.get() + 1)), 0);
+    }
+
+    #[test]
     fn a_counter_that_starts_in_its_upper_half_runs() {
         let mut clock = Clock::default();
         let start = 0x9000_0000_u32;

@@ -222,6 +222,21 @@ mod tests {
     }
 
     #[test]
+    fn every_integer_is_taken_as_its_words() {
+        let of =
+            |words: &[u32]| Seal::made(|sum| words.iter().for_each(|word| sum.write_u32(*word)));
+        assert_eq!(Seal::of(&(0x12_u8, 0x3456_u16)), of(&[0x12, 0x3456]));
+        assert_eq!(
+            Seal::of(&0x1234_5678_9ABC_DEF0_u64),
+            of(&[0x9ABC_DEF0, 0x1234_5678])
+        );
+        assert_eq!(Seal::of(&0x1234_5678_usize), of(&[0x1234_5678]));
+        let mut sum = WordSum(0);
+        0x1234_u16.hash(&mut sum);
+        assert_eq!(sum.finish(), 0x1234);
+    }
+
+    #[test]
     fn exchanged_words_are_detected() {
         assert!(!Seal::of(&[1_u32, 2]).holds(&[2_u32, 1]));
         assert!(!Seal::of(&(1_u64, 0_u8)).holds(&(1_u64 << 32, 0_u8)));

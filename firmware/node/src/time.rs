@@ -58,7 +58,7 @@ impl TimeSync {
         );
         let limit = |ppm: i16| i32::from(ppm / DRIFT_LIMIT_PPM).signum();
         let before = limit(self.drift_ppm);
-        self.drift_ppm = i16::try_from(ppm).unwrap_or(if ppm < 0 { i16::MIN } else { i16::MAX });
+        self.drift_ppm = ppm.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
         before != 0 && before == limit(self.drift_ppm)
     }
 
@@ -107,6 +107,20 @@ mod tests {
         for ppm in [2100, -2100, 40_000, -50_000] {
             let (fault, _) = fault_after(ppm, |_| 0);
             assert!(matches!(fault, Some(1 | 2)), "{ppm} {fault:?}");
+        }
+    }
+
+    #[test]
+    fn a_window_ends_with_its_time_and_drift_beyond_its_word_is_the_most_it_holds() {
+        let mut clock = TimeSync::default();
+        assert!(!clock.sync(0, Micros(0)));
+        assert!(!clock.sync(WINDOW.get() - 101, Micros(WINDOW.get() - 1)));
+        assert_eq!(clock.drift_ppm(), 0, "not yet");
+        assert!(!clock.sync(WINDOW.get() - 100, Micros(WINDOW.get())));
+        assert_eq!(clock.drift_ppm(), 100);
+        for (ppm, told) in [(40_000, i16::MAX), (-50_000, i16::MIN)] {
+            let (_, clock) = fault_after(ppm, |_| 0);
+            assert_eq!(clock.drift_ppm(), told);
         }
     }
 

@@ -6,11 +6,11 @@
 //! then not be on a sound axis that stands still:
 //!
 //! 1. Towards its reference, it is pushed by more than its motions take, break-away
-//!    friction and the margin of the axis included, for 36 ms.
+//!    friction and the margin of the axis included, for 30 ms.
 //! 2. Nothing has been learnt from motions yet, but the force should be nine tenths of
 //!    the largest, with the opposing chamber known to be empty, for 200 ms.
 //! 3. A chamber of an account that has had time to get right should hold eleven eighths
-//!    of the supply, for 36 ms. No load makes that on an axis that the supply can move:
+//!    of the supply, for 30 ms. No load makes that on an axis that the supply can move:
 //!    the air has gone another way.
 //!
 //! The force that a motion takes is learnt whenever the piston slides, as the mean over
@@ -44,7 +44,7 @@ const MINUTE: u16 = u16::MAX / ROUND;
 /// Doubt that is a fault …
 const FAULT: u16 = 200;
 /// … what a round adds that cannot be on a sound axis …
-const STRONG: u16 = 6 * ROUND;
+const STRONG: u16 = 20;
 /// … and one with the largest force.
 const WEAK: u16 = ROUND;
 /// Rounds of sliding over which the force is averaged …
@@ -309,6 +309,12 @@ impl MotionWatch {
             self.doubt.saturating_add(doubt)
         };
         self.is_overdue()
+    }
+
+    /// Whether the piston has stood still since the last round.
+    #[inline]
+    pub(super) const fn stands(&self) -> bool {
+        self.stands > 0
     }
 
     /// Whether a motion is overdue, as the last round has judged.

@@ -1,7 +1,7 @@
 //! A flipped bit in what a joint board keeps between two ticks means Hold: at the
 //! next tick for what a tick changes, within [`PARTS`] ticks for the rest.
 
-use super::expectation::MotionWatch;
+use super::expectation::{MotionModel, MotionWatch};
 use super::node::{JointNode, PARTS};
 use super::precharge::Precharge;
 use super::reference::Target;
@@ -15,7 +15,9 @@ use wheeleg_control::joint::{Correction, JointConfig, JointGains};
 use wheeleg_control::pwm::PwmTiming;
 use wheeleg_control::valve::ValveMode;
 use wheeleg_protocol::param::JointParam;
-use wheeleg_protocol::{Address, Fault, Message, ParamSet};
+use wheeleg_protocol::{
+    Address, Envelope, Fault, MAX_ENCODED, Message, ParamSet, Sync, SyncFlags, SyncSlots,
+};
 use wheeleg_units::{AdcCode, Micros, PositionMm};
 
 struct Valves([u16; 4]);
@@ -147,6 +149,45 @@ fn a_request_does_not_hide_earlier_damage() {
     }));
 }
 
+/// Whether a node that hears a SYNC after damage to its link holds.
+fn holds_at_sync(damage: impl FnOnce(&mut Node)) -> bool {
+    let mut node = armed();
+    let sync = |node: &mut Node, cycle: u16| {
+        let message = Message::Sync(Sync {
+            cycle,
+            master_time_us: 0,
+            flags: SyncFlags::NONE,
+            slots: SyncSlots::NONE,
+        });
+        let envelope = Envelope {
+            source: Address::MASTER,
+            destination: Address::BROADCAST,
+            sequence: 0,
+        };
+        let mut buffer = [0; MAX_ENCODED];
+        let bytes = message.emit(envelope, &mut buffer).unwrap();
+        node.on_bus_bytes(bytes, Micros(20_000 + u32::from(cycle) * 100));
+    };
+    for cycle in 1..4 {
+        sync(&mut node, cycle);
+    }
+    assert_eq!(node.mode(), Mode::Armed);
+    damage(&mut node);
+    sync(&mut node, 4);
+    node.faults().contains(Fault::StateCorrupt)
+}
+
+#[test]
+fn a_damaged_counter_or_address_is_seen_with_the_next_sync() {
+    assert!(!holds_at_sync(|_| {}));
+    for bit in 0..16 {
+        assert!(holds_at_sync(|node| node.core.cycle ^= 1 << bit), "{bit}");
+    }
+    assert!(holds_at_sync(|node| {
+        node.core.identity.address = Address::joint(2).unwrap();
+    }));
+}
+
 /// A flipped bit of the configuration is found in its turn, from whichever part the
 /// node looks at next.
 fn found_in_turn(damage: impl Fn(&mut Node)) {
@@ -183,6 +224,10 @@ fn damaged_parameters_settings_and_gains_are_seen_within_a_round() {
     found_in_turn(|node| node.settings.sensor.step_max = PositionMm::ZERO);
     found_in_turn(|node| {
         node.settings.staged_exhaust = ValveMode::BlowThrough.openings(Micros(10_000))
+    });
+    found_in_turn(|node| {
+        let gains = *node.controller.config().gains();
+        node.settings.motion = MotionModel::new(&gains, PositionMm::from_int(77)).unwrap();
     });
     found_in_turn(|node| node.core.times.hold = Micros(node.core.times.hold.get() ^ 1));
     found_in_turn(|node| {

@@ -12,7 +12,7 @@ use wheeleg_control::joint::{JointInput, JointLimits};
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_control::valve::{ValveMode, ValveOpenings};
 use wheeleg_protocol::{Fault, Limit, LimitBits};
-use wheeleg_units::{Duty, Micros, Ticks, VelocityMmS};
+use wheeleg_units::{Duty, Micros, PositionMm, Ticks, VelocityMmS};
 
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Closed loop on the reference of this tick.
@@ -30,7 +30,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             reference_velocity: velocity,
             announced,
         });
-        let beyond = output.error.saturating_abs() > self.settings.following_error;
+        let beyond = output.error.saturating_abs() > self.allowed_error();
         self.state.following = if beyond {
             self.state.following.next()
         } else {
@@ -67,6 +67,18 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.snapshot.limits = limits;
         self.snapshot.settled = output.settled;
         on_times
+    }
+
+    /// Following error that may last: a piston that stands lags behind nothing, so its error is
+    /// not that of a motion to come, and a quarter of it must do.
+    #[inline]
+    fn allowed_error(&self) -> PositionMm {
+        let allowed = self.settings.following_error;
+        if self.state.motion.stands() {
+            PositionMm::from_raw(allowed.raw() >> 2)
+        } else {
+            allowed
+        }
     }
 
     /// Whether the following error has lasted its time.

@@ -28,7 +28,8 @@ impl EncoderWatch {
     /// brought; true when the encoder is faulty.
     pub(super) fn sample(&mut self, drive_percent: i8, counts: i32, tick: Micros) -> bool {
         let driven = drive_percent.unsigned_abs() >= DRIVE_PERCENT;
-        let against = counts == 0 || (counts < 0) != (drive_percent < 0);
+        // Standing still is neither direction.
+        let against = counts.signum() != i32::from(drive_percent.signum());
         if !driven || !against {
             self.samples = 0;
             return false;
@@ -67,13 +68,19 @@ mod tests {
         assert_eq!(first_fault(|_| (100, 0)), Some(LIMIT));
         assert_eq!(first_fault(|_| (-40, 0)), Some(LIMIT));
         assert_eq!(first_fault(|n| (100, -(n as i32) / 4)), Some(LIMIT));
+        assert_eq!(first_fault(|n| (-100, n as i32 / 4)), Some(LIMIT));
         assert!(LIMIT * TICK.get() <= 100_000);
+        // A sample of which the window is a multiple.
+        let mut watch = EncoderWatch::default();
+        let found = (1..=200).find(|_| watch.sample(100, 0, Micros(500)));
+        assert_eq!(found, Some(180));
     }
 
     #[test]
     fn weak_drive_turning_and_braking_are_sound() {
         assert_eq!(first_fault(|_| (39, 0)), None);
         assert_eq!(first_fault(|_| (100, 34)), None);
+        assert_eq!(first_fault(|_| (-100, -34)), None);
         // One count in 80 ms is slow, but it turns.
         assert_eq!(first_fault(|n| (60, i32::from(n % 154 == 0))), None);
         // Rolling back at 60 counts, braked to a stop in 0.5 s, then forward.

@@ -173,7 +173,7 @@ fn a_count_longer_than_the_counter_survives_a_flip_in_any_of_its_copies() {
     };
     for (by, each) in [(400, 400), (400_u16.wrapping_neg(), -400)] {
         for bit in 0..24 {
-            for copy in 0..4 {
+            for copy in 0..6 {
                 let identity = NodeIdentity {
                     address: Address::wheel(8).unwrap(),
                     unique_id: [0; 12],
@@ -198,12 +198,16 @@ fn a_count_longer_than_the_counter_survives_a_flip_in_any_of_its_copies() {
                     0 => flip(&mut node.state.actual),
                     1 => flip(&mut node.counts[0]),
                     2 => flip(&mut node.counts[1]),
-                    // Damage elsewhere has no part in it.
-                    _ => node.state.drive ^= 1,
+                    // Damage elsewhere has no part in it, or one beside that of a copy.
+                    3 => node.state.drive ^= 1,
+                    _ => {
+                        node.state.drive ^= 1;
+                        flip(&mut node.counts[copy - 4]);
+                    }
                 }
                 turned(&mut node, 200..201, by);
                 let found = node.faults().contains(Fault::StateCorrupt);
-                assert_eq!(found, copy == 0 || copy == 3, "bit {bit}, copy {copy}");
+                assert_eq!(found, copy == 0 || copy >= 3, "bit {bit}, copy {copy}");
                 assert_eq!(
                     node.snapshot().count.get(),
                     201 * each,

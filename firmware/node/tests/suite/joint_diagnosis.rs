@@ -2,8 +2,8 @@
 //! who else has its address.
 
 use crate::common::joint::{JointRig, setpoint};
+use crate::common::mock::Memory;
 use crate::common::{ARM, decode, frame, refusal};
-use wheeleg_node::hardware::{ParameterStore, StoreError};
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_protocol::LinkLossAction::Hold;
@@ -62,25 +62,6 @@ fn a_reset_in_operation_is_a_fault_and_every_reset_has_its_cause() {
                 "told until the next start"
             );
         }
-    }
-}
-
-/// Memory for one set, which may fail.
-#[derive(Default)]
-struct Memory {
-    set: Vec<(u16, i32)>,
-    saves: u32,
-    broken: bool,
-}
-
-impl ParameterStore for Memory {
-    fn save(&mut self, records: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError> {
-        if self.broken {
-            return Err(StoreError);
-        }
-        self.set = records.collect();
-        self.saves += 1;
-        Ok(())
     }
 }
 

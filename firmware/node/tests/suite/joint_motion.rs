@@ -236,8 +236,10 @@ fn change_of_correction_is_bumpless() {
 #[test]
 fn settled_axis_switches_no_valve() {
     let mut rig = JointRig::tracking(Hold);
+    rig.run_cycles(20, Some(setpoint(106.0, Hold)));
     rig.run_cycles(10, Some(setpoint(100.2, Hold)));
     let pulses = rig.node.pulse_counts();
+    assert!(pulses.iter().any(|count| *count > 1), "{pulses:?}");
     for _ in 0..500 {
         rig.run_cycles(1, Some(setpoint(100.2, Hold)));
         assert!(!rig.any_open());

@@ -144,6 +144,12 @@ fn requests_for_others_are_ignored_and_wrong_ones_named() {
         gain: 0,
     });
     assert_eq!(refusal(&rig.request(&filter)), Some(NackReason::WrongBoard));
+    // An answer is no request.
+    let position = rig.request(&Message::TransmitPosition(TransmitPosition {}));
+    assert_eq!(
+        refusal(&rig.request(&position)),
+        Some(NackReason::UnknownMessage)
+    );
 }
 
 #[test]
@@ -172,6 +178,8 @@ fn answers_start_after_the_turnaround() {
     assert_eq!(envelope.sequence, 77);
     assert!((PositionMm::from_raw(position.position_raw).to_f64() - 100.0).abs() < 0.01);
     assert_eq!(position.cycle, rig.cycle);
+    // Ten ticks since the SYNC, of which the last read the stroke.
+    assert_eq!(position.age_us, 9000);
 }
 
 #[test]

@@ -12,3 +12,4 @@ mod joint_safe_states;
 mod joint_service;
 mod records;
 mod wheel;
+mod wheel_diagnosis;

@@ -81,6 +81,39 @@ fn a_joint_exactly_at_its_following_error_is_no_fault() {
     assert!(follows_at(PositionMm::from_raw(limit.raw() + 1)));
 }
 
+/// A joint that stands at a distance from its reference; whether it faults.
+fn stands_at(distance: PositionMm) -> bool {
+    let mut rig = JointRig::new();
+    let code = 3277 + 30_000;
+    rig.sensor.set(Ok(AdcCode::new(code)));
+    let measured = PositionMm::from_raw((i32::from(code) - 3277) * 200);
+    rig.run_cycles(3, None);
+    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    let slot = JointSetpoint {
+        reference: measured.saturating_add(distance),
+        ..setpoint(0.0, Hold)
+    };
+    for _ in 0..170 {
+        rig.run_cycles(1, Some(slot));
+        if rig.node.mode() == Mode::Hold {
+            assert!(rig.node.faults().contains(Fault::FollowingError));
+            return true;
+        }
+        assert_eq!(rig.node.mode(), Mode::Tracking);
+    }
+    false
+}
+
+/// What a valve stuck open makes of an axis at rest: its law holds it, away from its reference.
+#[test]
+fn a_joint_that_stands_may_be_off_by_a_quarter_of_its_following_error() {
+    let limit = JointParam::FollowingError.info().default / 4;
+    for sign in [1, -1] {
+        assert!(!stands_at(PositionMm::from_raw(sign * limit)));
+        assert!(stands_at(PositionMm::from_raw(sign * (limit + 1))));
+    }
+}
+
 /// Whether the integral is limited while a P + I law stands before `error_mm`.
 fn integral_limited(error_mm: f64) -> bool {
     let mut parameters = JointParameters::default();

@@ -153,6 +153,8 @@ pub const ROWS: &[Row] = &[
         stop_moving(2), &["joint 2:", "valve"]).holding(10.0),
     row("valve-stuck-open/first-vent", &[at("valve-stuck-open:joint2.vent-a", FOR_GOOD)], Phase::FirstReach,
         stop_moving(2), &["joint 2:", "valve"]).lasting(3.5),
+    row("valve-stuck-open/rest", &[at("valve-stuck-open:joint2.fill-a", FOR_GOOD)], Phase::Stand,
+        stop_moving(2), &["joint 2:", "valve"]).lasting(3.5),
     row("valve-slow", &[at("valve-slow:joint3.fill-a=8", FOR_GOOD)], Phase::SecondLower,
         stop_moving(3), &["joint 3:", "valve"]),
     row("valve-leaking", &[at("valve-leak:joint3=10000", FOR_GOOD)], Phase::SecondLower,

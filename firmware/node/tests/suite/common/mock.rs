@@ -4,7 +4,7 @@ use embedded_hal::digital::{self, InputPin, OutputPin};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use std::cell::Cell;
 use std::rc::Rc;
-use wheeleg_node::hardware::{Encoder, PositionSensor, SensorError};
+use wheeleg_node::hardware::{Encoder, ParameterStore, PositionSensor, SensorError, StoreError};
 use wheeleg_units::{AdcCode, WheelCount};
 
 /// Error of a mock that was told to fail.
@@ -126,5 +126,24 @@ pub struct Counter(pub Rc<Cell<i32>>);
 impl Encoder for Counter {
     fn count(&mut self, _: WheelCount) -> WheelCount {
         WheelCount::wrapping_new(self.0.get())
+    }
+}
+
+/// Memory for one set, which may fail.
+#[derive(Default)]
+pub struct Memory {
+    pub set: Vec<(u16, i32)>,
+    pub saves: u32,
+    pub broken: bool,
+}
+
+impl ParameterStore for Memory {
+    fn save(&mut self, records: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError> {
+        if self.broken {
+            return Err(StoreError);
+        }
+        self.set = records.collect();
+        self.saves += 1;
+        Ok(())
     }
 }

@@ -37,15 +37,20 @@ pub struct WheelRig {
 
 impl WheelRig {
     pub fn new() -> Self {
+        Self::stored(Some(WheelParameters::default()))
+    }
+
+    /// With parameters from the board's memory, or with a memory that is damaged.
+    pub fn stored(parameters: Option<WheelParameters>) -> Self {
         let (pulse, sign, counter) = (Pwm::default(), Pin::default(), Counter::default());
         let (supply, dump) = (Pin::default(), Pin::default());
         let address = Address::wheel(7).unwrap();
-        let node = WheelNode::new(
+        let node = WheelNode::from_store(
             NodeIdentity {
                 address,
                 unique_id: [7; 12],
             },
-            WheelParameters::default(),
+            parameters,
             HBridge {
                 pulse: pulse.clone(),
                 sign: sign.clone(),
