@@ -140,7 +140,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     /// 12.4 counts per sample, saturating.
     fn velocity_raw(&self) -> i16 {
         let velocity = self.snapshot.control.velocity.saturating_mul(16);
-        i16::try_from(velocity).unwrap_or(if velocity < 0 { i16::MIN } else { i16::MAX })
+        velocity.clamp(i16::MIN.into(), i16::MAX.into()) as i16
     }
 
     fn position(&self) -> Position {

@@ -13,3 +13,4 @@ mod joint_service;
 mod records;
 mod wheel;
 mod wheel_diagnosis;
+mod wheel_service;

@@ -1,23 +1,17 @@
 //! The wheel board on a motor model: safe states, modes, services.
 
-use crate::common::wheel::{WheelRig, setpoint};
+use crate::common::wheel::{WheelRig, select, setpoint};
 use crate::common::{ARM, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_protocol::param::WheelParam;
 use wheeleg_protocol::{
-    Acceleration8p8, ClearFault, Count24, EmergencyBrake, Fault, InputBits, Limit, Message,
-    NackReason, OpenAllValves, OpenMode, ParamGet, ParamSet, Speed7, WheelAcceleration,
-    WheelControlMode, WheelFilter, WheelMaxSpeed, WheelMode, WheelReference, WheelSampleTimer,
-    WheelVelocity,
+    ClearFault, Count24, EmergencyBrake, Fault, InputBits, Limit, Message, NackReason, ParamSet,
+    Speed7, WheelControlMode, WheelMaxSpeed, WheelReference, WheelVelocity,
 };
 use wheeleg_units::{Micros, WheelCount};
 
 fn clear(rig: &mut WheelRig) -> Message {
     rig.request(&Message::ClearFault(ClearFault {}))
-}
-
-fn select(rig: &mut WheelRig, mode: WheelControlMode) -> Message {
-    rig.request(&Message::WheelMode(WheelMode { mode }))
 }
 
 /// Runs without SYNC; gives the times at which Hold began to act and at which
@@ -318,96 +312,27 @@ fn integral_velocity_takes_whole_counts_only() {
 }
 
 #[test]
-fn filter_timer_and_profile_commands_are_parameters() {
+fn an_armed_wheel_that_gets_another_mode_stops_and_keeps_its_place() {
     let mut rig = WheelRig::new();
     rig.run_ms(40, None);
-    let commands = [
-        Message::WheelFilter(WheelFilter {
-            zero: 200,
-            pole: 30,
-            gain: 20,
-        }),
-        Message::WheelAcceleration(WheelAcceleration {
-            acceleration: Acceleration8p8::new(300).unwrap(),
-        }),
-        Message::WheelSampleTimer(WheelSampleTimer { timer: 124 }),
-    ];
-    for command in commands {
-        assert!(
-            matches!(rig.request(&command), Message::Ack(_)),
-            "{command:?}"
-        );
-    }
-    for (parameter, expected) in [
-        (WheelParam::FilterZero, 200),
-        (WheelParam::FilterPole, 30),
-        (WheelParam::FilterGain, 20),
-        (WheelParam::Acceleration, 300),
-        (WheelParam::SampleTimer, 124),
-    ] {
-        let get = Message::ParamGet(ParamGet { id: parameter.id() });
-        let Message::ParamValue(value) = rig.request(&get) else {
-            panic!()
-        };
-        assert_eq!(value.value, expected);
-    }
-    // 16 (124 + 1) clocks of 2 MHz.
-    assert_eq!(rig.node.tick_period_us(), 1000);
-    rig.run_ms(40, None);
-    assert!(rig.node.faults().is_empty(), "a new period is no overrun");
+    select(&mut rig, WheelControlMode::IntegralVelocity);
     rig.request(&ARM);
-    let timer = Message::WheelSampleTimer(WheelSampleTimer { timer: 64 });
-    assert_eq!(refusal(&rig.request(&timer)), Some(NackReason::Armed));
-}
-
-#[test]
-fn sample_timer_below_the_minimum_of_the_mode_is_refused() {
-    let mut rig = WheelRig::new();
-    rig.run_ms(40, None);
-    let timer = Message::WheelSampleTimer(WheelSampleTimer { timer: 10 });
-    assert!(
-        matches!(rig.request(&timer), Message::Ack(_)),
-        "position mode: 7"
-    );
-    let refused = select(&mut rig, WheelControlMode::Trapezoidal);
-    assert_eq!(
-        refusal(&refused),
-        Some(NackReason::OutOfRange),
-        "profile: 15"
-    );
-    assert_eq!(rig.node.control_mode(), WheelControlMode::Position);
-}
-
-#[test]
-fn joint_commands_are_for_the_other_board() {
-    let mut rig = WheelRig::armed();
-    let open = Message::OpenAllValves(OpenAllValves {
-        mode: OpenMode::Exhaust,
+    let turn = Message::WheelVelocity(WheelVelocity {
+        velocity_raw: 20 * 16,
+        deadline_cycle: rig.cycle,
     });
-    assert_eq!(refusal(&rig.request(&open)), Some(NackReason::WrongBoard));
+    assert!(matches!(rig.request(&turn), Message::Ack(_)));
+    rig.run_ms(600, None);
+    assert!(rig.drive() > 10);
+    let at = rig.counter.0.get();
+    assert!(matches!(
+        select(&mut rig, WheelControlMode::Position),
+        Message::Ack(_)
+    ));
+    rig.run_ms(600, None);
+    let off = (rig.counter.0.get() - at).abs();
+    assert!(off <= 20, "{off}");
     assert_eq!(rig.node.mode(), Mode::Armed);
-}
-
-#[test]
-fn supply_switch_is_debounced_and_reported() {
-    let mut rig = WheelRig::new();
-    rig.run_ms(20, None);
-    assert!(
-        !rig.sync(None, false)
-            .inputs
-            .contains(InputBits::SUPPLY_PRESSURE)
-    );
-    rig.supply.high.set(true);
-    rig.tick();
-    rig.tick();
-    assert!(!rig.node.snapshot().supply_present);
-    rig.tick();
-    assert!(rig.node.snapshot().supply_present);
-    assert!(
-        rig.sync(None, false)
-            .inputs
-            .contains(InputBits::SUPPLY_PRESSURE)
-    );
 }
 
 #[test]

@@ -194,7 +194,7 @@ impl Chip {
         done.map_err(|_| FlashError)
     }
 
-    fn read(&self, page: usize, word: usize) -> Option<u64> {
+    pub(crate) fn read(&self, page: usize, word: usize) -> Option<u64> {
         match *self.pages.get(page)?.get(word)? {
             Word::Steady(value) => Some(value),
             Word::Unreadable => None,

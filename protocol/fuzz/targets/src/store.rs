@@ -6,12 +6,15 @@
 use arbitrary::{Arbitrary, Unstructured};
 use wheeleg_board::store::{PAGES, RECORDS_MAX, Record, SaveError, Store, WORDS};
 use wheeleg_node::parameters::JointParameters;
-use wheeleg_protocol::param::JOINT_PARAMS;
+use wheeleg_protocol::param::{JOINT_PARAMS, JointParam};
 
 use crate::chip::{Chip, Mishap, Port, Torn, draw};
 
 /// Most saves of a run.
 const SAVES_MAX: u32 = 24;
+
+/// The parameter that tells the sets of a run apart.
+const OWN: JointParam = JointParam::SensorZero;
 
 type Set = Vec<Record>;
 
@@ -115,11 +118,13 @@ impl Play {
         }
     }
 
-    /// A set like no other of this run, most of its records real parameters.
+    /// A set like no other of this run: every other one of parameters that a board permits, the
+    /// rest with records among them that it refuses.
     fn set(&self, size: u8) -> Set {
         let mut state = draw(self.saves);
+        let permitted = self.saves.is_multiple_of(2);
         let own = Record {
-            id: u16::MAX,
+            id: OWN.id(),
             raw: self.saves as i32,
         };
         // Small ones mostly, and a full page now and then.
@@ -132,8 +137,9 @@ impl Play {
             let row = &JOINT_PARAMS[index % JOINT_PARAMS.len()];
             let span = row.max.abs_diff(row.min).max(1);
             let (id, raw) = match state >> 30 {
-                0 => (state as u16, state as i32),
-                1 => (row.id, state as i32),
+                _ if row.id == own.id => (own.id, own.raw),
+                0 if !permitted => (state as u16, state as i32),
+                1 if !permitted => (row.id, state as i32),
                 _ => (row.id, row.min.saturating_add_unsigned(state % span)),
             };
             Record { id, raw }
@@ -226,25 +232,25 @@ impl Play {
         self.parameters(loaded.as_deref());
     }
 
-    /// The same with the board's parameters: every value keeps to its limits.
+    /// The same as the board reads it: the whole set, or defaults of a store that is blank, or
+    /// nothing, which is a fault; every value keeps to its limits.
     fn parameters(&mut self, set: Option<&[Record]>) {
-        let put = |held: &mut JointParameters, record: Record| {
-            if let Ok(changed) = held.with(record.id, record.raw, true) {
-                *held = changed;
-            }
-        };
+        let with = |held: &JointParameters, id, raw| held.with(id, raw, true);
         let defaults = JointParameters::default();
-        let store = Store::new(Port(&mut self.chip));
-        let held = store.load(defaults, put).map_or(defaults, |(held, _)| held);
+        let blank = (0..PAGES).all(|page| self.chip.read(page, 0) == Some(u64::MAX));
+        let held = Store::new(Port(&mut self.chip)).parameters(defaults, with);
         for row in JOINT_PARAMS {
-            let raw = held.by_id(row.id).expect("a row of the table");
+            let raw = held.map_or(row.default, |held| held.by_id(row.id).expect("a row"));
             assert!(row.permits(raw), "{}: {raw}", row.name);
         }
         if !self.pages.iter().any(|page| page.unsteady) {
-            let mut expected = defaults;
-            for record in set.unwrap_or_default() {
-                put(&mut expected, *record);
-            }
+            let expected = match set {
+                Some(set) => set
+                    .iter()
+                    .try_fold(defaults, |held, record| with(&held, record.id, record.raw))
+                    .ok(),
+                None => blank.then_some(defaults),
+            };
             assert_eq!(held, expected);
         }
     }

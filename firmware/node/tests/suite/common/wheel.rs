@@ -9,7 +9,10 @@ use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::WheelParameters;
 use wheeleg_node::snapshot::TickReport;
 use wheeleg_node::wheel::WheelNode;
-use wheeleg_protocol::{Address, Message, SlotReply, Sync, SyncFlags, SyncSlots, WheelSetpoint};
+use wheeleg_protocol::{
+    Address, Message, SlotReply, Sync, SyncFlags, SyncSlots, WheelControlMode, WheelMode,
+    WheelSetpoint,
+};
 use wheeleg_units::{Micros, WheelCount};
 
 pub type Node = WheelNode<HBridge<Pwm, Pin>, Counter, SupplySwitch<Pin>, DumpPin<Pin>>;
@@ -192,4 +195,9 @@ pub fn setpoint(count: i32, velocity_raw: i16) -> WheelSetpoint {
         velocity_raw,
         track: true,
     }
+}
+
+/// Asks for another controller mode.
+pub fn select(rig: &mut WheelRig, mode: WheelControlMode) -> Message {
+    rig.request(&Message::WheelMode(WheelMode { mode }))
 }
