@@ -13,6 +13,8 @@ use wheeleg_sim::sil::BOARD_START_UP_NS;
 
 /// RCC_CSR: the independent watchdog has bitten.
 const WATCHDOG: u32 = 1 << 29;
+/// RCC_CSR: the program asked for it.
+const SOFTWARE: u32 = 1 << 28;
 /// RCC_CSR: brown-out or power-on.
 const BROWN_OUT: u32 = 1 << 27;
 const TICK_NS: u64 = 1_000_000;
@@ -149,6 +151,18 @@ fn the_watchdog_bites_when_the_main_loop_or_the_processor_stops_and_only_then() 
         }
         assert_eq!(bench.until_reset(200), None, "after the reset");
     }
+}
+
+#[test]
+fn a_processor_that_faults_is_reset_by_its_handler_at_once() {
+    let mut bench = Bench::new(1);
+    assert_eq!(bench.until_reset(200), None, "a sound board");
+    let hook = Request::Hook(Hook::FaultProcessor);
+    assert_eq!(bench.ask(&hook), Reply::Done);
+    let (after_ns, cause) = bench.until_reset(5).expect("a reset");
+    assert!(cause & SOFTWARE != 0 && cause & WATCHDOG == 0, "{cause:#x}");
+    assert!(after_ns <= 1_100_000, "{after_ns} ns");
+    assert_eq!(bench.until_reset(200), None, "it comes up again and stays");
 }
 
 #[test]

@@ -309,6 +309,7 @@ fn a_native_run_is_that_of_boards_that_were_down_to_the_last_bit_of_the_log() {
         ["node-hang:joint2@0.8s", "brown-out:wheel8=30@1.2s"],
         ["brown-out:joint2=30@0.8s", "node-hang:wheel8@1.2s"],
         ["node-reset:joint2@0.8s", "node-off:wheel8@1.2s..1.3s"],
+        ["processor-fault:joint2@0.8s", "processor-fault:wheel8@1.2s"],
     ];
     for pair in faults {
         let out = folder.path().join(pair[0].replace([':', '@', '='], "-"));

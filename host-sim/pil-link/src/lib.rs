@@ -54,11 +54,13 @@ mod request;
 pub mod wait;
 
 pub use frame::{Deframer, FrameError, encode};
-pub use reply::{Figures, Halt, Hello, Image, Outputs, Ran, Reply, Sent, Trip, WATCHDOG_RESET};
+pub use reply::{
+    Figures, Halt, Hello, Image, Outputs, Ran, Reply, SOFTWARE_RESET, Sent, Trip, WATCHDOG_RESET,
+};
 pub use request::{Hook, Inputs, Nonvolatile, Power, Request, Run, Straps, Switches};
 
 /// Version of this interface; both sides must have the same.
-pub const LINK_VERSION: u16 = 3;
+pub const LINK_VERSION: u16 = 4;
 
 /// Most bus bytes in one [`Run`]: 1.28 ms of two drivers at 1 Mbit/s.
 pub const MAX_RECEIVED: usize = 256;

@@ -128,6 +128,9 @@ pub struct Figures {
     pub outputs_low_after: u32,
 }
 
+/// Reset flag of the software, such as its fault handler, in [`Trip::cause`] (RM0440, RCC_CSR).
+pub const SOFTWARE_RESET: u32 = 1 << 28;
+
 /// Reset flag of the independent watchdog in [`Trip::cause`] (RM0440, RCC_CSR).
 pub const WATCHDOG_RESET: u32 = 1 << 29;
 

@@ -154,6 +154,8 @@ pub enum Hook {
     StopMainLoop,
     /// The processor stops altogether, its timers go on. Acts until the next reset.
     StopProcessor,
+    /// The program jumps to where nothing is, once it has done its tick: the processor faults.
+    FaultProcessor,
     /// One bit of RAM flips now.
     FlipBit {
         /// Address in RAM, or, with a symbol, the distance from it.

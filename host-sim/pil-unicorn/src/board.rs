@@ -151,7 +151,7 @@ impl Board {
     }
 
     fn hook(&mut self, hook: &Hook) -> Reply {
-        if matches!(hook, Hook::StopProcessor)
+        if matches!(hook, Hook::StopProcessor | Hook::FaultProcessor)
             && self.machine.is_some()
             && let Err(what) = self.finish_tick()
         {
@@ -163,6 +163,11 @@ impl Board {
         match hook {
             Hook::StopMainLoop => machine.state_mut().stop_main_loop = true,
             Hook::StopProcessor => machine.state_mut().stop_processor = true,
+            Hook::FaultProcessor => {
+                if let Err(what) = machine.derail() {
+                    return Reply::Refused(text(&what));
+                }
+            }
             Hook::StretchTransmission { times: 0 } => {
                 return Reply::Refused(text("a byte takes some time: at least once its own"));
             }

@@ -51,6 +51,9 @@ pub(crate) enum Stop {
     Waits,
 }
 
+/// Where no memory answers.
+const NOWHERE: u32 = 0xA000_0000;
+
 type Engine = Unicorn<'static, State>;
 
 /// A processor with its memory and peripherals.
@@ -153,6 +156,16 @@ impl Machine {
     /// What hooks and peripherals hold, to be changed.
     pub(crate) fn state_mut(&mut self) -> &mut State {
         self.uc.get_data_mut()
+    }
+
+    /// The processor goes on where no memory answers: it faults, and its program handles that.
+    ///
+    /// # Errors
+    /// A sentence of the engine.
+    pub(crate) fn derail(&mut self) -> Result<(), String> {
+        self.asleep = false;
+        self.state_mut().tolerant = true;
+        self.set(R::PC, NOWHERE)
     }
 
     /// A system reset: processor and peripherals start anew, RAM keeps its

@@ -60,6 +60,10 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
             "it has no watchdog that would start it again",
             "`sil` or `pil`",
         ),
+        (_, F::ProcessorFault) => (
+            "its program is not the image, and has no fault handler",
+            "`sil` or `pil`",
+        ),
         (NodeKind::Qemu, _) => return Ok(()),
         // One that falls silent for good can keep its cable.
         (_, F::NodeOff) if fault.until_s.is_none() => return Ok(()),
@@ -140,7 +144,9 @@ fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
     let part = match fault.kind {
         F::MasterSilent | F::MasterFrozen => "transmitter of the master",
         F::NodeSilent | F::Babble | F::BabbleUnguarded => "transmitter",
-        F::NodeOff | F::NodeReset | F::BrownOut | F::NodeHang => "power and program",
+        F::NodeOff | F::NodeReset | F::BrownOut | F::NodeHang | F::ProcessorFault => {
+            "power and program"
+        }
         F::PotOpen | F::PotShort | F::PotFrozen | F::PotNoisy => "potentiometer",
         F::SwitchStuckOn | F::SwitchStuckOff => "foot switch",
         F::EncoderLost | F::EncoderReversed => "encoder",

@@ -145,6 +145,8 @@ kinds! {
         "A board loses its power for a while and starts anew.";
     NodeHang = "node-hang", Board, None,
         "A board's program stops; its hardware goes on with the last outputs until the watchdog bites.";
+    ProcessorFault = "processor-fault", Board, None,
+        "A board's program jumps to where nothing is: its fault handler turns the outputs off and resets it.";
     Babble = "babble", Board, None,
         "A board sends rubbish; its driver-enable time limit lets it through in its own slot only, and cuts it off there.";
     BabbleUnguarded = "babble-unguarded", Board, None,
@@ -220,6 +222,7 @@ impl FaultKind {
                 | Self::NodeReset
                 | Self::BrownOut
                 | Self::NodeHang
+                | Self::ProcessorFault
                 | Self::InvalidParameter
         )
     }
@@ -230,7 +233,7 @@ impl FaultKind {
         let seconds = |ns: u64| ns as f64 * 1e-9;
         match self {
             Self::MasterReset | Self::BrownOut => value * 1e-3,
-            Self::ClientReset | Self::NodeReset => seconds(JOINT_TICK_NS),
+            Self::ClientReset | Self::NodeReset | Self::ProcessorFault => seconds(JOINT_TICK_NS),
             Self::NodeHang => seconds(WATCHDOG_NS),
             Self::InvalidParameter => seconds(SERVICE_NS),
             _ => f64::INFINITY,

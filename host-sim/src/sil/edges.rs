@@ -105,10 +105,10 @@ impl World {
             let Some((trip, address)) = trip.zip(Address::new(raw)) else {
                 continue;
             };
-            let cause = if trip.cause & link::WATCHDOG_RESET == 0 {
-                ResetCause::PowerUp
-            } else {
-                ResetCause::Watchdog
+            let cause = match trip.cause {
+                flags if flags & link::WATCHDOG_RESET != 0 => ResetCause::Watchdog,
+                flags if flags & link::SOFTWARE_RESET != 0 => ResetCause::ProcessorFault,
+                _ => ResetCause::PowerUp,
             };
             self.down_times.reset(self.now_ns, raw, cause);
             self.start_anew(address, cause)?;

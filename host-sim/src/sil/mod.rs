@@ -18,6 +18,7 @@ mod operator;
 mod power;
 mod setup;
 mod strangers;
+mod strike;
 mod traffic;
 mod words;
 mod world;

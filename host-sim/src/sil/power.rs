@@ -14,7 +14,6 @@ use super::downtime::{DownTimes, Due};
 use super::traffic::{NS_PER_US, micros};
 use super::world::{JOINT_TICK_NS, World};
 use crate::SimError;
-use crate::faults::{FaultKind, FaultSpec, Victim};
 
 /// A stopped program is reset after this, ns: the independent watchdog of the
 /// boards (firmware/board/BOARD.md).
@@ -296,7 +295,7 @@ impl World {
     }
 
     /// The processor of a board leaves its reset.
-    fn begin_start(&mut self, address: u8, cause: ResetCause) {
+    pub(super) fn begin_start(&mut self, address: u8, cause: ResetCause) {
         let start_up_ns = BOARD_START_UP_NS[usize::from(address > 6)];
         self.down[usize::from(address) - 1] = Down::Starting {
             until_ns: self.now_ns.saturating_add(start_up_ns),
@@ -347,53 +346,5 @@ impl World {
         })?;
         self.master_alive = true;
         Ok(())
-    }
-
-    /// What a fault does to the power of a board or to a program.
-    ///
-    /// # Errors
-    /// [`SimError`] if a board outside refuses it.
-    pub(super) fn strike_power(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
-        let after_ns = |ms: f64| self.now_ns.saturating_add((ms * 1e6) as u64);
-        match fault.kind {
-            FaultKind::MasterReset if begin => {
-                self.master_alive = false;
-                self.master_back_ns = Some(after_ns(fault.value));
-            }
-            FaultKind::ClientReset if begin => self.client = Client::connect(&mut self.master),
-            _ => {}
-        }
-        let Victim::Board(address) = fault.victim else {
-            return Ok(());
-        };
-        let down = match fault.kind {
-            FaultKind::NodeOff if begin => Down::Off { until_ns: u64::MAX },
-            FaultKind::NodeOff => Down::Off { until_ns: 0 },
-            FaultKind::NodeReset if begin => Down::Off {
-                until_ns: self.now_ns.saturating_add(JOINT_TICK_NS),
-            },
-            FaultKind::BrownOut if begin => Down::Off {
-                until_ns: after_ns(fault.value),
-            },
-            FaultKind::NodeHang if begin => Down::Hung {
-                until_ns: self.now_ns.saturating_add(WATCHDOG_NS),
-            },
-            _ => return Ok(()),
-        };
-        if let Down::Off { .. } = down {
-            self.memories[usize::from(address) - 1].power_fails(self.now_ns);
-        }
-        self.down[usize::from(address) - 1] = down;
-        let Some(outside) = &mut self.outside else {
-            return Ok(());
-        };
-        match down {
-            Down::Hung { .. } => outside.hook(address, link::Hook::StopProcessor),
-            _ => {
-                outside.set_power(address, link::Power::BrownOut);
-                // At once: it may be back before the board is run otherwise.
-                self.run_outside(&[(address, None)])
-            }
-        }
     }
 }

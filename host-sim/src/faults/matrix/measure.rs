@@ -87,6 +87,7 @@ impl Blind {
                     FaultKind::NodeOff
                     | FaultKind::NodeReset
                     | FaultKind::NodeHang
+                    | FaultKind::ProcessorFault
                     | FaultKind::BrownOut,
                     Victim::Board(address),
                 ) => blind.dark[usize::from(address) - 1] = true,

@@ -195,12 +195,12 @@ pub const ROWS: &[Row] = &[
     row("processor-hang", &[at("node-hang:joint3", FOR_GOOD)], Phase::Flight,
         stop_axis(3, [0.0, 60.0], 51.1, 75.0), &["joint 3 says why:", "The board was reset in operation", "The program did not feed the hardware watchdog", "report this with the firmware version"])
         .noted("the watchdog period is 50 ms (firmware/board/BOARD.md), not the 20 ms of the matrix: a flash save stalls the board for about 20 ms"),
-    row("stack-overflow", &[at("node-reset:joint2", FOR_GOOD)], Phase::Push,
-        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2 says why: it has started anew"])
-        .noted("as seen from outside: the fault handler of the image resets the board; the images' worst stack is bounded by `cargo xtask sizes`"),
-    row("panic", &[at("node-reset:wheel8", FOR_GOOD)], Phase::Push,
-        stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 8 says why: it has started anew"])
-        .noted("as seen from outside: the panic handler resets the board; the link check proves that no panic is reachable"),
+    row("stack-overflow", &[at("processor-fault:joint2", FOR_GOOD)], Phase::Push,
+        stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2 says why:", "A processor fault"])
+        .noted("the stack lies below all variables, so that one that overflows is a processor fault (in emulation the image's own handler runs: tests/tests/pil_faults.rs); the images' worst stack is bounded by `cargo xtask sizes`"),
+    row("panic", &[at("processor-fault:wheel8", FOR_GOOD)], Phase::Push,
+        stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 8 says why:", "A processor fault"])
+        .noted("the handler of panics does what that of faults does; the link check proves that no panic is reachable"),
     // Time.
     row("clock-drift/200ppm", &[at("clock-drift:joint6=200", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
     row("clock-drift/beyond", &[at("clock-drift:joint6=-30000", FOR_GOOD)], Phase::Flight,
