@@ -1,6 +1,7 @@
 //! All tests of the crate in one program, which is built and linked once: a mutant
 //! (`cargo xtask mutants`) takes a third of the time that a program per file takes.
 
+mod answers;
 mod bus_cycle;
 mod commands;
 mod common;

@@ -152,11 +152,34 @@ fn counters_and_logs_of_every_board_arrive_within_a_round_of_questions() {
         assert!(count(&heard) >= 1, "{n}");
         assert_eq!((count(&logged), count(&lost)), (1, 1), "{n}");
     }
+    let lost = |(_, event): &&(u64, Event)| matches!(event, Event::LogLost { .. });
+    assert_eq!(
+        rig.events.iter().filter(lost).count(),
+        8,
+        "none of no records"
+    );
     // One exchange in ten cycles, and nothing more while all is well.
     let requests = |rig: &Rig| rig.nodes.iter().map(|n| n.requests.len()).sum::<usize>();
     let before = requests(&rig);
     rig.run(ROUND);
     assert_eq!(requests(&rig) - before, ROUND / 10);
+}
+
+#[test]
+fn the_rest_of_a_log_is_asked_for_at_once() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(20);
+    let asked = |rig: &mut Rig| {
+        let asked = rig.node(5).requests.iter();
+        asked.filter(|m| matches!(m, Message::LogRead(_))).count()
+    };
+    rig.node(5).log = LogRecords { left: 3, ..NO_LOG };
+    let before = asked(&mut rig);
+    while asked(&mut rig) == before {
+        rig.cycle();
+    }
+    rig.run(20);
+    assert_eq!(asked(&mut rig) - before, 2, "and nothing more behind it");
 }
 
 #[test]
