@@ -93,7 +93,7 @@ macro_rules! fault_table {
             /// Its place in the set: one bit.
             #[must_use]
             pub const fn mask(self) -> $set {
-                match self { $( Self::$variant => $set(1 << $bit) ),* }
+                $set(1 << self.bit())
             }
 
             /// Name as in the interface definition.

@@ -347,6 +347,7 @@ messages! {
         #[serde(with = "le")] address: u16 = "frames with an address that does not exist";
         #[serde(with = "le")] unsent: u16 = "own frames replaced before they were sent";
         #[serde(with = "le")] drift_ppm: i16 = "board clock less master clock, ppm, over the last second";
+        #[serde(with = "le")] parameters: u32 = "sum of the parameters in force (section Parameter sets)";
     }
     /// Answer to LogRead: the oldest records, which are then forgotten.
     LogRecords = 0x87, Answer {

@@ -183,6 +183,17 @@ impl ParamLimits {
     }
 }
 
+/// Sum over the raw values of a board's parameters, in the order of its table, by which sets are
+/// told apart (SPEC.md, Parameter sets): any single value that differs changes it.
+#[must_use]
+pub fn parameter_sum(values: &[i32]) -> u32 {
+    // Odd multiplier (Knuth, 2^32 / golden ratio): a bijection of the sum before.
+    values.iter().fold(0, |sum: u32, value| {
+        sum.wrapping_mul(0x9E37_79B1)
+            .wrapping_add(value.cast_unsigned())
+    })
+}
+
 /// The limits of all rows. Evaluated at compile time alone.
 #[allow(clippy::indexing_slicing)]
 const fn limits<const N: usize>(table: &'static [ParamInfo]) -> [ParamLimits; N] {

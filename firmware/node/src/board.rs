@@ -82,6 +82,9 @@ pub(crate) trait Application {
 
     /// Limits that shape the output now.
     fn limits(&self) -> LimitBits;
+
+    /// Sum of the parameters in force.
+    fn parameter_sum(&self) -> u32;
 }
 
 impl BoardCore {
@@ -162,7 +165,7 @@ impl BoardCore {
     }
 
     #[inline(never)]
-    fn link_record(&self) -> Message {
+    fn link_record(&self, parameters: u32) -> Message {
         let quality = self.port.quality();
         let count = |count: u32| u16::try_from(count).unwrap_or(u16::MAX);
         LinkRecord {
@@ -176,6 +179,7 @@ impl BoardCore {
             address: count(quality.address),
             unsent: count(self.port.unsent()),
             drift_ppm: self.time.drift_ppm(),
+            parameters,
         }
         .into()
     }
@@ -331,7 +335,10 @@ fn common_request<A: Application>(
     let core = application.core();
     match request {
         Message::Identify(_) | Message::Discover(_) => return Ok(core.identity_message()),
-        Message::LinkReport(_) => return Ok(core.link_record()),
+        Message::LinkReport(_) => {
+            let sum = application.parameter_sum();
+            return Ok(application.core().link_record(sum));
+        }
         Message::LogRead(read) => {
             return Ok(core.supervisor.read_log(read.lease_ms, at).into());
         }

@@ -6,7 +6,7 @@
 //! replaces the old values. So a refused value changes nothing.
 
 use wheeleg_protocol::NackReason;
-use wheeleg_protocol::param::{JointParam, ParamLimits, WheelParam};
+use wheeleg_protocol::param::{JointParam, ParamLimits, WheelParam, parameter_sum};
 
 /// Raw values of all rows of a table, in its order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,6 +67,12 @@ impl<const N: usize> Parameters<N> {
             .values
             .chunks(const { N.div_ceil(PARTS).next_multiple_of(4) });
         parts.nth(part).unwrap_or_default()
+    }
+
+    /// Sum by which sets of parameters are told apart (protocol/SPEC.md, Parameters): any single
+    /// value that differs changes it.
+    pub fn sum(&self) -> u32 {
+        parameter_sum(&self.values)
     }
 
     fn at(&self, index: usize) -> i32 {

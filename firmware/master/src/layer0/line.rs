@@ -241,6 +241,7 @@ mod tests {
             address: 0,
             unsent: 0,
             drift_ppm: 0,
+            parameters: 0,
         }
     }
 

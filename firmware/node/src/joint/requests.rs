@@ -119,6 +119,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     fn limits(&self) -> LimitBits {
         self.snapshot.limits
     }
+
+    fn parameter_sum(&self) -> u32 {
+        self.parameters.sum()
+    }
 }
 
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {

@@ -97,7 +97,8 @@ impl JointSettings {
         let raw = |parameter| parameters.get(parameter);
         let micros = |parameter| Micros(u32::try_from(raw(parameter)).unwrap_or(0));
         let millis = |parameter| Micros::from_millis(u32::try_from(raw(parameter)).unwrap_or(0));
-        let code = |parameter| AdcCode::new(u16::try_from(raw(parameter)).unwrap_or(0));
+        // The table permits codes alone (a test says so).
+        let code = |parameter| AdcCode::new(raw(parameter) as u16);
         let position = |parameter| PositionMm::from_raw(raw(parameter));
 
         let gains = gains(parameters);
@@ -249,6 +250,18 @@ mod tests {
     #[test]
     fn defaults_of_the_table_are_those_of_the_control_law() {
         assert_eq!(gains(&JointParameters::default()), JointGains::default());
+    }
+
+    #[test]
+    fn codes_are_codes() {
+        for parameter in [
+            JointParam::SensorZero,
+            JointParam::SensorCodeMin,
+            JointParam::SensorCodeMax,
+        ] {
+            let row = parameter.info();
+            assert!(u16::try_from(row.min).is_ok() && u16::try_from(row.max).is_ok());
+        }
     }
 
     #[test]

@@ -134,6 +134,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
     fn limits(&self) -> LimitBits {
         self.snapshot.limits
     }
+
+    fn parameter_sum(&self) -> u32 {
+        self.parameters.sum()
+    }
 }
 
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, D> {

@@ -111,6 +111,7 @@ impl FakeNode {
                 address: 0,
                 unsent: 0,
                 drift_ppm: 0,
+                parameters: 0,
             },
             log: NO_LOG,
             parameter: 0,
