@@ -175,8 +175,12 @@ fn gain_out_of_range_and_in_a_wrong_unit() {
     let text = gain("velocity_window = { value = 3.5, unit = \"ticks\", source = \"x\" }");
     assert_all(
         &text,
-        &["`node.joint.velocity_window` = 3.5", "whole number"],
+        &["`node.joint.velocity_window` = 3.5", "whole number from"],
     );
+    let text = gain("duty_limit = { value = 1.5, unit = \"1\", source = \"x\" }");
+    assert_all(&text, &["= 1.5 is out of range: allowed 0 to 1 | "]);
+    let text = gain("proportional = { value = nan, unit = \"1/mm\", source = \"x\" }");
+    assert_all(&text, &["a finite number from 0 to 4 1/mm", "not nan"]);
 }
 
 #[test]
@@ -237,13 +241,37 @@ fn unknown_missing_and_mistyped_fields() {
         "steps             = { value = 3,",
         "steps             = { value = \"three\",",
     );
-    assert_all(&text, &["`gait.steps`", "\"three\"", "a finite number"]);
+    let allowed = "must be a whole number from 1 to 10000 | ";
+    assert_all(&text, &["`gait.steps` = \"three\"", allowed]);
 
+    for value in ["3.5", "nan"] {
+        let text = robot_with(
+            "steps             = { value = 3,",
+            &format!("steps             = {{ value = {value},"),
+        );
+        assert_all(&text, &[&format!("`gait.steps` = {value}"), allowed]);
+    }
     let text = robot_with(
-        "steps             = { value = 3,",
-        "steps             = { value = 3.5,",
+        "bore          = { value = 20.0",
+        "bore          = { value = nan",
     );
-    assert_all(&text, &["`gait.steps` = 3.5", "whole number"]);
+    assert_all(
+        &text,
+        &["`cylinder.bore` = nan", "a finite number from 4 to 200 mm"],
+    );
+}
+
+/// The unit of a pure number is written in a file, and says nothing in a sentence.
+#[test]
+fn a_pure_number_is_told_without_a_unit() {
+    let ratio = "heat_capacity_ratio   = { value = 1.4, unit = \"1\"";
+    let text = robot_with(ratio, &ratio.replace("1.4", "14.0"));
+    assert_all(
+        &text,
+        &["`gas.heat_capacity_ratio` = 14 is out of range: allowed 1 to 2 | "],
+    );
+    let text = robot_with("heat_capacity_ratio   =", "unknown               =");
+    assert_all(&text, &["[gas] lacks heat_capacity_ratio | "]);
 }
 
 /// The robot with this in the place of its `[source_switch]`, at the top of the file.
@@ -415,6 +443,15 @@ fn scenario_mistakes() {
 
     let text = scenario_with("value = 10.0, unit = \"s\"", "value = 0.0, unit = \"s\"");
     assert_all(&text, &["`duration` = 0 s", "0.01 to 3600 s"]);
+
+    let service = "targets = \"none\"\n[[events]]\nat = { value = 1.0, unit = \"s\" }\n\
+                   action = \"command\"\ncommand = \"WriteParameter\"\nboard = 1\n\
+                   parameter = \"proportional\"\nvalue = nan\n";
+    let text = scenario_with("targets = \"three-step\"\n", service);
+    assert_all(
+        &text,
+        &["`events[0].value` = nan must be a number from 0 to 4 1/mm"],
+    );
 
     let text = scenario_with("seed = 1", "seed = -1");
     assert_all(&text, &["`seed` = -1", "whole number"]);

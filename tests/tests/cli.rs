@@ -323,6 +323,73 @@ fn an_output_folder_that_cannot_be_made_is_named_before_the_run() {
 }
 
 #[test]
+fn every_mistake_of_a_file_is_told_once_with_the_name_of_the_file_above() {
+    let dir = folder();
+    let text = with_line(&source("scenarios/stand.toml"), "seed", "seed = -1");
+    let scenario = write(dir.path(), "twice.toml", &text);
+    let missing = dir.path().join("nowhere.toml");
+    for (file, name) in [(&scenario, "twice.toml"), (&missing, "nowhere.toml")] {
+        let assert = wheeleg()
+            .current_dir(dir.path())
+            .args(["run", name])
+            .assert()
+            .code(2);
+        let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert_eq!(said.matches("wheeleg::config").count(), 1, "{said}");
+        // In the heading, and above the lines of the file if there is one.
+        let names = 1 + usize::from(file.exists());
+        assert_eq!(said.matches(name).count(), names, "{said}");
+    }
+}
+
+#[test]
+fn a_fault_with_a_wrong_value_and_no_time_is_told_both() {
+    let mut command = wheeleg();
+    command
+        .args(["run", "stand", "--fault", "bit-errors=0"])
+        .assert()
+        .code(2)
+        .stderr(
+            contains("the value `0` is out of range: allowed 1e-9 to 0.1")
+                .and(contains("the time is missing")),
+        );
+}
+
+#[test]
+fn rows_of_the_fault_matrix_must_be_chosen() {
+    let mut command = wheeleg();
+    command.args(["faults", "run"]).assert().code(2).stderr(
+        contains("--row ID")
+            .and(contains("--all"))
+            .and(contains("wheeleg faults rows")),
+    );
+}
+
+#[test]
+fn an_option_of_another_command_is_told_with_that_command() {
+    let mut command = wheeleg();
+    command
+        .args(["tune", "--quick"])
+        .assert()
+        .code(2)
+        .stderr(contains("`--quick` is an option of `wheeleg compare`"));
+}
+
+/// Below a regular file nothing can be made, so that no run begins.
+#[test]
+fn options_without_a_command_are_those_of_a_run() {
+    let dir = folder();
+    let file = write(dir.path(), "file", "not a folder");
+    let mut command = wheeleg();
+    command
+        .args(["--seed", "3", "--out"])
+        .arg(file.join("out"))
+        .assert()
+        .code(2)
+        .stderr(contains("cannot create the folder"));
+}
+
+#[test]
 fn a_bad_seed_is_refused() {
     for seed in ["-1", "abc", "1.5", "99999999999999999999999999"] {
         let mut command = wheeleg();

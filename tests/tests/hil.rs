@@ -177,7 +177,13 @@ fn a_port_that_vanishes_in_mid_run_ends_it_with_an_error_that_names_it() {
     };
     assert_eq!(answered, 99, "one request was the call");
     assert!(error.contains(&bench.options.port), "{error}");
-    assert!(error.contains("logged up to here is complete"), "{error}");
+    for words in [
+        "cable and power",
+        "start the run again",
+        "logged up to here is complete",
+    ] {
+        assert!(error.contains(words), "{error}");
+    }
 }
 
 #[test]
@@ -198,6 +204,7 @@ fn a_board_that_falls_silent_is_given_up_after_the_patience() {
     let error = partner.ask(&bench::power_up(1)).expect_err("silence");
     let error = said(&error);
     assert!(error.contains("has not answered for 0.5 s"), "{error}");
+    assert!(error.contains("power and its cable"), "{error}");
     assert!(error.contains(&bench.options.port), "{error}");
 }
 

@@ -142,6 +142,36 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
     assert!(!page.contains(" logs at "));
 }
 
+/// A precharge that ends by its time holds the axis for two seconds at every arming; only the
+/// boards notice.
+#[test]
+fn the_console_names_a_precharge_that_is_too_high() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let robot = robot_with(folder.path(), "");
+    let text = fs::read_to_string(&robot).expect("the robot");
+    let none = text.lines().find(|line| line.starts_with("precharge "));
+    let high = "precharge = { value = 4.4, unit = \"bar\", source = \"test\" }";
+    let text = text.replace(none.expect("the robot tells it"), high);
+    let robot = write(folder.path(), "robot.toml", &text);
+    let events = ["Disarm", "Arm"].map(|name| format!("command = \"{name}\""));
+    let events = [event(0.1, &events[0]), event(0.3, &events[1])].concat();
+    let scenario = scenario(folder.path(), 3.6, &events);
+    let out = folder.path().join("out");
+    let [scenario, robot, out] = [scenario, robot, out].map(|p| p.to_string_lossy().into_owned());
+    let (good, said) = wheeleg(&["run", &scenario, "--robot", &robot, "--out", &out]);
+    assert!(good, "{said}");
+    let late = "The precharge ended after 2000 ms without its pressure";
+    let told: Vec<&str> = said.split("event ").filter(|e| e.contains(late)).collect();
+    let in_start_up = |e: &&&str| e.contains("start-up");
+    assert!(told.iter().any(|e| in_start_up(&e)), "{said}");
+    assert!(!told.iter().all(|e| in_start_up(&e)), "{said}");
+    assert!(
+        told.iter()
+            .all(|e| e.contains("lower the parameter precharge"))
+    );
+    assert!(!said.contains("The mode changed"), "{said}");
+}
+
 #[test]
 fn the_console_names_who_babbles_and_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -22,6 +22,7 @@ mod machine;
 mod nvic;
 mod soc;
 mod time;
+mod usage;
 mod wiring;
 
 use std::collections::BTreeMap;
@@ -39,9 +40,29 @@ use wheeleg_pil_link::{Deframer, Reply, Request, encode, text};
 use crate::board::Board;
 use crate::image::Image;
 use crate::machine::blocks::Blocks;
+use crate::usage::{Order, USAGE};
+
+/// Exit code of wrong arguments.
+const WRONG_ARGUMENTS: u8 = 2;
 
 fn main() -> ExitCode {
-    match serve() {
+    let done = match Order::read(std::env::args_os().skip(1)) {
+        Ok(Order::Help) => {
+            // A reader that has gone away is no error.
+            let _ = std::io::stdout().write_all(USAGE.as_bytes());
+            Ok(())
+        }
+        #[cfg(unix)]
+        Ok(Order::Bench(image)) => bench::serve(&image),
+        #[cfg(not(unix))]
+        Ok(Order::Bench(_)) => Err("--bench needs a pseudo-terminal, as Unix has".to_owned()),
+        Ok(Order::Serve { awake, images }) => serve(awake, &images),
+        Err(wrong) => {
+            eprintln!("wheeleg-pil-unicorn: {wrong}\n\n{USAGE}");
+            return ExitCode::from(WRONG_ARGUMENTS);
+        }
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(what) => {
             eprintln!("wheeleg-pil-unicorn: {what}");
@@ -51,24 +72,12 @@ fn main() -> ExitCode {
 }
 
 /// Answers requests until the input ends or every board has said good-bye.
-fn serve() -> Result<(), String> {
-    let mut paths: Vec<_> = std::env::args_os().skip(1).collect();
-    #[cfg(unix)]
-    if let [first, image] = paths.as_slice()
-        && first == "--bench"
-    {
-        return bench::serve(Path::new(image));
-    }
-    let awake = paths.first().is_some_and(|first| first == "--awake");
-    if awake {
-        paths.remove(0);
-    }
+fn serve(awake: bool, paths: &[OsString]) -> Result<(), String> {
     #[cfg(unix)]
     let mut watch = awake.then(Watch::default);
-    if paths.is_empty() {
-        return Err("give the ELF image of each board".to_owned());
-    }
-    let mut boards = boards(&paths)?;
+    #[cfg(not(unix))]
+    let _ = awake;
+    let mut boards = boards(paths)?;
     let mut input = std::io::stdin().lock();
     let mut output = std::io::stdout().lock();
     let mut deframer = Deframer::new();

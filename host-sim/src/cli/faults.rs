@@ -36,7 +36,7 @@ enum FaultsCommand {
 #[derive(Debug, Args)]
 struct RunArgs {
     /// All rows; those that are not implemented are listed and not counted.
-    #[arg(long, required_unless_present = "row")]
+    #[arg(long)]
     all: bool,
     /// One row, as `wheeleg faults rows` names it; may be given several times.
     #[arg(long, value_name = "ID", conflicts_with = "all")]
@@ -61,20 +61,36 @@ pub(super) fn command(args: &FaultsArgs) -> Result<ExitCode, SimError> {
     }
 }
 
+/// Width of a column that holds the ids of rows.
+fn id_width() -> usize {
+    let widths = matrix::ROWS.iter().map(|row| row.id.len());
+    widths.max().unwrap_or(0)
+}
+
 fn rows() -> String {
     let mut out = String::from("Rows of the fault matrix (wheeleg faults run --row ID):\n\n");
+    let width = id_width();
     for row in matrix::ROWS {
-        let strikes: Vec<&str> = row.strikes.iter().map(|s| s.what).collect();
+        let mut strikes: Vec<&str> = row.strikes.iter().map(|s| s.what).collect();
+        if row.estop {
+            strikes.push("E-stop");
+        }
         let what = match row.not_implemented() {
             Some(reason) => format!("not implemented: {reason}"),
             None => format!("{}; {}", strikes.join(", "), row.phase.words()),
         };
-        let _ = writeln!(out, "  {:26} {what}", row.id);
+        let _ = writeln!(out, "  {:width$}  {what}", row.id);
     }
     out
 }
 
 fn run(args: &RunArgs) -> Result<ExitCode, SimError> {
+    if !args.all && args.row.is_empty() {
+        return Err(SimError::simulation(
+            "`wheeleg faults run` is not told which rows: give --row ID, or --all",
+            "`wheeleg faults rows` lists the rows; --row may be given several times",
+        ));
+    }
     let rows = matrix::select(&args.row)?;
     let finished = matrix::write(&rows, args.seed, &args.out)?;
     if args.json {
@@ -90,14 +106,15 @@ fn run(args: &RunArgs) -> Result<ExitCode, SimError> {
 }
 
 fn verdicts(finished: &matrix::Finished) -> String {
+    let width = id_width();
     let mut out = format!(
-        "{:15}  {:26} {:>9} {:>9} {:>9} {:>9}  latched\n",
+        "{:15}  {:width$} {:>9} {:>9} {:>9} {:>9}  latched\n",
         "verdict", "row", "detected", "commanded", "telemetry", "physical"
     );
     let ms = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} ms"));
     for o in &finished.outcomes {
         let m = &o.measured;
-        let _ = write!(out, "{:15}  {:26}", o.verdict.words(), o.row.id);
+        let _ = write!(out, "{:15}  {:width$}", o.verdict.words(), o.row.id);
         if o.verdict != Verdict::NotImplemented {
             let times = [m.detected_ms, m.commanded_ms, m.sensed_ms, m.physical_ms].map(ms);
             let _ = write!(
@@ -151,8 +168,9 @@ fn listing(json: bool) -> String {
         }
     }
     out.push_str("\nNot implemented, refused by name:\n\n");
+    let width = id_width();
     for (name, reason) in matrix::not_implemented() {
-        let _ = writeln!(out, "  {name:26} {reason}");
+        let _ = writeln!(out, "  {name:width$}  {reason}");
     }
     out
 }
@@ -187,6 +205,21 @@ mod tests {
     }
 
     #[test]
+    fn rows_stand_in_two_columns_and_each_says_what_goes_wrong() {
+        let text = rows();
+        let lines = text.lines().skip(2);
+        assert_eq!(lines.clone().count(), matrix::ROWS.len());
+        for (line, row) in lines.zip(matrix::ROWS) {
+            let (id, what) = line.split_at(2 + id_width() + 2);
+            assert!(id.trim() == row.id && id.ends_with("  "), "{line}");
+            assert!(
+                what.starts_with(|c: char| c.is_ascii_alphabetic()),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
     fn what_is_not_implemented_is_listed_apart() {
         let text = listing(false);
         let (faults, missing) = text.split_once("\nNot implemented").expect("a section");
@@ -198,7 +231,8 @@ mod tests {
         assert!(list.len() == 9 && rows.clone().count() == 9, "{list:?}");
         for (row, listed) in rows.zip(list) {
             assert_eq!(listed["name"], row.id);
-            let line = format!("  {:26} {}\n", row.id, row.not_implemented().unwrap_or(""));
+            let reason = row.not_implemented().unwrap_or("");
+            let line = format!("  {:1$}  {reason}\n", row.id, id_width());
             assert!(
                 missing.contains(&line) && !faults.contains(row.id),
                 "{line}"

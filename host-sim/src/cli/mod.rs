@@ -13,6 +13,7 @@ mod params;
 mod plant;
 mod run;
 mod tune;
+mod usage;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::SimError;
+use crate::run::DEFAULT_SCENARIO;
 
 /// Exit code when `--strict` is given and a required target is not met.
 const TARGETS_MISSED: u8 = 1;
@@ -31,12 +33,14 @@ const INTERRUPTED: u8 = 130;
 
 /// Simulator and control stack of the hybrid robot Wheeleg.
 ///
-/// Without a command, runs the three-step test of the 2003 paper.
+/// Without a command, runs the three-step test of the 2003 paper, with the options of `run`.
 #[derive(Debug, Parser)]
-#[command(name = "wheeleg", version, about, after_help = EXIT_CODES)]
+#[command(name = "wheeleg", version, about, after_help = EXIT_CODES, args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    options: run::RunOptions,
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
@@ -75,8 +79,10 @@ enum Command {
 /// Parses the command line, does what it says, and returns the exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
-        None => run::command(&run::RunArgs::default()),
+    let cli = usage::parse::<Cli>(std::env::args_os());
+    let cli = cli.unwrap_or_else(|wrong| wrong.exit());
+    let result = match cli.command {
+        None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),
         Some(Command::List(args)) => list::command(&args),

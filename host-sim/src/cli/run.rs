@@ -21,6 +21,13 @@ pub(super) struct RunArgs {
     /// Built-in scenario or path of a TOML file.
     #[arg(default_value = run::DEFAULT_SCENARIO)]
     scenario: String,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+/// Options of `wheeleg run`, and of `wheeleg` without a command.
+#[derive(Debug, Args)]
+pub(super) struct RunOptions {
     /// Folder for the results [default: runs/<scenario>-seed<N>]. Results of an
     /// earlier run in it move to its folder `previous`.
     #[arg(long, value_name = "DIR")]
@@ -56,23 +63,6 @@ pub(super) struct RunArgs {
     strict: bool,
 }
 
-impl Default for RunArgs {
-    fn default() -> Self {
-        Self {
-            scenario: run::DEFAULT_SCENARIO.to_owned(),
-            out: None,
-            seed: None,
-            robot: None,
-            faults: Vec::new(),
-            nodes: NodeKind::Sil,
-            node: Vec::new(),
-            compare_sil: false,
-            json: false,
-            strict: false,
-        }
-    }
-}
-
 fn parse_seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("a seed is a whole number from 0 to {}", u64::MAX))
@@ -80,8 +70,13 @@ fn parse_seed(text: &str) -> Result<u64, String> {
 
 /// Runs the scenario and prints its verdicts.
 pub(super) fn command(args: &RunArgs) -> Result<ExitCode, SimError> {
+    scenario(&args.scenario, &args.options)
+}
+
+/// Runs a scenario, by name or path, and prints its verdicts.
+pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, SimError> {
     let options = Options {
-        scenario: args.scenario.clone(),
+        scenario: scenario.to_owned(),
         robot: args.robot.clone(),
         seed: args.seed,
         out: args.out.clone(),

@@ -78,19 +78,16 @@ impl Problem {
     }
 }
 
+/// What is wrong; where, say the [`ConfigError`] around it and the lines of the file below it.
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.summary())
+        f.write_str(&self.message)
     }
 }
 
 impl std::error::Error for Problem {}
 
 impl Diagnostic for Problem {
-    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        Some(Box::new("wheeleg::config"))
-    }
-
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         self.help
             .as_ref()

@@ -4,8 +4,8 @@ use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, par
 use wheeleg_protocol::{Address, ResetCause};
 
 use super::params::ParameterInfo;
-use super::quantity::pretty;
-use super::reader::{Entry, Reader};
+use super::quantity::{pretty, suffix};
+use super::reader::{Entry, Reader, range};
 use super::scenario::ParameterChoice;
 use crate::sil::{JointBoard, WheelBoard, identity, parameter_row};
 
@@ -90,11 +90,11 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
         r.problem(
             Some(span),
             format!(
-                "`{path}.{}` = {} {} contradicts other parameters: the board of {address} \
+                "`{path}.{}` = {}{} contradicts other parameters: the board of {address} \
                  refuses them together",
                 info.name,
                 pretty(value),
-                info.unit
+                suffix(info.unit)
             ),
             "not with the others",
             Some(format!("{path}.{}: {}", info.name, info.text)),
@@ -132,8 +132,15 @@ pub(super) fn choice(r: &mut Reader, entry: &Entry, board: Option<u8>) -> Option
     let info = r.choice(entry, "parameter", &names)?;
     let raw = entry.get("value").and_then(|(span, item)| {
         let value = item.as_float().or(item.as_integer().map(|n| n as f64));
-        let Some(value) = value else {
-            let message = format!("`value` must be a number in {}", info.unit);
+        let Some(value) = value.filter(|v| v.is_finite()) else {
+            let scale = scale(info.format);
+            let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+            let message = format!(
+                "`{}` = {} must be a number from {}",
+                entry.field_path("value"),
+                item.to_string().trim(),
+                range(min, max, info.unit)
+            );
             r.problem(Some(span), message, "not a number", None);
             return None;
         };
@@ -202,26 +209,23 @@ fn scale(format: Format) -> f64 {
 fn one(r: &mut Reader, entry: &Entry, info: &'static ParamInfo) -> Option<i32> {
     let scale = scale(info.format);
     let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
-    let (value, span, source) = r.table_quantity(entry, info.name, info.unit, info.text)?;
+    let range = range(min, max, info.unit);
+    let stated = (info.unit, range.as_str());
+    let (value, span, source) = r.table_quantity(entry, info.name, stated, info.text)?;
     let path = format!("{}.{}", entry.path, info.name);
     let raw = (value * scale).round();
+    let written = format!("`{path}` = {}{}", pretty(value), suffix(info.unit));
     if !(f64::from(info.min)..=f64::from(info.max)).contains(&raw) {
         r.problem(
             Some(span),
-            format!(
-                "`{path}` = {} {unit} is out of range: allowed {} to {} {unit}",
-                pretty(value),
-                pretty(min),
-                pretty(max),
-                unit = info.unit
-            ),
+            format!("{written} is out of range: allowed {range}"),
             "out of range",
             Some(format!("{path}: {}", info.text)),
         );
         return None;
     }
     if scale == 1.0 && value.fract() != 0.0 {
-        let message = format!("`{path}` = {} must be a whole number", pretty(value));
+        let message = format!("{written} must be a whole number from {range}");
         r.problem(Some(span), message, "not whole", None);
         return None;
     }

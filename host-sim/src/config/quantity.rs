@@ -126,6 +126,15 @@ impl Dimension {
     }
 }
 
+/// A unit behind a number, for messages; nothing where the number is a pure one.
+#[must_use]
+pub(crate) fn suffix(unit: &str) -> String {
+    match unit {
+        "1" | "count" => String::new(),
+        unit => format!(" {unit}"),
+    }
+}
+
 /// A number for people: up to `digits` significant digits, no float noise.
 #[must_use]
 pub(crate) fn pretty(value: f64) -> String {
@@ -173,5 +182,6 @@ mod tests {
         assert_eq!(pretty(-1_000_000.0), "-1000000");
         assert_eq!(pretty(0.0), "0");
         assert_eq!(pretty(1.44e-9), "1.44e-9");
+        assert_eq!(["mm", "1", "count"].map(suffix), [" mm", "", ""]);
     }
 }

@@ -25,13 +25,15 @@ pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<
                 ),
             ));
         }
-        if fault.from_s > scenario.duration_s {
+        if fault.from_s >= scenario.duration_s {
+            let end_s = scenario.duration_s;
             return Err(SimError::simulation(
                 format!(
-                    "the fault `{fault}` begins after the end of scenario `{}`, which lasts {} s",
-                    scenario.name, scenario.duration_s
+                    "the fault `{fault}` does nothing: scenario `{}` ends at {end_s} s, before it \
+                     could begin",
+                    scenario.name
                 ),
-                "choose a time from 0 s to the end",
+                format!("choose a begin from 0 s to below {end_s} s"),
             ));
         }
     }
@@ -138,7 +140,8 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
 }
 
 /// Parts of the robot, each with where it is, that a fault takes for itself as long as it
-/// lasts: the simulation keeps one fault of such a part, and its end restores the sound part.
+/// lasts: the simulation keeps one fault of such a part, and its end restores the sound part;
+/// or the two exclude each other, as a wiper that is open and one that jumps.
 fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
     use FaultKind as F;
     let part = match fault.kind {
@@ -166,14 +169,34 @@ fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
 /// What two faults at a time cannot both act on, in words.
 fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
     let others = parts(b);
-    let (part, place) = parts(a).into_iter().find(|part| others.contains(part))?;
-    Some(match place {
-        Victim::Robot => format!("the {part}"),
-        _ => format!(
-            "the {part} of {}",
-            place.to_string().trim_start_matches(':')
-        ),
+    let of = |place: Victim| place.to_string().trim_start_matches(':').to_owned();
+    if let Some((part, place)) = parts(a).into_iter().find(|part| others.contains(part)) {
+        return Some(match place {
+            Victim::Robot => format!("the {part}"),
+            _ => format!("the {part} of {}", of(place)),
+        });
+    }
+    // Of those that combine with every other kind, one of a kind at a time.
+    (a.kind == b.kind && a.victim == b.victim).then(|| match a.victim {
+        Victim::Robot => whole(a.kind).to_owned(),
+        place => of(place),
     })
+}
+
+/// What a fault strikes of which there is only one.
+fn whole(kind: FaultKind) -> &'static str {
+    use FaultKind as F;
+    match kind {
+        F::BusFull | F::BitErrors | F::BytesLost | F::BytesInserted | F::FramesDelayed => {
+            "the line"
+        }
+        F::MasterReset | F::LayerOneStall | F::CommandFlood | F::CycleJitter => "the master",
+        F::ClientReset => "the user's program",
+        F::TubeBurst => "the air supply",
+        F::FootLosesContact | F::FootSlips => "the ground",
+        F::DiskFull => "the recorder",
+        _ => "the robot",
+    }
 }
 
 /// Two faults of one part at a time: the end of one would undo the other. The same fault
@@ -184,15 +207,15 @@ fn no_rivals(faults: &[FaultSpec]) -> Result<(), SimError> {
             if a.from_s >= b.over_s() || b.from_s >= a.over_s() {
                 continue;
             }
-            let why = if a.kind == b.kind && a.victim == b.victim {
-                "are the same at the same time".to_owned()
-            } else if let Some(part) = contested(a, b) {
-                format!("both act on {part} at the same time, which cannot be combined")
-            } else {
+            let Some(part) = contested(a, b) else {
                 continue;
             };
+            let from_s = a.from_s.max(b.from_s);
             return Err(SimError::simulation(
-                format!("the faults `{a}` and `{b}` {why}"),
+                format!(
+                    "the faults `{a}` and `{b}` overlap on {part} from {from_s} s on, where they \
+                     cannot be combined"
+                ),
                 "leave one of them out, or end the first before the second begins",
             ));
         }
@@ -287,24 +310,34 @@ mod tests {
                 "invalid-parameter:wheel7@1.1s",
                 "the service tool",
             ),
-            (
-                "supply-lost@1s",
-                "supply-lost@2s",
-                "are the same at the same time",
-            ),
+            ("supply-lost@1s", "supply-lost@2s", "the air source"),
             (
                 "brown-out:joint1=30@1s",
                 "brown-out:joint1=40@1.02s",
-                "are the same at the same time",
+                "program of joint1 from 1.02 s on",
             ),
+            (
+                "bit-errors=0.0001@1s",
+                "bit-errors=0.001@0.5s..1.5s",
+                "the line from 1 s on",
+            ),
+            (
+                "load-step:joint2=5@1s",
+                "load-step:joint2=60@2s",
+                "on joint2 from 2 s on",
+            ),
+            ("disk-full@1s", "disk-full@1s..2s", "the recorder"),
         ] {
             for pair in [[a, b], [b, a]] {
                 let refusal = admitted(&pair, &Nodes::default()).expect_err(a).to_string();
+                // Both as they are given, so that values and times tell them apart.
                 for fault in pair {
-                    let name = fault.split('=').next().expect("a name");
-                    assert!(refusal.contains(name), "{refusal}");
+                    assert!(refusal.contains(&format!("`{fault}`")), "{refusal}");
                 }
-                assert!(refusal.contains(part), "{refusal}");
+                assert!(
+                    refusal.contains("overlap on") && refusal.contains(part),
+                    "{refusal}"
+                );
             }
         }
     }
@@ -342,6 +375,19 @@ mod tests {
         ] {
             let outcome = admitted(&pair, &Nodes::default());
             assert!(outcome.is_ok(), "{pair:?}: {outcome:?}");
+        }
+    }
+
+    #[test]
+    fn a_fault_that_begins_when_all_is_over_is_refused_with_the_end() {
+        for fault in ["supply-lost@10s", "supply-lost@10s..11s", "supply-lost@12s"] {
+            let refusal = admitted(&[fault], &Nodes::default()).expect_err(fault);
+            let words = "scenario `three-step` ends at 10 s";
+            assert!(refusal.to_string().contains(words), "{refusal}");
+        }
+        for fault in ["supply-lost@9.999s", "supply-lost@9s..11s"] {
+            let outcome = admitted(&[fault], &Nodes::default());
+            assert!(outcome.is_ok(), "{fault}: {outcome:?}");
         }
     }
 

@@ -67,10 +67,10 @@ impl Injector {
             self.active.retain(|f| f != fault);
         }
         self.line = LineErrors {
-            bit: self.sum(FaultKind::BitErrors),
-            lost: self.sum(FaultKind::BytesLost),
-            inserted: self.sum(FaultKind::BytesInserted),
-            delay_ns: (self.sum(FaultKind::FramesDelayed) * 1e3) as u64,
+            bit: self.value(FaultKind::BitErrors),
+            lost: self.value(FaultKind::BytesLost),
+            inserted: self.value(FaultKind::BytesInserted),
+            delay_ns: (self.value(FaultKind::FramesDelayed) * 1e3) as u64,
         };
         on_sensors(fault, begin, plant, state);
         on_air(fault, begin, plant, state);
@@ -94,11 +94,9 @@ impl Injector {
         self.of(kind).any(|f| f.victim == Victim::Board(address))
     }
 
-    fn sum(&self, kind: FaultKind) -> f64 {
-        self.of(kind).map(|f| f.value).sum::<f64>().min(
-            // Two faults of a kind add up, but a share stays a share.
-            kind.info().value.map_or(0.0, |v| v.max),
-        )
+    /// The value of a fault of which there is one at a time (`admission`); 0 without it.
+    fn value(&self, kind: FaultKind) -> f64 {
+        self.of(kind).next().map_or(0.0, |f| f.value)
     }
 
     /// What the master puts on the line in place of `sync`; `None`: nothing.
@@ -126,12 +124,12 @@ impl Injector {
 
     /// Commands per cycle of a user who floods the master.
     pub(crate) fn flood(&self) -> usize {
-        self.sum(FaultKind::CommandFlood) as usize
+        self.value(FaultKind::CommandFlood) as usize
     }
 
     /// By how much the master's next cycle comes late (or early), ns.
     pub(crate) fn cycle_jitter_ns(&mut self) -> i64 {
-        let largest = (self.sum(FaultKind::CycleJitter) * 1e6) as i64;
+        let largest = (self.value(FaultKind::CycleJitter) * 1e6) as i64;
         if largest == 0 {
             0
         } else {

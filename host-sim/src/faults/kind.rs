@@ -1,5 +1,6 @@
 //! The catalogue of faults that a run can be given.
 
+use crate::config::pretty;
 use crate::sil::{JOINT_TICK_NS, SERVICE_NS, WATCHDOG_NS};
 
 /// Where a fault strikes, and so what its target is called.
@@ -44,7 +45,7 @@ impl ValueSpec {
             "1" => String::new(),
             unit => format!(" {unit}"),
         };
-        let range = format!("{} to {}{unit}", self.min, self.max);
+        let range = format!("{} to {}{unit}", pretty(self.min), pretty(self.max));
         if self.gap > 0.0 {
             format!("{range}, and not between -{0} and {0}{unit}", self.gap)
         } else {

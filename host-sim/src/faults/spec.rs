@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::kind::{FaultKind, KINDS, Place};
+use super::kind::{FaultKind, KINDS, Place, ValueSpec};
 use super::matrix;
 
 /// What a fault strikes.
@@ -171,10 +171,11 @@ impl FromStr for FaultSpec {
 
     fn from_str(text: &str) -> Result<Self, SpecError> {
         let owned = || text.to_owned();
-        let (what, time) = text.split_once('@').ok_or_else(|| SpecError::Time {
-            text: owned(),
-            reason: "the time is missing".to_owned(),
-        })?;
+        // What else is wrong is told before a missing time, or with it.
+        let (what, time) = match text.split_once('@') {
+            Some((what, time)) => (what, Some(time)),
+            None => (text, None),
+        };
         let (what, number) = match what.split_once('=') {
             Some((what, number)) => (what, Some(number)),
             None => (what, None),
@@ -195,26 +196,19 @@ impl FromStr for FaultSpec {
         })?;
         let wrong = |reason: String| SpecError::Value {
             text: owned(),
-            reason,
+            reason: match time {
+                Some(_) => reason,
+                None => format!("{reason}; and the time is missing, as in `{what}@3.2s`"),
+            },
         };
         let value = match (info.value, number) {
             (None, None) => 0.0,
             (None, Some(n)) => return Err(wrong(format!("`{name}` takes no value, not `{n}`"))),
             (Some(v), None) => v.default,
-            (Some(v), Some(n)) => {
-                n.parse::<f64>()
-                    .ok()
-                    .filter(|x| v.allows(*x))
-                    .ok_or_else(|| {
-                        wrong(format!(
-                            "the value `{n}` is not a number from {} ({})",
-                            v.range(),
-                            v.doc
-                        ))
-                    })?
-            }
+            (Some(v), Some(n)) => v.parse(n).map_err(wrong)?,
         };
-        let (from_s, until_s) = times(time).map_err(|reason| SpecError::Time {
+        let time = time.ok_or_else(|| "the time is missing".to_owned());
+        let (from_s, until_s) = time.and_then(times).map_err(|reason| SpecError::Time {
             text: owned(),
             reason,
         })?;
@@ -250,6 +244,22 @@ fn no_such(text: &str, name: &str) -> SpecError {
             name: name.to_owned(),
             nearest: crate::config::closest(name, KINDS.iter().map(|k| k.name)),
         },
+    }
+}
+
+impl ValueSpec {
+    /// The number that `text` is, or what is wrong with it.
+    fn parse(&self, text: &str) -> Result<f64, String> {
+        let wrong = match text.parse::<f64>() {
+            Ok(x) if self.allows(x) => return Ok(x),
+            Ok(x) if !x.is_nan() => "out of range",
+            _ => "not a number",
+        };
+        Err(format!(
+            "the value `{text}` is {wrong}: allowed {} ({})",
+            self.range(),
+            self.doc
+        ))
     }
 }
 
@@ -345,19 +355,29 @@ mod tests {
             ("pot-open:wheel7@1s", "`:joint1` to `:joint6`, not `wheel7`"),
             ("pot-open:joint9@1s", "joint9"),
             ("node-silent:wheel3@1s", "wheel3"),
-            ("bit-errors=2@1s", "from 0.000000001 to 0.1"),
-            ("bit-errors=NaN@1s", "NaN"),
+            ("bit-errors=2@1s", "out of range: allowed 1e-9 to 0.1"),
+            ("bit-errors=NaN@1s", "`NaN` is not a number: allowed 1e-9"),
+            ("bit-errors=few@1s", "`few` is not a number: allowed 1e-9"),
+            ("bit-errors=@1s", "`` is not a number"),
+            ("bit-errors=inf@1s", "`inf` is out of range"),
             // What can do nothing is no fault.
-            ("bit-errors=0@1s", "`0` is not a number from"),
-            ("bytes-lost=0@1s", "`0` is not a number from"),
-            ("bytes-inserted=0@1s", "`0` is not a number from"),
-            ("frames-delayed=0@1s", "from 0.1 to 20000 us"),
-            ("cycle-jitter=0@1s", "from 0.001 to 5 ms"),
+            ("bit-errors=0@1s", "`0` is out of range"),
+            ("bytes-lost=0@1s", "`0` is out of range"),
+            ("bytes-inserted=0@1s", "`0` is out of range"),
+            ("frames-delayed=0@1s", "allowed 0.1 to 20000 us"),
+            ("cycle-jitter=0@1s", "allowed 0.001 to 5 ms"),
             ("clock-drift:joint1=0@1s", "and not between -1 and 1 ppm"),
             ("load-step:joint1=-0.5@1s", "and not between -1 and 1 N"),
-            ("valve-slow:joint1.fill-a=1@1s", "from 1.1 to 8"),
-            ("valve-leak:joint1=1@1s", "from 1.1 to 10000"),
-            ("supply-sag=10@1s", "from 0.5 to 9.9 bar"),
+            ("valve-slow:joint1.fill-a=1@1s", "allowed 1.1 to 8"),
+            ("valve-leak:joint1=1@1s", "allowed 1.1 to 10000"),
+            ("supply-sag=10@1s", "allowed 0.5 to 9.9 bar"),
+            // All that is wrong is told at once.
+            ("bit-errors=0", "`0` is out of range: allowed 1e-9 to 0.1"),
+            (
+                "bit-errors=0",
+                "the time is missing, as in `bit-errors@3.2s`",
+            ),
+            ("pot-open:joint9", "joint9"),
             ("ui-replay@1s", "not implemented: there is no Ethernet"),
             ("foot-sinks@1s", "not implemented: there is no soft terrain"),
             (

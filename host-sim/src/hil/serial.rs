@@ -118,14 +118,14 @@ impl SerialLine {
             let seconds = self.options.patience.as_secs_f64();
             return SimError::simulation(
                 format!("the board on {port} has not answered for {seconds} s"),
-                "a board that was reset has forgotten its session: start the run again; \
-                 what was logged up to here is complete",
+                "check the board's power and its cable, and start the run again (a board that \
+                 was reset has forgotten its session); what was logged up to here is complete",
             );
         }
         SimError::simulation(
             format!("the serial port {port} is lost: {error}"),
-            "plug the board in again and start the run again; what was logged up to here \
-             is complete",
+            "check the board's cable and power, plug it in again and start the run again; \
+             what was logged up to here is complete",
         )
     }
 }

@@ -5,7 +5,7 @@ use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_master::contact::Side;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
-use wheeleg_protocol::LinkRecord;
+use wheeleg_protocol::{LinkRecord, LogEvent};
 use wheeleg_units::PositionMm;
 
 use super::START_UP;
@@ -30,7 +30,7 @@ pub(super) struct Operator<'a> {
     rest_ns: u64,
     limit_ns: u64,
     stage: Stage,
-    notes: Vec<(u64, String)>,
+    notes: Vec<(u64, EventKind, String)>,
     next_event: usize,
     flood_refused: bool,
 }
@@ -167,8 +167,12 @@ impl<'a> Operator<'a> {
         let now_us = now_ns / 1000;
         while let Some((time_us, event)) = world.master().take_event() {
             // Counters and logs are no part of the story.
-            if !matches!(event, Event::Link { .. } | Event::Log { .. }) {
-                self.notes.push((time_us, describe(&event)));
+            if is_advice(&event) {
+                self.notes
+                    .push((time_us, EventKind::Fault, describe(&event)));
+            } else if !matches!(event, Event::Link { .. } | Event::Log { .. }) {
+                self.notes
+                    .push((time_us, EventKind::Info, describe(&event)));
             }
             match event {
                 Event::Homed if self.stage == Stage::Homing => {
@@ -206,7 +210,7 @@ impl<'a> Operator<'a> {
             .rev()
             .take(6)
             .rev()
-            .map(|(us, text)| format!("{:.3} s: {text}", *us as f64 * 1e-6))
+            .map(|(us, _, text)| format!("{:.3} s: {text}", *us as f64 * 1e-6))
             .collect();
         SimError::simulation(
             format!(
@@ -221,11 +225,11 @@ impl<'a> Operator<'a> {
 
     /// Writes the story of the start-up into the record, at time 0.
     pub(super) fn report_start_up(&self, recorder: &mut Recorder) {
-        for (us, text) in &self.notes {
+        for (us, kind, text) in &self.notes {
             let at_s = *us as f64 * 1e-6;
             recorder.event(
                 0,
-                EventKind::Info,
+                *kind,
                 format!("{START_UP}{at_s:.3} s after power-up: {text}"),
             );
         }
@@ -323,6 +327,7 @@ impl<'a> Operator<'a> {
     pub(super) fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
         while let Some((_, event)) = world.master().take_event() {
             let kind = match event {
+                _ if is_advice(&event) => EventKind::Fault,
                 Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
                 Event::Hold(_)
                 | Event::FootSwitch { .. }
@@ -350,6 +355,11 @@ impl<'a> Operator<'a> {
             recorder.event(t_ns, kind, describe(&event));
         }
     }
+}
+
+/// What a board logs and somebody should act on, so that it is told as a finding is.
+fn is_advice(event: &Event) -> bool {
+    matches!(event, Event::Log { entry, .. } if entry.event == LogEvent::PrechargeLate)
 }
 
 fn refused(command: &Command, reason: &str) -> SimError {

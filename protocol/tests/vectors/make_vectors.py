@@ -193,7 +193,7 @@ MESSAGES = {
                            ("reset_cause", "ResetCause"), ("clock_offset_us", "u32")]),
     0x86: ("LinkRecord", [("frames", "u32"), ("overflow", "u16"), ("truncated", "u16"), ("short", "u16"),
                           ("crc", "u16"), ("version", "u16"), ("length", "u16"), ("address", "u16"),
-                          ("unsent", "u16"), ("drift_ppm", "i16")]),
+                          ("unsent", "u16"), ("drift_ppm", "i16"), ("parameters", "u32")]),
     0x87: ("LogRecords", [("lost", "u16"), ("left", "u8"), ("entries", "bytes32")]),
 }
 

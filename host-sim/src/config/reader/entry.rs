@@ -25,7 +25,7 @@ impl Entry {
             .map(|(_, span, item)| (span.clone(), item.clone()))
     }
 
-    pub(super) fn field_path(&self, key: &str) -> String {
+    pub(crate) fn field_path(&self, key: &str) -> String {
         if self.path.is_empty() {
             key.to_owned()
         } else {

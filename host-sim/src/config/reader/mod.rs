@@ -11,10 +11,12 @@ use toml_edit::{Document, Item};
 
 use super::error::{ConfigError, Problem};
 use super::params::{FieldSpec, ParameterInfo, Params};
+use super::quantity::suffix;
 use super::suggest::closest;
 
 pub(crate) use entry::Entry;
 use entry::{Field, fields};
+pub(crate) use quantities::range;
 
 /// A parsed file and the problems found so far.
 pub(crate) struct Reader {
@@ -196,7 +198,10 @@ impl Reader {
         if !missing.is_empty() {
             let names: Vec<String> = missing
                 .iter()
-                .map(|f| format!("{} ({})", f.key, f.dimension.units()[0].0))
+                .map(|f| match suffix(f.dimension.units()[0].0).trim() {
+                    "" => f.key.to_owned(),
+                    unit => format!("{} ({unit})", f.key),
+                })
                 .collect();
             self.problem(
                 Some(entry.span.clone()),

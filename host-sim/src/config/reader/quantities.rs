@@ -7,7 +7,12 @@ use toml_edit::Item;
 use super::entry::{fields, number};
 use super::{Entry, Reader};
 use crate::config::params::{FieldSpec, ParameterInfo};
-use crate::config::quantity::{Dimension, pretty};
+use crate::config::quantity::{Dimension, pretty, suffix};
+
+/// What is allowed, in words.
+pub(crate) fn range(min: f64, max: f64, unit: &str) -> String {
+    format!("{} to {}{}", pretty(min), pretty(max), suffix(unit))
+}
 
 impl Reader {
     /// Reads one quantity `{ value, unit, source }` in SI.
@@ -36,7 +41,8 @@ impl Reader {
             return None;
         };
         let span = value.span().unwrap_or(value_key);
-        let written = self.numbers(&path, spec, &value, span.clone(), &unit)?;
+        let range = range(spec.min / factor, spec.max / factor, &unit);
+        let written = self.numbers(&path, spec, &value, span.clone(), &range)?;
         let mut ok = true;
         for v in &written {
             let si = v * factor;
@@ -47,10 +53,9 @@ impl Reader {
                 self.problem(
                     Some(span.clone()),
                     format!(
-                        "`{path}` = {} {unit} is out of range: allowed {} to {} {unit}",
+                        "`{path}` = {}{} is out of range: allowed {range}",
                         pretty(*v),
-                        pretty(spec.min / factor),
-                        pretty(spec.max / factor)
+                        suffix(&unit)
                     ),
                     "out of range",
                     Some(format!("{path}: {}", spec.doc)),
@@ -61,7 +66,10 @@ impl Reader {
                 ok = false;
                 self.problem(
                     Some(span.clone()),
-                    format!("`{path}` = {} must be a whole number", pretty(*v)),
+                    format!(
+                        "`{path}` = {} must be a whole number from {range}",
+                        pretty(*v)
+                    ),
                     "not whole",
                     None,
                 );
@@ -83,13 +91,13 @@ impl Reader {
         Some(written.into_iter().map(|v| v * factor).collect())
     }
 
-    /// Reads a quantity that has exactly one unit: value, position of the
-    /// value, source.
+    /// Reads a quantity that has exactly one unit, its `range` for help: value, position
+    /// of the value, source.
     pub(crate) fn table_quantity(
         &mut self,
         entry: &Entry,
         key: &str,
-        unit: &str,
+        (unit, range): (&str, &str),
         doc: &str,
     ) -> Option<(f64, Range<usize>, String)> {
         let path = entry.field_path(key);
@@ -104,7 +112,7 @@ impl Reader {
         );
         let Some((value, number_found)) = value.zip(number_found) else {
             let message =
-                format!("`{path}` needs a finite number in {unit} as its value, not {found}");
+                format!("`{path}` needs a finite number from {range} as its value, not {found}");
             self.problem(
                 Some(inner.span.clone()),
                 message,
@@ -235,7 +243,7 @@ impl Reader {
         spec: &FieldSpec,
         value: &Item,
         span: Range<usize>,
-        unit: &str,
+        range: &str,
     ) -> Option<Vec<f64>> {
         let numbers: Option<Vec<f64>> = if spec.dimension == Dimension::Flag {
             value.as_bool().map(|b| vec![f64::from(u8::from(b))])
@@ -251,8 +259,9 @@ impl Reader {
             _ => {
                 let expected = match (spec.dimension, spec.components) {
                     (Dimension::Flag, _) => "true or false".to_owned(),
-                    (_, 1) => format!("a finite number in {unit}"),
-                    (_, n) => format!("a list of {n} finite numbers in {unit}"),
+                    (_, 1) if spec.integer => format!("a whole number from {range}"),
+                    (_, 1) => format!("a finite number from {range}"),
+                    (_, n) => format!("a list of {n} finite numbers from {range}"),
                 };
                 self.problem(
                     Some(span),

@@ -1,0 +1,106 @@
+//! What is said of a command line that cannot be read.
+
+use std::ffi::OsString;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Command, Parser};
+
+/// An option of more commands than these is known to the reader.
+const COMMANDS: usize = 3;
+
+/// Reads a command line. An option that the command does not have is answered with the
+/// commands that have it; the parser's own tip, to pass it as a value, would lead to a
+/// scenario or an axis of that name.
+///
+/// # Errors
+/// As [`Parser::try_parse_from`].
+pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C, clap::Error> {
+    let line: Vec<OsString> = line.collect();
+    C::try_parse_from(line).map_err(|mut wrong| {
+        let option = match wrong.get(ContextKind::InvalidArg) {
+            Some(ContextValue::String(text)) => text.clone(),
+            _ => return wrong,
+        };
+        if wrong.kind() == ErrorKind::UnknownArgument && option.starts_with('-') {
+            let mut root = C::command();
+            root.build();
+            let mut having = Vec::new();
+            find(&root, &option, &mut having);
+            wrong.remove(ContextKind::Suggested);
+            if (1..=COMMANDS).contains(&having.len()) {
+                let tip = format!("`{option}` is an option of `{}`", having.join("`, `"));
+                wrong.insert(
+                    ContextKind::Suggested,
+                    ContextValue::StyledStrs(vec![tip.into()]),
+                );
+            }
+        }
+        wrong
+    })
+}
+
+/// Adds the commands that have an option, as one writes them.
+fn find(command: &Command, option: &str, having: &mut Vec<String>) {
+    let name = |arg: &clap::Arg| arg.get_long().map(|long| format!("--{long}"));
+    if command
+        .get_arguments()
+        .any(|arg| name(arg).as_deref() == Some(option))
+    {
+        let whole = command.get_bin_name().unwrap_or(command.get_name());
+        having.push(whole.to_owned());
+    }
+    for below in command.get_subcommands() {
+        find(below, option, having);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::Cli;
+
+    fn said(line: &[&str]) -> String {
+        let line = line.iter().map(OsString::from);
+        parse::<Cli>(line).expect_err("wrong").to_string()
+    }
+
+    #[test]
+    fn an_option_of_another_command_is_told_with_that_command() {
+        for line in [
+            &["wheeleg", "tune", "--quick"][..],
+            &["wheeleg", "tune", "axis", "--quick"],
+            &["wheeleg", "--quick"],
+        ] {
+            let said = said(line);
+            assert!(said.contains("unexpected argument '--quick'"), "{said}");
+            assert!(
+                said.contains("`--quick` is an option of `wheeleg compare`"),
+                "{said}"
+            );
+            assert!(!said.contains("as a value"), "{said}");
+        }
+        let said = said(&["wheeleg", "faults", "rows", "--row", "pot-open"]);
+        assert!(said.contains("option of `wheeleg faults run`"), "{said}");
+    }
+
+    #[test]
+    fn an_option_of_no_command_gets_no_tip_but_one_of_similar_letters() {
+        let nowhere = said(&["wheeleg", "tune", "axis", "--nowhere"]);
+        assert!(!nowhere.contains("tip:"), "{nowhere}");
+        let common = said(&["wheeleg", "list", "--out", "here"]);
+        assert!(!common.contains("tip:"), "{common}");
+        let near = said(&["wheeleg", "run", "--sed", "1"]);
+        assert!(near.contains("similar argument exists: '--seed'"), "{near}");
+        let command = said(&["wheeleg", "lst"]);
+        assert!(command.contains("'list'"), "{command}");
+    }
+
+    #[test]
+    fn options_without_a_command_are_those_of_a_run() {
+        let line = ["wheeleg", "--out", "here", "--strict"].map(OsString::from);
+        let cli = parse::<Cli>(line.into_iter()).expect("read");
+        assert!(cli.command.is_none());
+        let both = said(&["wheeleg", "--strict", "list"]);
+        assert!(both.contains("cannot be used with"), "{both}");
+    }
+}
