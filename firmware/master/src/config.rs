@@ -52,6 +52,9 @@ pub struct MasterConfig {
     /// Boards that were commissioned, by address 1..=8. Another board at such an
     /// address bars arming; `None` takes any.
     pub commissioned: [Option<UniqueId>; NODES],
+    /// Sum of the parameters that each board should have in force (protocol/SPEC.md, Parameter
+    /// sets), by address 1..=8; `None` takes any. Wheels are given theirs at every arming.
+    pub parameters: [Option<u32>; NODES],
 }
 
 impl Default for MasterConfig {
@@ -65,6 +68,7 @@ impl Default for MasterConfig {
             switch_frame: SwitchFrame::default(),
             first_sequence: 1,
             commissioned: [None; NODES],
+            parameters: [None; NODES],
         }
     }
 }

@@ -42,6 +42,8 @@ findings! {
         "Check the address straps, and that the right image is flashed.";
     ForeignBoard: "It is not the board that was commissioned at this address.",
         "Put the right board in, or commission the robot anew.";
+    OtherParameters: "Its parameters in force are not those of the robot file.",
+        "Write the file's parameters to it and save them, or take its own over into the file.";
     SlotBabble: "It sends rubbish in its own slot, where its driver-enable guard lets it through.",
         "Switch the robot off and replace this board: its processor or line driver is damaged.";
     BusBabble: "The bus is full of rubbish, and no slot tells who babbles: source unknown, the board's driver-enable guard is broken too.",

@@ -381,5 +381,6 @@ fn link_sample(record: &LinkRecord) -> LinkSample {
         address: record.address,
         unsent: record.unsent,
         drift_ppm: i32::from(record.drift_ppm),
+        parameters: record.parameters,
     }
 }

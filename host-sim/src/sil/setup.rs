@@ -9,6 +9,7 @@ use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::homing::HomingConfig;
 use wheeleg_master::layer1::params::{GaitParams, Pattern};
+use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::ground::{Ground, GroundPatch};
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -30,6 +31,18 @@ fn millimetres(m: f64) -> PositionMm {
 
 fn microseconds(s: f64) -> u32 {
     (s * 1e6).round() as u32
+}
+
+/// Sums of the joints' parameters, as the file of the robot gives them.
+fn sums(robot: &RobotConfig) -> [Option<u32>; 8] {
+    let sum = |set: &Vec<(u16, i32)>| {
+        let with = |parameters: JointParameters, (id, raw): &(u16, i32)| {
+            parameters.with(*id, *raw, true).ok()
+        };
+        let set = set.iter().try_fold(JointParameters::default(), with);
+        set.map(|set| set.sum())
+    };
+    std::array::from_fn(|i| robot.node.joints.get(i).and_then(sum))
 }
 
 /// The plant of the robot, standing on the scenario's ground in the start pose of the gait.
@@ -98,6 +111,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
         commissioned: robot.commissioned,
+        parameters: sums(robot),
         ..MasterConfig::default()
     }
 }

@@ -267,6 +267,8 @@ samples! {
         unsent: u16, "1", 0, Node;
         /// Board clock less master clock over the last second.
         drift_ppm: i32, "ppm", 0, Node;
+        /// Sum of the parameters in force.
+        parameters: u32, "1", 0, Node;
     }
 
     /// Something that happened.

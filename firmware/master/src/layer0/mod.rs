@@ -22,6 +22,7 @@ pub mod questions;
 pub mod reflex;
 mod requests;
 mod safety;
+mod sums;
 pub mod wheels;
 
 use wheeleg_protocol::link::{Requester, RequesterConfig};
@@ -43,6 +44,7 @@ use nodes::Nodes;
 use odometry::Odometry;
 use questions::Questions;
 use reflex::Reflexes;
+use sums::Sums;
 use wheels::{WheelUnits, Wheels};
 
 /// Cycles without set-points from layer 1 after which all axes hold: 100 ms.
@@ -106,6 +108,7 @@ pub struct Layer0 {
     push: PushProfile,
     stale_cycles: u16,
     left_behind: LeftBehind,
+    sums: Sums,
     /// Strokes at which all joints are kept after a stop.
     frozen: Option<[Option<PositionMm>; JOINTS]>,
     /// References of the user, one joint at a time.
@@ -155,6 +158,7 @@ impl Layer0 {
             setpoints: Setpoints::idle(0),
             stale_cycles: 0,
             left_behind: LeftBehind::default(),
+            sums: Sums::new(config.parameters),
             frozen: None,
             direct: [None; JOINTS],
             direct_travel: None,

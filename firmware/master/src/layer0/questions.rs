@@ -2,8 +2,9 @@
 //! board failed or started anew, what it has heard, what it has logged.
 //!
 //! They take one acyclic exchange in ten cycles, and one at once after a fault. What
-//! boards have heard is asked for while the master itself hears broken frames: on a
-//! sound line there is nothing to tell.
+//! boards have heard is asked for while the master itself hears broken frames; on a
+//! sound line, which has little to tell, in every eighth round: with it comes the sum of
+//! the parameters in force.
 
 use wheeleg_protocol::{Address, FaultReport, LinkReport, LogRead, Message, NodeMode, SlotReply};
 
@@ -13,6 +14,8 @@ use crate::setpoint::NODES;
 const PERIOD_CYCLES: u32 = 10;
 /// Questions of a round: link and log of every board.
 const ROUND: usize = 2 * NODES;
+/// Rounds without links between two with them on a sound line, 0.8 s each.
+const QUIET_ROUNDS: u8 = 7;
 /// Time for which the boards go on recording, ms: three rounds of 1.6 s.
 const LEASE_MS: u16 = 5_000;
 
@@ -36,8 +39,8 @@ pub struct Questions {
     next_cycle: u32,
     /// Broken frames that the master had heard when the last round began.
     errors: u32,
-    /// It has heard more of them since.
-    noisy: bool,
+    /// Rounds without links still to come; the one under way has them if it is all of them.
+    quiet: u8,
 }
 
 /// Whether a board has started anew between two replies.
@@ -140,10 +143,14 @@ impl Questions {
         }
         self.next_cycle = cycle.wrapping_add(PERIOD_CYCLES);
         if self.turn == 0 {
-            self.noisy = errors != self.errors;
+            self.quiet = if errors != self.errors {
+                QUIET_ROUNDS
+            } else {
+                self.quiet.checked_sub(1).unwrap_or(QUIET_ROUNDS)
+            };
             self.errors = errors;
         }
-        let turn = if self.noisy {
+        let turn = if self.quiet == QUIET_ROUNDS {
             self.turn
         } else {
             self.turn.max(NODES)

@@ -240,6 +240,10 @@ impl Layer0 {
             self.questions.why(index);
         }
         events.push(now_us, Event::Link { node, record });
+        if self.sums.heard(index, record.parameters) {
+            let (node, finding) = (Some(node), Finding::OtherParameters);
+            events.push(now_us, Event::Found { node, finding });
+        }
         if let Some(babbler) = self.line.heard(index, &record) {
             let (node, finding) = (Some(babbler.raw()), Finding::Babbler);
             events.push(now_us, Event::Found { node, finding });

@@ -166,6 +166,26 @@ fn counters_and_logs_of_every_board_arrive_within_a_round_of_questions() {
 }
 
 #[test]
+fn a_board_with_other_parameters_than_wanted_is_named_whenever_they_change() {
+    let mut parameters = [None; 8];
+    parameters[2] = Some(1234);
+    let mut rig = Rig::new(MasterConfig {
+        parameters,
+        ..MasterConfig::default()
+    });
+    rig.node(3).link.parameters = 1234;
+    rig.node(4).link.parameters = 99;
+    rig.run(5 * ROUND);
+    assert_eq!(found(&rig, Finding::OtherParameters), []);
+    rig.node(3).link.parameters = 1235;
+    rig.run(5 * ROUND);
+    assert_eq!(found(&rig, Finding::OtherParameters), [Some(3)], "once");
+    rig.node(3).link.parameters = 1236;
+    rig.run(5 * ROUND);
+    assert_eq!(found(&rig, Finding::OtherParameters), [Some(3), Some(3)]);
+}
+
+#[test]
 fn the_rest_of_a_log_is_asked_for_at_once() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.run(20);

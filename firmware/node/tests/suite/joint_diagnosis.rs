@@ -217,6 +217,7 @@ fn errors_of_the_link_are_counted_by_kind() {
     let Message::LinkRecord(link) = rig.request(&Message::LinkReport(LinkReport {})) else {
         panic!();
     };
+    assert_eq!(link.parameters, rig.node.parameters().sum());
     assert_eq!((link.crc, link.short, link.truncated), (2, 1, 1));
     assert_eq!(
         (link.overflow, link.version, link.length, link.address),

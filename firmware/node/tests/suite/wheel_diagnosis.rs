@@ -5,10 +5,10 @@ use crate::common::wheel::WheelRig;
 use crate::common::{ARM, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::WheelParameters;
-use wheeleg_protocol::param::WheelParam;
+use wheeleg_protocol::param::{WheelParam, parameter_sum};
 use wheeleg_protocol::{
-    ClearFault, Fault, FaultReport, Message, NackReason, ParamSave, ParamSet, ResetCause,
-    WheelFilter,
+    ClearFault, Fault, FaultReport, LinkReport, Message, NackReason, ParamSave, ParamSet,
+    ResetCause, WheelFilter,
 };
 use wheeleg_units::Micros;
 
@@ -87,6 +87,28 @@ fn parameters_are_stored_when_asked_and_a_damaged_set_is_a_fault() {
         let _ = rig.request(&Message::ClearFault(ClearFault {}));
         assert!(matches!(rig.request(&ARM), Message::Ack(_)));
     }
+}
+
+/// The sum of the parameters in force that the board tells.
+fn told_sum(rig: &mut WheelRig) -> u32 {
+    match rig.request(&Message::LinkReport(LinkReport {})) {
+        Message::LinkRecord(record) => record.parameters,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_sum_of_the_parameters_in_force_is_told() {
+    let mut rig = WheelRig::new();
+    rig.run_ms(40, None);
+    let delivered = told_sum(&mut rig);
+    let values = WheelParam::ALL.iter().map(|row| row.info().default);
+    assert_eq!(delivered, parameter_sum(&values.collect::<Vec<_>>()));
+    let (id, value) = (WheelParam::FilterGain.id(), 20);
+    rig.request(&Message::ParamSet(ParamSet { id, value }));
+    let changed = told_sum(&mut rig);
+    assert_ne!(changed, delivered);
+    assert_eq!(changed, rig.node.parameters().sum());
 }
 
 #[test]
