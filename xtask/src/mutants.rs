@@ -59,6 +59,7 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
             "firmware/master/src/layer0/reflex.rs",
             "firmware/master/src/layer0/requests.rs",
             "firmware/master/src/layer0/safety.rs",
+            "firmware/master/src/layer0/sums.rs",
         ],
         &["wheeleg-master"],
     ),
