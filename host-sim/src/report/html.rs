@@ -86,6 +86,7 @@ fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
             frames => v.frames,
             counts => [v.overflow, v.truncated, v.short, v.crc, v.version, v.length, v.address, v.unsent],
             drift => v.drift_ppm.to_string().replace('-', "−"),
+            parameters => format!("{:08x}", v.parameters),
         }
     })
     .collect()

@@ -5,6 +5,7 @@ mod answers;
 mod bus_cycle;
 mod commands;
 mod common;
+mod direct;
 mod foot;
 mod motion;
 mod parameters;

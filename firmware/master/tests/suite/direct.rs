@@ -1,0 +1,144 @@
+//! Commands of the user to single axes: what reaches which board, and when nothing may.
+
+use crate::common::Rig;
+use wheeleg_master::MasterConfig;
+use wheeleg_master::command::{Command, CorrectionKind};
+use wheeleg_master::contact::Side;
+use wheeleg_master::dispatcher::Refusal;
+use wheeleg_protocol::{Address, Correction, Message};
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+#[test]
+fn each_command_reaches_its_board_alone() {
+    let acceleration_mm_s2 = fixed::types::I16F16::lit("600");
+    let correction = CorrectionKind::Id;
+    let speed_mm_s = VelocityMmS::from_int(180);
+    let side = Side::Right;
+    type Wanted = fn(&Message) -> bool;
+    let commands: [(Command, u8, Wanted); 4] = [
+        (
+            Command::SelectCorrection {
+                joint: 2,
+                correction,
+            },
+            2,
+            |m| matches!(m, Message::SelectCorrection(c) if c.correction == Correction::Id),
+        ),
+        // As in the wheel set-up of every arming.
+        (
+            Command::WheelSpeed { side, speed_mm_s },
+            8,
+            |m| matches!(m, Message::WheelMaxSpeed(s) if s.speed.get() == 10),
+        ),
+        (
+            Command::WheelAcceleration {
+                side,
+                acceleration_mm_s2,
+            },
+            8,
+            |m| matches!(m, Message::WheelAcceleration(a) if a.acceleration.raw() == 5),
+        ),
+        (
+            Command::WheelFilter {
+                side: Side::Left,
+                a: 1,
+                b: 2,
+                k: 3,
+            },
+            7,
+            |m| matches!(m, Message::WheelFilter(f) if (f.zero, f.pole, f.gain) == (1, 2, 3)),
+        ),
+    ];
+    for (command, board, wanted) in commands {
+        let mut rig = Rig::new(MasterConfig::default());
+        rig.run(60);
+        let ticket = rig.submit(command);
+        rig.run(10);
+        assert!(rig.done(ticket), "{command:?}");
+        for node in &rig.nodes {
+            let count = node.requests.iter().filter(|m| wanted(m)).count();
+            let own = node.address.raw() == board;
+            assert_eq!(count, usize::from(own), "{command:?} {}", node.address);
+        }
+    }
+}
+
+fn lead(rig: &mut Rig) -> Result<(), Refusal> {
+    let stroke_mm = PositionMm::from_int(50);
+    let ticket = rig.submit(Command::JointReference {
+        joint: 1,
+        stroke_mm,
+    });
+    rig.run(2);
+    match rig.refusal(ticket) {
+        Some(reason) => Err(reason),
+        None => Ok(assert!(rig.done(ticket))),
+    }
+}
+
+#[test]
+fn after_a_stop_of_one_axis_no_other_may_be_led_until_it_is_cleared() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    assert_eq!(lead(&mut rig), Ok(()));
+    rig.submit(Command::EmergencyBrake { joint: 2 });
+    rig.run(3);
+    assert_eq!(lead(&mut rig), Err(Refusal::Latched));
+    rig.submit(Command::ClearFault);
+    rig.run(20);
+    assert_eq!(lead(&mut rig), Err(Refusal::NotArmed));
+}
+
+#[test]
+fn valves_of_a_disarmed_joint_stop_nothing() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(60);
+    let ticket = rig.submit(Command::OpenAllValves { joint: 2 });
+    rig.run(10);
+    assert!(rig.done(ticket));
+    assert_eq!(lead(&mut rig), Err(Refusal::NotArmed));
+}
+
+#[test]
+fn a_second_stop_keeps_the_axes_where_the_first_did() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.arm();
+    rig.submit(Command::EmergencyBrake { joint: 2 });
+    rig.run(3);
+    let kept = |rig: &mut Rig| {
+        let sync = rig.cycle();
+        let slot = sync.slots.joint(Address::joint(1).unwrap()).unwrap();
+        slot.reference
+    };
+    let before = kept(&mut rig);
+    // Pushed away, and asked to stop once more.
+    rig.node(1).position += i64::from(PositionMm::from_int(9).raw());
+    rig.node(1).rate = 0;
+    rig.run(2);
+    rig.submit(Command::EmergencyBrake { joint: 3 });
+    rig.run(3);
+    assert_eq!(kept(&mut rig), before);
+}
+
+/// Counts by which the left wheel goes in a gait, after a move of the user of so many mm or none.
+fn gait_after(travel: Option<i16>) -> i64 {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.stand();
+    if let Some(mm) = travel {
+        let travel_mm = PositionMm::from_int(mm);
+        rig.submit(Command::WheelReference { travel_mm });
+        rig.run(100);
+    }
+    let start = rig.node(7).position;
+    let ticket = rig.submit(Command::StartGait);
+    rig.run(1100);
+    assert!(rig.done(ticket));
+    rig.node(7).position - start
+}
+
+#[test]
+fn a_move_of_the_user_is_none_of_the_gaits() {
+    let alone = gait_after(None);
+    assert!(alone > 10_000, "{alone}");
+    assert_eq!(gait_after(Some(10)), alone);
+}
