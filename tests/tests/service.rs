@@ -142,6 +142,30 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
     assert!(!page.contains(" logs at "));
 }
 
+/// Lost, half loaded or set by somebody: the sum that a board tells is not that of the file.
+#[test]
+fn the_console_names_a_joint_with_other_parameters_than_the_robot_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |board: u8, parameter: &str, value: u32| {
+        format!(
+            "command = \"WriteParameter\"\nboard = {board}\nparameter = \"{parameter}\"\nvalue = {value}"
+        )
+    };
+    let events = [
+        event(0.1, "command = \"Disarm\""),
+        event(0.2, &write(3, "motion_margin", 45)),
+        event(0.3, &write(8, "following_error", 777)),
+    ];
+    let scenario = scenario(folder.path(), 8.0, &events.concat());
+    let out = folder.path().join("out");
+    let [scenario, out] = [scenario, out].map(|p| p.to_string_lossy().into_owned());
+    let (good, said) = wheeleg(&["run", &scenario, "--out", &out]);
+    assert!(good, "{said}");
+    let told = "Its parameters in force are not those of the robot file.";
+    assert_eq!(said.matches(told).count(), 1, "{said}");
+    assert!(said.contains(&format!("joint 3: {told}")), "{said}");
+}
+
 /// A precharge that ends by its time holds the axis for two seconds at every arming; only the
 /// boards notice.
 #[test]
