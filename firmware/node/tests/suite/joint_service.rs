@@ -144,12 +144,19 @@ fn requests_for_others_are_ignored_and_wrong_ones_named() {
         gain: 0,
     });
     assert_eq!(refusal(&rig.request(&filter)), Some(NackReason::WrongBoard));
-    // An answer is no request.
+    // Neither an answer is a request, nor a SYNC to one board alone.
     let position = rig.request(&Message::TransmitPosition(TransmitPosition {}));
-    assert_eq!(
-        refusal(&rig.request(&position)),
-        Some(NackReason::UnknownMessage)
-    );
+    let sync = Message::Sync(Sync {
+        cycle: rig.cycle.wrapping_add(1),
+        master_time_us: 0,
+        flags: SyncFlags::ESTOP,
+        slots: SyncSlots::NONE,
+    });
+    for no_request in [position, sync] {
+        let refused = refusal(&rig.request(&no_request));
+        assert_eq!(refused, Some(NackReason::UnknownMessage), "{no_request:?}");
+    }
+    assert_eq!(rig.node.mode(), Mode::Armed);
 }
 
 #[test]
