@@ -81,7 +81,8 @@ impl Bench {
         (0..ticks).find_map(|_| {
             let ran = self.tick(Power::Good);
             assert_eq!(ran.outputs, Outputs::default());
-            ran.trip.map(|trip| (trip.at_ns - since_ns, trip.cause))
+            ran.trip
+                .map(|trip| (trip.at_ns.wrapping_sub(since_ns), trip.cause))
         })
     }
 }
@@ -161,7 +162,8 @@ fn a_processor_that_faults_is_reset_by_its_handler_at_once() {
     assert_eq!(bench.ask(&hook), Reply::Done);
     let (after_ns, cause) = bench.until_reset(5).expect("a reset");
     assert!(cause & SOFTWARE != 0 && cause & WATCHDOG == 0, "{cause:#x}");
-    assert!(after_ns <= 1_100_000, "{after_ns} ns");
+    // It faults where it sleeps, less than a tick before the bench's time.
+    assert!((after_ns as i64).abs() < TICK_NS as i64, "{after_ns} ns");
     assert_eq!(bench.until_reset(200), None, "it comes up again and stays");
 }
 
