@@ -18,6 +18,7 @@ pub mod export;
 pub mod faults;
 pub mod figures;
 pub mod hil;
+pub mod interface;
 mod output;
 pub mod pil;
 pub mod report;

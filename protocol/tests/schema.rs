@@ -1,5 +1,9 @@
 //! The schema hash sees every change that gives bytes another meaning.
 
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
 use wheeleg_protocol::param::{
     Format, JOINT_PARAMS, JointParam, ParamInfo, WHEEL_PARAMS, WheelParam, lookup,
 };
@@ -15,17 +19,54 @@ fn text() -> String {
     out
 }
 
+fn fnv(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3)
+    })
+}
+
 #[test]
 fn the_hash_is_fnv_1a_of_the_text() {
-    let fnv = |bytes: &[u8]| {
-        bytes.iter().fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3)
-        })
-    };
     // Published check values of FNV-1a.
     assert_eq!(fnv(b""), 0xCBF2_9CE4_8422_2325);
     assert_eq!(fnv(b"foobar"), 0x8594_4171_F739_67E8);
     assert_eq!(fnv(text().as_bytes()), SCHEMA_HASH);
+}
+
+/// The archive tells people what stands behind a hash: one file for each definition, and
+/// their order in `ORDER`, oldest first. With `UPDATE_SPEC` the definition of this build is
+/// put into it.
+#[test]
+fn the_archive_has_this_interface_and_every_file_has_the_hash_of_its_name() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("interfaces");
+    let order = folder.join("ORDER");
+    let listed = || fs::read_to_string(&order).expect("ORDER");
+    let own = format!("{SCHEMA_HASH:016x}");
+    if std::env::var_os("UPDATE_SPEC").is_some() && !listed().lines().any(|line| line == own) {
+        fs::write(folder.join(format!("{own}.txt")), text()).expect("the folder is writable");
+        fs::write(&order, format!("{}{own}\n", listed())).expect("ORDER is writable");
+    }
+    let listed = listed();
+    let listed: Vec<&str> = listed.lines().collect();
+    assert!(
+        listed.contains(&own.as_str()),
+        "{own} is not in protocol/interfaces: \
+         UPDATE_SPEC=1 cargo test -p wheeleg-protocol --test schema"
+    );
+    let mut files = BTreeSet::new();
+    for entry in fs::read_dir(&folder).expect("the folder") {
+        let path = entry.expect("an entry").path();
+        if path == order {
+            continue;
+        }
+        let name = path.file_name().expect("a name").to_string_lossy();
+        let hash = fnv(&fs::read(&path).expect("a file"));
+        assert_eq!(name, format!("{hash:016x}.txt"), "{}", path.display());
+        files.insert(format!("{hash:016x}"));
+    }
+    let set: BTreeSet<String> = listed.iter().map(|line| (*line).to_owned()).collect();
+    assert_eq!(set, files, "ORDER and the files");
+    assert_eq!(listed.len(), set.len(), "ORDER names one twice");
 }
 
 #[test]

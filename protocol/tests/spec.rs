@@ -3,8 +3,8 @@
 //! The tables between `<!-- begin … -->` and `<!-- end … -->` are compared with
 //! the text rendered from the code's own tables; the worked examples are read
 //! from the document, decoded, and encoded again. After a deliberate change of
-//! the interface, `UPDATE_SPEC=1 cargo test -p wheeleg-protocol --test spec`
-//! writes the tables anew.
+//! the interface, `UPDATE_SPEC=1 cargo test -p wheeleg-protocol` writes the
+//! tables anew, and the interface into its archive (`schema.rs`).
 
 mod common;
 

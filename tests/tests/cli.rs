@@ -11,6 +11,8 @@ use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
+use wheeleg_protocol::SCHEMA_HASH;
+use wheeleg_sim::interface::archive;
 
 /// Longest time that any one call may take before it counts as hung.
 const HUNG: Duration = Duration::from_secs(120);
@@ -401,6 +403,47 @@ fn a_bad_seed_is_refused() {
             .code(2)
             .stderr(contains("--seed").and(contains(seed)));
     }
+}
+
+#[test]
+fn interfaces_are_listed_and_compared_and_bad_hashes_are_refused() {
+    let own = format!("{SCHEMA_HASH:016x}");
+    let earlier = archive::newest_earlier().expect("an earlier interface");
+    let earlier = format!("{earlier:016x}");
+    let listed = contains(format!("This program: {own}")).and(contains(&earlier));
+    wheeleg().arg("interface").assert().success().stdout(listed);
+    let first = contains("The first difference is in").and(contains("this program has"));
+    let first = first.and(contains(format!("{earlier} has")));
+    wheeleg()
+        .args(["interface", &format!("0x{}", earlier.to_uppercase())])
+        .assert()
+        .success()
+        .stdout(first);
+    let all = contains(format!("- this program, {own}\n+ {earlier}\nin "));
+    wheeleg()
+        .args(["interface", &earlier, "--all"])
+        .assert()
+        .success()
+        .stdout(all);
+    wheeleg()
+        .args(["interface", &own])
+        .assert()
+        .success()
+        .stdout(contains("are the same"));
+    for (bad, said) in [
+        ("xyz", "`xyz` is no hash"),
+        ("1234", "16 hexadecimal digits"),
+        ("+234567890abcdef", "is no hash"),
+        ("0123456789abcdef", "0123456789abcdef is not an interface"),
+    ] {
+        wheeleg()
+            .args(["interface", bad])
+            .assert()
+            .code(2)
+            .stdout("")
+            .stderr(contains(said).and(contains(&own)));
+    }
+    wheeleg().args(["interface", "--all"]).assert().code(2);
 }
 
 /// Ctrl-C in mid-run: the program ends by itself, says so, and the log up to

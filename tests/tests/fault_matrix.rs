@@ -10,9 +10,11 @@ use assert_cmd::Command;
 use predicates::str::contains;
 use serde_json::Value;
 use sil::{robot, run, scenario, story};
+use wheeleg_protocol::SCHEMA_HASH;
 use wheeleg_sim::config::builtin;
 use wheeleg_sim::faults::matrix::{self, Expect, ROWS, Verdict};
 use wheeleg_sim::faults::{FaultKind, KINDS};
+use wheeleg_sim::interface::{Side, archive, first_difference};
 
 const DOCUMENT: &str = include_str!("../../host-sim/FAULTS.md");
 
@@ -104,6 +106,19 @@ fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
     assert!(
         (0.015..0.05).contains(&lost),
         "{lost} of the frames are lost"
+    );
+    // The very line in which the interfaces of master and board begin to differ.
+    let mismatch = outcomes
+        .iter()
+        .find(|o| o.row.id == "version-mismatch/joint");
+    let side = |name, hash| Side { name, hash };
+    let earlier = archive::newest_earlier().expect("an earlier interface");
+    let here = side("the master", SCHEMA_HASH);
+    let told = first_difference(here, side("joint 4", earlier));
+    let reads = &mismatch.expect("the row").measured.reads;
+    assert!(
+        reads.iter().any(|line| line.contains(&told)),
+        "{told}: {reads:?}"
     );
     for id in known {
         assert!(ROWS.iter().any(|row| row.id == id), "no row {id}");

@@ -207,6 +207,7 @@ fn an_image_of_another_bus_interface_is_refused() {
         &images.path("wheel").display().to_string(),
         &format!("has the bus interface {other:016x}"),
         &format!("{SCHEMA_HASH:016x}, that of this program"),
+        &format!("{other:016x} is not an interface of this archive"),
         "cargo xtask firmware",
     ]);
     // Who has no such board does not care.

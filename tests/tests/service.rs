@@ -90,6 +90,7 @@ fn commissioned_boards_run_and_swapped_ones_are_named_with_both_ids() {
         !good && said.contains("joint 4") && said.contains("same version"),
         "{said}"
     );
+    assert!(said.contains("The first difference is in"), "{said}");
 }
 
 #[test]

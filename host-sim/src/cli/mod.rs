@@ -8,6 +8,7 @@ mod delay;
 mod export;
 mod faults;
 mod figures;
+mod interface;
 mod list;
 mod params;
 mod plant;
@@ -74,6 +75,8 @@ enum Command {
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
+    /// Tell in what the bus interface of this program differs from another.
+    Interface(interface::InterfaceArgs),
 }
 
 /// Parses the command line, does what it says, and returns the exit code.
@@ -96,6 +99,7 @@ pub fn main() -> ExitCode {
         Some(Command::Tune(args)) => tune::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
+        Some(Command::Interface(args)) => interface::command(&args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("{:?}", miette::Report::new(error));

@@ -1,6 +1,13 @@
 //! A board that was built from another interface definition.
 
-use wheeleg_protocol::{Decoder, Envelope, MAX_ENCODED, Message};
+use wheeleg_protocol::{Decoder, Envelope, MAX_ENCODED, Message, SCHEMA_HASH};
+
+use crate::interface::archive;
+
+/// The interface that such a board was built from: the newest that is not this program's.
+fn other() -> u64 {
+    archive::newest_earlier().unwrap_or(!SCHEMA_HASH)
+}
 
 /// A frame as such a board sends it: its Identity names another hash.
 pub(super) fn of_other(bytes: Vec<u8>) -> Vec<u8> {
@@ -11,7 +18,7 @@ pub(super) fn of_other(bytes: Vec<u8>) -> Vec<u8> {
         };
         let envelope = Envelope::from(frame.header);
         if let Ok(Message::Identity(mut identity)) = Message::parse(&frame) {
-            identity.schema_hash = !identity.schema_hash;
+            identity.schema_hash = other();
             let mut buffer = [0; MAX_ENCODED];
             let message = Message::from(identity);
             if let Ok(changed) = message.emit(envelope, &mut buffer) {
@@ -25,7 +32,7 @@ pub(super) fn of_other(bytes: Vec<u8>) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wheeleg_protocol::{Ack, Address, BoardKind, Identity, SCHEMA_HASH};
+    use wheeleg_protocol::{Ack, Address, BoardKind, Identity};
 
     fn sent(message: impl Into<Message>) -> Vec<u8> {
         let envelope = Envelope {
@@ -51,9 +58,10 @@ mod tests {
             unique_id: [4; 12],
         };
         let other = Identity {
-            schema_hash: !SCHEMA_HASH,
+            schema_hash: other(),
             ..identity
         };
+        assert_ne!(other.schema_hash, SCHEMA_HASH);
         assert_eq!(of_other(sent(identity)), sent(other));
         let ack = sent(Ack { request: 0x11 });
         assert_eq!(of_other(ack.clone()), ack);

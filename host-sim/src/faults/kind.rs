@@ -157,7 +157,7 @@ kinds! {
     DuplicateAddress = "duplicate-address", Board, None,
         "Another board with the same address straps is plugged in.";
     OtherInterface = "other-interface", Board, None,
-        "A board was built from another interface definition (from power-up on).";
+        "A board was built from an earlier interface definition (from power-up on).";
     BitErrors = "bit-errors", Robot, value("1", 1e-9, 0.1, 1e-4, "share of wrong bits"),
         "Bits on the line flip at random.";
     BytesLost = "bytes-lost", Robot, value("1", 1e-9, 1.0, 1e-3, "share of lost bytes"),

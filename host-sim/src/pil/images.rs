@@ -1,14 +1,15 @@
 //! The images of boards outside, found and looked at before anything is started: one of
 //! another kind or interface would differ, or not answer, and nobody would know why.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use wheeleg_pil_link::image::{Digest, Kind, identify};
+use wheeleg_pil_link::image::{Digest, Identity, Kind, identify};
 use wheeleg_protocol::SCHEMA_HASH;
 
 use super::choice::{NodeKind, Nodes};
 use super::unicorn::{self, IMAGES_VARIABLE};
 use crate::SimError;
+use crate::interface::{Side, first_difference};
 
 /// Sources that the images would have if they were built from what this program was.
 const SOURCES_G431: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources-g431"));
@@ -58,7 +59,7 @@ fn look_at(kind: Kind) -> Result<Image, SimError> {
             "build the images with: {}; or name their folder in {IMAGES_VARIABLE}",
             wrong.build
         );
-        SimError::simulation(wrong.to_string(), help)
+        SimError::simulation(format!("{wrong}{}", difference(&path, kind)), help)
     })?;
     let sources = match kind {
         Kind::QemuJoint | Kind::QemuWheel | Kind::QemuHilJoint => SOURCES_QEMU,
@@ -69,6 +70,25 @@ fn look_at(kind: Kind) -> Result<Image, SimError> {
         path,
         same_sources: identity.sources == sources,
     })
+}
+
+/// Where the interface of an image begins to differ; nothing if it is refused for another
+/// reason.
+fn difference(path: &Path, kind: Kind) -> String {
+    let here = Side {
+        name: "this program",
+        hash: SCHEMA_HASH,
+    };
+    match identify(path, &[kind], None) {
+        Ok(Identity { interface, .. }) if interface != SCHEMA_HASH => {
+            let there = Side {
+                name: "the image",
+                hash: interface,
+            };
+            format!(". {}", first_difference(here, there))
+        }
+        _ => String::new(),
+    }
 }
 
 impl Image {

@@ -7,6 +7,8 @@ use wheeleg_master::finding::Finding;
 use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord};
 
+use crate::interface::{Side, first_difference};
+
 /// An event of the master in words.
 pub(crate) fn describe(event: &Event) -> String {
     let text = match *event {
@@ -25,7 +27,7 @@ pub(crate) fn describe(event: &Event) -> String {
              {master:016x} ({}): will not arm. {}",
             board(node),
             env!("CARGO_PKG_VERSION"),
-            Finding::OtherInterface
+            other_interface(node, master, theirs)
         ),
         Event::ForeignBoard {
             node,
@@ -153,9 +155,11 @@ fn refusal(reason: &Refusal) -> String {
                 Finding::NodeLost.remedy()
             )
         }
-        Refusal::SchemaMismatch { node, .. } => {
-            format!("{}: {}", board(node), Finding::OtherInterface)
-        }
+        Refusal::SchemaMismatch {
+            node,
+            master,
+            theirs,
+        } => format!("{}: {}", board(node), other_interface(node, master, theirs)),
         Refusal::WrongRole { node } => format!("{}: {}", board(node), Finding::WrongRole),
         Refusal::ForeignBoard { node } => format!("{}: {}", board(node), Finding::ForeignBoard),
         Refusal::DuplicateAddress { node } => {
@@ -175,6 +179,23 @@ fn refusal(reason: &Refusal) -> String {
         Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
         ref other => format!("{other:?}"),
     }
+}
+
+/// What is wrong with a board of another interface, and where it begins to differ.
+fn other_interface(node: u8, master: u64, theirs: u64) -> String {
+    let here = Side {
+        name: "the master",
+        hash: master,
+    };
+    let there = Side {
+        name: &board(node),
+        hash: theirs,
+    };
+    format!(
+        "{} {}",
+        Finding::OtherInterface,
+        first_difference(here, there)
+    )
 }
 
 /// A unique id, hexadecimal, lowest byte first.

@@ -231,9 +231,9 @@ pub const ROWS: &[Row] = &[
         &["wheel 7 refuses", "refuses parameter 0x7FFF", "unchanged"]),
     // Versions.
     row("version-mismatch/joint", &[at("other-interface:joint4", FOR_GOOD)], Phase::PowerUp,
-        Expect::NoArming, &["joint 4 has interface", concat!("(firmware ", env!("CARGO_PKG_VERSION"), ")"), "the master has", "will not arm"]),
+        Expect::NoArming, &["joint 4 has interface", concat!("(firmware ", env!("CARGO_PKG_VERSION"), ")"), "the master has", "will not arm", "The first difference is in"]),
     row("version-mismatch/wheel", &[at("other-interface:wheel7", FOR_GOOD)], Phase::PowerUp,
-        Expect::NoArming, &["wheel 7 has interface", "the master has", "will not arm"]),
+        Expect::NoArming, &["wheel 7 has interface", "the master has", "will not arm", "The first difference is in"]),
     // Host.
     row("disk-full", &[at("disk-full", FOR_GOOD)], Phase::Flight, goes_on(0.0), &["messages could not be written"]),
     row("log-writer-slow",
