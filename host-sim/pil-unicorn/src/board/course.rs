@@ -174,7 +174,9 @@ impl Board {
                 self.power_lost_in_save = false;
                 let machine = self.machine()?;
                 machine.reset(BROWN_OUT_RESET | PIN_RESET, true)?;
-                machine.state_mut().soc.ports[0].outside |= 1 << wiring::POWER_OK;
+                let soc = &mut machine.state_mut().soc;
+                soc.ports[0].outside |= 1 << wiring::POWER_OK;
+                soc.starting = true;
                 Ok(())
             }
         }
@@ -237,6 +239,7 @@ impl Board {
                     let state = machine.state();
                     let at_ns = state.soc.time.ns_of(state.cycle);
                     machine.reset(cause | PIN_RESET, false)?;
+                    machine.state_mut().soc.starting = true;
                     self.tripped(at_ns, cause);
                 }
                 Stop::Waits => return Err(WAITS.to_owned()),

@@ -131,6 +131,9 @@ pub(crate) struct Soc {
     events: [Event; ADC],
     /// Cycle at which the watchdog bites.
     bites_at: u64,
+    /// The program starts: how long that takes is known when its tick timer is started, and
+    /// so what of the line it can have heard. Until then it hears nothing.
+    pub(crate) starting: bool,
 }
 
 impl Soc {
@@ -184,6 +187,7 @@ impl Soc {
             due: [u64::MAX; SOURCES],
             events: [Event::Update; ADC],
             bites_at: u64::MAX,
+            starting: false,
         }
     }
 
@@ -244,6 +248,7 @@ impl Soc {
     /// Cycle `cycle` is `ns` from now, cycle `now`, on. Bytes on the line keep their times;
     /// those whose times have been passed over are lost.
     pub(crate) fn align(&mut self, cycle: u64, ns: u64, now: u64) {
+        self.starting = false;
         let moved = self.time.align(cycle, ns);
         let cycles = self.time.cycles(u64::try_from(moved).unwrap_or(0));
         self.usart.come_sooner(cycles, now);
@@ -340,7 +345,7 @@ impl Soc {
         let drives = driver.is_some_and(|(on, off)| (on..off).contains(&at));
         let hears = self.ports[1].carries(wiring::BUS_RX, wiring::BUS_FUNCTION);
         // DE and /RE are one line.
-        self.usart.happen(at, drives || !hears);
+        self.usart.happen(at, drives || !hears || self.starting);
         if let Some(driver) = driver {
             self.burst_high = Some(driver);
         }
