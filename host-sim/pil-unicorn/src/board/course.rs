@@ -145,17 +145,24 @@ impl Board {
         ))
     }
 
-    /// Puts the received bytes on the line at their times.
+    /// Puts the received bytes on the line at their times. A board that has just started hears
+    /// nothing of what ended before its tick timer was started: its start-up code was executed
+    /// ahead of them.
     fn deliver(&mut self, run: &Run) -> Result<(), String> {
         let mut late = 0;
+        let hears_from_ns = match self.running {
+            true => self.first_edge_ns.saturating_sub(self.grid_ns),
+            false => 0,
+        };
         let state = self.machine()?.state_mut();
         let count = run.received.len() as u64;
         for (i, byte) in (1..).zip(&run.received) {
             let back = (count - i) * u64::from(run.byte_ns);
-            let end = state
-                .soc
-                .time
-                .cycle_of(run.received_end_ns.saturating_sub(back));
+            let end_ns = run.received_end_ns.saturating_sub(back);
+            if end_ns <= hears_from_ns {
+                continue;
+            }
+            let end = state.soc.time.cycle_of(end_ns);
             late += u32::from(end < state.cycle);
             state.soc.expect(end.max(state.cycle), *byte);
         }
