@@ -209,7 +209,18 @@ pub enum Event {
 /// Events kept for the user.
 pub const EVENT_DEPTH: usize = 32;
 
-/// Bounded queue of events; the oldest goes first when it is full.
+impl Event {
+    /// Whether it ends a command of the user, or is what one asked for.
+    const fn is_outcome(&self) -> bool {
+        matches!(
+            self,
+            Self::Done(_) | Self::Refused { .. } | Self::Parameter { .. } | Self::Position { .. }
+        )
+    }
+}
+
+/// Bounded queue of events. When it is full the oldest goes that is no outcome of a command:
+/// whoever gave one waits for its outcome, and gets no other.
 #[derive(Debug, Default)]
 pub struct Events {
     queue: Deque<(u64, Event), EVENT_DEPTH>,
@@ -229,11 +240,26 @@ impl Events {
     /// Adds an event that happened at `time_us`.
     pub fn push(&mut self, time_us: u64, event: Event) {
         if self.queue.is_full() {
-            let _oldest = self.queue.pop_front();
-            self.lost = self.lost.wrapping_add(1);
+            self.drop_one();
         }
         // Cannot fail: a place was just made.
         let _stored = self.queue.push_back((time_us, event));
+    }
+
+    /// Turns the queue once around and leaves one event out.
+    #[cold]
+    fn drop_one(&mut self) {
+        let mut events = self.queue.iter();
+        let spare = events.position(|(_, event)| !event.is_outcome());
+        let spare = spare.unwrap_or(0);
+        for place in 0..EVENT_DEPTH {
+            if let Some(event) = self.queue.pop_front()
+                && place != spare
+            {
+                let _stored = self.queue.push_back(event);
+            }
+        }
+        self.lost = self.lost.wrapping_add(1);
     }
 
     /// Takes the oldest event with its time in µs.
@@ -245,5 +271,48 @@ impl Events {
     #[must_use]
     pub const fn lost(&self) -> u32 {
         self.lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command::CommandCode;
+
+    fn done(id: u32) -> Event {
+        Event::Done(Ticket {
+            client: 0,
+            id,
+            code: CommandCode::Disarm,
+        })
+    }
+
+    fn drained(events: &mut Events) -> Vec<Event> {
+        std::iter::from_fn(|| events.pop().map(|(_, event)| event)).collect()
+    }
+
+    #[test]
+    fn a_full_queue_keeps_outcomes_and_the_newest_in_their_order() {
+        let mut events = Events::new();
+        events.push(0, done(1));
+        for node in 0..40 {
+            events.push(1, Event::NodeReady(node));
+        }
+        events.push(2, done(2));
+        assert_eq!(events.lost(), 42 - EVENT_DEPTH as u32);
+        let mut wanted = vec![done(1)];
+        wanted.extend((10..40).map(Event::NodeReady));
+        wanted.push(done(2));
+        assert_eq!(drained(&mut events), wanted);
+    }
+
+    #[test]
+    fn of_outcomes_alone_the_oldest_goes() {
+        let mut events = Events::new();
+        for id in 0..=EVENT_DEPTH as u32 {
+            events.push(0, done(id));
+        }
+        let wanted: Vec<Event> = (1..=EVENT_DEPTH as u32).map(done).collect();
+        assert_eq!((drained(&mut events), events.lost()), (wanted, 1));
     }
 }
