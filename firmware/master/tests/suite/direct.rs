@@ -70,10 +70,10 @@ fn lead(rig: &mut Rig) -> Result<(), Refusal> {
         stroke_mm,
     });
     rig.run(2);
-    match rig.refusal(ticket) {
-        Some(reason) => Err(reason),
-        None => Ok(assert!(rig.done(ticket))),
-    }
+    let refused = rig.refusal(ticket);
+    assert_eq!(rig.done(ticket), refused.is_none());
+    refused.map_or(Ok(()), Err)
+}
 }
 
 #[test]
