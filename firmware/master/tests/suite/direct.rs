@@ -74,7 +74,6 @@ fn lead(rig: &mut Rig) -> Result<(), Refusal> {
     assert_eq!(rig.done(ticket), refused.is_none());
     refused.map_or(Ok(()), Err)
 }
-}
 
 #[test]
 fn after_a_stop_of_one_axis_no_other_may_be_led_until_it_is_cleared() {
