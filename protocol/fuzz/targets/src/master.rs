@@ -554,6 +554,8 @@ impl Play {
         }
         self.rig.nodes[6].inputs = InputBits::SUPPLY_PRESSURE;
         self.act(Action::Layer1(true));
+        // A queue of commands that is full would refuse these.
+        self.cycles(2);
         self.command(Command::StopGait, 0, 0);
         self.command(Command::ClearFault, 0, 0);
         self.cycles(QUIET);
