@@ -224,6 +224,8 @@ fn joint_that_reads_like_one_at_rest_is_held_once_it_had_the_air_for_a_motion() 
             rig.run_cycles(1, Some(setpoint(end, Hold)));
             if rig.node.motion_overdue() > Micros::ZERO {
                 doubt_at = doubt_at.or(Some(rig.now));
+                let account = rig.node.motion_account();
+                assert_eq!(account.overdue, rig.node.motion_overdue());
             }
         }
         assert!(rig.node.faults().contains(Fault::NoMotion));
