@@ -209,18 +209,34 @@ pub enum Event {
 /// Events kept for the user.
 pub const EVENT_DEPTH: usize = 32;
 
+/// How long an event stays in a full queue, the least first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Weight {
+    /// It comes again, or is told elsewhere.
+    Routine,
+    /// It happened once.
+    Told,
+    /// A person has to know why the robot stopped, or what is wrong with it.
+    Cause,
+    /// A command of the user ends with it, or asked for it: whoever gave one waits.
+    Outcome,
+}
+
 impl Event {
-    /// Whether it ends a command of the user, or is what one asked for.
-    const fn is_outcome(&self) -> bool {
-        matches!(
-            self,
-            Self::Done(_) | Self::Refused { .. } | Self::Parameter { .. } | Self::Position { .. }
-        )
+    const fn weight(&self) -> Weight {
+        match self {
+            Self::Link { .. } | Self::Log { .. } | Self::LogLost { .. } => Weight::Routine,
+            Self::Hold(_) | Self::Found { .. } | Self::Diagnosis { .. } => Weight::Cause,
+            Self::Done(_) | Self::Refused { .. } | Self::Parameter { .. } | Self::Position { .. } => {
+                Weight::Outcome
+            }
+            _ => Weight::Told,
+        }
     }
 }
 
-/// Bounded queue of events. When it is full the oldest goes that is no outcome of a command:
-/// whoever gave one waits for its outcome, and gets no other.
+/// Bounded queue of events. When it is full the oldest of the least weight goes, which may be
+/// the newcomer: an outcome of a command stays as long as anything else is there.
 #[derive(Debug, Default)]
 pub struct Events {
     queue: Deque<(u64, Event), EVENT_DEPTH>,
@@ -239,19 +255,23 @@ impl Events {
 
     /// Adds an event that happened at `time_us`.
     pub fn push(&mut self, time_us: u64, event: Event) {
-        if self.queue.is_full() {
-            self.drop_one();
+        if self.queue.is_full() && !self.made_room(&event) {
+            return;
         }
         // Cannot fail: a place was just made.
         let _stored = self.queue.push_back((time_us, event));
     }
 
-    /// Turns the queue once around and leaves one event out.
+    /// Turns the queue once around and leaves one event out; false if that is the newcomer.
     #[cold]
-    fn drop_one(&mut self) {
-        let mut events = self.queue.iter();
-        let spare = events.position(|(_, event)| !event.is_outcome());
-        let spare = spare.unwrap_or(0);
+    fn made_room(&mut self, newcomer: &Event) -> bool {
+        self.lost = self.lost.wrapping_add(1);
+        let weights = || self.queue.iter().map(|(_, event)| event.weight());
+        let least = weights().min().unwrap_or(Weight::Outcome);
+        if least > newcomer.weight() {
+            return false;
+        }
+        let spare = weights().position(|weight| weight == least).unwrap_or(0);
         for place in 0..EVENT_DEPTH {
             if let Some(event) = self.queue.pop_front()
                 && place != spare
@@ -259,7 +279,7 @@ impl Events {
                 let _stored = self.queue.push_back(event);
             }
         }
-        self.lost = self.lost.wrapping_add(1);
+        true
     }
 
     /// Takes the oldest event with its time in µs.
@@ -307,12 +327,32 @@ mod tests {
     }
 
     #[test]
-    fn of_outcomes_alone_the_oldest_goes() {
+    fn of_outcomes_alone_the_oldest_goes_and_nothing_less_pushes_one_out() {
         let mut events = Events::new();
         for id in 0..=EVENT_DEPTH as u32 {
             events.push(0, done(id));
         }
+        events.push(1, Event::NodeReady(1));
+        events.push(1, Event::Hold(HoldReason::EmergencyStop));
         let wanted: Vec<Event> = (1..=EVENT_DEPTH as u32).map(done).collect();
-        assert_eq!((drained(&mut events), events.lost()), (wanted, 1));
+        assert_eq!((drained(&mut events), events.lost()), (wanted, 3));
+    }
+
+    #[test]
+    fn what_stopped_the_robot_outlives_what_comes_again() {
+        let mut events = Events::new();
+        let lost = |records| Event::LogLost { node: 1, records };
+        let stop = Event::Hold(HoldReason::EmergencyStop);
+        events.push(0, stop);
+        events.push(0, Event::NodeReady(1));
+        for records in 2..EVENT_DEPTH as u16 {
+            events.push(0, lost(records));
+        }
+        for id in 0..EVENT_DEPTH as u32 - 1 {
+            events.push(1, done(id));
+        }
+        let mut wanted = vec![stop];
+        wanted.extend((0..EVENT_DEPTH as u32 - 1).map(done));
+        assert_eq!(drained(&mut events), wanted);
     }
 }

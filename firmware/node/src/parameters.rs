@@ -69,7 +69,7 @@ impl<const N: usize> Parameters<N> {
         parts.nth(part).unwrap_or_default()
     }
 
-    /// Sum by which sets of parameters are told apart (protocol/SPEC.md, Parameters): any single
+    /// Sum by which sets of parameters are told apart (protocol/SPEC.md, Parameter sets): any single
     /// value that differs changes it.
     pub fn sum(&self) -> u32 {
         parameter_sum(&self.values)

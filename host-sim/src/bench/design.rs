@@ -99,8 +99,8 @@ pub fn design(axis: &AxisParams, kind: Kind) -> Design {
     }
 }
 
-/// No move takes three times as long as the whole stroke at full speed, or ends a
-/// tenth of the stroke off.
+/// No move takes three times as long as the whole stroke at full speed, or stays a tenth of the
+/// stroke behind (a board allows a piston that stands less).
 fn supervision(facts: &Facts) -> Supervision {
     let limit_s = 0.5 + 3.0 * facts.stroke_mm / facts.speed_mm_s;
     Supervision {

@@ -29,6 +29,9 @@ pub(super) fn command(args: &InterfaceArgs) -> Result<ExitCode, SimError> {
     let changes = interface::changes(SCHEMA_HASH, there)
         .map_err(|hash| refused(interface::not_archived(hash)))?;
     let name = format!("{there:016x}");
+    if changes.is_empty() {
+        return print("The interfaces are the same.\n");
+    }
     if args.all {
         let mut out = format!("- this program, {SCHEMA_HASH:016x}\n+ {name}\n");
         for change in &changes {

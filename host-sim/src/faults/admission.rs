@@ -63,7 +63,7 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
             "`sil` or `pil`",
         ),
         (_, F::ProcessorFault) => (
-            "its program is not the image, and has no fault handler",
+            "nothing makes its processor fault there",
             "`sil` or `pil`",
         ),
         (NodeKind::Qemu, _) => return Ok(()),

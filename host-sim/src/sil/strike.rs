@@ -57,6 +57,7 @@ impl World {
             }
         }
     }
+
     /// The processor of a board faults: its handler turns the outputs off and resets it.
     fn fault_processor(&mut self, address: u8) -> Result<(), SimError> {
         let i = usize::from(address) - 1;

@@ -203,6 +203,7 @@ impl Layer0 {
                     lost = lost.or(Some(address));
                     self.nodes.forget(index);
                     self.questions.lost(index);
+                    self.sums.lost(index);
                     events.push(now_us, Event::NodeLost(address));
                     if self.line.is_spoilt(index) {
                         let (node, finding) = (Some(address), Finding::SlotBabble);

@@ -27,6 +27,14 @@ impl Sums {
         let before = told.replace(sum);
         before != Some(sum) && wanted.is_some_and(|wanted| wanted != sum)
     }
+
+
+    /// A board is lost: what comes back may be another one.
+    pub(super) fn lost(&mut self, index: usize) {
+        if let Some(told) = self.told.get_mut(index) {
+            *told = None;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -42,5 +50,7 @@ mod tests {
         assert_eq!(heard, [false, false, true, false, true, false, true]);
         assert!(!sums.heard(3, 8), "any will do");
         assert!(!sums.heard(NODES, 8), "no board");
+        sums.lost(2);
+        assert!(sums.heard(2, 8), "told again of what came back");
     }
 }

@@ -186,6 +186,22 @@ fn a_board_with_other_parameters_than_wanted_is_named_whenever_they_change() {
 }
 
 #[test]
+fn on_a_sound_line_links_are_asked_for_in_every_eighth_round() {
+    let mut rig = Rig::new(MasterConfig::default());
+    rig.run(300);
+    let asked = |rig: &Rig, node: usize| {
+        let asked = rig.nodes[node].requests.iter();
+        asked.filter(|m| matches!(m, Message::LinkReport(_))).count()
+    };
+    let before: Vec<usize> = (0..8).map(|node| asked(&rig, node)).collect();
+    // One round of sixteen questions and seven of eight, ten cycles each.
+    rig.run(3 * (160 + 7 * 80));
+    for (node, before) in before.into_iter().enumerate() {
+        assert_eq!(asked(&rig, node) - before, 3, "{node}");
+    }
+}
+
+#[test]
 fn the_rest_of_a_log_is_asked_for_at_once() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.run(20);

@@ -26,6 +26,9 @@ const PRECHARGE_PERIOD: Micros = Micros(60_000);
 /// Longest literal blow-through (ASSUMED: empties a 2 l reservoir).
 const BLOW_THROUGH_TIME: Micros = Micros::from_millis(5000);
 
+/// What the worst of the laws leaves where its pulses become too short for the valves.
+pub(super) const AT_REST: PositionMm = PositionMm::from_int(4);
+
 /// Everything that follows from the parameters, worked out when they change.
 /// The controller, the PWM and the supervision keep theirs; the board keeps `tick`.
 #[derive(Clone, Debug)]
@@ -53,6 +56,8 @@ pub struct TickSettings {
     pub slew_rate: VelocityMmS,
     /// Following error that is a fault when it lasts …
     pub following_error: PositionMm,
+    /// … that of a piston that stands …
+    pub standing_error: PositionMm,
     /// … for this many ticks.
     pub following_ticks: Ticks,
     /// What is expected of the piston.
@@ -77,6 +82,7 @@ impl TickSettings {
             slew_step,
             slew_rate,
             following_error,
+            standing_error,
             following_ticks,
             motion: _,
             precharge,
@@ -85,7 +91,7 @@ impl TickSettings {
         } = self;
         let [a, b, c, d] = &staged_exhaust.0;
         (sensor, correction, slew_step, slew_rate).hash(state);
-        (following_error, following_ticks, precharge).hash(state);
+        (following_error, standing_error, following_ticks, precharge).hash(state);
         (a, b, c, d, full_period).hash(state);
     }
 }
@@ -125,6 +131,12 @@ impl JointSettings {
         }
         let motion = MotionModel::new(&gains, position(P::MotionMargin))?;
         let precharge = precharge(raw(P::Precharge), &gains, &motion)?;
+        let following_error = position(P::FollowingError);
+        // Less than where a law may leave a piston at rest is none.
+        let standing_error = PositionMm::from_raw(following_error.raw() >> 2)
+            .max(gains.release_band)
+            .max(AT_REST)
+            .min(following_error);
         let exhaust_duty = Duty::from_raw(raw(P::ExhaustDuty));
         let [opening, ..] = allocate(exhaust_duty, gains.pwm_period).0;
         // A pulse too short for the valve would never exhaust at all.
@@ -147,7 +159,8 @@ impl JointSettings {
                 },
                 slew_step: per_tick(raw(P::SlewRate)),
                 slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
-                following_error: position(P::FollowingError),
+                following_error,
+                standing_error,
                 following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
                 motion,
                 precharge,
