@@ -227,9 +227,10 @@ impl Event {
         match self {
             Self::Link { .. } | Self::Log { .. } | Self::LogLost { .. } => Weight::Routine,
             Self::Hold(_) | Self::Found { .. } | Self::Diagnosis { .. } => Weight::Cause,
-            Self::Done(_) | Self::Refused { .. } | Self::Parameter { .. } | Self::Position { .. } => {
-                Weight::Outcome
-            }
+            Self::Done(_)
+            | Self::Refused { .. }
+            | Self::Parameter { .. }
+            | Self::Position { .. } => Weight::Outcome,
             _ => Weight::Told,
         }
     }

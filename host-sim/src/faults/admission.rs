@@ -62,10 +62,7 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
             "it has no watchdog that would start it again",
             "`sil` or `pil`",
         ),
-        (_, F::ProcessorFault) => (
-            "nothing makes its processor fault there",
-            "`sil` or `pil`",
-        ),
+        (_, F::ProcessorFault) => ("nothing makes its processor fault there", "`sil` or `pil`"),
         (NodeKind::Qemu, _) => return Ok(()),
         // One that falls silent for good can keep its cable.
         (_, F::NodeOff) if fault.until_s.is_none() => return Ok(()),

@@ -191,7 +191,9 @@ fn on_a_sound_line_links_are_asked_for_in_every_eighth_round() {
     rig.run(300);
     let asked = |rig: &Rig, node: usize| {
         let asked = rig.nodes[node].requests.iter();
-        asked.filter(|m| matches!(m, Message::LinkReport(_))).count()
+        asked
+            .filter(|m| matches!(m, Message::LinkReport(_)))
+            .count()
     };
     let before: Vec<usize> = (0..8).map(|node| asked(&rig, node)).collect();
     // One round of sixteen questions and seven of eight, ten cycles each.
