@@ -95,6 +95,7 @@ impl<S: Stream> Partner<S> {
     pub fn hello(&mut self) -> Result<Hello, SimError> {
         // Ends whatever a former partner left half said.
         self.stream.send(&[0])?;
+        self.greeted = false;
         let version = LINK_VERSION;
         match self.ask(&Request::Hello { version })? {
             Reply::Hello(hello) if hello.version == version => {
@@ -254,11 +255,13 @@ mod tests {
             host: "canned".try_into().expect("fits"),
             outputs_are_virtual: true,
         });
-        let said = [&hello, &hello, &Reply::Done].map(|reply| {
+        let said = [&hello, &hello, &hello, &Reply::Done].map(|reply| {
             let mut frame = [0; MAX_FRAME];
             encode(0, reply, &mut frame).expect("fits").to_vec()
         });
         let mut partner = Partner::new(Canned(said.into()));
+        assert!(partner.hello().is_ok());
+        // A session may be opened anew.
         assert!(partner.hello().is_ok());
         let version = LINK_VERSION;
         let answer = partner.ask(&Request::Hello { version });

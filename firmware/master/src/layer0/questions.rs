@@ -50,17 +50,14 @@ pub(super) fn has_started(before: Option<&SlotReply>, reply: &SlotReply) -> bool
 
 impl Questions {
     /// A reply of node index 0..8; `before` is the one before it, if the node has not
-    /// been lost since. A new fault is a question, and a start in operation, after which the
-    /// board tells what it has heard and which parameters it has, too.
+    /// been lost since. A new fault is a question, and a start in operation.
     pub fn on_reply(&mut self, index: usize, before: Option<&SlotReply>, reply: &SlotReply) {
         let Some(node) = self.nodes.get_mut(index) else {
             return;
         };
         let faults = reply.active_faults.raw();
-        let anew = has_started(before, reply) || core::mem::take(&mut node.lost);
-        node.why |= faults & !node.faults != 0 || anew;
-        // Its parameters may be others.
-        node.link |= anew;
+        let started = has_started(before, reply);
+        node.why |= faults & !node.faults != 0 || started || core::mem::take(&mut node.lost);
         node.faults = faults;
     }
 
