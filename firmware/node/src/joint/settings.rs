@@ -197,7 +197,8 @@ fn gains(parameters: &JointParameters) -> JointGains {
         release_band: position(P::ReleaseBand),
         release_dwell: micros(P::ReleaseDwell),
         bumpless_time: micros(P::BumplessTime),
-        velocity_window: u8::try_from(parameters.get(P::VelocityWindow)).unwrap_or(0),
+        // The table permits bytes alone (a test says so).
+        velocity_window: parameters.get(P::VelocityWindow) as u8,
         stroke_min: position(P::StrokeMin),
         stroke_max: position(P::StrokeMax),
         pwm_period: micros(P::PwmPeriod),
@@ -266,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_are_codes() {
+    fn codes_are_codes_and_a_window_is_a_byte() {
         for parameter in [
             JointParam::SensorZero,
             JointParam::SensorCodeMin,
@@ -275,6 +276,8 @@ mod tests {
             let row = parameter.info();
             assert!(u16::try_from(row.min).is_ok() && u16::try_from(row.max).is_ok());
         }
+        let window = JointParam::VelocityWindow.info();
+        assert!(u8::try_from(window.min).is_ok() && u8::try_from(window.max).is_ok());
     }
 
     #[test]
