@@ -55,8 +55,6 @@ pub struct Partner<S> {
     /// Requests that wait for the reply to the one before: a board that answers keeps
     /// no more than a few bytes of the next.
     queued: VecDeque<Request>,
-    /// Whether the session is open: a greeting is no reply any more.
-    greeted: bool,
 }
 
 impl<S: Stream> Partner<S> {
@@ -69,7 +67,6 @@ impl<S: Stream> Partner<S> {
             unread: 0..0,
             waiting: 0,
             queued: VecDeque::new(),
-            greeted: false,
         }
     }
 
@@ -95,13 +92,9 @@ impl<S: Stream> Partner<S> {
     pub fn hello(&mut self) -> Result<Hello, SimError> {
         // Ends whatever a former partner left half said.
         self.stream.send(&[0])?;
-        self.greeted = false;
         let version = LINK_VERSION;
         match self.ask(&Request::Hello { version })? {
-            Reply::Hello(hello) if hello.version == version => {
-                self.greeted = true;
-                Ok(hello)
-            }
+            Reply::Hello(hello) if hello.version == version => Ok(hello),
             Reply::Hello(hello) => Err(SimError::simulation(
                 format!(
                     "{} speaks version {} of the board link, this program version {version}",
@@ -139,8 +132,6 @@ impl<S: Stream> Partner<S> {
             let found = self.deframer.next::<Reply>(&mut input);
             self.unread.start += before - input.len();
             match found {
-                // Of a call before this one, which was given up too soon.
-                Ok(Some((_, Reply::Hello(_)))) if self.greeted => {}
                 Ok(Some((_, reply))) => {
                     self.waiting -= 1;
                     return Ok(reply);
@@ -216,55 +207,4 @@ pub(super) fn unexpected(name: &str, reply: &Reply) -> SimError {
         ),
     };
     SimError::simulation(format!("{name} {what}"), help)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use wheeleg_pil_link::Image;
-
-    /// Says what it was told to, whatever it hears.
-    struct Canned(VecDeque<Vec<u8>>);
-
-    impl Stream for Canned {
-        fn name(&self) -> String {
-            "canned".to_owned()
-        }
-
-        fn send(&mut self, _: &[u8]) -> Result<(), SimError> {
-            Ok(())
-        }
-
-        fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, SimError> {
-            let said = self.0.pop_front().expect("nothing more is asked");
-            buffer[..said.len()].copy_from_slice(&said);
-            Ok(said.len())
-        }
-    }
-
-    /// On a slow line the greeting of a call that was given up comes behind that of the next.
-    #[test]
-    fn a_late_greeting_is_no_answer() {
-        let hello = Reply::Hello(Hello {
-            version: LINK_VERSION,
-            image: Image {
-                name: "joint".try_into().expect("fits"),
-                digest: [0; 16],
-                clock_hz: 0,
-            },
-            host: "canned".try_into().expect("fits"),
-            outputs_are_virtual: true,
-        });
-        let said = [&hello, &hello, &hello, &Reply::Done].map(|reply| {
-            let mut frame = [0; MAX_FRAME];
-            encode(0, reply, &mut frame).expect("fits").to_vec()
-        });
-        let mut partner = Partner::new(Canned(said.into()));
-        assert!(partner.hello().is_ok());
-        // A session may be opened anew.
-        assert!(partner.hello().is_ok());
-        let version = LINK_VERSION;
-        let answer = partner.ask(&Request::Hello { version });
-        assert_eq!(answer.ok(), Some(Reply::Done));
-    }
 }
