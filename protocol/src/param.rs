@@ -361,7 +361,7 @@ parameters! {
         SensorRate = 0x0120, "sensor_rate", "mm/s", I16F16, "100" ..= "20000", default "3000", disarmed,
             "Largest credible speed; faster is a sensor fault.";
         FollowingError = 0x0121, "following_error", "mm", I16F16, "1" ..= "500", default "60", disarmed,
-            "Error that is a fault when it lasts; of a piston that stands, a quarter of it, at least 4 mm and release_band.";
+            "Error that is a fault when it lasts; of a piston that stands, a quarter of it.";
         FollowingTime = 0x0122, "following_time", "ms", Integer, "10" ..= "10000", default "1500", disarmed,
             "Time for which the following error must last.";
         WatchdogCycles = 0x0123, "watchdog_cycles", "cycles", Integer, "1" ..= "10", default "5", disarmed,

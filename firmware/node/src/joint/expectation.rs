@@ -27,7 +27,6 @@
 //! none is told.
 
 use super::air::{Air, AirModel, ROUND};
-use super::settings::AT_REST;
 use crate::JOINT_TICK;
 use core::hash::{Hash, Hasher};
 use wheeleg_control::axis::AxisModel;
@@ -37,8 +36,9 @@ use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 
 /// Motion that shows that the piston follows, raw mm (0.5 mm).
 const SHOWN: i32 = 1 << 15;
-/// Error below which no motion is expected, raw mm.
-const ERROR: i32 = AT_REST.raw();
+/// Error below which no motion is expected, raw mm (4 mm): what the worst of the
+/// laws leaves where its pulses become too short for the valves.
+const ERROR: i32 = 4 << 16;
 /// Rounds of standing still after which nothing is known of the air any more.
 const MINUTE: u16 = u16::MAX / ROUND;
 /// Doubt that is a fault …

@@ -70,13 +70,14 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     /// Following error that may last: a piston that stands lags behind nothing, so its error is
-    /// not that of a motion to come, and less must do.
+    /// not that of a motion to come, and a quarter of it must do.
     #[inline]
     fn allowed_error(&self) -> PositionMm {
+        let allowed = self.settings.following_error;
         if self.state.motion.stands() {
-            self.settings.standing_error
+            PositionMm::from_raw(allowed.raw() >> 2)
         } else {
-            self.settings.following_error
+            allowed
         }
     }
 

@@ -26,9 +26,6 @@ const PRECHARGE_PERIOD: Micros = Micros(60_000);
 /// Longest literal blow-through (ASSUMED: empties a 2 l reservoir).
 const BLOW_THROUGH_TIME: Micros = Micros::from_millis(5000);
 
-/// What the worst of the laws leaves where its pulses become too short for the valves.
-pub(super) const AT_REST: PositionMm = PositionMm::from_int(4);
-
 /// Everything that follows from the parameters, worked out when they change.
 /// The controller, the PWM and the supervision keep theirs; the board keeps `tick`.
 #[derive(Clone, Debug)]
@@ -56,8 +53,6 @@ pub struct TickSettings {
     pub slew_rate: VelocityMmS,
     /// Following error that is a fault when it lasts …
     pub following_error: PositionMm,
-    /// … that of a piston that stands …
-    pub standing_error: PositionMm,
     /// … for this many ticks.
     pub following_ticks: Ticks,
     /// What is expected of the piston.
@@ -82,7 +77,6 @@ impl TickSettings {
             slew_step,
             slew_rate,
             following_error,
-            standing_error,
             following_ticks,
             motion: _,
             precharge,
@@ -91,7 +85,7 @@ impl TickSettings {
         } = self;
         let [a, b, c, d] = &staged_exhaust.0;
         (sensor, correction, slew_step, slew_rate).hash(state);
-        (following_error, standing_error, following_ticks, precharge).hash(state);
+        (following_error, following_ticks, precharge).hash(state);
         (a, b, c, d, full_period).hash(state);
     }
 }
@@ -131,12 +125,6 @@ impl JointSettings {
         }
         let motion = MotionModel::new(&gains, position(P::MotionMargin))?;
         let precharge = precharge(raw(P::Precharge), &gains, &motion)?;
-        let following_error = position(P::FollowingError);
-        // Less than where a law may leave a piston at rest is none.
-        let standing_error = PositionMm::from_raw(following_error.raw() >> 2)
-            .max(gains.release_band)
-            .max(AT_REST)
-            .min(following_error);
         let exhaust_duty = Duty::from_raw(raw(P::ExhaustDuty));
         let [opening, ..] = allocate(exhaust_duty, gains.pwm_period).0;
         // A pulse too short for the valve would never exhaust at all.
@@ -159,8 +147,7 @@ impl JointSettings {
                 },
                 slew_step: per_tick(raw(P::SlewRate)),
                 slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
-                following_error,
-                standing_error,
+                following_error: position(P::FollowingError),
                 following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
                 motion,
                 precharge,
@@ -197,8 +184,7 @@ fn gains(parameters: &JointParameters) -> JointGains {
         release_band: position(P::ReleaseBand),
         release_dwell: micros(P::ReleaseDwell),
         bumpless_time: micros(P::BumplessTime),
-        // The table permits bytes alone (a test says so).
-        velocity_window: parameters.get(P::VelocityWindow) as u8,
+        velocity_window: u8::try_from(parameters.get(P::VelocityWindow)).unwrap_or(0),
         stroke_min: position(P::StrokeMin),
         stroke_max: position(P::StrokeMax),
         pwm_period: micros(P::PwmPeriod),
@@ -267,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_are_codes_and_a_window_is_a_byte() {
+    fn codes_are_codes() {
         for parameter in [
             JointParam::SensorZero,
             JointParam::SensorCodeMin,
@@ -276,8 +262,6 @@ mod tests {
             let row = parameter.info();
             assert!(u16::try_from(row.min).is_ok() && u16::try_from(row.max).is_ok());
         }
-        let window = JointParam::VelocityWindow.info();
-        assert!(u8::try_from(window.min).is_ok() && u8::try_from(window.max).is_ok());
     }
 
     #[test]
