@@ -5,16 +5,18 @@ mod program;
 mod sil;
 
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 
 use assert_cmd::Command;
 use predicates::str::contains;
 use serde_json::Value;
-use sil::{robot, run, scenario, story};
+use sil::{command, gait, robot, run, scenario, story};
 use wheeleg_protocol::SCHEMA_HASH;
-use wheeleg_sim::config::builtin;
+use wheeleg_sim::config::{EventAction, LegChoice, builtin};
 use wheeleg_sim::faults::matrix::{self, Expect, ROWS, Verdict};
 use wheeleg_sim::faults::{FaultKind, KINDS};
 use wheeleg_sim::interface::{Side, archive, first_difference};
+use wheeleg_sim::telemetry::Recorder;
 
 const DOCUMENT: &str = include_str!("../../host-sim/FAULTS.md");
 
@@ -162,6 +164,39 @@ fn nothing_trips_without_a_fault() {
         assert!(holds.is_none(), "{name}\n{}", story(&recording));
     }
     assert!(quiet >= 7, "{quiet} scenarios without faults");
+}
+
+/// In the row of a minute the robot holds most of the time: this one is told to walk on after
+/// every stop, so that boards that drive see the broken frames.
+#[test]
+fn a_robot_that_is_started_again_and_again_acts_on_no_wrong_frame_for_a_minute() {
+    let rounds = (0..20).flat_map(|round| {
+        let from_s = 1.0 + 3.0 * f64::from(round);
+        let clear = (from_s, EventAction::ClearFault);
+        let commands = [(0.2, "Arm"), (0.5, "Stand"), (1.5, "StartGait")];
+        let commands = commands.map(|(after_s, name)| (from_s + after_s, command(name)));
+        std::iter::once(clear).chain(commands)
+    });
+    let mut scenario = gait(LegChoice::Left, 61.0, &rounds.collect::<Vec<_>>());
+    scenario.faults = vec!["bit-errors=1e-4@0.5s..60.5s".parse().expect("a fault")];
+    let mut recorder = Recorder::in_memory();
+    let go_on = &mut |_| ControlFlow::Continue(());
+    let outcome = wheeleg_sim::sil::run(&scenario, &robot(), 1, &mut recorder, go_on);
+    let line = outcome.expect("the run gets to its end").line;
+    let recording = recorder.finish().expect("nothing is written to a file");
+    let mut story = story(&recording);
+    story.truncate(6_000);
+    assert_eq!(line.wrong, 0, "{story}");
+    let lost = 1.0 - line.accepted as f64 / line.sent as f64;
+    assert!(
+        line.sent > 40_000 && lost > 0.015,
+        "{} sent, {lost} lost",
+        line.sent
+    );
+    let rows = &recording.joints[1];
+    let driving = rows.iter().filter(|r| matches!(r.v.mode, 2 | 3)).count();
+    let share = driving as f64 / rows.len() as f64;
+    assert!((0.4..0.8).contains(&share), "{share}\n{story}");
 }
 
 /// How far the yaw of the left leg, at rest in mid-stroke, is from there 1 and 2 s after

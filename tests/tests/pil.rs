@@ -6,15 +6,13 @@ mod bench;
 
 use bench::pil::{Board, edge};
 use bench::{delivery, numbered};
-use wheeleg_pil_link::{Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, Straps};
+use wheeleg_pil_link::{
+    Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, SOFTWARE_RESET, Straps, WATCHDOG_RESET,
+};
 use wheeleg_protocol::{Address, FaultReport};
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_sim::sil::BOARD_START_UP_NS;
 
-/// RCC_CSR: the independent watchdog has bitten.
-const WATCHDOG: u32 = 1 << 29;
-/// RCC_CSR: the program asked for it.
-const SOFTWARE: u32 = 1 << 28;
 /// RCC_CSR: brown-out or power-on.
 const BROWN_OUT: u32 = 1 << 27;
 const TICK_NS: u64 = 1_000_000;
@@ -140,7 +138,7 @@ fn the_watchdog_bites_when_the_main_loop_or_the_processor_stops_and_only_then() 
     for hook in [Hook::StopMainLoop, Hook::StopProcessor] {
         assert_eq!(bench.ask(&Request::Hook(hook)), Reply::Done);
         let (after_ns, cause) = bench.until_reset(80).expect("a reset");
-        assert!(cause & WATCHDOG != 0, "{cause:#x}");
+        assert!(cause & WATCHDOG_RESET != 0, "{cause:#x}");
         // Fed at the end of the last tick, within the millisecond before.
         assert!(
             (48_000_000..=50_100_000).contains(&after_ns),
@@ -161,7 +159,10 @@ fn a_processor_that_faults_is_reset_by_its_handler_at_once() {
     let hook = Request::Hook(Hook::FaultProcessor);
     assert_eq!(bench.ask(&hook), Reply::Done);
     let (after_ns, cause) = bench.until_reset(5).expect("a reset");
-    assert!(cause & SOFTWARE != 0 && cause & WATCHDOG == 0, "{cause:#x}");
+    assert!(
+        cause & SOFTWARE_RESET != 0 && cause & WATCHDOG_RESET == 0,
+        "{cause:#x}"
+    );
     // It faults where it sleeps, less than a tick before the bench's time.
     assert!((after_ns as i64).abs() < TICK_NS as i64, "{after_ns} ns");
     // It comes up again and stays up.
@@ -179,7 +180,7 @@ fn a_brown_out_resets_with_outputs_off_and_the_board_returns_with_the_supply() {
     }
     let down = bench.tick(Power::BrownOut);
     let trip = down.trip.expect("a reset");
-    assert!(trip.cause & BROWN_OUT != 0 && trip.cause & WATCHDOG == 0);
+    assert!(trip.cause & BROWN_OUT != 0 && trip.cause & WATCHDOG_RESET == 0);
     for _ in 0..100 {
         let ran = bench.tick(Power::BrownOut);
         assert_eq!((ran.outputs, ran.period_us), (Outputs::default(), 0));

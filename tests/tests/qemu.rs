@@ -511,6 +511,8 @@ fn a_bench_board_on_the_emulated_uart_closes_the_loop_over_its_port() {
     let mut emulator = Command::new("qemu-system-arm")
         .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
         .args(["-display", "none", "-monitor", "none", "-serial", "pty"])
+        // Its clock counts instructions: a tick on a busy machine is no overrun.
+        .args(["-icount", "shift=5,sleep=off"])
         .arg("-kernel")
         .arg(image("qemu-hil-joint"))
         .stdin(Stdio::null())

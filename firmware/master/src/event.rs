@@ -216,7 +216,7 @@ enum Weight {
     Routine,
     /// It happened once.
     Told,
-    /// A person has to know why the robot stopped, or what is wrong with it.
+    /// A person has to know why the robot stopped or does not start, and which board is to blame.
     Cause,
     /// A command of the user ends with it, or asked for it: whoever gave one waits.
     Outcome,
@@ -226,7 +226,15 @@ impl Event {
     const fn weight(&self) -> Weight {
         match self {
             Self::Link { .. } | Self::Log { .. } | Self::LogLost { .. } => Weight::Routine,
-            Self::Hold(_) | Self::Found { .. } | Self::Diagnosis { .. } => Weight::Cause,
+            Self::Hold(_)
+            | Self::Found { .. }
+            | Self::Diagnosis { .. }
+            | Self::NodeLost(_)
+            | Self::SchemaMismatch { .. }
+            | Self::WrongRole(_)
+            | Self::DuplicateAddress { .. }
+            | Self::ForeignBoard { .. }
+            | Self::HomingFailed { .. } => Weight::Cause,
             Self::Done(_)
             | Self::Refused { .. }
             | Self::Parameter { .. }

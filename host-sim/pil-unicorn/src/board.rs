@@ -236,7 +236,6 @@ impl Board {
         let store = std::mem::take(&mut self.store);
         let cause = BROWN_OUT_RESET | PIN_RESET;
         let mut soc = Soc::new(store, straps.unique_id, straps.crystal, cause);
-        soc.starting = true;
         let bits = u32::from(straps.address);
         let mut closed = 0;
         for (bit, pin) in wiring::STRAPS.iter().enumerate() {

@@ -50,8 +50,8 @@ pub struct Partner<S> {
     buffer: [u8; MAX_FRAME],
     /// Stretch of the buffer that is not yet read.
     unread: std::ops::Range<usize>,
-    /// Requests without a reply.
-    waiting: u32,
+    /// Requests without a reply, the oldest first: whether each is a greeting.
+    waiting: VecDeque<bool>,
     /// Requests that wait for the reply to the one before: a board that answers keeps
     /// no more than a few bytes of the next.
     queued: VecDeque<Request>,
@@ -65,7 +65,7 @@ impl<S: Stream> Partner<S> {
             deframer: Deframer::new(),
             buffer: [0; MAX_FRAME],
             unread: 0..0,
-            waiting: 0,
+            waiting: VecDeque::new(),
             queued: VecDeque::new(),
         }
     }
@@ -116,24 +116,27 @@ impl<S: Stream> Partner<S> {
         // A frame of this length holds any request (tested with the link).
         let bytes = encode(0, request, &mut frame).map_err(|e| self.damaged(e))?;
         self.stream.send(bytes)?;
-        self.waiting += 1;
+        self.waiting
+            .push_back(matches!(request, Request::Hello { .. }));
         Ok(())
     }
 
-    /// Waits for the reply to the oldest request.
+    /// Waits for the reply to the oldest request. A greeting that nobody waits for is the late
+    /// answer to a call that was given up; it is passed over.
     ///
     /// # Errors
     /// [`SimError`] when the board has gone, stays silent or sends rubbish.
     pub fn receive(&mut self) -> Result<Reply, SimError> {
-        debug_assert!(self.waiting > 0, "nothing was asked");
+        debug_assert!(!self.waiting.is_empty(), "nothing was asked");
         loop {
             let mut input = &self.buffer[self.unread.clone()];
             let before = input.len();
             let found = self.deframer.next::<Reply>(&mut input);
             self.unread.start += before - input.len();
             match found {
+                Ok(Some((_, Reply::Hello(_)))) if self.waiting.front() == Some(&false) => {}
                 Ok(Some((_, reply))) => {
-                    self.waiting -= 1;
+                    self.waiting.pop_front();
                     return Ok(reply);
                 }
                 Ok(None) => {
@@ -155,7 +158,7 @@ impl<S: Stream> Partner<S> {
     /// # Errors
     /// As [`Self::send`].
     pub(super) fn send_next(&mut self) -> Result<(), SimError> {
-        if self.waiting == 0
+        if self.waiting.is_empty()
             && let Some(request) = self.queued.pop_front()
         {
             self.send(&request)?;
@@ -207,4 +210,55 @@ pub(super) fn unexpected(name: &str, reply: &Reply) -> SimError {
         ),
     };
     SimError::simulation(format!("{name} {what}"), help)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_pil_link::Image;
+
+    /// Says what it was told to, whatever it hears.
+    struct Canned(VecDeque<Vec<u8>>);
+
+    impl Stream for Canned {
+        fn name(&self) -> String {
+            "canned".to_owned()
+        }
+
+        fn send(&mut self, _: &[u8]) -> Result<(), SimError> {
+            Ok(())
+        }
+
+        fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, SimError> {
+            let said = self.0.pop_front().expect("nothing more is asked");
+            buffer[..said.len()].copy_from_slice(&said);
+            Ok(said.len())
+        }
+    }
+
+    /// On a slow line the greeting of a call that was given up comes behind that of the next.
+    #[test]
+    fn a_late_greeting_is_no_answer() {
+        let hello = Reply::Hello(Hello {
+            version: LINK_VERSION,
+            image: Image {
+                name: "joint".try_into().expect("fits"),
+                digest: [0; 16],
+                clock_hz: 0,
+            },
+            host: "canned".try_into().expect("fits"),
+            outputs_are_virtual: true,
+        });
+        let said = [&hello, &hello, &Reply::Done, &hello].map(|reply| {
+            let mut frame = [0; MAX_FRAME];
+            encode(0, reply, &mut frame).expect("fits").to_vec()
+        });
+        let mut partner = Partner::new(Canned(said.into()));
+        assert!(partner.hello().is_ok());
+        assert_eq!(partner.ask(&Request::Bye).ok(), Some(Reply::Done));
+        // A session may be opened anew, by anybody.
+        let version = LINK_VERSION;
+        let answer = partner.ask(&Request::Hello { version });
+        assert_eq!(answer.ok(), Some(hello));
+    }
 }

@@ -220,14 +220,24 @@ fn joint_that_reads_like_one_at_rest_is_held_once_it_had_the_air_for_a_motion() 
     for end in [175.0, 5.0] {
         let mut rig = JointRig::tracking(Hold);
         let (mut doubt_at, start) = (None, rig.now);
+        let mut open = [false; 2];
         while rig.node.mode() == Mode::Tracking {
-            rig.run_cycles(1, Some(setpoint(end, Hold)));
+            if (rig.now - start).is_multiple_of(10_000) {
+                rig.sync(Some(setpoint(end, Hold)), false);
+            }
+            open = [open[1], rig.any_open()];
+            rig.tick();
             if rig.node.motion_overdue() > Micros::ZERO {
                 doubt_at = doubt_at.or(Some(rig.now));
                 let account = rig.node.motion_account();
                 assert_eq!(account.overdue, rig.node.motion_overdue());
             }
         }
+        assert_eq!(
+            open,
+            [true, false],
+            "shut in the tick that finds it, latched in the next"
+        );
         assert!(rig.node.faults().contains(Fault::NoMotion));
         assert!(!rig.any_open());
         // Nothing has been learnt of this axis: only when the opposing chamber must be

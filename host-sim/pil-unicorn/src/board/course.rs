@@ -150,9 +150,10 @@ impl Board {
     /// ahead of them.
     fn deliver(&mut self, run: &Run) -> Result<(), String> {
         let mut late = 0;
-        let hears_from_ns = match self.running {
-            true => self.first_edge_ns.saturating_sub(self.grid_ns),
-            false => 0,
+        let hears_from_ns = if self.running {
+            self.first_edge_ns.saturating_sub(self.grid_ns)
+        } else {
+            0
         };
         let state = self.machine()?.state_mut();
         let count = run.received.len() as u64;
@@ -183,7 +184,6 @@ impl Board {
                 machine.reset(BROWN_OUT_RESET | PIN_RESET, true)?;
                 let soc = &mut machine.state_mut().soc;
                 soc.ports[0].outside |= 1 << wiring::POWER_OK;
-                soc.starting = true;
                 Ok(())
             }
         }
@@ -246,7 +246,6 @@ impl Board {
                     let state = machine.state();
                     let at_ns = state.soc.time.ns_of(state.cycle);
                     machine.reset(cause | PIN_RESET, false)?;
-                    machine.state_mut().soc.starting = true;
                     self.tripped(at_ns, cause);
                 }
                 Stop::Waits => return Err(WAITS.to_owned()),

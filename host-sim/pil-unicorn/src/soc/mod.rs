@@ -131,8 +131,9 @@ pub(crate) struct Soc {
     events: [Event; ADC],
     /// Cycle at which the watchdog bites.
     bites_at: u64,
-    /// The program starts: how long that takes is known when its tick timer is started, and
-    /// so what of the line it can have heard. Until then it hears nothing.
+    /// The program starts, as it does after every reset: how long that takes is known when its
+    /// tick timer is started, and so what of the line it can have heard. Until then it hears
+    /// nothing.
     pub(crate) starting: bool,
 }
 
@@ -187,7 +188,7 @@ impl Soc {
             due: [u64::MAX; SOURCES],
             events: [Event::Update; ADC],
             bites_at: u64::MAX,
-            starting: false,
+            starting: true,
         }
     }
 

@@ -46,6 +46,7 @@ fn the_bus_is_heard_on_its_pin_only() {
         let mut soc = switched(pins);
         soc.usart.write(CR1, ENABLED, 0).expect("modelled");
         soc.usart.write(CR3, DMAR | 1 << 12, 0).expect("modelled");
+        soc.starting = false;
         soc.expect(1700, 7);
         soc.usart_event(1700);
         soc.usart.dma_receive()

@@ -15,9 +15,9 @@ const TICK_MS: f64 = 1.0;
 /// Load of the line that counts as full.
 const FULL: f64 = 0.95;
 /// What degrades may leave its course by this before it is stopped, mm.
-const DEGRADED_MM: f64 = 40.0;
+pub(super) const DEGRADED_MM: f64 = 40.0;
 /// From the detection to the safe state, where the begin of the trouble is chance, ms.
-const REACTION_MS: f64 = 60.0;
+pub(super) const REACTION_MS: f64 = 60.0;
 
 /// How a row came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,16 +98,12 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
     match row.expect {
         Expect::Stop(expected) => {
             stop(&mut f, &row, &expected, &m);
-            f.within(
-                "valves physically shut",
-                m.physical_ms,
-                expected.all_ms + closing_ms(robot) + TICK_MS,
-            );
+            physically_shut(&mut f, robot, &m, expected.all_ms);
         }
         Expect::GoesOn { deviation_mm } => goes_on(&mut f, deviation_mm, &m),
-        Expect::Degrades => degrades(&mut f, &m),
+        Expect::Degrades => degrades(&mut f, robot, &m),
         Expect::StartsAnew { board } => starts_anew(&mut f, board, ran, &m),
-        Expect::NoArming => f.check(ran.error.is_some(), || "the robot gets ready".to_owned()),
+        Expect::NoArming => no_arming(&mut f, ran),
         Expect::NotImplemented(_) => {}
     }
     if let (Some(error), false) = (&ran.error, row.expect == Expect::NoArming) {
@@ -145,6 +141,15 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         measured: m,
         faults: ran.faults.iter().map(ToString::to_string).collect(),
     }
+}
+
+/// Valves that were commanded shut at the latest after `all_ms` let no more air through.
+fn physically_shut(f: &mut Failures, robot: &RobotConfig, m: &Measured, all_ms: f64) {
+    f.within(
+        "valves physically shut",
+        m.physical_ms,
+        all_ms + closing_ms(robot) + TICK_MS,
+    );
 }
 
 /// Closing time of the slowest valve with its line, ms.
@@ -201,6 +206,20 @@ fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
     }
 }
 
+fn no_arming(f: &mut Failures, ran: &Ran) {
+    f.check(ran.error.is_some(), || "the robot gets ready".to_owned());
+    let outputs = ran.outputs;
+    f.check(outputs.ticks > 0, || {
+        "no board got to its first tick".to_owned()
+    });
+    f.check(outputs.driven == 0, || {
+        format!(
+            "a joint board drives in {} of {} ticks",
+            outputs.driven, outputs.ticks
+        )
+    });
+}
+
 fn goes_on(f: &mut Failures, limit_mm: f64, m: &Measured) {
     f.check(!m.stopped, || "the motion stops".to_owned());
     if let Some(ms) = m.detected_ms {
@@ -216,7 +235,7 @@ fn goes_on(f: &mut Failures, limit_mm: f64, m: &Measured) {
     }
 }
 
-fn degrades(f: &mut Failures, m: &Measured) {
+fn degrades(f: &mut Failures, robot: &RobotConfig, m: &Measured) {
     match m.detected_ms {
         None => {
             f.check(!m.stopped, || "stopped without a reason".to_owned());
@@ -227,17 +246,17 @@ fn degrades(f: &mut Failures, m: &Measured) {
             }
         }
         Some(detected) => {
+            let all_ms = detected + REACTION_MS;
             f.check(m.stopped, || "detected, but not all axes stop".to_owned());
+            f.within("all valves commanded shut", m.commanded_ms, all_ms);
+            f.within("all boards tell a safe mode", m.sensed_ms, all_ms);
+            physically_shut(f, robot, m, all_ms);
             f.within(
-                "all valves commanded shut",
-                m.commanded_ms,
-                detected + REACTION_MS,
+                "both wheels stand",
+                m.wheels_stand_ms,
+                all_ms + WHEEL_STOP_MS,
             );
-            f.within(
-                "all boards tell a safe mode",
-                m.sensed_ms,
-                detected + REACTION_MS,
-            );
+            f.check(m.latched, || "not latched".to_owned());
         }
     }
 }
@@ -246,6 +265,7 @@ fn degrades(f: &mut Failures, m: &Measured) {
 mod tests {
     use super::*;
     use crate::config::builtin;
+    use crate::faults::matrix::run::Outputs;
     use crate::faults::matrix::select;
     use crate::sil::LineAudit;
     use crate::telemetry::Recording;
@@ -260,6 +280,7 @@ mod tests {
             recording: Recording::default(),
             line: LineAudit::default(),
             arming_asked: true,
+            outputs: Outputs::default(),
             error: None,
         };
         let moved = |held_mm| {

@@ -13,6 +13,8 @@ const TICK_S: f64 = 1e-3;
 /// Armed and tracking.
 const DRIVING: [u8; 2] = [2, 3];
 const EXHAUST: u8 = 5;
+/// The tick in which a staged exhaust is ended, and the time in which its outlets shut: samples.
+const OUTLETS_SHUT: usize = 10;
 /// A rim slower than this stands, mm/s.
 const STANDING_MM_S: f64 = 5.0;
 /// Motion that tells a reading that stands from rest, mm.
@@ -223,17 +225,20 @@ fn detected_s(r: &Recording, from_s: f64, master_heard: bool) -> Option<f64> {
     all.min_by(f64::total_cmp)
 }
 
-/// End of the last sample in which `open` holds outside of a staged exhaust; `None`
-/// if that is the last sample of all, `from_s` if there is none.
+/// End of the last sample in which `open` holds outside of a staged exhaust, the shutting of its
+/// outlets included; `None` if that is the last sample of all, `from_s` if there is none.
 fn open_until_s(
     rows: &[Sample<JointSample>],
     from_s: f64,
     open: impl Fn(&JointSample) -> bool,
 ) -> Option<f64> {
-    let open = |s: &JointSample| open(s) && s.mode != EXHAUST;
-    let last = rows
-        .iter()
-        .rposition(|r| r.t_s() >= from_s - 1e-9 && open(&r.v));
+    let exhausts = |i: usize| {
+        let before = &rows[i.saturating_sub(OUTLETS_SHUT)..=i];
+        before.iter().any(|r| r.v.mode == EXHAUST)
+    };
+    let last = (0..rows.len())
+        .rev()
+        .find(|&i| rows[i].t_s() >= from_s - 1e-9 && open(&rows[i].v) && !exhausts(i));
     until_s(last, rows, from_s)
 }
 
@@ -367,6 +372,18 @@ mod tests {
         assert!(close(until(&|ms| ms < 540 || ms == 700), 0.701));
         assert!(close(until(&|ms| ms < 300), 0.5));
         assert_eq!(until(&|_| true), None);
+    }
+
+    #[test]
+    fn the_outlets_of_a_staged_exhaust_may_shut_after_its_end_and_nothing_later() {
+        let open = |s: &JointSample| s.fill_a_us != 0;
+        let until = |last_ms: u64| {
+            let mut list = rows(|ms| ms < 540 || (600..=last_ms).contains(&ms));
+            list[600..700].iter_mut().for_each(|r| r.v.mode = EXHAUST);
+            open_until_s(&list, 0.5, open).expect("shut")
+        };
+        assert!((until(709) - 0.540).abs() < 1e-9);
+        assert!((until(710) - 0.711).abs() < 1e-9);
     }
 
     #[test]

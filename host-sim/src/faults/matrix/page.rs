@@ -4,7 +4,7 @@ use minijinja::{Value, context};
 use serde_json::json;
 
 use super::count;
-use super::judge::{Outcome, Verdict};
+use super::judge::{DEGRADED_MM, Outcome, REACTION_MS, Verdict};
 use super::row::{Expect, Row, Since};
 use crate::SimError;
 use crate::report::page;
@@ -59,6 +59,12 @@ fn expected_json(row: &Row) -> serde_json::Value {
         Expect::GoesOn { deviation_mm } => json!({
             "reaction": reaction(row), "deviation_mm": deviation_mm, "latched": false,
         }),
+        Expect::Degrades => json!({
+            "reaction": reaction(row),
+            "all_ms_after_detection": REACTION_MS,
+            "deviation_mm_without_detection": DEGRADED_MM,
+            "latched": "if all axes stop",
+        }),
         _ => json!({ "reaction": reaction(row) }),
     };
     value["reads"] = json!(row.reads);
@@ -107,6 +113,9 @@ fn limits(row: &Row) -> String {
             )
         }
         Expect::GoesOn { deviation_mm } => format!("deviation {deviation_mm} mm"),
+        Expect::Degrades => format!(
+            "all {REACTION_MS:.0} ms after the detection; without one, deviation {DEGRADED_MM:.0} mm"
+        ),
         _ => String::new(),
     }
 }

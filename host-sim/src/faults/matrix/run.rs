@@ -1,9 +1,9 @@
 //! Runs rows of the matrix on the simulated robot, two at a time.
 
-use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
+use wheeleg_node::mode::ModeRules as _;
 use wheeleg_protocol::param::params_at;
 
 use super::judge::{Outcome, judge};
@@ -18,7 +18,7 @@ use crate::config::{
 use crate::faults::{FaultSpec, check};
 use crate::pil::Nodes;
 use crate::run::DEFAULT_SCENARIO;
-use crate::sil::{self, LineAudit};
+use crate::sil::{self, LineAudit, WatchedJoint};
 use crate::telemetry::{Recorder, Recording};
 
 /// Rows at a time.
@@ -38,10 +38,21 @@ pub(super) struct Ran {
     pub(super) faults: Vec<FaultSpec>,
     pub(super) recording: Recording,
     pub(super) line: LineAudit,
-    /// Arming was asked for after the instant.
+    /// Arming was asked for when every fault was over.
     pub(super) arming_asked: bool,
+    /// From power-up on.
+    pub(super) outputs: Outputs,
     /// The run ended before its time, and why.
     pub(super) error: Option<String>,
+}
+
+/// What the joint boards had on their outputs from power-up on, in the time of the start-up, too.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Outputs {
+    /// Ticks that were looked at, of all joints.
+    pub(super) ticks: u64,
+    /// Ticks among them with a valve energised, or under control.
+    pub(super) driven: u64,
 }
 
 /// The robots and their runs without faults.
@@ -104,8 +115,8 @@ impl Robots {
         };
         let run = self.sound[index].get_or_init(|| {
             let scenario = self.scenario(stands, SOUND_S);
-            let (recording, _, error) = simulate(&scenario, self.robot(row.variant), self.seed);
-            error.map_or(Ok(recording), Err)
+            let run = simulate(&scenario, self.robot(row.variant), self.seed);
+            run.error.map_or(Ok(run.recording), Err)
         });
         run.as_ref()
             .map(Some)
@@ -131,21 +142,20 @@ impl Robots {
         for (after_s, ask) in row.asks {
             scenario.events.push(event(at_s + after_s, asked(ask)));
         }
-        let arming_asked = matches!(row.expect, Expect::Stop(_) | Expect::Degrades);
-        if arming_asked {
+        let arm_s = duration_s - ARM_S;
+        let stops = matches!(row.expect, Expect::Stop(_) | Expect::Degrades);
+        if stops {
             scenario
                 .events
-                .push(event(duration_s - ARM_S, EventAction::command("Arm")));
+                .push(event(arm_s, EventAction::command("Arm")));
         }
         check(&scenario, robot, &Nodes::default())?;
-        let (recording, line, error) = simulate(&scenario, robot, self.seed);
+        let arming_asked = stops && faults.iter().all(|fault| fault.over_s() < arm_s);
         let ran = Ran {
             at_s,
             faults,
-            recording,
-            line,
             arming_asked,
-            error,
+            ..simulate(&scenario, robot, self.seed)
         };
         let measured: Measured = measure(row, &ran, self.sound(row)?);
         Ok(judge(*row, robot, &ran, measured))
@@ -175,20 +185,31 @@ fn stands(phase: Phase) -> bool {
 }
 
 /// A run in memory; an error ends it and is told.
-fn simulate(
-    scenario: &Scenario,
-    robot: &RobotConfig,
-    seed: u64,
-) -> (Recording, LineAudit, Option<String>) {
+fn simulate(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Ran {
     let mut recorder = Recorder::in_memory();
-    let go_on = &mut |_| ControlFlow::Continue(());
-    let (line, error) = match sil::run(scenario, robot, seed, &mut recorder, go_on) {
+    let mut outputs = Outputs::default();
+    let mut look = |joint: &WatchedJoint<'_>| {
+        let driven = joint.board.pulses != [0; 4] || joint.board.mode.may_drive();
+        outputs.ticks += 1;
+        outputs.driven += u64::from(driven);
+    };
+    let run = sil::run_watched(scenario, robot, seed, &mut recorder, &mut look);
+    let (line, error) = match run {
         Ok(outcome) => (outcome.line, None),
         Err(e) => (LineAudit::default(), Some(e.to_string())),
     };
-    match recorder.finish() {
-        Ok(recording) => (recording, line, error),
-        Err(e) => (Recording::default(), line, error.or(Some(e.to_string()))),
+    let (recording, error) = match recorder.finish() {
+        Ok(recording) => (recording, error),
+        Err(e) => (Recording::default(), error.or(Some(e.to_string()))),
+    };
+    Ran {
+        at_s: 0.0,
+        faults: Vec::new(),
+        recording,
+        line,
+        arming_asked: false,
+        outputs,
+        error,
     }
 }
 

@@ -36,6 +36,6 @@ engine! {
 
 #[cfg(feature = "sim")]
 engine! {
-    scenario: 2_000, 400;
-    files: 2_000, 400;
+    scenario: 2_000, 4_000;
+    files: 2_000, 4_000;
 }
