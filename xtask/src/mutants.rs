@@ -15,7 +15,7 @@ const VERSION: &str = "27.1.0";
 
 /// Files whose mistakes could leave an axis energised, and the packages whose
 /// tests must notice. What stands together is built and tested together.
-const GROUPS: [(&[&str], &[&str]); 3] = [
+const GROUPS: [(&[&str], &[&str]); 4] = [
     (
         &[
             "firmware/node/src/board.rs",
@@ -33,9 +33,12 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
             "firmware/node/src/joint/node.rs",
             "firmware/node/src/joint/outputs.rs",
             "firmware/node/src/joint/precharge.rs",
+            "firmware/node/src/joint/reference.rs",
             "firmware/node/src/joint/requests.rs",
+            "firmware/node/src/joint/settings.rs",
             "firmware/node/src/time.rs",
             "firmware/node/src/wheel/encoder.rs",
+            "firmware/node/src/wheel/motion.rs",
             "firmware/node/src/wheel/node.rs",
             "firmware/node/src/wheel/outputs.rs",
             "firmware/node/src/wheel/requests.rs",
@@ -45,6 +48,10 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
     (
         &["protocol/src/link/supervisor.rs"],
         &["wheeleg-protocol", "wheeleg-node"],
+    ),
+    (
+        &["firmware/control/src/valve.rs"],
+        &["wheeleg-control", "wheeleg-node"],
     ),
     (
         &[
@@ -60,6 +67,8 @@ const GROUPS: [(&[&str], &[&str]); 3] = [
             "firmware/master/src/layer0/requests.rs",
             "firmware/master/src/layer0/safety.rs",
             "firmware/master/src/layer0/sums.rs",
+            "firmware/master/src/layer0/wheels.rs",
+            "firmware/master/src/layer1/square.rs",
         ],
         &["wheeleg-master"],
     ),
