@@ -119,14 +119,19 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
     assert_eq!(kept(&mut rig), before);
 }
 
-/// Counts by which the left wheel goes in a gait, after a move of the user of so many mm or none.
-fn gait_after(travel: Option<i16>) -> i64 {
+/// Counts by which the left wheel goes in a gait, after moves of the user of so many mm.
+fn gait_after(moves_mm: &[i16]) -> i64 {
     let mut rig = Rig::new(MasterConfig::default());
     rig.stand();
-    if let Some(mm) = travel {
-        let travel_mm = PositionMm::from_int(mm);
-        rig.submit(Command::WheelReference { travel_mm });
+    // A second time: the numbers begin anew with neither.
+    let ticket = rig.submit(Command::Stand);
+    rig.run(500);
+    assert!(rig.done(ticket));
+    for mm in moves_mm {
+        let travel_mm = PositionMm::from_int(*mm);
+        let ticket = rig.submit(Command::WheelReference { travel_mm });
         rig.run(100);
+        assert!(rig.done(ticket));
     }
     let start = rig.node(7).position;
     let ticket = rig.submit(Command::StartGait);
@@ -135,9 +140,12 @@ fn gait_after(travel: Option<i16>) -> i64 {
     rig.node(7).position - start
 }
 
+/// Both number their motions: however many there were, a gait goes on from where the wheels are.
 #[test]
 fn a_move_of_the_user_is_none_of_the_gaits() {
-    let alone = gait_after(None);
+    let alone = gait_after(&[]);
     assert!(alone > 10_000, "{alone}");
-    assert_eq!(gait_after(Some(10)), alone);
+    for moves_mm in [&[10][..], &[10, 10], &[10, 10, 10]] {
+        assert_eq!(gait_after(moves_mm), alone, "{moves_mm:?}");
+    }
 }
