@@ -17,6 +17,7 @@ const STAGE_S: f64 = 0.500;
 const STANDING_MM_S: f64 = 5.0;
 const TICK_S: f64 = 1e-3;
 
+const IDLE: u8 = 1;
 const ARMED: u8 = 2;
 const HOLD: u8 = 4;
 const EXHAUST: u8 = 5;
@@ -391,7 +392,7 @@ fn coming_back_from_an_e_stop_moves_nothing() {
 
 /// Arming before the supply is back must not be possible.
 #[test]
-fn without_supply_pressure_the_robot_does_not_stay_armed() {
+fn without_supply_pressure_the_robot_does_not_arm() {
     let t = 2.5;
     let events = [
         (t, EventAction::EStop),
@@ -400,8 +401,12 @@ fn without_supply_pressure_the_robot_does_not_stay_armed() {
     ];
     let recording = run(&gait(LegChoice::Left, t + 3.0, &events), &robot(), 1);
     assert!(!at(&recording.supply, t + 1.3).pressure_switch);
+    let told = story(&recording);
+    assert!(told.contains("Arm refused: NoAir"), "{told}");
     for rows in &recording.joints {
         assert!(last(window(rows, t + 0.1, f64::INFINITY), t, energised).is_none());
-        assert_eq!(rows[rows.len() - 1].v.mode, HOLD, "{}", story(&recording));
+        // Cleared, and not armed for a single tick.
+        let after = window(rows, t + 1.25, f64::INFINITY);
+        assert!(after.iter().all(|r| r.v.mode == IDLE), "{told}");
     }
 }

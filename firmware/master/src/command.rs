@@ -214,7 +214,7 @@ commands! {
     WheelSpeed = 0x0111, "side, mm/s", "Highest speed of the wheel's own profile.", Self::WheelSpeed { .. } =>
     WheelAcceleration = 0x0112, "side, mm/s^2", "Acceleration of the wheel's own profile.", Self::WheelAcceleration { .. } =>
     WheelFilter = 0x0113, "side, A, B, K", "Coefficients of the wheel's lead filter.", Self::WheelFilter { .. } =>
-    Arm = 0x0120, "none", "Energises all axes where they stand; needs every node enumerated, compatible and free of faults.", Self::Arm =>
+    Arm = 0x0120, "none", "Energises all axes where they stand; needs every node enumerated, compatible and free of faults, and supply pressure.", Self::Arm =>
     Disarm = 0x0121, "none", "Valves and motors off.", Self::Disarm =>
     ClearFault = 0x0122, "none", "Clears latched faults of all nodes and the E-stop of the master.", Self::ClearFault =>
     EmergencyStop = 0x0123, "none", "E-stop bit in every SYNC from the next on: HOLD and supply dump. Never queued, never refused for lateness.", Self::EmergencyStop =>

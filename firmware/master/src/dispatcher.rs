@@ -88,6 +88,9 @@ pub enum Refusal {
     NotAtStart,
     /// An E-stop or HOLD is latched: clear it first.
     Latched,
+    /// The supply pressure switch is open: wait until the pressure is there (after an E-stop,
+    /// until the reservoir is filled again), then ask anew.
+    NoAir,
     /// A node has not been heard.
     NodeMissing {
         /// Bus address.

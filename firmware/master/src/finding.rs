@@ -35,7 +35,7 @@ macro_rules! findings {
 
 findings! {
     NodeLost: "It has missed three cycles.",
-        "Check its supply, its bus plug and its fuse.";
+        "Check its supply, its bus plug and its fuse; where several are lost at once, the bus line and its termination.";
     OtherInterface: "Its firmware was built from another interface definition than the master's.",
         "Flash master and board from the same version.";
     WrongRole: "It answers as another kind of board than its address stands for.",
@@ -46,6 +46,8 @@ findings! {
         "Write the file's parameters to it and save them, or take its own over into the file.";
     SlotBabble: "It sends rubbish in its own slot, where its driver-enable guard lets it through.",
         "Switch the robot off and replace this board: its processor or line driver is damaged.";
+    SlotsOverlap: "Its replies and those of the board in the slot before fall on one another: the clock of one of the two runs wrong.",
+        "One of the two will say that it cannot keep to its slot: check the clock of that one, before supplies and plugs.";
     BusBabble: "The bus is full of rubbish, and no slot tells who babbles: source unknown, the board's driver-enable guard is broken too.",
         "Unplug the boards one by one until the line is quiet: the last one unplugged babbles.";
     Babbler: "It heard nothing of the rubbish that all others heard: it babbled itself, and its driver-enable guard is broken.",

@@ -239,6 +239,9 @@ impl Layer0 {
         if let Some(bar) = self.nodes.bar_to_arming(alive, self.schema_hash) {
             return Err(bar);
         }
+        if self.has_no_air() {
+            return Err(Refusal::NoAir);
+        }
         // All or nothing: some nodes armed on their own would be no answer.
         if !self.jobs.has_room(ARMING_JOBS) {
             return Err(Refusal::Busy);

@@ -1,7 +1,8 @@
 //! What is on the line beside what was asked for, and who sends it.
 //!
 //! A board that babbles within its driver-enable guard spoils its own slot alone:
-//! the slot names it. Without the guard it spoils all of them, and nobody can be
+//! the slot names it. Where the board in the slot before is not heard either, the replies of
+//! the two fall on one another: the clock of one of them runs wrong. Without the guard it spoils all of them, and nobody can be
 //! heard; when the line is quiet again, the boards' own counters tell: a board whose
 //! driver is on hears nothing, so the one that has counted no errors has made them.
 
@@ -81,6 +82,15 @@ pub enum Found {
     Flood(Address),
 }
 
+/// Whose rubbish is in the slot of a board that is not heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spoilt {
+    /// Its own.
+    Own,
+    /// Its own reply, and that of the board in the slot before.
+    WithTheSlotBefore,
+}
+
 /// Watch over the line.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
@@ -93,6 +103,8 @@ pub struct Line {
     /// Bytes of this cycle in frames that nobody asked for, by node.
     unasked: [u32; NODES],
     spoilt: [u8; NODES],
+    /// Cycles in a row in which each node was not heard.
+    silent: [u8; NODES],
     babble: Lasting,
     floods: [Lasting; NODES],
     /// Errors that each node had counted before the babble, and after.
@@ -169,6 +181,13 @@ impl Line {
             let now = core::mem::take(bytes) >= SPOILT_SLOT && !replied(index);
             *spoilt = if now { spoilt.saturating_add(1) } else { 0 };
         }
+        for (index, silent) in self.silent.iter_mut().enumerate() {
+            *silent = if replied(index) {
+                0
+            } else {
+                silent.saturating_add(1)
+            };
+        }
         let floods = self.floods.iter_mut().zip(&mut self.unasked);
         for (index, (flood, bytes)) in floods.enumerate() {
             let now = core::mem::take(bytes) >= FLOOD_BYTES;
@@ -180,14 +199,21 @@ impl Line {
         }
     }
 
-    /// Whether the slot of node index 0..8 has been spoilt for as long as a board is
-    /// given to answer, and its alone.
+    /// By whom the slot of node index 0..8 has been spoilt for as long as a board is
+    /// given to answer, if it has been, and it alone.
     #[must_use]
-    pub fn is_spoilt(&self, index: usize) -> bool {
-        let spoilt = |slot: &u8| *slot >= SPOILT_CYCLES;
-        !self.babble.told
-            && self.spoilt.get(index).is_some_and(spoilt)
-            && self.spoilt.iter().filter(|slot| spoilt(slot)).count() == 1
+    pub fn spoilt(&self, index: usize) -> Option<Spoilt> {
+        let lasts = |cycles: &u8| *cycles >= SPOILT_CYCLES;
+        let alone = self.spoilt.iter().filter(|slot| lasts(slot)).count() == 1;
+        if self.babble.told || !alone || !self.spoilt.get(index).is_some_and(lasts) {
+            return None;
+        }
+        let before = index.checked_sub(1).and_then(|i| self.silent.get(i));
+        Some(if before.is_some_and(lasts) {
+            Spoilt::WithTheSlotBefore
+        } else {
+            Spoilt::Own
+        })
     }
 
     /// Takes what node index 0..8 has heard. Gives the board that babbled, once, when
@@ -315,25 +341,43 @@ mod tests {
         for _ in 0..5 {
             line.stretch(&twins, slot_end(4));
             line.end_cycle(|index| index != 4, |_| {});
-            assert!(!line.is_spoilt(4), "two replies at once");
+            assert_eq!(line.spoilt(4), None, "two replies at once");
         }
         for cycle in 0..3 {
-            assert!(!line.is_spoilt(4), "{cycle}");
+            assert_eq!(line.spoilt(4), None, "{cycle}");
             line.stretch(&[7; 31], slot_end(4));
             line.end_cycle(|index| index != 4, |_| {});
         }
-        let named: Vec<usize> = (0..NODES).filter(|i| line.is_spoilt(*i)).collect();
+        let named: Vec<usize> = (0..NODES).filter(|i| line.spoilt(*i).is_some()).collect();
         assert_eq!(named, [4]);
+        assert_eq!(line.spoilt(4), Some(Spoilt::Own));
         for _ in 0..3 {
             line.stretch(&[7; 31], slot_end(4));
             line.stretch(&[7; 31], slot_end(5));
             line.end_cycle(|_| false, |_| {});
         }
-        assert!(!(0..NODES).any(|i| line.is_spoilt(i)));
+        assert!((0..NODES).all(|i| line.spoilt(i).is_none()));
         line.end_cycle(|_| true, |_| {});
         line.stretch(&[7; 31], slot_end(4));
         line.end_cycle(|index| index != 4, |_| {});
-        assert!(!line.is_spoilt(4), "begins anew");
+        assert_eq!(line.spoilt(4), None, "begins anew");
+    }
+
+    #[test]
+    fn two_boards_in_a_row_that_are_not_heard_have_spoilt_the_slot_of_the_second_together() {
+        let slot_end = |slot: u64| 1020 + 100 + slot * 310 + 310;
+        let spoilt = |silent: [usize; 2]| {
+            let mut line = Line::default();
+            for _ in 0..SPOILT_CYCLES {
+                line.stretch(&[7; 45], slot_end(4));
+                line.end_cycle(|index| !silent.contains(&index), |_| {});
+            }
+            line.spoilt(4)
+        };
+        assert_eq!(spoilt([3, 4]), Some(Spoilt::WithTheSlotBefore));
+        // The rest of a reply never gets into the slot before, or across one.
+        assert_eq!(spoilt([4, 5]), Some(Spoilt::Own));
+        assert_eq!(spoilt([2, 4]), Some(Spoilt::Own));
     }
 
     #[test]
@@ -361,7 +405,7 @@ mod tests {
                 line.stretch(bytes, 1020 + 100 + 3 * 310);
                 line.end_cycle(|index| index != 2, |_| {});
             }
-            line.is_spoilt(2)
+            line.spoilt(2).is_some()
         };
         let half = REPLY_BYTES / 2;
         assert!(!spoils(&[7; REPLY_BYTES][..half - 1]) && spoils(&[7; REPLY_BYTES][..half]));

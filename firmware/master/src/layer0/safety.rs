@@ -3,7 +3,7 @@
 use wheeleg_protocol::{Address, EmergencyBrake, InputBits, Message};
 
 use super::acyclic::{Job, Purpose};
-use super::line::Found;
+use super::line::{Found, Spoilt};
 use super::liveness::Change;
 use super::nodes::Node;
 use super::{GroupKind, Layer0, Power, STALL_CYCLES};
@@ -182,6 +182,12 @@ impl Layer0 {
         });
     }
 
+    /// Whether the supply pressure switch is open, as its board told last.
+    pub(super) fn has_no_air(&self) -> bool {
+        let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);
+        supply.is_some_and(|reply| !reply.inputs.contains(InputBits::SUPPLY_PRESSURE))
+    }
+
     /// Ends a cycle for the supervision of the nodes.
     pub(super) fn supervise(&mut self, now_us: u64, events: &mut Events) {
         if self.cycle == 0 {
@@ -205,8 +211,12 @@ impl Layer0 {
                     self.questions.lost(index);
                     self.sums.lost(index);
                     events.push(now_us, Event::NodeLost(address));
-                    if self.line.is_spoilt(index) {
-                        let (node, finding) = (Some(address), Finding::SlotBabble);
+                    if let Some(spoilt) = self.line.spoilt(index) {
+                        let node = Some(address);
+                        let finding = match spoilt {
+                            Spoilt::Own => Finding::SlotBabble,
+                            Spoilt::WithTheSlotBefore => Finding::SlotsOverlap,
+                        };
                         events.push(now_us, Event::Found { node, finding });
                     }
                     match address {
@@ -245,8 +255,7 @@ impl Layer0 {
             }
             self.hold_all(HoldReason::NodeDisarmed(node), now_us, events);
         }
-        let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);
-        if supply.is_some_and(|reply| !reply.inputs.contains(InputBits::SUPPLY_PRESSURE)) {
+        if self.has_no_air() {
             self.hold_all(HoldReason::SupplyLost, now_us, events);
         }
         if self.stale_cycles >= STALL_CYCLES {

@@ -203,6 +203,22 @@ fn node_fault_and_supply_loss_hold_all() {
     rig.run(2);
     assert!(rig.saw(|event| *event == Event::Hold(HoldReason::SupplyLost)));
     assert!(!rig.master.is_armed());
+
+    // Cleared without air: nothing may arm, not even for a cycle.
+    rig.submit(Command::ClearFault);
+    rig.run(20);
+    let ticket = rig.submit(Command::Arm);
+    rig.run(5);
+    assert_eq!(rig.refusal(ticket), Some(Refusal::NoAir));
+    let armed = |rig: &mut Rig| {
+        let requests = rig.node(3).requests.iter();
+        requests.filter(|m| matches!(m, Message::Arm(_))).count()
+    };
+    assert_eq!(armed(&mut rig), 1, "before the air was lost");
+    rig.node(7).inputs = InputBits::SUPPLY_PRESSURE;
+    rig.run(2);
+    rig.arm();
+    assert_eq!(armed(&mut rig), 2);
 }
 
 #[test]

@@ -117,6 +117,11 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
             format!("the user does not read `{words}`")
         });
     }
+    for words in row.silent_about {
+        f.check(!m.reads.iter().any(|line| line.contains(words)), || {
+            format!("the user reads `{words}`, which blames what is sound")
+        });
+    }
     f.check(!m.reads.iter().any(|line| line.contains("WRONG")), || {
         "a board takes what it must refuse".to_owned()
     });

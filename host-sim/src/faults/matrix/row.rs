@@ -154,6 +154,8 @@ pub struct Row {
     pub held_mm: Option<f64>,
     /// What the user must be able to read: all of it.
     pub reads: &'static [&'static str],
+    /// What the user must not read: it would blame what is sound.
+    pub silent_about: &'static [&'static str],
     /// Anything that the numbers do not tell.
     pub note: &'static str,
 }
@@ -195,6 +197,7 @@ pub(super) const fn row(
         answering: 0,
         held_mm: None,
         reads,
+        silent_about: &[],
         note: "",
     }
 }
@@ -207,6 +210,11 @@ pub(super) const fn missing(id: &'static str, reason: &'static str) -> Row {
 impl Row {
     pub(super) const fn noted(mut self, note: &'static str) -> Self {
         self.note = note;
+        self
+    }
+
+    pub(super) const fn silent_about(mut self, words: &'static [&'static str]) -> Self {
+        self.silent_about = words;
         self
     }
 

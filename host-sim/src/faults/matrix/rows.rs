@@ -66,7 +66,7 @@ pub const ROWS: &[Row] = &[
         stop(LINK_MS, LINK_SHUT_MS), &["No SYNC arrived"]),
     // Its counter is frozen.
     row("master-frozen/flight", &[at("master-frozen", 0.2)], Phase::Flight,
-        stop(LINK_MS, LINK_SHUT_MS), &["cycle counter does not advance", "Restart the master"]),
+        stop(LINK_MS, LINK_SHUT_MS), &["cycle counter does not advance", "restart it: its control loop is stuck"]),
     row("master-frozen/push", &[at("master-frozen", 0.2)], Phase::Push,
         stop(LINK_MS, LINK_SHUT_MS), &["cycle counter does not advance"]),
     // One node silent, reset, babbling, with the address of another.
@@ -209,7 +209,8 @@ pub const ROWS: &[Row] = &[
     // Time.
     row("clock-drift/200ppm", &[at("clock-drift:joint6=200", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
     row("clock-drift/beyond", &[at("clock-drift:joint6=-30000", LONG_S)], Phase::Flight,
-        stop([0.0, 500.0], 540.0), &["joint 6", "slot"]),
+        stop([0.0, 500.0], 540.0), &["joint 6", "fall on one another", "joint 6: The board cannot keep to its slot"])
+        .silent_about(&["sends rubbish", "replace this board"]),
     row("cycle-jitter/1ms", &[at("cycle-jitter=1", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
     // Master's layers.
     row("fifo-full", &[at("command-flood=100", 0.5)], Phase::Flight, goes_on(0.001), &["refused, QueueFull"]),
