@@ -172,7 +172,124 @@ pub(super) fn advance(
 
 #[cfg(test)]
 mod tests {
-    use super::{CYCLE_TICKS, travel};
+    use super::{CYCLE_TICKS, Target, TickReference, advance, travel};
+    use crate::joint::settings::{JointSettings, TickSettings};
+    use crate::parameters::JointParameters;
+    use core::hash::{Hash, Hasher};
+    use core::num::NonZeroU8;
+    use std::hash::DefaultHasher;
+    use wheeleg_control::joint::Announced;
+    use wheeleg_protocol::{JointSetpoint, LinkLossAction, NextReference};
+    use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
+
+    fn settings() -> TickSettings {
+        JointSettings::new(&JointParameters::default())
+            .unwrap()
+            .tick
+    }
+
+    /// At 20 mm with 100 mm/s, and 50 mm announced for so many cycles later.
+    fn moving(announced_cycles: Option<u8>) -> Target {
+        let next = announced_cycles.map(|cycles| NextReference {
+            reference: PositionMm::from_int(50).to_wire(),
+            cycles: NonZeroU8::new(cycles).unwrap(),
+        });
+        Target::from_setpoint(&JointSetpoint {
+            reference: PositionMm::from_int(20),
+            velocity: VelocityMmS::from_int(100).to_wire(),
+            next,
+            on_link_loss: LinkLossAction::Hold,
+            track: true,
+        })
+    }
+
+    /// The references of the ticks after a set-point, from where it begins.
+    fn follow(mut target: Target) -> impl Iterator<Item = TickReference> {
+        let settings = settings();
+        let mut last = PositionMm::from_int(20);
+        core::iter::repeat_with(move || {
+            let tick = advance(last, &mut target, &settings);
+            last = tick.reference;
+            tick
+        })
+    }
+
+    #[test]
+    fn a_setpoint_moves_on_for_one_bus_cycle_and_then_stands() {
+        for (k, tick) in (0..).zip(follow(moving(None)).take(35)) {
+            let on_the_way = k < CYCLE_TICKS;
+            let velocity = if on_the_way { 100 } else { 0 };
+            assert_eq!(tick.velocity, VelocityMmS::from_int(velocity), "tick {k}");
+            // 100 mm/s are 0.1 mm in a tick.
+            let tenths = f64::from(k.min(CYCLE_TICKS));
+            let off = tick.reference.to_f64() - (20.0 + tenths / 10.0);
+            assert!(off.abs() < 1e-4, "tick {k}: {off}");
+            assert!(!tick.slew_limited, "tick {k}");
+        }
+    }
+
+    #[test]
+    fn an_announced_reference_is_counted_down_to_its_tick() {
+        for (k, tick) in (0..).zip(follow(moving(Some(3))).take(40)) {
+            let announced = Announced {
+                reference: PositionMm::from_int(50),
+                after: Ticks((3 * CYCLE_TICKS).saturating_sub(k)),
+            };
+            assert_eq!(tick.announced, Some(announced), "tick {k}");
+        }
+        for tick in follow(moving(None)).take(40) {
+            assert_eq!(tick.announced, None);
+        }
+    }
+
+    fn hash(target: &Target) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        target.hash(&mut hasher);
+        hasher.finish()
+    }
+
+    #[test]
+    fn every_bit_of_a_target_is_sealed() {
+        for (has_next, age) in [(false, 0), (true, 0), (false, u32::MAX), (true, u32::MAX)] {
+            let sound = Target {
+                has_next,
+                age,
+                ..moving(Some(3))
+            };
+            let no_next = Target {
+                has_next: !has_next,
+                ..sound
+            };
+            assert_ne!(hash(&no_next), hash(&sound), "{sound:?}");
+            for bit in 0..32 {
+                let flip = |raw: i32| raw ^ 1_i32.rotate_left(bit);
+                let position = |of: PositionMm| PositionMm::from_raw(flip(of.raw()));
+                let Announced { reference, after } = sound.next;
+                let next = |reference, after| Target {
+                    next: Announced { reference, after },
+                    ..sound
+                };
+                for damaged in [
+                    Target {
+                        reference: position(sound.reference),
+                        ..sound
+                    },
+                    Target {
+                        velocity: VelocityMmS::from_raw(flip(sound.velocity.raw())),
+                        ..sound
+                    },
+                    next(position(reference), after),
+                    next(reference, Ticks(after.get() ^ 1 << bit)),
+                    Target {
+                        age: age ^ 1 << bit,
+                        ..sound
+                    },
+                ] {
+                    assert_ne!(hash(&damaged), hash(&sound), "bit {bit}: {damaged:?}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn the_way_of_a_cycle_is_exact_for_every_velocity() {

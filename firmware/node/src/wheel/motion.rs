@@ -145,3 +145,79 @@ pub(super) fn whole_velocity(velocity_raw: i16) -> i8 {
     let whole = velocity_raw.wrapping_shr(4);
     i8::try_from(whole).unwrap_or(if whole < 0 { i8::MIN } else { i8::MAX })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::WheelParameters;
+    use wheeleg_control::wheel::WheelInput;
+
+    const MODE: WheelControlMode = WheelControlMode::Trapezoidal;
+
+    fn settings() -> WheelSettings {
+        WheelSettings::new(&WheelParameters::default(), MODE).unwrap()
+    }
+
+    fn standing_at(actual: WheelCount) -> WheelController {
+        let mut controller = WheelController::new();
+        engage(&mut controller, MODE, actual);
+        controller
+    }
+
+    #[test]
+    fn a_profile_runs_once_to_a_new_reference_and_none_when_it_has_arrived() {
+        let (start, goal) = (WheelCount::wrapping_new(0), WheelCount::wrapping_new(3_000));
+        let settings = settings();
+        let mut controller = standing_at(start);
+        let mut target = Target::at(goal);
+        let mut starts = 0;
+        for _ in 0..1_000 {
+            let ran = controller.mode() == WheelMode::Trapezoidal;
+            command(&mut controller, MODE, &mut target, &settings);
+            let runs = controller.mode() == WheelMode::Trapezoidal;
+            starts += u32::from(runs && !ran);
+            let actual = controller.command();
+            controller.step(&WheelInput {
+                actual,
+                limit: false,
+                stop: false,
+            });
+        }
+        assert_eq!(controller.command(), goal);
+        assert_eq!(controller.mode(), WheelMode::Position);
+        assert_eq!(starts, 1);
+    }
+
+    #[test]
+    fn a_controller_that_does_not_control_starts_no_profile() {
+        let mut controller = standing_at(WheelCount::wrapping_new(0));
+        controller.apply(WheelCommand::Idle).unwrap();
+        let mut target = Target::at(WheelCount::wrapping_new(3_000));
+        command(&mut controller, MODE, &mut target, &settings());
+        assert_eq!(controller.mode(), WheelMode::Idle);
+    }
+
+    #[test]
+    fn whole_velocity_rounds_down_and_saturates() {
+        for (raw, whole) in [
+            (i16::MIN, -128),
+            (-2_049, -128),
+            (-2_048, -128),
+            (-2_047, -128),
+            (-2_032, -127),
+            (-17, -2),
+            (-16, -1),
+            (-1, -1),
+            (0, 0),
+            (15, 0),
+            (16, 1),
+            (2_031, 126),
+            (2_032, 127),
+            (2_047, 127),
+            (2_048, 127),
+            (i16::MAX, 127),
+        ] {
+            assert_eq!(whole_velocity(raw), whole, "{raw}");
+        }
+    }
+}
