@@ -9,13 +9,14 @@ use wheeleg_master::contact::{Sector, Side};
 use wheeleg_master::dispatcher::{Refusal, Ticket};
 use wheeleg_master::event::Event;
 use wheeleg_master::layer0::odometry::WheelGeometry;
+use wheeleg_master::layer0::wheels::WheelUnits;
 use wheeleg_master::layer1::params::GaitParams;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{
     Address, BoardKind, InputBits, Limit, LimitBits, Message, NackReason, NodeMode, SCHEMA_HASH,
     SyncFlags,
 };
-use wheeleg_units::{PositionMm, VelocityMmS};
+use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
 
 #[test]
 fn cycle_counter_and_time_advance_and_wrap() {
@@ -319,6 +320,96 @@ fn a_wheel_move_beyond_the_encoder_circle_is_refused() {
     // A second one would add up to 15 m from where the wheels are.
     assert_eq!(go(&mut rig, 7_500), (Some(Refusal::Moving), false));
     assert_eq!(go(&mut rig, -7_500), (None, true));
+}
+
+/// Half of what the 24-bit circle tells apart, less one.
+#[test]
+fn a_wheel_reference_is_at_most_2_to_the_22_less_one_counts_away() {
+    let wheels = WheelGeometry {
+        counts_per_revolution: 1_000_000,
+        circumference_um: 1_000_000,
+    };
+    let mut rig = Rig::new(MasterConfig {
+        wheels,
+        ..MasterConfig::default()
+    });
+    rig.arm();
+    for wheel in [7, 8] {
+        rig.node(wheel).rate = 0;
+    }
+    let go = |rig: &mut Rig, counts: i32| {
+        let travel_mm = PositionMm::from_f64(f64::from(counts) / 1e3);
+        let ticket = rig.submit(Command::WheelReference { travel_mm });
+        rig.cycle();
+        (rig.refusal(ticket), rig.done(ticket))
+    };
+    let reach = (1 << 22) - 1;
+    for far in [reach + 1, -reach - 1] {
+        let (refusal, done) = go(&mut rig, far);
+        assert!(matches!(refusal, Some(Refusal::Parameter(_))), "{far}");
+        assert!(!done);
+    }
+    // The wheels are held: each way back comes on top of the way there.
+    for (counts, answer) in [
+        (reach, (None, true)),
+        (1, (Some(Refusal::Moving), false)),
+        (-reach, (None, true)),
+        (-reach, (None, true)),
+        (-1, (Some(Refusal::Moving), false)),
+    ] {
+        assert_eq!(go(&mut rig, counts), answer, "{counts}");
+    }
+}
+
+#[test]
+fn a_velocity_is_told_in_sixteenths_of_a_count_per_sample() {
+    let units = |sample_us| WheelUnits {
+        geometry: WheelGeometry::default(),
+        sample_us,
+    };
+    // 104 000 counts and 942.478 mm per turn: 180 mm/s are 10.33 counts in 520 µs.
+    for (sample_us, mm_s, raw) in [
+        (520, 180, 165),
+        (520, -180, -165),
+        (520, 1, 1),
+        (520, 0, 0),
+        (1_040, 180, 331),
+        (2_048, 32_000, i16::MAX),
+        (2_048, -32_000, i16::MIN),
+    ] {
+        let speed = VelocityMmS::from_int(mm_s);
+        assert_eq!(units(sample_us).velocity_raw(speed), raw, "{mm_s} mm/s");
+    }
+}
+
+/// By a hand, while the master does not lead them.
+#[test]
+fn wheels_that_were_turned_while_stopped_go_on_from_where_they_are() {
+    let disarm = [Command::Disarm];
+    let stop = [Command::EmergencyStop, Command::ClearFault];
+    for end in [&disarm[..], &stop] {
+        let mut rig = Rig::new(MasterConfig::default());
+        rig.arm();
+        let travel_mm = PositionMm::from_int(100);
+        rig.submit(Command::WheelReference { travel_mm });
+        rig.run(30);
+        for command in end {
+            rig.submit(*command);
+            rig.run(20);
+        }
+        rig.node(7).position += 3_000;
+        rig.node(8).position -= 7_000;
+        rig.arm();
+        let here = [7, 8].map(|wheel| rig.node(wheel).position);
+        rig.submit(Command::WheelReference { travel_mm });
+        let sync = rig.cycle();
+        for (wheel, here) in [7, 8].into_iter().zip(here) {
+            let slot = sync.slots.wheel(Address::wheel(wheel).unwrap()).unwrap();
+            let begin = WheelCount::wrapping_new(here as i32);
+            let way = slot.reference.wrapping_difference(begin);
+            assert_eq!(way, 11_035, "wheel {wheel} after {end:?}");
+        }
+    }
 }
 
 #[test]

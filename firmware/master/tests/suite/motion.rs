@@ -293,3 +293,52 @@ fn touchdown_reflex_is_asked_for_from_the_lowering_on() {
         assert_eq!(s.setpoints.joints[5].unwrap().reflex, Reflex::None);
     }
 }
+
+/// The number of a motion tells that its distance counts from anew.
+#[test]
+fn a_second_gait_numbers_its_motions_on() {
+    let motions = |gait: &mut SquareGait| -> std::collections::BTreeSet<u16> {
+        let mut ideal = Ideal::new();
+        (0..=1_000)
+            .map(|cycle| {
+                let setpoints = gait.setpoints(START_US + cycle * 10_000, &ideal.feedback);
+                ideal.follow(&setpoints);
+                setpoints.travel.unwrap().segment
+            })
+            .collect()
+    };
+    let mut first = SquareGait::new(GaitParams::default(), START_US, 1).unwrap();
+    let of_first = motions(&mut first);
+    let next = first.segment() + 1;
+    let mut second = SquareGait::new(GaitParams::default(), START_US, next).unwrap();
+    let of_second = motions(&mut second);
+    assert_eq!(of_first.union(&of_second).count(), 8);
+}
+
+#[test]
+fn the_leg_that_steps_second_is_held_until_it_is_lowered() {
+    let held_mm = PositionMm::from_int(150);
+    let params = GaitParams {
+        steps: 4,
+        pattern: Pattern::Alternate { first: Side::Left },
+        held_leg_s6_mm: held_mm,
+        ..GaitParams::default()
+    };
+    let mut right_lowered = false;
+    for s in record(params, 10_000, 13) {
+        let (phase, stepping) = (s.setpoints.phase, s.setpoints.stepping.unwrap());
+        let air = matches!(phase, Phase::Lift | Phase::Reach);
+        right_lowered |= stepping == Side::Right && phase == Phase::Lower;
+        for side in [Side::Left, Side::Right] {
+            let vertical = s.setpoints.joints[side.joint(Cylinder::Vertical)].unwrap();
+            let wanted = if air && stepping == side {
+                PositionMm::ZERO
+            } else if side == Side::Left || right_lowered {
+                params.stroke_mm
+            } else {
+                held_mm
+            };
+            assert_eq!(vertical.reference_mm, wanted, "{side:?} at {}", s.t_s);
+        }
+    }
+}
