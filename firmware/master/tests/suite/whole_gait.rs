@@ -114,6 +114,23 @@ fn profile_drive_sends_the_end_of_the_push() {
 }
 
 #[test]
+fn streamed_wheels_are_told_the_velocity_of_the_push() {
+    let mut rig = rig();
+    rig.submit(Command::StartGait);
+    let wheel = Address::wheel(8).unwrap();
+    let mut fastest = 0;
+    for cycle in 0..1000 {
+        let slot = rig.cycle().slots.wheel(wheel).unwrap();
+        if rig.master.layer0().phase() != Phase::Push {
+            assert_eq!(slot.velocity_raw, 0, "cycle {cycle}");
+        }
+        fastest = fastest.max(slot.velocity_raw);
+    }
+    // 180 mm/s are 10.33 counts per sample.
+    assert_eq!(fastest, 165);
+}
+
+#[test]
 fn commands_out_of_place_are_refused_with_the_reason() {
     let mut rig = Rig::new(MasterConfig::default());
     rig.run(60);
