@@ -453,6 +453,76 @@ fn scenario_mistakes() {
         &["`events[0].value` = nan must be a number from 0 to 4 1/mm"],
     );
 
+    // Joints and boards count from 1: nothing may be left to be refused in the run.
+    for (line, allowed) in [
+        (
+            "joint = 0",
+            "`events[0].joint` = 0 must be a whole number from 1 to 6",
+        ),
+        (
+            "joint = 9",
+            "`events[0].joint` = 9 must be a whole number from 1 to 6",
+        ),
+        (
+            "board = 0",
+            "`events[0].board` = 0 must be a whole number from 1 to 8",
+        ),
+        (
+            "board = 9",
+            "`events[0].board` = 9 must be a whole number from 1 to 8",
+        ),
+    ] {
+        let event = format!(
+            "targets = \"none\"\n[[events]]\nat = {{ value = 1.0, unit = \"s\" }}\n\
+             action = \"command\"\ncommand = \"TransmitPosition\"\n{line}\n"
+        );
+        let text = scenario_with("targets = \"three-step\"\n", &event);
+        assert_all(&text, &["my.toml:", allowed]);
+        assert_eq!(text.lines().count(), 1, "{text}");
+    }
+
+    let bare = "\n[[events]]\nat = { value = 1.0, unit = \"s\" }\naction = \"command\"\n\
+                command = \"JointReference\"\njoint = 1\n";
+    let error = Scenario::parse("my.toml", &(SCENARIO.to_owned() + bare)).expect_err("no stroke");
+    let line = SCENARIO.lines().count() + 2;
+    assert_all(
+        &report(&error),
+        &[
+            &format!("my.toml:{line}: `events[0]`: "),
+            "JointReference",
+            "needs `stroke`",
+            "add `stroke` to the event",
+        ],
+    );
+
+    let late = "targets = \"none\"\nfaults = [\"master-silent@3s\", \"pot-open:joint3@12s\"]\n";
+    let text = scenario_with("targets = \"three-step\"\n", late);
+    assert_all(
+        &text,
+        &[
+            "my.toml:",
+            "`faults[1]`",
+            "pot-open:joint3@12s",
+            "below 10 s",
+        ],
+    );
+    assert_eq!(text.lines().count(), 1, "{text}");
+
+    let text = scenario_with("targets = \"three-step\"\n", "");
+    assert_all(&text, &["`targets` is missing", "\"stand\"", "\"none\""]);
+
+    let text = scenario_with(
+        "[motion]\n",
+        "[motion]\nfaults = [\"pot-open:joint3@2s\"]\n",
+    );
+    assert_all(
+        &text,
+        &[
+            "unknown field `faults` in [motion]",
+            "top of the file, above the first section",
+        ],
+    );
+
     let text = scenario_with("seed = 1", "seed = -1");
     assert_all(&text, &["`seed` = -1", "whole number"]);
 

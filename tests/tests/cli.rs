@@ -446,6 +446,56 @@ fn interfaces_are_listed_and_compared_and_bad_hashes_are_refused() {
     wheeleg().args(["interface", "--all"]).assert().code(2);
 }
 
+/// Times of events are those of the scenario wherever they are told, and a command that is
+/// refused is told like a fault, once.
+#[test]
+fn events_have_one_time_everywhere_and_refusals_are_told() {
+    let dir = folder();
+    let scenario = scenario_file(dir.path(), 1.0);
+    let mut text = fs::read_to_string(&scenario).expect("written");
+    for at in ["0.400", "0.600"] {
+        text += &format!(
+            "[[events]]\nat = {{ value = {at}, unit = \"s\" }}\naction = \"command\"\n\
+             command = \"JointReference\"\njoint = 1\n\
+             stroke = {{ value = 0.1, unit = \"m\" }}\n"
+        );
+    }
+    let scenario = write(dir.path(), "refused.toml", &text);
+    let out = dir.path().join("out");
+    let fault = "pot-open:joint3@0.8s";
+    let assert = wheeleg()
+        .args(["run", "--fault", fault, "--out"])
+        .args([&out, &scenario])
+        .assert()
+        .success();
+    let told = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    let json = fs::read_to_string(out.join("summary.json")).expect("summary.json");
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    let messages: Vec<&str> = json["messages"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
+    let refused: Vec<&&str> = messages
+        .iter()
+        .filter(|line| line.contains("JointReference"))
+        .collect();
+    assert!(
+        refused.len() == 1 && refused[0].starts_with("0.4") && refused[0].ends_with("(2 times)"),
+        "{messages:?}"
+    );
+    let page = fs::read_to_string(out.join("report.html")).expect("report.html");
+    assert!(page.contains(&format!(
+        ">0.800</td><td>scenario</td><td>fault {fault} begins"
+    )));
+    for message in messages {
+        assert!(told.contains(&format!("event   {message}")), "{told}");
+        let (time, _) = message.split_once(" s: ").expect("a time");
+        assert!(page.contains(&format!(">{time}</td>")), "{message}");
+    }
+}
+
 /// Ctrl-C in mid-run: the program ends by itself, says so, and the log up to
 /// then opens whole.
 #[cfg(unix)]

@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use assert_cmd::Command;
+use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use sil::{command, gait, robot, run, scenario, story};
@@ -60,6 +61,46 @@ fn the_table_has_the_rows_of_the_document() {
         let missing = matches!(row.expect, Expect::NotImplemented(_));
         assert_eq!(stated, missing, "{}", row.id);
     }
+}
+
+/// Numbers of a text: `0.9 to 3.1 ms` has 0.9 and 3.1.
+fn numbers(text: &str) -> BTreeSet<&str> {
+    let parts = text.split(|c: char| !c.is_ascii_digit() && c != '.' && c != '-');
+    let parts = parts.map(|part| part.trim_matches('.'));
+    parts.filter(|part| part.parse::<f64>().is_ok()).collect()
+}
+
+/// The document's limits are those by which the rows are judged.
+#[test]
+fn the_document_has_the_limits_of_its_rows() {
+    let lines = DOCUMENT.lines().filter(|line| line.starts_with("| "));
+    let mut judged = 0;
+    for line in lines {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').collect();
+        let [_, _, within, _, listed] = cells[..] else {
+            continue;
+        };
+        let stated = numbers(within);
+        for row in ROWS.iter().filter(|row| names(listed).contains(row.id)) {
+            let mut limits = match row.expect {
+                Expect::Stop(stop) => {
+                    let own = (stop.axis > 0).then_some(stop.own_ms);
+                    let from = Some(stop.detected_ms[0]).filter(|ms| *ms > 0.0);
+                    let all = [Some(stop.detected_ms[1]), Some(stop.all_ms), own, from];
+                    all.into_iter().flatten().collect()
+                }
+                Expect::GoesOn { deviation_mm } => vec![deviation_mm],
+                _ => Vec::new(),
+            };
+            limits.extend(row.held_mm);
+            for limit in limits {
+                judged += 1;
+                let limit = limit.to_string();
+                assert!(stated.contains(&*limit), "{}: {limit} in{within}", row.id);
+            }
+        }
+    }
+    assert!(judged > 130, "{judged} limits");
 }
 
 /// A fault that no row injects would be one that nobody has measured.
@@ -256,6 +297,15 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
     let detected = row["measured"]["detected_ms"].as_f64().expect("measured");
     assert!((0.9..=3.1).contains(&detected), "{detected} ms");
     assert_eq!(row["expected"]["axis"], 3);
+    let (expected, measured) = (&row["expected"], &row["measured"]);
+    for what in ["physical_ms", "wheels_stand_ms"] {
+        let [limit, value] = [expected, measured].map(|of| of[what].as_f64().expect(what));
+        assert!(value <= limit && limit > 35.0, "{what}: {value} of {limit}");
+    }
+    assert!(
+        measured["deviation_mm"].is_null(),
+        "a motion that stops has none"
+    );
     let page = std::fs::read_to_string(folder.path().join("matrix/report.html"));
     let page = page
         .expect("a page")
@@ -264,6 +314,7 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
         "pot-open",
         "PASS",
         "The position sensor reads outside its range",
+        "detected 0.9 to 3.1, axis 4.1, all 35, physical ",
     ] {
         assert!(page.contains(words), "{words}");
     }
@@ -271,8 +322,37 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
         assert!(!page.contains(outside), "{outside}");
     }
 
-    let (mut command, _folder) = faults_run(&["--row", "valve-slow"]);
-    command.assert().code(1).stdout(contains("FAIL"));
+    let (mut command, folder) = faults_run(&["--row", "valve-slow", "--row", "valve-slow"]);
+    let failed = contains("FAIL").count(1);
+    let failed = failed.and(contains("detected: never"));
+    command
+        .assert()
+        .code(1)
+        .stdout(failed.and(contains("not all axes stop")));
+    // What goes on has no latency of a stop.
+    let json = std::fs::read_to_string(folder.path().join("matrix/summary.json"));
+    let json: Value = serde_json::from_str(&json.expect("a summary")).expect("JSON");
+    let measured = &json["rows"][0]["measured"];
+    for what in [
+        "own_commanded_ms",
+        "commanded_ms",
+        "sensed_ms",
+        "physical_ms",
+        "wheels_stand_ms",
+        "held_mm",
+    ] {
+        assert!(measured[what].is_null(), "{what}: {measured}");
+    }
+    assert!(measured["deviation_mm"].is_number(), "{measured}");
+    let (mut command, folder) = faults_run(&["--row", "e-stop/walking"]);
+    command.assert().success();
+    let page = std::fs::read_to_string(folder.path().join("matrix/report.html"));
+    assert!(page.expect("a page").contains("<td>E-stop@"));
+    let (mut command, _folder) = faults_run(&["--row", "pot-frozen"]);
+    command
+        .assert()
+        .code(2)
+        .stderr(contains("frozen/lowering").and(contains("frozen/reach")));
     let (mut command, _folder) = faults_run(&["--row", "ui-replay"]);
     command.assert().code(2).stderr(contains("not implemented"));
     let (mut command, _folder) = faults_run(&["--row", "pot-opn"]);

@@ -15,7 +15,7 @@ use crate::interface::{self, Side, archive};
 pub(super) struct InterfaceArgs {
     /// Hash of the other interface, 16 hexadecimal digits, as the master names it.
     hash: Option<String>,
-    /// Print all lines that differ.
+    /// Print all lines that differ: `-` before those of this program, `+` before those of HASH.
     #[arg(long, requires = "hash")]
     all: bool,
 }

@@ -1,5 +1,7 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
+use miette::Diagnostic as _;
+
 use super::error::ConfigError;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
@@ -250,7 +252,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         ),
     );
     let seed = match top.get("seed") {
-        Some(_) => r.whole(&top, "seed", i64::MAX as u64),
+        Some(_) => r.whole(&top, "seed", 0..=i64::MAX as u64),
         None => {
             r.problem(
                 None,
@@ -275,7 +277,14 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         ground.extend(patch(r, &entry));
     }
     let faults = r.texts(&top, "faults", |text| {
-        text.parse::<FaultSpec>().map_err(|e| e.to_string())
+        let fault = text.parse::<FaultSpec>().map_err(|e| e.to_string())?;
+        match duration.filter(|end_s| fault.from_s >= *end_s) {
+            Some(end_s) => Err(format!(
+                "the fault `{fault}` does nothing: the scenario ends at {end_s} s, before it \
+                 could begin; allowed is a begin from 0 s to below {end_s} s"
+            )),
+            None => Ok(fault),
+        }
     });
     Some(Scenario {
         name: name?,
@@ -345,16 +354,17 @@ fn motion(r: &mut Reader) -> Option<Motion> {
     ];
     match r.choice(&entry, "kind", &kinds)? {
         MotionKind::Stand => {
-            r.reject_unknown(&entry, &["kind"]);
+            r.reject_misplaced(&entry, &["kind"], &TOP);
             Some(Motion::Stand)
         }
         MotionKind::SquareWave => {
-            r.reject_unknown(&entry, &["kind", "leg"]);
+            r.reject_misplaced(&entry, &["kind", "leg"], &TOP);
             let leg = r.choice(&entry, "leg", &LEGS)?;
             Some(Motion::SquareWave { leg })
         }
         MotionKind::Sinusoid => {
-            r.reject_unknown(&entry, &["kind", "leg", "length", "height", "rate"]);
+            let known = ["kind", "leg", "length", "height", "rate"];
+            r.reject_misplaced(&entry, &known, &TOP);
             let leg = r.choice(&entry, "leg", &LEGS);
             let length = scalar(
                 "length",
@@ -401,6 +411,7 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         latest,
         "time of the event, within the duration of the scenario",
     );
+    let before = r.problem_count();
     let at_s = required(r, entry, &at);
     let actions = [
         ("kill-master", ActionKind::KillMaster),
@@ -410,7 +421,7 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
     ];
     let kind = r.choice(entry, "action", &actions)?;
     let action = if matches!(kind, ActionKind::Command) {
-        r.reject_unknown(
+        r.reject_misplaced(
             entry,
             &[
                 "at",
@@ -423,10 +434,11 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
                 "parameter",
                 "value",
             ],
+            &TOP,
         );
         let commands: Vec<(&str, &str)> = super::COMMAND_NAMES.iter().map(|n| (*n, *n)).collect();
         let name = r.choice(entry, "command", &commands);
-        let joint = entry.get("joint").and_then(|_| r.whole(entry, "joint", 6));
+        let joint = r.whole(entry, "joint", 1..=6);
         let stroke = scalar(
             "stroke",
             Dimension::Length,
@@ -443,7 +455,7 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         );
         let stroke_m = optional(r, entry, &stroke);
         let travel_m = optional(r, entry, &travel);
-        let board = entry.get("board").and_then(|_| r.whole(entry, "board", 8));
+        let board = r.whole(entry, "board", 1..=8);
         let board = board.map(|number| number as u8);
         let parameter = super::node::choice(r, entry, board);
         EventAction::Command {
@@ -455,13 +467,26 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
             travel_m,
         }
     } else {
-        r.reject_unknown(entry, &["at", "action"]);
+        r.reject_misplaced(entry, &["at", "action"], &TOP);
         match kind {
             ActionKind::KillMaster => EventAction::KillMaster,
             ActionKind::EStop => EventAction::EStop,
             _ => EventAction::ClearFault,
         }
     };
+    // Of a field that is there and wrong, it is told what is wrong.
+    if r.problem_count() == before
+        && let Err(reason) = crate::sil::can_be_given(&action)
+    {
+        let place = Some(entry.span.clone());
+        let help = reason.help().map(|help| help.to_string());
+        r.problem(
+            place,
+            format!("`{}`: {reason}", entry.path),
+            "in this event",
+            help,
+        );
+    }
     Some(ScenarioEvent {
         at_s: at_s?,
         action,
@@ -469,7 +494,7 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
 }
 
 fn patch(r: &mut Reader, entry: &Entry) -> Option<GroundPatch> {
-    r.reject_unknown(entry, &["x", "y", "height"]);
+    r.reject_misplaced(entry, &["x", "y", "height"], &TOP);
     let mut range = |key: &'static str, doc: &'static str| -> Option<[f64; 2]> {
         let spec = FieldSpec {
             components: 2,

@@ -119,7 +119,6 @@ pub(super) fn render(
         })
         .collect();
     let figures = pictures(figures);
-    let start = source.analysis.start_s;
     let delays: Vec<Value> = source
         .analysis
         .start_delays
@@ -128,7 +127,7 @@ pub(super) fn render(
             context! {
                 step => d.step,
                 name => d.move_name,
-                at => format!("{:.3}", d.at_s - start),
+                at => format!("{:.3}", d.at_s),
                 delay => d.delay_s.map_or_else(|| "did not move".to_owned(), |v| format!("{:.0}", v * 1e3)),
             }
         })
@@ -147,7 +146,7 @@ pub(super) fn render(
         .into_iter()
         .map(|(t_s, kind, text)| {
             context! {
-                t => format!("{:.3}", t_s - start).replace('-', "−"),
+                t => format!("{t_s:.3}"),
                 kind => kind,
                 text => text,
             }
@@ -177,6 +176,7 @@ pub(super) fn render(
             seed => summary.seed,
             hash => &*summary.hash,
             complete => summary.complete,
+            dropped => summary.dropped_messages,
             faults => &summary.faults,
         },
         scenario_text => &*source.scenario.description,
@@ -189,7 +189,7 @@ pub(super) fn render(
         met => met,
         shift => source.analysis.shift_s.map(|s| format!("{:.0}", s * 1e3)),
         messages => source.recording.messages,
-        start => format!("{start:.3}"),
+        start => format!("{:.3}", source.analysis.start_s),
         targets => targets,
         figures => figures,
         delays => delays,

@@ -71,6 +71,7 @@ mod tests {
     use super::*;
     use crate::analysis::{self, testing};
     use crate::config::builtin;
+    use crate::telemetry::{EventSample, Row};
 
     /// Every file of a run, from a recording made of the reference model.
     fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
@@ -139,6 +140,35 @@ mod tests {
         assert!(!whole.contains("was stopped after") && !whole.contains("not judged"));
         assert!(!part.contains(verdict) && !part.contains(">PASS<") && !part.contains(">FAIL<"));
         assert!(part.contains("was stopped after") && part.contains("not judged"));
+    }
+
+    /// The motion begins 0.25 s after the record: only the figures count from there.
+    #[test]
+    fn the_page_tells_events_in_scenario_time_and_what_the_log_lacks() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario("three-step").expect("built in");
+        let mut recording = testing::from_reference(&robot, 0.25, 0.0);
+        recording.events.push(Row {
+            t_ns: 3_000_000_000,
+            v: EventSample {
+                kind: "fault".to_owned(),
+                text: "a thing".to_owned(),
+            },
+        });
+        let mut analysis = analysis::analyse(&scenario, &robot, &recording);
+        analysis.start_s = 0.25;
+        let (folder, mut summary) = report("three-step");
+        let mut page = |dropped: u64| {
+            summary.dropped_messages = dropped;
+            let (r, a) = (&recording, &analysis);
+            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            std::fs::read_to_string(folder.path().join("report.html")).expect("written")
+        };
+        let (whole, part) = (page(0), page(321));
+        assert!(whole.contains(">3.000</td><td>fault</td><td>a thing"));
+        assert!(whole.contains("0.250 s of scenario time"));
+        let loss = "messages could not be written to the log";
+        assert!(!whole.contains(loss) && part.contains(loss) && part.contains("321 of "));
     }
 
     #[test]
@@ -216,7 +246,10 @@ mod tests {
             assert_eq!(&png[1..4], b"PNG", "{id}");
             assert!(png.len() > 5_000, "{id}: {}", png.len());
             let svg = std::fs::read_to_string(figures.join(format!("{id}.svg"))).expect("SVG");
-            assert!(svg.contains("time [s]"), "{id}");
+            assert!(
+                svg.contains("time since the start of the motion [s]"),
+                "{id}"
+            );
         }
     }
 

@@ -1,11 +1,13 @@
 //! The machine-readable summary of a run.
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 
 use crate::analysis::{Analysis, Target};
 use crate::config::{RobotConfig, Scenario};
 use crate::pil::PilSummary;
-use crate::telemetry::Recording;
+use crate::telemetry::{EventSample, Recording};
 
 /// Facts about a run that are not in its recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +42,8 @@ pub struct Summary {
     pub seed: u64,
     /// Faults injected, of the scenario and of the command line.
     pub faults: Vec<String>,
-    /// What went wrong and what to do about it, in order of time.
+    /// What went wrong and what to do about it, and commands that were not carried out, in order
+    /// of time; equal ones of these are one message that tells how many.
     pub messages: Vec<String>,
     /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
     pub hash: String,
@@ -65,12 +68,33 @@ pub struct Summary {
     pub pil: Option<PilSummary>,
 }
 
-/// Faults and findings as the user reads them, with their time.
+/// Whether a user's command, or a service tool's, came to nothing. The record has the answers to
+/// all commands as one kind of event; only the words tell a refusal.
+fn is_refusal(event: &EventSample) -> bool {
+    let words = ["refused", "refuses", "nobody answers"];
+    event.kind == "command" && words.iter().any(|word| event.text.contains(word))
+}
+
+/// Faults, findings and refusals as the user reads them, with their time. A user who asks for the
+/// same again and again gets one line, at the time of the first refusal.
 fn messages(recording: &Recording) -> Vec<String> {
-    let faults = recording.events.iter().filter(|e| e.v.kind == "fault");
-    faults
-        .map(|e| format!("{:.3} s: {}", e.t_s(), e.v.text))
-        .collect()
+    let mut counts: HashMap<&str, usize> = HashMap::new();
+    for event in recording.events.iter().filter(|e| is_refusal(&e.v)) {
+        *counts.entry(&event.v.text).or_default() += 1;
+    }
+    let told = recording.events.iter().filter_map(|e| {
+        let line = format!("{:.3} s: {}", e.t_s(), e.v.text);
+        if e.v.kind == "fault" {
+            return Some(line);
+        }
+        // Taken out with the first, so that the others find none.
+        let count = is_refusal(&e.v).then(|| counts.remove(e.v.text.as_str()));
+        match count.flatten()? {
+            1 => Some(line),
+            n => Some(format!("{line} ({n} times)")),
+        }
+    });
+    told.collect()
 }
 
 impl Summary {
@@ -111,5 +135,40 @@ impl Summary {
         let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
         text.push('\n');
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::Row;
+
+    #[test]
+    fn faults_are_all_told_and_equal_refusals_once_with_their_number() {
+        let mut recording = Recording::default();
+        for (ms, kind, text) in [
+            (1, "command", "Arm: accepted"),
+            (2, "command", "JointReference: refused, Moving"),
+            (3, "fault", "joint 1: a thing"),
+            (4, "command", "JointReference: refused, Moving"),
+            (5, "fault", "joint 1: a thing"),
+            (6, "command", "master: Arm refused: Interrupted"),
+            (7, "info", "nothing is refused"),
+        ] {
+            recording.events.push(Row {
+                t_ns: ms * 1_000_000,
+                v: EventSample {
+                    kind: kind.to_owned(),
+                    text: text.to_owned(),
+                },
+            });
+        }
+        let expected = [
+            "0.002 s: JointReference: refused, Moving (2 times)",
+            "0.003 s: joint 1: a thing",
+            "0.005 s: joint 1: a thing",
+            "0.006 s: master: Arm refused: Interrupted",
+        ];
+        assert_eq!(messages(&recording), expected);
     }
 }

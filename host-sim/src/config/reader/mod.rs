@@ -223,8 +223,19 @@ impl Reader {
         Some(T::build(&mut || values.next().unwrap_or_default()))
     }
 
+    /// Problems found so far.
+    pub(crate) fn problem_count(&self) -> usize {
+        self.problems.len()
+    }
+
     /// Reports every field of `entry` that is not in `known`.
     pub(crate) fn reject_unknown(&mut self, entry: &Entry, known: &[&str]) {
+        self.reject_misplaced(entry, known, &[]);
+    }
+
+    /// The same; of a field that is one of the `top` of the file it says where it belongs.
+    /// TOML takes whatever stands below a heading for that section.
+    pub(crate) fn reject_misplaced(&mut self, entry: &Entry, known: &[&str], top: &[&str]) {
         for (key, span, _) in &entry.fields {
             if known.contains(&key.as_str()) {
                 continue;
@@ -234,6 +245,9 @@ impl Reader {
                 path => format!("in [{path}]"),
             };
             let help = match closest(key, known.iter().copied()) {
+                _ if top.contains(&key.as_str()) => {
+                    format!("`{key}` belongs to the top of the file, above the first section")
+                }
                 Some(word) => format!("did you mean `{word}`?"),
                 None => format!("known here: {}", known.join(", ")),
             };

@@ -1,5 +1,7 @@
 //! Texts, choices and whole numbers.
 
+use std::ops::RangeInclusive;
+
 use super::{Entry, Reader};
 use crate::config::suggest::closest;
 
@@ -69,20 +71,29 @@ impl Reader {
         key: &str,
         choices: &[(&str, T)],
     ) -> Option<T> {
+        let names: Vec<String> = choices.iter().map(|(n, _)| format!("\"{n}\"")).collect();
+        let names = names.join(", ");
+        if entry.get(key).is_none() {
+            self.problem(
+                Some(entry.span.clone()),
+                format!("`{}` is missing; accepted: {names}", entry.field_path(key)),
+                "expected here",
+                Some(format!("write `{key} = \"…\"`")),
+            );
+            return None;
+        }
         let text = self.text(entry, key)?;
         if let Some((_, value)) = choices.iter().find(|(name, _)| *name == text) {
             return Some(*value);
         }
-        let names: Vec<String> = choices.iter().map(|(n, _)| format!("\"{n}\"")).collect();
         let span = entry.get(key).and_then(|(k, i)| i.span().or(Some(k)));
         let help = closest(&text, choices.iter().map(|(n, _)| *n))
             .map(|word| format!("did you mean \"{word}\"?"));
         self.problem(
             span,
             format!(
-                "`{}` = \"{text}\" is not known; accepted: {}",
-                entry.field_path(key),
-                names.join(", ")
+                "`{}` = \"{text}\" is not known; accepted: {names}",
+                entry.field_path(key)
             ),
             "not known",
             help,
@@ -91,16 +102,23 @@ impl Reader {
     }
 
     /// Reads a whole number without unit, such as a seed.
-    pub(crate) fn whole(&mut self, entry: &Entry, key: &str, max: u64) -> Option<u64> {
+    pub(crate) fn whole(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        allowed: RangeInclusive<u64>,
+    ) -> Option<u64> {
         let (key_span, item) = entry.get(key)?;
         let value = item.as_integer().and_then(|v| u64::try_from(v).ok());
         match value {
-            Some(v) if v <= max => Some(v),
+            Some(v) if allowed.contains(&v) => Some(v),
             _ => {
                 let message = format!(
-                    "`{}` = {} must be a whole number from 0 to {max}",
+                    "`{}` = {} must be a whole number from {} to {}",
                     entry.field_path(key),
-                    item.to_string().trim()
+                    item.to_string().trim(),
+                    allowed.start(),
+                    allowed.end()
                 );
                 self.problem(item.span().or(Some(key_span)), message, "not allowed", None);
                 None

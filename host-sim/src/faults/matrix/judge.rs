@@ -51,6 +51,8 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// What did not, or why it was not run.
     pub failures: Vec<String>,
+    /// What parts of a stop may take beyond the limit for all axes.
+    pub after_all: AfterAll,
     /// What was measured.
     pub measured: Measured,
     /// The faults as they were injected.
@@ -58,11 +60,12 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    pub(super) fn not_implemented(row: Row, reason: &str) -> Self {
+    pub(super) fn not_implemented(row: Row, robot: &RobotConfig, reason: &str) -> Self {
         Self {
             row,
             verdict: Verdict::NotImplemented,
             failures: vec![reason.to_owned()],
+            after_all: AfterAll::of(robot),
             measured: Measured::default(),
             faults: Vec::new(),
         }
@@ -95,13 +98,19 @@ impl Failures {
 /// Judges a run.
 pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Outcome {
     let mut f = Failures::default();
+    let after_all = AfterAll::of(robot);
     match row.expect {
         Expect::Stop(expected) => {
-            stop(&mut f, &row, &expected, &m);
-            physically_shut(&mut f, robot, &m, expected.all_ms);
+            detected(&mut f, expected.detected_ms, &m);
+            if m.stopped {
+                stop(&mut f, &row, &expected, &after_all, &m);
+            } else {
+                // Then nothing of the stop has a time.
+                f.0.push("not all axes stop".to_owned());
+            }
         }
         Expect::GoesOn { deviation_mm } => goes_on(&mut f, deviation_mm, &m),
-        Expect::Degrades => degrades(&mut f, robot, &m),
+        Expect::Degrades => degrades(&mut f, &after_all, &m),
         Expect::StartsAnew { board } => starts_anew(&mut f, board, ran, &m),
         Expect::NoArming => no_arming(&mut f, ran),
         Expect::NotImplemented(_) => {}
@@ -143,17 +152,36 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         row,
         verdict,
         failures: f.0,
+        after_all,
         measured: m,
         faults: ran.faults.iter().map(ToString::to_string).collect(),
     }
 }
 
+/// What is left of a stop when all axes are commanded to: beyond their limit, ms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AfterAll {
+    /// Until the slowest valve is shut.
+    pub physical_ms: f64,
+    /// Until both rims stand.
+    pub wheels_ms: f64,
+}
+
+impl AfterAll {
+    fn of(robot: &RobotConfig) -> Self {
+        Self {
+            physical_ms: closing_ms(robot) + TICK_MS,
+            wheels_ms: WHEEL_STOP_MS,
+        }
+    }
+}
+
 /// Valves that were commanded shut at the latest after `all_ms` let no more air through.
-fn physically_shut(f: &mut Failures, robot: &RobotConfig, m: &Measured, all_ms: f64) {
+fn physically_shut(f: &mut Failures, after_all: &AfterAll, m: &Measured, all_ms: f64) {
     f.within(
         "valves physically shut",
         m.physical_ms,
-        all_ms + closing_ms(robot) + TICK_MS,
+        all_ms + after_all.physical_ms,
     );
 }
 
@@ -164,14 +192,16 @@ fn closing_ms(robot: &RobotConfig) -> f64 {
     closing.fold(0.0, f64::max) * 1e3
 }
 
-fn stop(f: &mut Failures, row: &Row, expected: &Stop, m: &Measured) {
-    let [from, to] = expected.detected_ms;
+fn detected(f: &mut Failures, [from, to]: [f64; 2], m: &Measured) {
     f.within("detected", m.detected_ms, to);
     if let Some(ms) = m.detected_ms {
         f.check(ms >= from - 1e-6, || {
             format!("detected after {ms:.1} ms, not before {from:.1}")
         });
     }
+}
+
+fn stop(f: &mut Failures, row: &Row, expected: &Stop, after_all: &AfterAll, m: &Measured) {
     if expected.axis > 0 {
         f.within(
             "valves of the axis commanded shut",
@@ -181,10 +211,11 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, m: &Measured) {
     }
     f.within("all valves commanded shut", m.commanded_ms, expected.all_ms);
     f.within("all boards tell a safe mode", m.sensed_ms, expected.all_ms);
+    physically_shut(f, after_all, m, expected.all_ms);
     f.within(
         "both wheels stand",
         m.wheels_stand_ms,
-        expected.all_ms + WHEEL_STOP_MS,
+        expected.all_ms + after_all.wheels_ms,
     );
     f.check(m.latched, || "not latched".to_owned());
     if let Some(limit) = row.held_mm {
@@ -236,11 +267,12 @@ fn goes_on(f: &mut Failures, limit_mm: f64, m: &Measured) {
         Some(mm) => f.check(mm <= limit_mm, || {
             format!("a stroke deviates by {mm:.3} mm, allowed {limit_mm}")
         }),
-        None => f.0.push("nothing to compare with".to_owned()),
+        // One that stops has failed already.
+        None => f.check(m.stopped, || "nothing to compare with".to_owned()),
     }
 }
 
-fn degrades(f: &mut Failures, robot: &RobotConfig, m: &Measured) {
+fn degrades(f: &mut Failures, after_all: &AfterAll, m: &Measured) {
     match m.detected_ms {
         None => {
             f.check(!m.stopped, || "stopped without a reason".to_owned());
@@ -255,11 +287,11 @@ fn degrades(f: &mut Failures, robot: &RobotConfig, m: &Measured) {
             f.check(m.stopped, || "detected, but not all axes stop".to_owned());
             f.within("all valves commanded shut", m.commanded_ms, all_ms);
             f.within("all boards tell a safe mode", m.sensed_ms, all_ms);
-            physically_shut(f, robot, m, all_ms);
+            physically_shut(f, after_all, m, all_ms);
             f.within(
                 "both wheels stand",
                 m.wheels_stand_ms,
-                all_ms + WHEEL_STOP_MS,
+                all_ms + after_all.wheels_ms,
             );
             f.check(m.latched, || "not latched".to_owned());
         }
@@ -291,6 +323,7 @@ mod tests {
         let moved = |held_mm| {
             let measured = Measured {
                 held_mm,
+                stopped: true,
                 ..Measured::default()
             };
             let outcome = judge(*row, &robot, &ran, measured);
@@ -299,5 +332,38 @@ mod tests {
         let limit = row.held_mm.expect("a limit");
         assert!(!moved(Some(limit)));
         assert!(moved(Some(limit + 0.1)) && moved(None));
+    }
+
+    #[test]
+    fn a_row_that_must_stop_and_goes_on_fails() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["pot-open".to_owned()]).expect("a row")[0];
+        let ran = Ran {
+            at_s: 0.0,
+            faults: Vec::new(),
+            recording: Recording::default(),
+            line: LineAudit::default(),
+            arming_asked: true,
+            outputs: Outputs::default(),
+            error: None,
+        };
+        let failures = |m| judge(*row, &robot, &ran, m).failures.join("; ");
+        let on = failures(Measured::default());
+        assert!(on.contains("detected: never") && on.contains("not all axes stop"));
+        // One that has stopped is judged by every time that it lacks.
+        let stopped = failures(Measured {
+            stopped: true,
+            ..Measured::default()
+        });
+        for what in [
+            "valves of the axis commanded shut: never",
+            "all valves commanded shut: never",
+            "all boards tell a safe mode: never",
+            "valves physically shut: never",
+            "both wheels stand: never",
+            "not latched",
+        ] {
+            assert!(stopped.contains(what), "{what}: {stopped}");
+        }
     }
 }

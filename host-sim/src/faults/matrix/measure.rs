@@ -22,7 +22,9 @@ const EXPECTED_MM: f64 = 2.0;
 /// Trapped air is watched for this long after the stop, s.
 const HELD_S: f64 = 0.5;
 
-/// What was measured. Times in ms count from the row's instant; `None`: never.
+/// What was measured. Times in ms count from the row's instant; `None`: never. Those of the stop
+/// are `None`, too, where axes go on or none has driven: the last pulse of a motion that goes on
+/// is no latency.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Measured {
     /// Instant of the fault, s of scenario time.
@@ -47,7 +49,8 @@ pub struct Measured {
     pub supply_switch_ms: Option<f64>,
     /// Largest sensed movement of a held joint in the half second after the stop, mm.
     pub held_mm: Option<f64>,
-    /// Largest deviation of a true stroke from the same run without the fault, mm.
+    /// Largest deviation of a true stroke from the same run without the fault, mm; only where
+    /// the motion goes on.
     pub deviation_mm: Option<f64>,
     /// No axis drives at the end.
     pub stopped: bool,
@@ -125,28 +128,33 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
         reads: reads(ran),
         ..Measured::default()
     };
-    let shut: Vec<Option<f64>> = (0..8).map(|i| shut_s(r, i, since_s, &blind)).collect();
-    let safe: Vec<Option<f64>> = (0..8).map(|i| safe_s(r, i, since_s, &blind)).collect();
-    m.own_commanded_ms = (axis > 0).then(|| shut[axis - 1]).flatten().map(ms);
-    m.commanded_ms = worst(&shut).map(ms);
-    m.sensed_ms = worst(&safe).map(ms);
-    let physical: Vec<Option<f64>> = (0..6)
-        .map(|i| {
-            open_until_s(&r.joints[i], since_s, |s| {
-                s.valves_open & !blind.stuck[i] != 0
-            })
-        })
-        .collect();
-    m.physical_ms = worst(&physical).map(ms);
-    m.wheels_stand_ms = stand_s(r, since_s).map(ms);
     let supply = || r.supply.iter().filter(|s| s.t_s() >= since_s - 1e-9);
     m.dump_ms = supply().find(|s| s.v.dump_commanded).map(|s| ms(s.t_s()));
     m.supply_switch_ms = supply().find(|s| !s.v.pressure_switch).map(|s| ms(s.t_s()));
-    m.stopped = m.commanded_ms.is_some() && m.sensed_ms.is_some();
-    m.latched = m.stopped && ran.arming_asked;
     m.drives = drives(r, at_s);
-    m.held_mm = worst(&safe).and_then(|from_s| held_mm(r, from_s));
-    m.deviation_mm = sound.and_then(|sound| deviation_mm(r, sound, at_s));
+    let shut: Vec<Option<f64>> = (0..8).map(|i| shut_s(r, i, since_s, &blind)).collect();
+    let safe: Vec<Option<f64>> = (0..8).map(|i| safe_s(r, i, since_s, &blind)).collect();
+    let (commanded, sensed) = (worst(&shut), worst(&safe));
+    m.stopped = commanded.is_some() && sensed.is_some();
+    m.latched = m.stopped && ran.arming_asked;
+    if m.stopped && m.drives {
+        m.own_commanded_ms = (axis > 0).then(|| shut[axis - 1]).flatten().map(ms);
+        m.commanded_ms = commanded.map(ms);
+        m.sensed_ms = sensed.map(ms);
+        let physical: Vec<Option<f64>> = (0..6)
+            .map(|i| {
+                open_until_s(&r.joints[i], since_s, |s| {
+                    s.valves_open & !blind.stuck[i] != 0
+                })
+            })
+            .collect();
+        m.physical_ms = worst(&physical).map(ms);
+        m.wheels_stand_ms = stand_s(r, since_s).map(ms);
+        m.held_mm = sensed.and_then(|from_s| held_mm(r, from_s));
+    }
+    if !m.stopped {
+        m.deviation_mm = sound.and_then(|sound| deviation_mm(r, sound, at_s));
+    }
     let after = |t: f64| t >= since_s;
     let loads = r.bus.iter().filter(|b| after(b.t_s()));
     m.bus_load = loads.fold(0.0, |most, b| b.v.load.max(most));

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-pub use judge::{Outcome, Verdict};
+pub use judge::{AfterAll, Outcome, Verdict};
 pub use measure::Measured;
 pub use row::{Expect, Phase, Row, Since, Stop, Strike, Variant};
 pub use rows::ROWS;
@@ -112,6 +112,15 @@ mod tests {
         assert_eq!(one("pot-open").expect("a row"), "pot-open");
         let unknown = one("pot-opn").expect_err("no row").to_string();
         assert!(unknown.contains("did you mean `pot-open`"), "{unknown}");
+        let group = one("pot-frozen").expect_err("a group").to_string();
+        assert!(
+            group.contains("`pot-frozen/lowering`, `pot-frozen/reach`"),
+            "{group}"
+        );
+        let twice = ["pot-open", "pot-short", "pot-open"].map(str::to_owned);
+        let once = select(&twice).expect("rows");
+        let ids: Vec<&str> = once.iter().map(|row| row.id).collect();
+        assert_eq!(ids, ["pot-open", "pot-short"]);
         let refused = one("ui-replay").expect_err("not implemented").to_string();
         assert!(refused.contains("not implemented"), "{refused}");
     }

@@ -4,7 +4,7 @@ use minijinja::{Value, context};
 use serde_json::json;
 
 use super::count;
-use super::judge::{DEGRADED_MM, Outcome, REACTION_MS, Verdict};
+use super::judge::{AfterAll, DEGRADED_MM, Outcome, REACTION_MS, Verdict};
 use super::row::{Expect, Row, Since};
 use crate::SimError;
 use crate::report::page;
@@ -35,7 +35,7 @@ fn row_json(outcome: &Outcome) -> serde_json::Value {
         "row": row.id,
         "faults": outcome.faults,
         "phase": row.phase.words(),
-        "expected": expected_json(row),
+        "expected": expected_json(outcome),
         "measured": run.then_some(&outcome.measured),
         "latched": run.then_some(outcome.measured.latched),
         "pass": pass,
@@ -45,7 +45,8 @@ fn row_json(outcome: &Outcome) -> serde_json::Value {
     })
 }
 
-fn expected_json(row: &Row) -> serde_json::Value {
+fn expected_json(outcome: &Outcome) -> serde_json::Value {
+    let (row, after_all) = (&outcome.row, &outcome.after_all);
     let mut value = match row.expect {
         Expect::Stop(stop) => json!({
             "reaction": reaction(row),
@@ -53,6 +54,9 @@ fn expected_json(row: &Row) -> serde_json::Value {
             "axis": (stop.axis > 0).then_some(stop.axis),
             "own_ms": stop.own_ms,
             "all_ms": stop.all_ms,
+            "physical_ms": tidy(stop.all_ms + after_all.physical_ms),
+            "wheels_stand_ms": tidy(stop.all_ms + after_all.wheels_ms),
+            "dump_ms": row.estop.then_some(stop.all_ms),
             "held_mm": row.held_mm,
             "latched": true,
         }),
@@ -62,6 +66,8 @@ fn expected_json(row: &Row) -> serde_json::Value {
         Expect::Degrades => json!({
             "reaction": reaction(row),
             "all_ms_after_detection": REACTION_MS,
+            "physical_ms_after_detection": tidy(REACTION_MS + after_all.physical_ms),
+            "wheels_stand_ms_after_detection": tidy(REACTION_MS + after_all.wheels_ms),
             "deviation_mm_without_detection": DEGRADED_MM,
             "latched": "if all axes stop",
         }),
@@ -95,29 +101,63 @@ pub(super) fn reaction(row: &Row) -> String {
     }
 }
 
-/// Limits of a row, in words.
-fn limits(row: &Row) -> String {
+/// A sum of limits without the tail of its binary fraction.
+fn tidy(ms: f64) -> f64 {
+    (ms * 1e3).round() / 1e3
+}
+
+/// Limits of a row, in words, as it is judged by them.
+fn limits(outcome: &Outcome) -> String {
+    let row = &outcome.row;
+    let after = |all_ms: f64| {
+        let AfterAll {
+            physical_ms,
+            wheels_ms,
+        } = outcome.after_all;
+        format!(
+            "all {all_ms}, physical {:.1}, wheels {:.0} ms",
+            all_ms + physical_ms,
+            all_ms + wheels_ms
+        )
+    };
     match row.expect {
         Expect::Stop(stop) => {
             let [from, to] = stop.detected_ms;
             let own = if stop.axis > 0 {
-                format!(", axis {:.0}", stop.own_ms)
+                format!(", axis {}", stop.own_ms)
             } else {
                 String::new()
             };
-            let held = row.held_mm.map(|mm| format!(", held within {mm:.0} mm"));
+            let dump = if row.estop {
+                format!(", dump {} ms", stop.all_ms)
+            } else {
+                String::new()
+            };
+            let held = row.held_mm.map(|mm| format!(", held within {mm} mm"));
             format!(
-                "detected {from:.0} to {to:.0}{own}, all {:.0} ms{}",
-                stop.all_ms,
+                "detected {from} to {to}{own}, {}{dump}{}",
+                after(stop.all_ms),
                 held.unwrap_or_default()
             )
+            .replace('-', "−")
         }
         Expect::GoesOn { deviation_mm } => format!("deviation {deviation_mm} mm"),
         Expect::Degrades => format!(
-            "all {REACTION_MS:.0} ms after the detection; without one, deviation {DEGRADED_MM:.0} mm"
+            "after the detection {}; without one, deviation {DEGRADED_MM} mm",
+            after(REACTION_MS)
         ),
         _ => String::new(),
     }
+}
+
+/// Faults of a row, and its E-stop, each with its time.
+fn what_goes_wrong(outcome: &Outcome) -> String {
+    let mut all = outcome.faults.clone();
+    if outcome.row.estop {
+        // The instant from which the row counts is that of the E-stop.
+        all.push(format!("E-stop@{:.3}s", outcome.measured.since_s));
+    }
+    all.join(", ")
 }
 
 /// The first line of the record that holds each of the expected words.
@@ -152,18 +192,17 @@ pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, SimError
             let run = o.verdict != Verdict::NotImplemented;
             context! {
                 id => o.row.id,
-                faults => o.faults.join(", "),
+                faults => what_goes_wrong(o),
                 phase => if run { o.row.phase.words() } else { "" },
-                estop => o.row.estop,
                 reaction => reaction(&o.row),
-                limits => limits(&o.row),
+                limits => limits(o),
                 detected => ms(m.detected_ms),
                 own => ms(m.own_commanded_ms),
                 commanded => ms(m.commanded_ms),
                 sensed => ms(m.sensed_ms),
                 physical => ms(m.physical_ms),
                 wheels => ms(m.wheels_stand_ms),
-                deviation => if m.stopped { "–".to_owned() } else { ms(m.deviation_mm) },
+                deviation => ms(m.deviation_mm),
                 latched => if m.latched { "yes" } else if run { "no" } else { "" },
                 verdict => o.verdict.words(),
                 class => match o.verdict {

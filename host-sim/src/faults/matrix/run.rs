@@ -124,10 +124,10 @@ impl Robots {
     }
 
     fn run(&self, row: &Row) -> Result<Outcome, SimError> {
-        if let Some(reason) = row.not_implemented() {
-            return Ok(Outcome::not_implemented(*row, reason));
-        }
         let robot = self.robot(row.variant);
+        if let Some(reason) = row.not_implemented() {
+            return Ok(Outcome::not_implemented(*row, robot, reason));
+        }
         let at_s = instant_s(row, robot, self.seed);
         let faults = faults(row, at_s)?;
         let duration_s = at_s + row.after_s;
@@ -266,10 +266,8 @@ pub fn select(ids: &[String]) -> Result<Vec<&'static Row>, SimError> {
     }
     let find = |id: &String| {
         let row = ROWS.iter().find(|row| row.id == id).ok_or_else(|| {
-            let nearest = crate::config::closest(id, ROWS.iter().map(|row| row.id));
-            let nearest = nearest.map_or_else(String::new, |n| format!("; did you mean `{n}`?"));
             SimError::simulation(
-                format!("the fault matrix has no row `{id}`{nearest}"),
+                format!("the fault matrix has no row `{id}`{}", meant(id)),
                 "`wheeleg faults rows` prints all of them",
             )
         })?;
@@ -280,7 +278,28 @@ pub fn select(ids: &[String]) -> Result<Vec<&'static Row>, SimError> {
             ))
         })
     };
-    ids.iter().map(find).collect()
+    let mut rows: Vec<&'static Row> = Vec::new();
+    for id in ids {
+        let row = find(id)?;
+        if !rows.contains(&row) {
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+/// Rows that a name which none has may stand for: those that begin with it, else the nearest.
+fn meant(id: &str) -> String {
+    let ids = ROWS.iter().map(|row| row.id);
+    let begin: Vec<String> = ids
+        .clone()
+        .filter(|row| !id.is_empty() && row.starts_with(id))
+        .map(|row| format!("`{row}`"))
+        .collect();
+    if !begin.is_empty() {
+        return format!("; these begin with it: {}", begin.join(", "));
+    }
+    crate::config::closest(id, ids).map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
 }
 
 /// Runs rows; `progress` is told each as it is done.

@@ -27,6 +27,9 @@ const JOINTS: [&str; 6] = [
     "6 R vert.",
 ];
 
+/// The figures count as the paper's do; tables and messages are in scenario time.
+const MOTION_TIME: &str = "time since the start of the motion [s]";
+
 impl Source<'_> {
     /// Time axis: seconds since the motion began.
     fn t(&self, t_s: f64) -> f64 {
@@ -76,7 +79,7 @@ impl Source<'_> {
     }
 
     fn panel(&self, title: impl Into<String>, height: u32, content: Content) -> Panel {
-        let mut panel = Panel::new(title, self.x_range(), height, content);
+        let mut panel = Panel::new(title, self.x_range(), height, content).over(MOTION_TIME);
         panel.marks = self.marks();
         panel
     }

@@ -68,6 +68,8 @@ pub(crate) struct Panel {
     pub(crate) content: Content,
     /// Height in pixels at scale 1.
     pub(crate) height: u32,
+    /// Label of the abscissa of a raster; lines have their own.
+    raster_x: &'static str,
 }
 
 /// A figure: panels one below the other, with a common axis below the last before
@@ -192,7 +194,17 @@ impl Panel {
             marks: Vec::new(),
             content,
             height,
+            raster_x: TIME,
         }
+    }
+
+    /// Names the abscissa of lines and rasters, where time has a zero of its own.
+    pub(crate) fn over(mut self, x_label: &'static str) -> Self {
+        if let Content::Lines(lines) = &mut self.content {
+            lines.x_label = x_label.to_owned();
+        }
+        self.raster_x = x_label;
+        self
     }
 
     /// Leaves the legend to another panel, but for the lines `named`.

@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::axes::Grid;
-use super::{FONT, LEFT, Panel, TIME, colour, text};
+use super::{FONT, LEFT, Panel, colour, text};
 
 /// One row of a raster: runs of (from, to, intensity 0..1).
 pub(crate) struct RasterRow {
@@ -29,7 +29,7 @@ impl Panel {
         let n = rows.len().max(1) as f64;
         let mut chart = self.chart(body, scale, axis_px, (0.0, n))?;
         let font = (FONT, 13 * scale).into_font().color(&colour::INK);
-        self.draw_axes(&mut chart, scale, axis_px, TIME, Grid::Upright)?;
+        self.draw_axes(&mut chart, scale, axis_px, self.raster_x, Grid::Upright)?;
         for (i, row) in rows.iter().enumerate() {
             let top = n - i as f64 - 0.08;
             let bottom = n - i as f64 - 0.92;
