@@ -605,3 +605,16 @@ fn an_interrupted_run_leaves_a_readable_log() {
         assert!(simulated < 3599.0, "{simulated}");
     }
 }
+
+#[test]
+fn a_board_of_another_interface_is_answered_with_what_to_do_about_it() {
+    let dir = folder();
+    let mut command = wheeleg();
+    command
+        .args(["run", "stand", "--fault", "other-interface:joint4@0s"])
+        .arg("--out")
+        .arg(dir.path().join("out"))
+        .assert()
+        .failure()
+        .stderr(contains("build and flash this board").and(contains("supply").not()));
+}

@@ -15,6 +15,9 @@ use crate::SimError;
 use crate::config::{LegChoice, Motion, ParameterChoice, Scenario, ScenarioEvent, StartUpParams};
 use crate::telemetry::{EventKind, LinkSample, Recorder};
 
+/// What to do about a robot that does not get ready, where no board is to blame.
+const HELP: &str = "check supply pressure, board gains and start pose in the robot file";
+
 /// How far the start-up has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
@@ -180,11 +183,19 @@ impl<'a> Operator<'a> {
                         until_ns: now_ns + self.rest_ns,
                     };
                 }
-                Event::HomingFailed { .. }
-                | Event::Hold(_)
-                | Event::SchemaMismatch { .. }
-                | Event::ForeignBoard { .. }
-                | Event::Refused { .. } => return Err(self.not_ready(now_ns)),
+                Event::HomingFailed { .. } | Event::Hold(_) | Event::Refused { .. } => {
+                    return Err(self.not_ready(now_ns, HELP));
+                }
+                Event::SchemaMismatch { .. } => {
+                    let help = "build and flash this board from the sources of this program; \
+                         `wheeleg interface HASH --all` prints all that differs";
+                    return Err(self.not_ready(now_ns, help));
+                }
+                Event::ForeignBoard { .. } => {
+                    let help = "put the board back that was commissioned, or take this one over: \
+                         `wheeleg commission`";
+                    return Err(self.not_ready(now_ns, help));
+                }
                 _ => {}
             }
         }
@@ -192,7 +203,7 @@ impl<'a> Operator<'a> {
             Stage::Enumerating if world.master().is_ready() => (Command::Arm, Stage::Arming),
             Stage::Arming if world.master().is_armed() => (Command::Stand, Stage::Homing),
             Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
-            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns)),
+            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, HELP)),
             _ => return Ok(false),
         };
         world
@@ -203,7 +214,7 @@ impl<'a> Operator<'a> {
         Ok(false)
     }
 
-    fn not_ready(&self, now_ns: u64) -> SimError {
+    fn not_ready(&self, now_ns: u64, help: &str) -> SimError {
         let story: Vec<String> = self
             .notes
             .iter()
@@ -219,7 +230,7 @@ impl<'a> Operator<'a> {
                 self.stage,
                 story.join("; ")
             ),
-            "check supply pressure, board gains and start pose in the robot file",
+            help,
         )
     }
 
