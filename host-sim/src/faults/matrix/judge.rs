@@ -307,11 +307,9 @@ mod tests {
     use crate::sil::LineAudit;
     use crate::telemetry::Recording;
 
-    #[test]
-    fn a_held_joint_that_moves_too_far_fails_its_row() {
-        let robot = builtin::robot("wheeleg-2003").expect("built in");
-        let row = select(&["valve-stuck-open/vent".to_owned()]).expect("a row")[0];
-        let ran = Ran {
+    /// A run in which nothing was recorded.
+    fn empty_run() -> Ran {
+        Ran {
             at_s: 0.0,
             faults: Vec::new(),
             recording: Recording::default(),
@@ -319,7 +317,14 @@ mod tests {
             arming_asked: true,
             outputs: Outputs::default(),
             error: None,
-        };
+        }
+    }
+
+    #[test]
+    fn a_held_joint_that_moves_too_far_fails_its_row() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["valve-stuck-open/vent".to_owned()]).expect("a row")[0];
+        let ran = empty_run();
         let moved = |held_mm| {
             let measured = Measured {
                 held_mm,
@@ -338,15 +343,7 @@ mod tests {
     fn a_row_that_must_stop_and_goes_on_fails() {
         let robot = builtin::robot("wheeleg-2003").expect("built in");
         let row = select(&["pot-open".to_owned()]).expect("a row")[0];
-        let ran = Ran {
-            at_s: 0.0,
-            faults: Vec::new(),
-            recording: Recording::default(),
-            line: LineAudit::default(),
-            arming_asked: true,
-            outputs: Outputs::default(),
-            error: None,
-        };
+        let ran = empty_run();
         let failures = |m| judge(*row, &robot, &ran, m).failures.join("; ");
         let on = failures(Measured::default());
         assert!(on.contains("detected: never") && on.contains("not all axes stop"));
