@@ -177,8 +177,7 @@ fn engine() -> StepResult<String> {
     output(
         cargo()
             .args(["test", "--release", "--package", "wheeleg-fuzz-targets"])
-            .args(["--features", "sim", "--test", "engine"])
-            .args(["--", "--test-threads=2"])
+            .args(["--test", "engine", "--", "--test-threads=2"])
             .env("BOLERO_RANDOM_TEST_TIME_MS", "120000")
             .env("BOLERO_RANDOM_ITERATIONS", "1000000000"),
     )?;
