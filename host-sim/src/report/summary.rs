@@ -148,11 +148,11 @@ mod tests {
         let mut recording = Recording::default();
         for (ms, kind, text) in [
             (1, "command", "Arm: accepted"),
-            (2, "command", "JointReference: refused, Moving"),
+            (2, "command", "JointReference refused: the robot is moving"),
             (3, "fault", "joint 1: a thing"),
-            (4, "command", "JointReference: refused, Moving"),
+            (4, "command", "JointReference refused: the robot is moving"),
             (5, "fault", "joint 1: a thing"),
-            (6, "command", "master: Arm refused: Interrupted"),
+            (6, "command", "master: Arm refused: a stop came between"),
             (7, "info", "nothing is refused"),
         ] {
             recording.events.push(Row {
@@ -164,10 +164,10 @@ mod tests {
             });
         }
         let expected = [
-            "0.002 s: JointReference: refused, Moving (2 times)",
+            "0.002 s: JointReference refused: the robot is moving (2 times)",
             "0.003 s: joint 1: a thing",
             "0.005 s: joint 1: a thing",
-            "0.006 s: master: Arm refused: Interrupted",
+            "0.006 s: master: Arm refused: a stop came between",
         ];
         assert_eq!(messages(&recording), expected);
     }

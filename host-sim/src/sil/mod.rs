@@ -352,7 +352,7 @@ pub fn commission(
             asked = true;
             world
                 .submit(Command::Commission)
-                .map_err(|reject| SimError::simulation(format!("refused: {reject:?}"), ""))?;
+                .map_err(|why| operator::refused(&Command::Commission, &why))?;
         }
         while let Some((_, event)) = world.master().take_event() {
             match event {

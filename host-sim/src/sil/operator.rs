@@ -3,13 +3,14 @@
 
 use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_master::contact::Side;
+use wheeleg_master::dispatcher::Reject;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_protocol::{LinkRecord, LogEvent};
 use wheeleg_units::PositionMm;
 
 use super::START_UP;
-use super::words::describe;
+use super::words::{describe, reject};
 use super::world::World;
 use crate::SimError;
 use crate::config::{LegChoice, Motion, ParameterChoice, Scenario, ScenarioEvent, StartUpParams};
@@ -209,7 +210,7 @@ impl<'a> Operator<'a> {
         world
             .master()
             .submit(command, now_us)
-            .map_err(|reject| refused(&command, &format!("{reject:?}")))?;
+            .map_err(|why| refused(&command, &why))?;
         self.stage = next;
         Ok(false)
     }
@@ -274,7 +275,7 @@ impl<'a> Operator<'a> {
             .master()
             .submit(command, now_us)
             .map(|_| ())
-            .map_err(|reject| refused(&command, &format!("{reject:?}")))
+            .map_err(|why| refused(&command, &why))
     }
 
     /// The events of the scenario that are due at `t_ns`, each once.
@@ -312,7 +313,7 @@ impl<'a> Operator<'a> {
         }
         let text = match world.submit(command) {
             Ok(_) => format!("{name}: accepted"),
-            Err(reject) => format!("{name}: refused, {reject:?}"),
+            Err(why) => format!("{name} refused: {}", reject(&why)),
         };
         recorder.event(t_ns, EventKind::Command, text);
         Ok(())
@@ -326,9 +327,9 @@ impl<'a> Operator<'a> {
             let joint = (i % 6) as u8 + 1;
             let command = Command::TransmitPosition { joint };
             let answer = world.master().submit(command, now_us);
-            if let (Err(reject), false) = (answer, self.flood_refused) {
+            if let (Err(why), false) = (answer, self.flood_refused) {
                 self.flood_refused = true;
-                let text = format!("flood of commands: number {i} refused, {reject:?}");
+                let text = format!("flood of commands: number {i} refused: {}", reject(&why));
                 recorder.event(t_ns, EventKind::Command, text);
             }
         }
@@ -373,9 +374,9 @@ fn is_advice(event: &Event) -> bool {
     matches!(event, Event::Log { entry, .. } if entry.event == LogEvent::PrechargeLate)
 }
 
-fn refused(command: &Command, reason: &str) -> SimError {
+pub(super) fn refused(command: &Command, why: &Reject) -> SimError {
     SimError::simulation(
-        format!("the master refuses {:?}: {reason}", command.code()),
+        format!("the master refuses {:?}: {}", command.code(), reject(why)),
         "the events of the log tell what the robot was doing",
     )
 }

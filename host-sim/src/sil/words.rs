@@ -1,13 +1,16 @@
 //! What the master says, as a person reads it.
 
+mod refusal;
+
 use wheeleg_master::config::UniqueId;
-use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::finding::Finding;
 use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord};
 
 use crate::interface::{Side, first_difference};
+use refusal::refusal;
+pub(super) use refusal::reject;
 
 /// An event of the master in words.
 pub(crate) fn describe(event: &Event) -> String {
@@ -142,42 +145,6 @@ fn hold_reason(reason: &HoldReason) -> String {
         }
         HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
         HoldReason::EmergencyStop => "E-stop".to_owned(),
-    }
-}
-
-/// Why a command is refused, with what to do about it.
-fn refusal(reason: &Refusal) -> String {
-    match *reason {
-        Refusal::NodeMissing { node } | Refusal::NoAnswer { node } => {
-            format!(
-                "{} does not answer. {}",
-                board(node),
-                Finding::NodeLost.remedy()
-            )
-        }
-        Refusal::SchemaMismatch {
-            node,
-            master,
-            theirs,
-        } => format!("{}: {}", board(node), other_interface(node, master, theirs)),
-        Refusal::WrongRole { node } => format!("{}: {}", board(node), Finding::WrongRole),
-        Refusal::ForeignBoard { node } => format!("{}: {}", board(node), Finding::ForeignBoard),
-        Refusal::DuplicateAddress { node } => {
-            format!("{}: {}", board(node), Fault::DuplicateAddress)
-        }
-        Refusal::NodeFault { node, faults } => {
-            let faults = FaultBits::from_raw(faults);
-            let words: Vec<String> = faults.iter().map(|fault| fault.to_string()).collect();
-            format!("{}: {}", board(node), words.join(" "))
-        }
-        Refusal::NodeReset { node } => format!(
-            "{} was reset meanwhile: do it again, and read back what it holds",
-            board(node)
-        ),
-        Refusal::NodeRefused { node, reason } => format!("{}: {}", board(node), reason.text()),
-        Refusal::NodeBusy { node } => format!("{} stays busy", board(node)),
-        Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
-        ref other => format!("{other:?}"),
     }
 }
 

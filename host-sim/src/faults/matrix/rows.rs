@@ -214,7 +214,7 @@ pub const ROWS: &[Row] = &[
         .noted("the neighbours' slots overlap at once; that its clock is wrong the board says after 1.7 s"),
     row("cycle-jitter/1ms", &[at("cycle-jitter=1", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
     // Master's layers.
-    row("fifo-full", &[at("command-flood=100", 0.5)], Phase::Flight, goes_on(0.001), &["refused, QueueFull"]),
+    row("fifo-full", &[at("command-flood=100", 0.5)], Phase::Flight, goes_on(0.001), &["refused: the queue to layer 0 is full"]),
     row("layer1-stall/flight", &[at("layer1-stall", 0.3)], Phase::Flight,
         stop([89.0, 111.0], 140.0), &["layer 1 gave nothing for 100 ms"]),
     row("layer1-stall/push", &[at("layer1-stall", 0.3)], Phase::Push,
