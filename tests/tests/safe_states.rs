@@ -402,7 +402,10 @@ fn without_supply_pressure_the_robot_does_not_arm() {
     let recording = run(&gait(LegChoice::Left, t + 3.0, &events), &robot(), 1);
     assert!(!at(&recording.supply, t + 1.3).pressure_switch);
     let told = story(&recording);
-    assert!(told.contains("Arm refused: the supply pressure switch is open"), "{told}");
+    assert!(
+        told.contains("Arm refused: the supply pressure switch is open"),
+        "{told}"
+    );
     for rows in &recording.joints {
         assert!(last(window(rows, t + 0.1, f64::INFINITY), t, energised).is_none());
         // Cleared, and not armed for a single tick.

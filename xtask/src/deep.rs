@@ -18,7 +18,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 8] = [
+const CHECKS: [Check; 9] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -49,6 +49,12 @@ const CHECKS: [Check; 8] = [
         "200 robots off their data through every scenario without a fault, and under loads",
         20,
         off_data,
+    ),
+    Check(
+        "cylinders",
+        "the predictive law on 240 cylinders drawn at random",
+        2,
+        cylinders,
     ),
     Check(
         "state-flips",
@@ -166,6 +172,15 @@ fn off_data() -> StepResult<String> {
         ["wheeleg-tests", "off_data", test],
         amount,
         " false alarms; ",
+    )
+}
+
+fn cylinders() -> StepResult<String> {
+    let test = "few_combinations_miss_on_cylinders_drawn_at_random";
+    measured(
+        ["wheeleg-tests", "cylinders", test],
+        ("WHEELEG_CYLINDERS", 240),
+        " cylinders from number ",
     )
 }
 

@@ -202,8 +202,8 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
     let force_rod = 1e-3 * ambient * area_rod;
     let top = flow_b.min(1.5 * flow_a);
-    let slope = 0.34 / horizon;
-    let brake = 0.6 * slope * top;
+    let slope = 0.28 / horizon;
+    let brake = 0.65 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
     let nimble = 0.9 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
@@ -234,7 +234,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ),
         ("horizon", horizon * two(32)),
         ("slope", slope * two(8)),
-        ("damping", 0.75 / horizon * two(8)),
+        ("damping", 0.66 / horizon * two(8)),
         ("brake", brake),
         ("top_speed", top * two(16)),
         ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),

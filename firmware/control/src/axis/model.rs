@@ -101,11 +101,11 @@ const AMBIENT_PA: u64 = 101_325;
 /// Polytropic exponent × 100 (ASSUMED: usual for small cylinders).
 const EXPONENT_PERCENT: u64 = 120;
 /// Slope of the speed law times the dead time, × 100.
-const SLOPE_PERCENT: u64 = 34;
+const SLOPE_PERCENT: u64 = 28;
 /// Gain of the speed error times the dead time, × 100.
-const DAMPING_PERCENT: u64 = 75;
+const DAMPING_PERCENT: u64 = 66;
 /// Deceleration over slope times top speed, × 100.
-const BRAKE_PERCENT: u64 = 60;
+const BRAKE_PERCENT: u64 = 65;
 /// Top speed as a share of that of a choked outlet, × 100.
 const TOP_PERCENT: u64 = 100;
 /// Bandwidth of the observer, rad/s: noise of a 12-bit converter with 16-fold

@@ -67,7 +67,7 @@ impl Inertia {
         let squared = part(share, share, 16);
         let slope = part(model.slope, share, 16).clamp(1 << 8, (1 << 16) - 1);
         // 2^32 / (2 slope²) with slope × 2^8: 2^47 / slope².
-        // 255/s is the slope of a dead time of 1.3 ms; a shorter one makes it no steeper.
+        // 255/s is the slope of a dead time of 1.1 ms; a shorter one makes it no steeper.
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
         let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
         // Six tenths of it: a tick then turns at most two thirds of a speed round.

@@ -63,9 +63,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
         }
         Refusal::NoSuchJoint { joint } => format!("there is no joint or wheel {joint}"),
         Refusal::Parameter(ref error) => parameter(error),
-        Refusal::Busy => {
-            "another command of this kind is under way: wait for its end".to_owned()
-        }
+        Refusal::Busy => "another command of this kind is under way: wait for its end".to_owned(),
         Refusal::Interrupted => {
             "a stop or another command came between: see what came before it, then give it again"
                 .to_owned()

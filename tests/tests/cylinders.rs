@@ -1,0 +1,114 @@
+//! The predictive law on cylinders that nobody tuned it for, drawn at random, with loads, masses,
+//! friction and valve times off their data.
+//!
+//! A few cylinders here; `cargo xtask deep cylinders` draws as many as it takes to know a rate.
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_sim::bench::suite::{Factors, StartUp, steps};
+use wheeleg_sim::bench::{Kind, Metrics};
+use wheeleg_sim::config::AxisConfig;
+
+/// How many cylinders are drawn, and the number of the first: others than those that the law's
+/// factors were searched on (1000 to 1119) show whether they hold.
+const CYLINDERS_VARIABLE: &str = "WHEELEG_CYLINDERS";
+const FIRST_VARIABLE: &str = "WHEELEG_CYLINDERS_FIRST";
+/// Combinations of factors on each.
+const COMBINATIONS: u64 = 8;
+/// Choked outflow of air at 293.15 K per conductance, Pa (ISO 6358: ρ0 R T).
+const CHOKED_PA: f64 = 99_716.0;
+
+/// A cylinder within what the comparison takes (bore 12 to 40 mm, stroke 50 to 400 mm), each
+/// quantity uniform in its logarithm: valves that let it run at 0.25 to 1 m/s and open in 2 to
+/// 8 ms, friction of 2 to 6 % of its force and 2 N, mass 0.3 to 6 kg at the bore of the bench axis.
+fn drawn(number: u64) -> AxisParams {
+    let mut p = AxisConfig::load("bench-vq110u").expect("built in").axis;
+    let mut random = Pcg64Mcg::seed_from_u64(number);
+    let mut between = |low: f64, high: f64| low * (high / low).powf(random.random_range(0.0..1.0));
+    let c = &mut p.cylinder;
+    let (bench_bore_m, bench_stroke_m) = (c.bore_m, c.stroke_m);
+    c.bore_m = between(0.012, 0.040);
+    c.rod_m = c.bore_m * between(0.3, 0.5);
+    c.stroke_m = between(0.05, 0.4);
+    let size = (c.bore_m / bench_bore_m).powi(2);
+    for volume_m3 in [&mut c.dead_volume_a_m3, &mut c.dead_volume_b_m3] {
+        *volume_m3 = 0.3e-6 + *volume_m3 * size;
+    }
+    c.line_volume_m3 *= size.sqrt() * between(0.5, 2.0);
+    c.line_delay_s *= between(0.5, 2.0);
+    let area_m2 = std::f64::consts::FRAC_PI_4 * c.bore_m * c.bore_m;
+    let conductance = between(0.25, 1.0) * area_m2 / CHOKED_PA;
+    let (on_s, share) = (between(0.002, 0.008), between(0.5, 0.9));
+    for valve in [&mut c.fill_valve, &mut c.vent_valve] {
+        valve.flow.conductance_m3_s_pa = conductance;
+        (valve.t_on_s, valve.t_off_s) = (on_s, on_s * share);
+    }
+    if let Some(line) = &mut c.line_flow {
+        line.conductance_m3_s_pa *= size.max(1.0);
+    }
+    c.piston_leak_m3_s_pa *= size;
+    c.rod_leak_m3_s_pa *= size;
+    c.friction.coulomb_n = 2.0 + 6e5 * area_m2 * between(0.02, 0.06);
+    c.friction.static_n = 1.5 * c.friction.coulomb_n;
+    c.friction.viscous_n_s_m *= size * between(0.5, 2.0);
+    p.moving_mass_kg = size * between(0.3, 6.0);
+    p.initial_stroke_m = 0.3 * c.stroke_m;
+    p.potentiometer.electrical_stroke_m *= c.stroke_m / bench_stroke_m;
+    p
+}
+
+fn number(variable: &str, default: u64) -> u64 {
+    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
+}
+
+/// The bars of the combinations on the bench axis, after one learning move, and no false alarm.
+#[test]
+fn few_combinations_miss_on_cylinders_drawn_at_random() {
+    let (first, cylinders) = (number(FIRST_VARIABLE, 9000), number(CYLINDERS_VARIABLE, 6));
+    let mut times = Vec::new();
+    let mut missed = Vec::new();
+    let mut alarms = 0;
+    for which in first..first + cylinders {
+        let sheet = drawn(which);
+        let (middle, span) = (
+            0.5 * sheet.cylinder.stroke_m,
+            (0.5 * sheet.cylinder.stroke_m).min(0.1),
+        );
+        let (far, near) = (middle + 0.5 * span, middle - 0.5 * span);
+        for case in 0..COMBINATIONS {
+            let seed = which * COMBINATIONS + case;
+            let factors = Factors::random(&sheet, seed);
+            let start = StartUp::Identified;
+            let targets = [far, near, far];
+            let kind = Kind::Predictive;
+            let traces = steps(&sheet, &factors, kind, start, seed, &targets, 3.0).expect("runs");
+            let told = traces.iter().flat_map(|t| t.faults.iter()).next();
+            let alarm = told.is_some() || traces.iter().any(|t| !t.drove);
+            let all: Vec<Metrics> = traces[1..].iter().map(Metrics::of).collect();
+            let holds = all.iter().all(|m| {
+                m.steady_error_mm.abs() <= 0.5 && m.overshoot_mm <= 6.0 && !m.limit_cycle()
+            });
+            times.extend(all.iter().map(|m| m.settle_s.unwrap_or(f64::INFINITY)));
+            alarms += u32::from(alarm);
+            if alarm || !holds {
+                missed.push(format!("cylinder {which}, case {case}, {told:?}: {all:?}"));
+            }
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    let runs = cylinders * COMBINATIONS;
+    let share = |percent: usize| times[times.len() * percent / 100];
+    for miss in &missed {
+        println!("{miss}");
+    }
+    println!(
+        "{cylinders} cylinders from number {first}, {runs} combinations: {} missed, {alarms} of \
+         them by a false alarm; settled in {:.2} s, nine tenths in {:.2} s",
+        missed.len(),
+        share(50),
+        share(90)
+    );
+    // The bar is none; measured are 6.4 % of 1,920. More would be a step back.
+    assert!(missed.len() as u64 * 100 <= runs * 8, "{}", missed.len());
+}
