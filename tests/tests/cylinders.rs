@@ -54,7 +54,12 @@ fn drawn(number: u64) -> AxisParams {
     c.friction.viscous_n_s_m *= size * between(0.5, 2.0);
     p.moving_mass_kg = size * between(0.3, 6.0);
     p.initial_stroke_m = 0.3 * c.stroke_m;
-    p.potentiometer.electrical_stroke_m *= c.stroke_m / bench_stroke_m;
+    for length_m in [
+        &mut p.potentiometer.electrical_stroke_m,
+        &mut p.potentiometer.offset_m,
+    ] {
+        *length_m *= c.stroke_m / bench_stroke_m;
+    }
     p
 }
 
@@ -109,6 +114,6 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
         share(50),
         share(90)
     );
-    // The bar is none; measured are 6.4 % of 1,920. More would be a step back.
-    assert!(missed.len() as u64 * 100 <= runs * 8, "{}", missed.len());
+    // The bar is none; measured are 4.9 % of 1,920. More would be a step back.
+    assert!(missed.len() as u64 * 100 <= runs * 7, "{}", missed.len());
 }
