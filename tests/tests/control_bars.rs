@@ -86,9 +86,10 @@ fn the_default_settles_fast_and_close_on_fifty_seeds() {
     }
     times.sort_by(f64::total_cmp);
     let (median, worst) = (times[times.len() / 2], times[times.len() - 1]);
-    // Measured 0.29 and 0.31; below 0.24 would beat perfect knowledge.
-    assert!((0.24..=0.50).contains(&median), "{median}");
-    assert!(worst <= 0.60, "{worst}");
+    // Measured 0.29 and 0.30; below 0.24 would beat perfect knowledge. The bars are 0.50 and
+    // 0.60; above these here would be a step back.
+    assert!((0.24..=0.32).contains(&median), "{median}");
+    assert!(worst <= 0.40, "{worst}");
 }
 
 #[test]
@@ -200,7 +201,7 @@ fn two_hundred_combinations() {
 
 #[test]
 fn off_the_bench_axis_few_combinations_miss() {
-    // Of 200 on each axis 3, 2 and 5 were measured: reversals that had not died out, a
+    // Of 1,200 on each axis 19, 6 and 4 were measured: reversals that had not died out, a
     // rest beside the bar, a false alarm near the target.
     for (name, count) in [
         ("small-12x50", 60),
@@ -410,8 +411,8 @@ fn the_time_optimal_bound_and_the_ratio_to_it() {
         .settle_s
         .expect("settles");
     let ratio = ours / bound.settle_s;
-    // Nobody beats perfect knowledge; measured 1.6 extending, 1.4 retracting.
-    assert!((1.0..=1.75).contains(&ratio), "{ours} / {bound:?}");
+    // Nobody beats perfect knowledge.
+    assert!((1.0..=1.5).contains(&ratio), "{ours} / {bound:?}");
 }
 
 #[test]

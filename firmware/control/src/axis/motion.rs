@@ -83,7 +83,8 @@ impl Inertia {
             ),
             slope,
             damping: part(model.damping, share, 16),
-            brake: part(model.brake, squared, 16),
+            // Below 2^18 mm/s², 27 g: the speed law takes it × 2^13.
+            brake: part(model.brake, squared, 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
             load_gain: part(model.observe_load, mass, 16),
             check: 0,

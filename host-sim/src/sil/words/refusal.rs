@@ -11,15 +11,17 @@ use super::{board, other_interface};
 pub(super) fn refusal(reason: &Refusal) -> String {
     match *reason {
         Refusal::Expired => "its deadline passed while it waited: give it again".to_owned(),
-        Refusal::NotArmed => "it needs armed axes: arm first".to_owned(),
+        Refusal::NotArmed => "it needs armed axes: clear a stop if there was one, then arm".to_owned(),
         Refusal::NotDisarmed => "it needs disarmed axes: disarm first".to_owned(),
         Refusal::Moving => {
-            "the robot is moving: wait for the end of the motion, or give Hold or StopGait first"
+            "the robot is moving: wait for the end of the motion, or give Hold, or StopGait in a gait"
                 .to_owned()
         }
-        Refusal::NotMoving => "no motion is under way".to_owned(),
+        Refusal::NotMoving => "no gait is under way; Hold ends any other motion".to_owned(),
         Refusal::NotAtStart => {
-            "the robot does not stand in the start pose: give Stand first".to_owned()
+            "the robot does not stand in the start pose (give Stand first), or this is not the \
+             leg that steps first"
+                .to_owned()
         }
         Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
         Refusal::NoAir => {
@@ -27,7 +29,11 @@ pub(super) fn refusal(reason: &Refusal) -> String {
              if it stays open, check compressor, hose and regulator"
                 .to_owned()
         }
-        Refusal::NodeMissing { node } | Refusal::NoAnswer { node } => {
+        Refusal::NodeMissing { node } => {
+            let remedy = Finding::NodeLost.remedy();
+            format!("{} has not been heard or identified yet. {remedy}", board(node))
+        }
+        Refusal::NoAnswer { node } => {
             let remedy = Finding::NodeLost.remedy();
             format!("{} does not answer. {remedy}", board(node))
         }
@@ -57,13 +63,13 @@ pub(super) fn refusal(reason: &Refusal) -> String {
             board(node)
         ),
         Refusal::NotConfirmed => {
-            "all boards agreed to arm, but not all show that they are armed: the faults that \
-             follow tell which one"
+            "all boards agreed to arm, but one did not close its loop in time, or a joint still \
+             fills: check supply pressure and precharge, then arm again"
                 .to_owned()
         }
-        Refusal::NoSuchJoint { joint } => format!("there is no joint or wheel {joint}"),
+        Refusal::NoSuchJoint { joint } => format!("there is no joint {joint}: they are 1 to 6"),
         Refusal::Parameter(ref error) => parameter(error),
-        Refusal::Busy => "another command of this kind is under way: wait for its end".to_owned(),
+        Refusal::Busy => "other requests are still under way: wait for their answers".to_owned(),
         Refusal::Interrupted => {
             "a stop or another command came between: see what came before it, then give it again"
                 .to_owned()
