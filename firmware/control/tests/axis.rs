@@ -202,7 +202,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
     let force_rod = 1e-3 * ambient * area_rod;
     let top = flow_b.min(1.5 * flow_a);
-    let slope = 0.28 / horizon;
+    let slope = f64::min(0.28 / horizon, 65_535.0 / 256.0);
     let brake = 0.65 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);

@@ -106,8 +106,6 @@ const SLOPE_PERCENT: u64 = 28;
 const DAMPING_PERCENT: u64 = 66;
 /// Deceleration over slope times top speed, × 100.
 const BRAKE_PERCENT: u64 = 65;
-/// Top speed as a share of that of a choked outlet, × 100.
-const TOP_PERCENT: u64 = 100;
 /// Bandwidth of the observer, rad/s: noise of a 12-bit converter with 16-fold
 /// oversampling gives 1 mm/s of speed.
 const OBSERVER: u64 = 150;
@@ -124,7 +122,7 @@ impl AxisModel {
     /// The speed law is scaled by two facts of the axis: the dead time
     /// T = tick + t_on + line, which bounds its slope and damping,
     /// and the speed at which a choked outlet lets the piston go, which bounds
-    /// its top. The four factors were searched on the bench axis (bore 20 × 180 mm,
+    /// its top. The three factors were searched on the bench axis (bore 20 × 180 mm,
     /// VQ110U-class valves), three other and 120 random cylinders, all with loads, masses,
     /// friction and valve times off their data, and judged on 240 more. They have no unit.
     ///
@@ -261,12 +259,12 @@ impl AxisModel {
 
         // Speed law. The larger piston side is the slower outlet, of choked speed
         // C ρ0 R T / area.
-        let slower_16 = flow_b_16.min(flow_a_16.wrapping_mul(3).wrapping_shr(1));
-        let top_16 = percent(slower_16, TOP_PERCENT);
+        let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(3).wrapping_shr(1));
         let per_horizon_8 = |percents: u64| divide(percents.wrapping_mul(2_560_000), horizon_us);
-        let slope_8 = per_horizon_8(SLOPE_PERCENT);
-        // × 2^14: 2^25 × 2^37.
-        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, horizon_us);
+        // × 2^14, below 256/s: that of a dead time of 1.1 ms, and no steeper below it.
+        // 2^22 × 2^37.
+        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, horizon_us).min(65_535 << 6);
+        let slope_8 = slope_14.wrapping_shr(6);
         let brake = percent(
             slope_14.wrapping_mul(top_16).wrapping_shr(30),
             BRAKE_PERCENT,

@@ -13,6 +13,9 @@ const STOP_ZONE: i32 = 1 << 16;
 /// Length before an end stop in which a cushion may act, raw mm (6 mm).
 const CUSHION: i32 = 6 << 16;
 
+/// π² × 2^4.
+const PI_SQUARED_4: i32 = 158;
+
 /// Least mass that is counted on, kg × 2^16 (0.02 kg): the least that may be told.
 const LIGHTEST: i32 = 1311;
 
@@ -39,6 +42,9 @@ pub struct Inertia {
     pub slides: i32,
     /// Coulomb friction below it, mN per raw mm/s × 2^18.
     pub grip: i32,
+    /// Share × 2^16 of the way to the end of the dead time that the springs of the air let
+    /// the piston go: 1/(1 + (ω T/2)²).
+    pub ease: i32,
     /// Sum of all these.
     check: u32,
 }
@@ -65,13 +71,21 @@ impl Inertia {
         };
         // Shares are at most 1: what they are of fits as before.
         let squared = part(share, share, 16);
-        let slope = part(model.slope, share, 16).clamp(1 << 8, (1 << 16) - 1);
-        // 2^32 / (2 slope²) with slope × 2^8: 2^47 / slope².
-        // 255/s is the slope of a dead time of 1.1 ms; a shorter one makes it no steeper.
+        let slope = part(model.slope, share, 16).max(1 << 8);
+        // 2^32 / (2 slope²) with slope × 2^8, below 2^16: 2^47 / slope².
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
         let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
         // Six tenths of it: a tick then turns at most two thirds of a speed round.
         let slides = part(taken, 39_322, 16).max(STICK);
+        // 1/(1 + x²) with x = π look-ahead/period; look-ahead in ticks, below 720.
+        let ahead_6 = model
+            .horizon_us
+            .cast_unsigned()
+            .wrapping_shl(6)
+            .checked_div(model.times.tick.cast_unsigned())
+            .unwrap_or(0) as i32;
+        let period_8 = period_squared(model, mass);
+        let turn_8 = part(ahead_6.wrapping_mul(ahead_6), PI_SQUARED_4, 8).cast_unsigned();
         let made = Self {
             mass,
             per_force,
@@ -87,6 +101,7 @@ impl Inertia {
             brake: part(model.brake, squared, 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
             load_gain: part(model.observe_load, mass, 16),
+            ease: quotient(u64::from(period_8), period_8.wrapping_add(turn_8), 16),
             check: 0,
         };
         Self {
@@ -95,7 +110,7 @@ impl Inertia {
         }
     }
 
-    #[inline]
+    #[inline(never)]
     fn sum(&self) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
@@ -108,6 +123,7 @@ impl Inertia {
             load_gain,
             slides,
             grip,
+            ease,
             check: _,
         } = *self;
         let sum = 0;
@@ -119,7 +135,8 @@ impl Inertia {
         let sum = mix(sum, linear);
         let sum = mix(sum, load_gain);
         let sum = mix(sum, slides);
-        mix(sum, grip)
+        let sum = mix(sum, grip);
+        mix(sum, ease)
     }
 
     /// Whether all of it is as it was made.
@@ -138,9 +155,17 @@ impl Inertia {
     }
 }
 
+/// Square of the period of a swing of a mass (kg × 2^16) on the air of both chambers,
+/// ticks² × 2^8.
+#[inline]
+pub(super) fn period_squared(model: &AxisModel, mass: i32) -> u32 {
+    scaled(mass, model.swing, 16).unsigned_abs()
+}
+
 /// Cube root of a share × 2^16 of at most one.
 ///
-/// Newton's method on a share that is brought into 1/8…1 by shifts of three bits.
+/// Newton's method on a share that is brought into 1/8…1 by shifts of three bits: the
+/// chord is within a tenth of the root there, and a step squares that.
 fn cube_root(share: u32) -> i32 {
     if share >= 1 << 16 {
         return 1 << 16;
@@ -156,12 +181,19 @@ fn cube_root(share: u32) -> i32 {
         .wrapping_mul(9362)
         .wrapping_shr(14)
         .wrapping_add(28_087);
-    for _ in 0..4 {
-        let square = root.wrapping_mul(root.min((1 << 16) - 1)).wrapping_shr(16);
-        let step = near.wrapping_shl(16).checked_div(square).unwrap_or(0);
-        root = root.wrapping_mul(2).wrapping_add(step) / 3;
+    for _ in 0..3 {
+        root = nearer(root, near);
     }
     root.wrapping_shr(third) as i32
+}
+
+/// A step of Newton's method towards the cube root of `share`.
+// A function of its own: the loop would be unrolled.
+#[inline(never)]
+fn nearer(root: u32, share: u32) -> u32 {
+    let square = root.wrapping_mul(root.min((1 << 16) - 1)).wrapping_shr(16);
+    let step = share.wrapping_shl(16).checked_div(square).unwrap_or(0);
+    root.wrapping_mul(2).wrapping_add(step) / 3
 }
 
 /// Estimated motion.
@@ -265,7 +297,7 @@ impl Motion {
 mod tests {
     use super::{Inertia, Motion, STICK, cube_root};
     use crate::axis::{AxisData, AxisModel};
-    use wheeleg_units::Micros;
+    use wheeleg_units::{Micros, PositionMm};
 
     #[test]
     fn a_light_piston_that_stands_is_seen_to_stand() {
@@ -296,7 +328,7 @@ mod tests {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
         let sound = Inertia::new(&model, 3 << 16);
         assert!(sound.is_sound());
-        let words: [fn(&mut Inertia) -> &mut i32; 9] = [
+        let words: [fn(&mut Inertia) -> &mut i32; 10] = [
             |own| &mut own.mass,
             |own| &mut own.per_force,
             |own| &mut own.slope,
@@ -306,6 +338,7 @@ mod tests {
             |own| &mut own.load_gain,
             |own| &mut own.slides,
             |own| &mut own.grip,
+            |own| &mut own.ease,
         ];
         for word in words {
             for bit in 0..32 {
@@ -326,7 +359,11 @@ mod tests {
                 .cbrt()
                 .min(1.0);
             let slope = f64::from(model.slope) * share;
+            let period_ticks = f64::from(super::period_squared(&model, raw)).sqrt() / 16.0;
+            let half_turn =
+                core::f64::consts::PI * f64::from(model.horizon_us) * 1e-3 / period_ticks;
             for (value, exact) in [
+                (inertia.ease, 65_536.0 / (1.0 + half_turn * half_turn)),
                 (inertia.per_force, 2_f64.powi(40) / f64::from(raw)),
                 (inertia.slope, slope),
                 (inertia.damping, f64::from(model.damping) * share),
@@ -341,6 +378,30 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// A light piston behind large and fast valves: brake × 2^13 must fit 32 bits, or the
+    /// speed law would turn its sign.
+    #[test]
+    fn the_brake_of_the_lightest_and_fastest_axis_fits_its_format() {
+        let data = AxisData {
+            bore: PositionMm::from_int(10),
+            rod: PositionMm::from_int(4),
+            stroke: PositionMm::from_int(100),
+            dead_a: PositionMm::from_int(1),
+            dead_b: PositionMm::from_int(1),
+            conductance: "0.42".parse().expect("a number"),
+            mass: PositionMm::from_f64(0.1),
+            valve_on: Micros(1000),
+            valve_off: Micros(1000),
+            line_delay: Micros(100),
+            ..AxisData::default()
+        };
+        let model = AxisModel::new(&data, Micros(1000)).expect("in range");
+        assert!(model.brake > 1 << 18, "{}", model.brake);
+        let inertia = Inertia::new(&model, model.mass);
+        assert_eq!(inertia.brake, (1 << 18) - 1);
+        assert!(inertia.brake.checked_mul(1 << 13).is_some());
     }
 
     #[test]

@@ -226,27 +226,30 @@ impl Predictive {
                 mass: self.inertia.mass,
             },
         );
-        let stands = quiet || self.motion.speed.wrapping_abs() < STILL;
-        let awaited = match input.announced {
-            Some(announced) if stands => self.preload(model, announced.reference.raw()),
-            _ => None,
-        };
-        if input.announced.is_none() {
+        let still = self.motion.speed.wrapping_abs() < STILL;
+        let stands = quiet || still;
+        let mut to = reference;
+        let mut awaited = None;
+        if let Some(announced) = input.announced {
+            let next = announced.reference.raw();
+            if stands {
+                awaited = self.preload(model, next);
+            }
+            if awaited.is_some() {
+                to = next;
+            }
+        } else {
             self.awaits = None;
         }
         if awaited.is_some() || (stands && self.motion.at_stop(model)) {
-            let to = match input.announced {
-                Some(announced) if awaited.is_some() => announced.reference.raw(),
-                _ => reference,
-            };
             self.makes_up = Some(to > self.motion.stroke);
         }
-        if self.motion.speed.wrapping_abs() < STILL
-            && let Some(mass) = self.learner.take()
-        {
+        let mut idle = awaited.is_none() && quiet;
+        if still && let Some(mass) = self.learner.take() {
             self.inertia = Inertia::new(model, mass);
+            idle = true;
         }
-        if awaited.is_none() && quiet {
+        if idle {
             return Drive {
                 on: self.air.shut(model),
                 settled: self.rest.is_settled(),
@@ -254,7 +257,7 @@ impl Predictive {
                 force: 0,
             };
         }
-        let mut ahead = Ahead::new(model, &self.motion);
+        let mut ahead = Ahead::new(model, &self.inertia, &self.motion);
         let expected = self.air.ahead(model, ahead.stroke, ahead.mean);
         ahead.correct(model, &self.inertia, &self.motion, expected);
         let force = awaited.unwrap_or_else(|| {
