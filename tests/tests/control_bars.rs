@@ -416,7 +416,7 @@ fn the_time_optimal_bound_and_the_ratio_to_it() {
 }
 
 #[test]
-fn axes_that_nobody_tuned_for() {
+fn the_other_axis_files() {
     for name in ["small-12x50", "long-16x400", "heavy-40x250"] {
         let sheet = AxisConfig::load(name).expect("built in").axis;
         assert!(plant_check::check(&sheet).expect("runs").passed, "{name}");

@@ -23,13 +23,14 @@
 //! * [`Bench::run`] keeps chamber pressures, noise and what the board has learnt
 //!   from one motion to the next; so a learning move is simply a motion before.
 //! * [`Metrics::of`] works out the figures; [`suite`] has the experiments of the
-//!   comparison; [`optimal`] the bound that perfect knowledge gives; [`identify`]
+//!   comparison; [`grain`] says whether valves are fine enough for a cylinder; [`optimal`] the bound that perfect knowledge gives; [`identify`]
 //!   finds the valves' delays at start-up, as a board would.
 
 pub mod commission;
 mod design;
 pub mod export;
 mod firmware;
+pub mod grain;
 mod identify;
 mod metrics;
 mod motion;
@@ -41,6 +42,7 @@ pub mod suite;
 
 pub use design::{Kind, axis_data, design};
 pub use firmware::{Design, Firmware, Supervision, TICK};
+pub use grain::Grain;
 pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};

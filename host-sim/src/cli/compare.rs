@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::print;
 use crate::SimError;
-use crate::bench::Kind;
+use crate::bench::{Grain, Kind};
 use crate::compare::{self, CaseId, Comparison, Move, Options};
 use crate::config::axis::AXES;
 
@@ -148,6 +148,9 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, SimError> {
     let mut out = String::new();
     for axis in &comparison.axes {
         out.push_str(&axis_table(comparison, &axis.config.name));
+        if let Some(advice) = Grain::of(&axis.config.axis).advice() {
+            let _ = writeln!(out, "  {advice}");
+        }
     }
     let alarms = comparison.false_alarms().count();
     let infeasible = comparison.infeasible().len();

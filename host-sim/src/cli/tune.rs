@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::print;
 use crate::SimError;
+use crate::bench::grain::COARSE;
 use crate::compare::number;
 use crate::tune::{Section, Tuned};
 
@@ -84,6 +85,9 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, SimError> {
             let _ = writeln!(text, "stopped by supervision {when}: {}", names.join(", "));
         }
     }
+    if let Some(advice) = tuned.grain.advice() {
+        let _ = writeln!(text, "{advice}");
+    }
     let valve = &tuned.config.axis.cylinder.fill_valve;
     let found = tuned.delays.map_or_else(
         || "not found".to_owned(),
@@ -91,8 +95,9 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, SimError> {
     );
     let _ = writeln!(
         text,
-        "opening delay  {found} (sheet {:.2} ms)\nparameters     {}\nreport         {}",
+        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})\nparameters     {}\nreport         {}",
         valve.t_on_s * 1e3,
+        tuned.grain.ratio,
         finished.parameters.display(),
         finished.report.display()
     );

@@ -20,7 +20,7 @@ use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 use crate::SimError;
 use crate::bench::commission::{commission, toml_lines, value};
 use crate::bench::suite::{Factors, Rig};
-use crate::bench::{Delays, Design, Kind, Supervision, design, design_with, identify};
+use crate::bench::{Delays, Design, Grain, Kind, Supervision, design, design_with, identify};
 use crate::compare::{Figures, MARGIN, Move, Played, axis_error, draw, save};
 use crate::config::AxisConfig;
 use crate::output;
@@ -92,6 +92,8 @@ pub struct Tuned {
     pub seed: u64,
     /// Force left over the load, at most 1000.
     pub margin: f64,
+    /// How fine its valves are.
+    pub grain: Grain,
     /// Delays found; `None` if the piston did not answer.
     pub delays: Option<Delays>,
     /// All tests.
@@ -180,6 +182,7 @@ impl Tuned {
         Ok(Self {
             seed,
             margin: Factors::NONE.static_margin(plant).min(1e3),
+            grain: Grain::of(plant),
             delays,
             tests,
             toml: format!(
@@ -228,6 +231,8 @@ impl Tuned {
             "seed": self.seed,
             "static_margin": self.margin,
             "least_margin": MARGIN,
+            "valve_grain": self.grain,
+            "advice": self.grain.advice(),
             "sheet_t_on_ms": ms(valve.t_on_s),
             "sheet_t_off_ms": ms(valve.t_off_s),
             "found_t_on_ms": self.delays.map(|d| ms(d.t_on_s)),

@@ -13,9 +13,6 @@ const STOP_ZONE: i32 = 1 << 16;
 /// Length before an end stop in which a cushion may act, raw mm (6 mm).
 const CUSHION: i32 = 6 << 16;
 
-/// π² × 2^4.
-const PI_SQUARED_4: i32 = 158;
-
 /// Least mass that is counted on, kg × 2^16 (0.02 kg): the least that may be told.
 const LIGHTEST: i32 = 1311;
 
@@ -42,9 +39,6 @@ pub struct Inertia {
     pub slides: i32,
     /// Coulomb friction below it, mN per raw mm/s × 2^18.
     pub grip: i32,
-    /// Share × 2^16 of the way to the end of the dead time that the springs of the air let
-    /// the piston go: 1/(1 + (ω T/2)²).
-    pub ease: i32,
     /// Sum of all these.
     check: u32,
 }
@@ -77,15 +71,6 @@ impl Inertia {
         let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
         // Six tenths of it: a tick then turns at most two thirds of a speed round.
         let slides = part(taken, 39_322, 16).max(STICK);
-        // 1/(1 + x²) with x = π look-ahead/period; look-ahead in ticks, below 720.
-        let ahead_6 = model
-            .horizon_us
-            .cast_unsigned()
-            .wrapping_shl(6)
-            .checked_div(model.times.tick.cast_unsigned())
-            .unwrap_or(0) as i32;
-        let period_8 = period_squared(model, mass);
-        let turn_8 = part(ahead_6.wrapping_mul(ahead_6), PI_SQUARED_4, 8).cast_unsigned();
         let made = Self {
             mass,
             per_force,
@@ -101,7 +86,6 @@ impl Inertia {
             brake: part(model.brake, squared, 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
             load_gain: part(model.observe_load, mass, 16),
-            ease: quotient(u64::from(period_8), period_8.wrapping_add(turn_8), 16),
             check: 0,
         };
         Self {
@@ -123,7 +107,6 @@ impl Inertia {
             load_gain,
             slides,
             grip,
-            ease,
             check: _,
         } = *self;
         let sum = 0;
@@ -135,8 +118,7 @@ impl Inertia {
         let sum = mix(sum, linear);
         let sum = mix(sum, load_gain);
         let sum = mix(sum, slides);
-        let sum = mix(sum, grip);
-        mix(sum, ease)
+        mix(sum, grip)
     }
 
     /// Whether all of it is as it was made.
@@ -153,13 +135,6 @@ impl Inertia {
         // Forces below 2^25 mN (33 kN), 2^40 over the least mass below 2^30: it fits.
         clip::<23>(part(clip::<26>(force), self.per_force, 24))
     }
-}
-
-/// Square of the period of a swing of a mass (kg × 2^16) on the air of both chambers,
-/// ticks² × 2^8.
-#[inline]
-pub(super) fn period_squared(model: &AxisModel, mass: i32) -> u32 {
-    scaled(mass, model.swing, 16).unsigned_abs()
 }
 
 /// Cube root of a share × 2^16 of at most one.
@@ -328,7 +303,7 @@ mod tests {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
         let sound = Inertia::new(&model, 3 << 16);
         assert!(sound.is_sound());
-        let words: [fn(&mut Inertia) -> &mut i32; 10] = [
+        let words: [fn(&mut Inertia) -> &mut i32; 9] = [
             |own| &mut own.mass,
             |own| &mut own.per_force,
             |own| &mut own.slope,
@@ -338,7 +313,6 @@ mod tests {
             |own| &mut own.load_gain,
             |own| &mut own.slides,
             |own| &mut own.grip,
-            |own| &mut own.ease,
         ];
         for word in words {
             for bit in 0..32 {
@@ -359,11 +333,7 @@ mod tests {
                 .cbrt()
                 .min(1.0);
             let slope = f64::from(model.slope) * share;
-            let period_ticks = f64::from(super::period_squared(&model, raw)).sqrt() / 16.0;
-            let half_turn =
-                core::f64::consts::PI * f64::from(model.horizon_us) * 1e-3 / period_ticks;
             for (value, exact) in [
-                (inertia.ease, 65_536.0 / (1.0 + half_turn * half_turn)),
                 (inertia.per_force, 2_f64.powi(40) / f64::from(raw)),
                 (inertia.slope, slope),
                 (inertia.damping, f64::from(model.damping) * share),

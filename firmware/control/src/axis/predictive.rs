@@ -226,8 +226,7 @@ impl Predictive {
                 mass: self.inertia.mass,
             },
         );
-        let still = self.motion.speed.wrapping_abs() < STILL;
-        let stands = quiet || still;
+        let stands = quiet || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
         let mut awaited = None;
         if let Some(announced) = input.announced {
@@ -244,12 +243,12 @@ impl Predictive {
         if awaited.is_some() || (stands && self.motion.at_stop(model)) {
             self.makes_up = Some(to > self.motion.stroke);
         }
-        let mut idle = awaited.is_none() && quiet;
-        if still && let Some(mass) = self.learner.take() {
+        if self.motion.speed.wrapping_abs() < STILL
+            && let Some(mass) = self.learner.take()
+        {
             self.inertia = Inertia::new(model, mass);
-            idle = true;
         }
-        if idle {
+        if awaited.is_none() && quiet {
             return Drive {
                 on: self.air.shut(model),
                 settled: self.rest.is_settled(),
@@ -257,7 +256,7 @@ impl Predictive {
                 force: 0,
             };
         }
-        let mut ahead = Ahead::new(model, &self.inertia, &self.motion);
+        let mut ahead = Ahead::new(model, &self.motion);
         let expected = self.air.ahead(model, ahead.stroke, ahead.mean);
         ahead.correct(model, &self.inertia, &self.motion, expected);
         let force = awaited.unwrap_or_else(|| {

@@ -2,8 +2,8 @@
 
 use super::STILL;
 use crate::axis::model::AxisModel;
-use crate::axis::motion::{Motion, period_squared};
-use crate::axis::{part, square_root};
+use crate::axis::motion::Motion;
+use crate::axis::{part, scaled, square_root};
 use core::hash::{Hash, Hasher};
 
 /// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
@@ -19,8 +19,8 @@ const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 9;
 /// … but never wider than this, raw mm (0.4 mm).
 const WIDEST: i32 = 26_214;
-/// A piston further from its target than this does not rest there, raw mm (0.42 mm).
-const LEFT: i32 = 27_525;
+/// A piston further from its target than this does not rest there, raw mm (0.45 mm).
+const LEFT: i32 = 29_491;
 /// Ticks outside before the end of rest at the same target, …
 const RELEASE_TICKS: u16 = 20;
 /// … and with a new one.
@@ -215,7 +215,8 @@ impl Rest {
 /// that asks for it keeps the valves shut, unless a move is announced.
 #[inline]
 fn swing(model: &AxisModel, mass: i32) -> u16 {
-    let ticks = square_root(period_squared(model, mass)).wrapping_shr(4);
+    let square_8 = scaled(mass, model.swing, 16);
+    let ticks = square_root(square_8.unsigned_abs()).wrapping_shr(4);
     ticks.clamp(100, 1000) as u16
 }
 
