@@ -94,7 +94,7 @@ impl Inertia {
         }
     }
 
-    #[inline(never)]
+    #[inline]
     fn sum(&self) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
@@ -157,18 +157,11 @@ fn cube_root(share: u32) -> i32 {
         .wrapping_shr(14)
         .wrapping_add(28_087);
     for _ in 0..3 {
-        root = nearer(root, near);
+        let square = root.wrapping_mul(root.min((1 << 16) - 1)).wrapping_shr(16);
+        let step = near.wrapping_shl(16).checked_div(square).unwrap_or(0);
+        root = root.wrapping_mul(2).wrapping_add(step) / 3;
     }
     root.wrapping_shr(third) as i32
-}
-
-/// A step of Newton's method towards the cube root of `share`.
-// A function of its own: the loop would be unrolled.
-#[inline(never)]
-fn nearer(root: u32, share: u32) -> u32 {
-    let square = root.wrapping_mul(root.min((1 << 16) - 1)).wrapping_shr(16);
-    let step = share.wrapping_shl(16).checked_div(square).unwrap_or(0);
-    root.wrapping_mul(2).wrapping_add(step) / 3
 }
 
 /// Estimated motion.
