@@ -76,7 +76,7 @@ impl Grain {
             format!(
                 "coarse valves: their shortest opening ({:.1} ms) changes the force by {:.0} N, and friction \
 holds no more than {:.0} N: rest beside the target, swinging or fault 34 (following_error) may be met \
-under a load. Throttle valve and line to {:.2} dm3/(s bar), take valves that shut faster, or longer tubes",
+under a load. Throttle valve and line to {:.2} dm3/(s bar), take valves that shut faster, or give the chambers more volume",
                 self.shortest_opening_ms,
                 self.force_step_n,
                 self.friction_holds_n,
