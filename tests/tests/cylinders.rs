@@ -12,7 +12,7 @@ use wheeleg_sim::bench::{Kind, Metrics};
 use wheeleg_sim::config::AxisConfig;
 
 /// How many cylinders are drawn, and the number of the first: others than those that the law's
-/// factors were searched on (1000 to 1119) show whether they hold.
+/// factors were searched on (1000 to 1119 of the generator at 8239838) show whether they hold.
 const CYLINDERS_VARIABLE: &str = "WHEELEG_CYLINDERS";
 const FIRST_VARIABLE: &str = "WHEELEG_CYLINDERS_FIRST";
 /// Combinations of factors on each.
@@ -129,11 +129,19 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
     );
     // The bar is none. More than is allowed here would be a step back: of 720 cylinders 2.3 %
     // and 16 % were missed, 3 of 5,040 and 43 of 720 by a fault.
-    let [[fine, fine_missed, fine_alarms], [coarse, coarse_missed, _]] = tally;
+    let [
+        [fine, fine_missed, fine_alarms],
+        [coarse, coarse_missed, coarse_alarms],
+    ] = tally;
+    assert!(fine > 0 && coarse > 0, "{fine} and {coarse}");
     assert!(fine_alarms * 1000 <= fine * 3, "{fine_alarms} of {fine}");
     assert!(fine_missed * 100 <= fine * 4, "{fine_missed} of {fine}");
     assert!(
         coarse_missed * 100 <= coarse * 25,
         "{coarse_missed} of {coarse}"
+    );
+    assert!(
+        coarse_alarms * 100 <= coarse * 15,
+        "{coarse_alarms} of {coarse}"
     );
 }

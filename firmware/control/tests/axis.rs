@@ -182,6 +182,24 @@ fn the_probe_finds_the_opening_delay() {
     assert_eq!(probe(3_500, false), None, "a piston that never moves");
 }
 
+/// Of a dead time below 1.1 ms the slope goes no further, and the deceleration with it.
+#[test]
+fn the_slope_of_the_fastest_valves_is_limited_and_the_brake_with_it() {
+    let of = |valve_on: u32| {
+        let data = AxisData {
+            valve_on: Micros(valve_on),
+            line_delay: Micros(0),
+            ..AxisData::default()
+        };
+        AxisModel::new(&data, TICK).expect("in range")
+    };
+    let (limited, fastest) = (of(90), of(0));
+    assert_eq!((limited.slope, fastest.slope), (65_535, 65_535));
+    assert_eq!(limited.brake, fastest.brake);
+    let slower = of(200);
+    assert!(slower.slope < 65_535 && slower.brake < limited.brake);
+}
+
 /// The coefficients in floating point, from the formulas of the module's text.
 fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let number = |value: PositionMm| f64::from(value.raw()) / 65_536.0;

@@ -73,14 +73,16 @@ impl Grain {
     #[must_use]
     pub fn advice(&self) -> Option<String> {
         (self.ratio > COARSE).then(|| {
+            // Rounded down: what is printed must be enough.
+            let throttled = (self.conductance_for_half_dm3_s_bar * 1e3).floor() * 1e-3;
             format!(
                 "coarse valves: their shortest opening ({:.1} ms) changes the force by {:.0} N, and friction \
 holds no more than {:.0} N: rest beside the target, swinging or fault 34 (following_error) may be met \
-under a load. Throttle valve and line to {:.2} dm3/(s bar), take valves that shut faster, or give the chambers more volume",
+under a load. Throttle valve and line to {:.3} dm3/(s bar), take valves that shut faster, or give the chambers more volume",
                 self.shortest_opening_ms,
                 self.force_step_n,
                 self.friction_holds_n,
-                self.conductance_for_half_dm3_s_bar
+                throttled
             )
         })
     }

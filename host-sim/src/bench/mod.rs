@@ -23,7 +23,8 @@
 //! * [`Bench::run`] keeps chamber pressures, noise and what the board has learnt
 //!   from one motion to the next; so a learning move is simply a motion before.
 //! * [`Metrics::of`] works out the figures; [`suite`] has the experiments of the
-//!   comparison; [`grain`] says whether valves are fine enough for a cylinder; [`optimal`] the bound that perfect knowledge gives; [`identify`]
+//!   comparison; [`grain`] says whether valves are fine enough for a cylinder;
+//!   [`optimal`] the bound that perfect knowledge gives; [`identify`]
 //!   finds the valves' delays at start-up, as a board would.
 
 pub mod commission;

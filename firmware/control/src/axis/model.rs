@@ -124,7 +124,7 @@ impl AxisModel {
     /// and the speed at which a choked outlet lets the piston go, which bounds
     /// its top. The three factors were searched on the bench axis (bore 20 × 180 mm,
     /// VQ110U-class valves), three other and 120 random cylinders, all with loads, masses,
-    /// friction and valve times off their data, and judged on 240 more. They have no unit.
+    /// friction and valve times off their data, and judged on 720 more. They have no unit.
     ///
     /// In integers, like the tick: every coefficient is within 0.1 % of the exact
     /// one, or a step of its format.

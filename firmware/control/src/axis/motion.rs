@@ -140,7 +140,7 @@ impl Inertia {
 /// Cube root of a share × 2^16 of at most one.
 ///
 /// Newton's method on a share that is brought into 1/8…1 by shifts of three bits: the
-/// chord is within a tenth of the root there, and a step squares that.
+/// chord is within a ninth of the root there, and a step squares that.
 fn cube_root(share: u32) -> i32 {
     if share >= 1 << 16 {
         return 1 << 16;

@@ -15,7 +15,7 @@ const SLIDES: i32 = 10 << 16;
 pub(super) struct Ahead {
     /// Raw mm.
     pub(super) stroke: i32,
-    /// Mean speed until then, raw mm/s.
+    /// Mean speed until then, raw mm/s; 0 if that would end beyond an end stop.
     pub(super) mean: i32,
     /// Speed then, raw mm/s.
     pub(super) speed: i32,
