@@ -35,6 +35,13 @@ pub struct GasParams {
 }
 
 impl GasParams {
+    /// ρ0 R T \[Pa\]: the volume of its own gas that choked flow takes out of a chamber, per
+    /// sonic conductance and time (ISO 6358), at ambient and near the reference temperature.
+    #[must_use]
+    pub fn choked_outflow_pa(&self) -> f64 {
+        self.reference_density_kg_m3 * self.gas_constant_j_kg_k * self.ambient_temperature_k
+    }
+
     /// Checks every field against its valid range.
     ///
     /// # Errors

@@ -156,10 +156,7 @@ fn free_step_m(axis: &AxisParams) -> f64 {
     let volume_a = volume(c.dead_volume_a_m3, area_a);
     let volume_b = volume(c.dead_volume_b_m3, area_b);
     let open_s = c.fill_valve.t_off_s + 0.1 * c.fill_valve.t_on_s;
-    let flow = c.fill_valve.flow.conductance_m3_s_pa
-        * axis.gas.reference_density_kg_m3
-        * axis.gas.gas_constant_j_kg_k
-        * axis.gas.ambient_temperature_k;
+    let flow = c.fill_valve.flow.conductance_m3_s_pa * axis.gas.choked_outflow_pa();
     // The exponent and the pressure appear in force and stiffness alike.
     let force = flow * open_s * area_a / volume_a;
     force / (area_a * area_a / volume_a + area_b * area_b / volume_b)
@@ -169,9 +166,6 @@ fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
     let c = &axis.cylinder;
     let area_m2 = std::f64::consts::FRAC_PI_4 * c.bore_m * c.bore_m;
     let flow = data.conductance.to_num::<f64>() * 1e-8;
-    let rho_r_t = axis.gas.reference_density_kg_m3
-        * axis.gas.gas_constant_j_kg_k
-        * axis.gas.ambient_temperature_k;
     let us = |value: Micros| f64::from(value.get()) * 1e-6;
     // As fast as lets half of the period be used, 100 Hz at most; slower than 50 Hz only
     // where a pulse or a gap that acts would not fit half a period of 20 ms.
@@ -182,7 +176,7 @@ fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
     let period_s = period_ms.clamp(10.0, 120.0).ceil() * 1e-3;
     Facts {
         stroke_mm: c.stroke_m * 1e3,
-        speed_mm_s: flow * rho_r_t / area_m2 * 1e3,
+        speed_mm_s: flow * axis.gas.choked_outflow_pa() / area_m2 * 1e3,
         dead_time_s: 1e-3 + us(data.valve_on) + us(data.line_delay),
         shortest_duty: (us(data.valve_off) + us(data.margin)) / period_s,
         period_s,

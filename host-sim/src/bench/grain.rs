@@ -43,11 +43,7 @@ impl Grain {
         let opening_s = seconds(data.valve_off.get()) + seconds(data.margin.get());
         let conductance = data.conductance.to_num::<f64>();
         let gas = &axis.gas;
-        let flow_m3_s = conductance
-            * 1e-8
-            * gas.reference_density_kg_m3
-            * gas.gas_constant_j_kg_k
-            * gas.ambient_temperature_k;
+        let flow_m3_s = conductance * 1e-8 * gas.choked_outflow_pa();
         let area_m2 = std::f64::consts::FRAC_PI_4 * c.bore_m * c.bore_m;
         let volume_m3 = c.dead_volume_a_m3 + c.line_volume_m3 + 0.5 * area_m2 * c.stroke_m;
         // Fast against the exchange of heat, where that is modelled.

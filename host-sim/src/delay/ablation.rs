@@ -225,8 +225,7 @@ fn fine_step(trial: &mut Trial) {
     let volume_m3 = c.line_volume_m3 + c.dead_volume_a_m3.min(c.dead_volume_b_m3);
     let (fill, vent) = (&c.fill_valve.flow, &c.vent_valve.flow);
     let largest = fill.conductance_m3_s_pa.max(vent.conductance_m3_s_pa);
-    let rate =
-        largest * gas.reference_density_kg_m3 * gas.gas_constant_j_kg_k * gas.ambient_temperature_k;
+    let rate = largest * gas.choked_outflow_pa();
     let shortest_ns = volume_m3 / (gas.heat_capacity_ratio * rate * STEEPEST) * 1e9;
     trial.axis.step_ns = trial
         .axis
