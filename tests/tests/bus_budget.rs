@@ -1,9 +1,7 @@
 //! The traffic on the simulated line against the budget that the protocol
 //! computes at compile time.
 
-mod sil;
-
-use sil::{command_to, gait, range, robot, run, stand, window};
+use crate::sil::{command_to, gait, range, robot, run, stand, window};
 use wheeleg_protocol::link::{BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, GAP_US, TURNAROUND_US};
 use wheeleg_protocol::{Message, MessageType, NODES};
 use wheeleg_sim::config::LegChoice;

@@ -1,7 +1,6 @@
 //! `wheeleg check vectors` as a user meets it.
 
-mod program;
-
+use crate::program;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,6 @@
 //! The command line as a user meets it: good input, bad input, an interrupted run.
 
-mod program;
-
+use crate::program;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

@@ -1,11 +1,9 @@
 //! The paper's three steps through the whole stack: what was commanded, what was
 //! sensed and what physically happened agree, on either leg.
 
-mod sil;
-
 use std::sync::OnceLock;
 
-use sil::{at, command_to, gait, range, robot, run, settled_touches, window};
+use crate::sil::{at, command_to, gait, range, robot, run, settled_touches, window};
 use wheeleg_plant::sensors::AdcNoise;
 use wheeleg_sim::analysis::{Analysis, analyse};
 use wheeleg_sim::config::{LegChoice, TargetSet};

@@ -1,8 +1,7 @@
 //! `wheeleg compare` and `wheeleg tune`: what they print, write and refuse, and that
 //! a row is what the same moves give without them.
 
-mod program;
-
+use crate::program;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -1,8 +1,7 @@
 //! `wheeleg delay`: the two bars of the start delay, what the ablation and the
 //! predictions must say if the physics is right, and the command line.
 
-mod program;
-
+use crate::program;
 use std::fs;
 use std::sync::OnceLock;
 

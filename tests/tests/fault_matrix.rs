@@ -1,17 +1,16 @@
 //! The fault matrix: every row of host-sim/FAULTS.md is run, and comes out as it must or
 //! as the shortfalls of that file say; no fault trips where there is none.
 
-mod program;
-mod sil;
-
+use crate::program;
+use crate::sil;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
+use crate::sil::{command, gait, robot, run, scenario, story};
 use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
-use sil::{command, gait, robot, run, scenario, story};
 use wheeleg_protocol::SCHEMA_HASH;
 use wheeleg_sim::config::{EventAction, LegChoice, builtin};
 use wheeleg_sim::faults::matrix::{self, Expect, ROWS, Verdict};

@@ -1,7 +1,6 @@
 //! `wheeleg figures`: everything that is promised is written, and nothing that was there is lost.
 
-mod program;
-
+use crate::program;
 use std::fs;
 use std::path::Path;
 

@@ -3,12 +3,10 @@
 //!
 //! A few robots here; `cargo xtask deep off-data` walks as many as it takes to know a rate.
 
-mod sil;
-
 use std::collections::BTreeMap;
 use std::fmt;
 
-use sil::{robot, scenario};
+use crate::sil::{robot, scenario};
 use wheeleg_node::joint::MotionAccount;
 use wheeleg_protocol::Fault;
 use wheeleg_sim::config::{RobotConfig, Scenario, builtin};

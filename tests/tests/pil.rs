@@ -2,10 +2,8 @@
 //! its supply, determinism. `cargo xtask pil` builds what they need and runs
 //! them; the bit-for-bit comparison of a whole run is a step of its own there.
 
-mod bench;
-
-use bench::pil::{Board, edge};
-use bench::{delivery, numbered};
+use crate::bench::pil::{Board, edge};
+use crate::bench::{delivery, numbered};
 use wheeleg_pil_link::{
     Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, SOFTWARE_RESET, Straps, WATCHDOG_RESET,
 };

@@ -3,12 +3,10 @@
 //! to be over, and the board latches that. An image without the limit is found.
 //! `cargo xtask pil` builds both and runs this.
 
-mod bench;
-
 use std::path::{Path, PathBuf};
 
-use bench::pil::{Board, edge};
-use bench::{delivery, numbered, power_up};
+use crate::bench::pil::{Board, edge};
+use crate::bench::{delivery, numbered, power_up};
 use wheeleg_pil_link::{Figures, Hook, Power, Ran, Reply, Request};
 use wheeleg_protocol::{Address, Decoder, Fault, FaultRecord, FaultReport, MAX_ENCODED, Message};
 use wheeleg_sim::pil::unicorn::image;

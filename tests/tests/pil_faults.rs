@@ -4,17 +4,14 @@
 //! sensed and the physical side. And a disturbed line, of which every board must hear
 //! what its native application hears. `cargo xtask pil` runs this.
 
-mod bench;
-mod program;
-mod sil;
-
+use crate::program;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use bench::pil::Board;
-use bench::power_up;
-use sil::{at, energised, gait, range, robot, run_with, window};
+use crate::bench::pil::Board;
+use crate::bench::power_up;
+use crate::sil::{at, energised, gait, range, robot, run_with, window};
 use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
 use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes, PilSummary};

@@ -3,12 +3,11 @@
 //! instant it strikes, on a joint and on a wheel. `cargo xtask pil` runs this,
 //! `cargo xtask deep state-flips` runs many more.
 
-mod bench;
-
+use crate::bench;
 use std::ops::Range;
 
-use bench::pil::{Board, edge};
-use bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
+use crate::bench::pil::{Board, edge};
+use crate::bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
 use wheeleg_node::{joint, wheel};
 use wheeleg_pil_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, text};
 use wheeleg_protocol::{

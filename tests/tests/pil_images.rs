@@ -2,8 +2,7 @@
 //! what it is, what is wanted and the command that builds it; results of an earlier run
 //! stay where they are. `cargo xtask pil` builds what this needs and runs it.
 
-mod program;
-
+use crate::program;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

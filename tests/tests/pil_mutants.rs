@@ -2,8 +2,7 @@
 //! comparison on emulated boards finds every one of them, and nothing in the images
 //! that are flashed. `cargo xtask pil` builds both and runs this.
 
-mod program;
-
+use crate::program;
 use std::path::PathBuf;
 use std::process::Command;
 

@@ -3,12 +3,10 @@
 //! cut in any unit of the save; and set and saved in a whole run, equal to the host to the bit.
 //! `cargo xtask pil` runs this.
 
-mod bench;
-mod sil;
-
-use bench::pil::{Board, edge};
-use bench::{delivery, numbered, power_up};
-use sil::{command, command_about, run_with, stand};
+use crate::bench::pil::{Board, edge};
+use crate::bench::{delivery, numbered, power_up};
+use crate::sil;
+use crate::sil::{command, command_about, run_with, stand};
 use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request};
 use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{

@@ -1,9 +1,7 @@
 //! Precharge on simulated cylinders: what it makes of the first motion after a stop, and how far
 //! the piston moves while the chambers are filled. The board is the whole application.
 
-mod sil;
-
-use sil::{command, range, robot, run, stand, window};
+use crate::sil::{command, range, robot, run, stand, window};
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{Arm, ClearFault, Limit, LinkLossAction, SCHEMA_HASH};

@@ -2,9 +2,7 @@
 //! walks: all come back within a second, disarmed, and nothing moves until the user says
 //! so.
 
-mod sil;
-
-use sil::{at, command, energised, gait, range, robot, run, stand, story, window};
+use crate::sil::{at, command, energised, gait, range, robot, run, stand, story, window};
 use wheeleg_sim::config::{EventAction, LegChoice};
 use wheeleg_sim::pil::Nodes;
 use wheeleg_sim::telemetry::{JointSample, Recording, Row};

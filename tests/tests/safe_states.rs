@@ -2,9 +2,7 @@
 //! gait, E-stop, and coming back from it. Checked on the commanded, sensed and
 //! physical signals.
 
-mod sil;
-
-use sil::{at, command, energised, gait, range, robot, run, story, window};
+use crate::sil::{at, command, energised, gait, range, robot, run, story, window};
 use wheeleg_sim::config::{EventAction, LegChoice};
 use wheeleg_sim::telemetry::{JointSample, Recording, Row};
 use wheeleg_tests::{STEP, mix};

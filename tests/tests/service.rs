@@ -1,8 +1,7 @@
 //! What a person does with boards, by the command line: commission them, change and
 //! store a parameter, and read who is at fault.
 
-mod program;
-
+use crate::program;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
-use crate::process::{cargo, command, output, run, target_dir};
+use crate::process::{command, output, target_dir};
 use crate::report::Report;
+use crate::rust;
 
 /// Target for the speed of the run, simulated seconds per wall second. Printed
 /// beside the measured value and not enforced: a busy machine is no defect.
@@ -25,10 +26,7 @@ const SEED: &str = "1";
 
 /// Builds, runs twice, compares. Returns the folder of the first run.
 pub(crate) fn steps(report: &mut Report) -> Option<PathBuf> {
-    report.step("release build", || {
-        run(cargo().args(["build", "--locked", "--release", "--bin", "wheeleg"]))?;
-        Ok(())
-    })?;
+    report.step("release build", || Ok(rust::build(&["--bin", "wheeleg"])?))?;
     let first = report.step("main job: wheeleg run three-step", || {
         let summary = simulate("main-job-a")?;
         check_targets(&summary.json)?;

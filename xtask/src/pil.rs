@@ -15,6 +15,7 @@ use crate::no_std::{self, Way, set_up};
 use crate::process::{self, cargo, run, target_dir};
 use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
+use crate::rust;
 use crate::sizes;
 use crate::tools::{apt_install, have, may_apt};
 
@@ -80,9 +81,13 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         return;
     }
     report.step("lints and tests of the emulator", || {
-        let clippy = ["clippy", "--locked", "--all-targets", "--package", PACKAGE];
-        run(cargo().args(clippy).args(["--", "-D", "warnings"]))?;
-        run(cargo().args(["test", "--locked", "--package", PACKAGE]))?;
+        // As the emulator itself is built: each further profile builds the engine once more.
+        let package = ["--locked", "--release", "--package", PACKAGE];
+        run(cargo()
+            .args(["clippy", "--all-targets"])
+            .args(package)
+            .args(["--", "-D", "warnings"]))?;
+        run(cargo().arg("test").args(package))?;
         Ok(())
     });
     report.step(
@@ -172,17 +177,11 @@ impl Images {
 
 /// The tests that need emulated boards.
 fn tests(emulator: &Path, images: &Images) -> StepResult {
-    let names = [
-        "pil",
-        "pil_driver",
-        "pil_faults",
-        "pil_flips",
-        "pil_hil",
-        "pil_images",
-        "pil_store",
-        "pil_mutants",
-    ];
-    run(&mut test_programs(emulator, images, &names))?;
+    run(&mut test_programs(
+        emulator,
+        images,
+        &["emulated", "pil_hil"],
+    ))?;
     Ok(())
 }
 
@@ -191,7 +190,8 @@ fn test_programs(emulator: &Path, images: &Images, names: &[&str]) -> Command {
     let mut test = cargo();
     // Optimised, as the program of the figures below is: one build serves both.
     test.args(["test", "--locked", "--release", "--no-fail-fast"]);
-    test.args(["--package", "wheeleg-tests", "--features", "pil"]);
+    test.args(rust::HOST)
+        .args(["--features", "wheeleg-tests/pil"]);
     for name in names {
         test.args(["--test", name]);
     }
@@ -207,8 +207,8 @@ pub(crate) fn state_flips() -> StepResult<String> {
     tools()?;
     let emulator = emulator()?;
     let images = Images::build(set_up(firmware::TARGET)?, "firmware", false)?;
-    let mut test = test_programs(&emulator, &images, &["pil_flips"]);
-    test.args(["--", "--nocapture"])
+    let mut test = test_programs(&emulator, &images, &["emulated"]);
+    test.args(["pil_flips", "--", "--nocapture"])
         .env("WHEELEG_FLIP_TIMES", "20");
     let found = process::figures(&mut test, |line| line.contains(" flips in "))?;
     let [joint, wheel] = found.as_slice() else {

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::process::{cargo, command, run, target_dir};
+use crate::process::{command, run, target_dir};
 use crate::report::Report;
+use crate::rust;
 use crate::tools;
 
 /// One axis with the polytropic law is enough for a commit; the script takes any.
@@ -40,8 +41,7 @@ pub(crate) fn steps(report: &mut Report) {
 
 fn export(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)?;
-    let built = ["build", "--locked", "--release", "--package", "wheeleg-sim"];
-    run(cargo().args(built).args(["--bin", "wheeleg"]))?;
+    rust::build(&["--bin", "wheeleg"])?;
     let wheeleg = target_dir().join("release").join("wheeleg");
     for axis in AXES {
         run(command(&wheeleg).args(["plant", "check", axis]))?;

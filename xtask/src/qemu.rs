@@ -13,6 +13,7 @@ use crate::no_std::{Way, cargo_for, set_up};
 use crate::pil;
 use crate::process::{ask, cargo, command, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
+use crate::rust;
 use crate::tools::{apt_install, have, may_apt};
 
 const EMULATOR: &str = "qemu-system-arm";
@@ -123,8 +124,9 @@ fn present(path: &Path) -> anyhow::Result<()> {
 /// `cargo test` of the tests that need the images.
 fn tests(images: &Path) -> std::process::Command {
     let mut test = cargo();
-    test.args(["test", "--locked", "--package", "wheeleg-tests"])
-        .args(["--features", "qemu", "--test", "qemu"])
+    test.args(["test", "--locked", "--release"])
+        .args(rust::HOST)
+        .args(["--features", "wheeleg-tests/qemu", "--test", "qemu"])
         .env("WHEELEG_IMAGES", images);
     test
 }

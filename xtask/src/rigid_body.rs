@@ -5,8 +5,9 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::process::{cargo, command, output, run, target_dir};
+use crate::process::{command, output, run, target_dir};
 use crate::report::Report;
+use crate::rust;
 use crate::tools;
 
 const ROBOT: &str = "wheeleg-2003";
@@ -42,9 +43,7 @@ fn export(folder: &Path, urdf: &Path, states: &Path) -> Result<()> {
         fs::remove_dir_all(folder)?;
     }
     fs::create_dir_all(folder)?;
-    let built = ["build", "--locked", "--release", "--package", "wheeleg-sim"];
-    run(cargo().args(built).args(["--bin", "wheeleg"]))?;
-    run(cargo().args(built).args(["--example", "floating_states"]))?;
+    rust::build(&["--bin", "wheeleg", "--example", "floating_states"])?;
     let release = target_dir().join("release");
     run(command(release.join("wheeleg"))
         .args(["export", "urdf", ROBOT, "--out"])

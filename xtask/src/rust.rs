@@ -3,8 +3,20 @@
 use crate::process::{cargo, run};
 use crate::report::StepResult;
 
+/// All that needs neither boards nor an emulator's build tools: what `cargo xtask pil` builds is
+/// left out. One selection for all steps, since each has its own set of features to build for.
+pub(crate) const HOST: [&str; 3] = ["--workspace", "--exclude", "wheeleg-pil-unicorn"];
+
 /// Seed of the property tests in the suite.
 const PROPTEST_SEED: &str = "20030001";
+
+/// Builds `targets` of the host's release build.
+pub(crate) fn build(targets: &[&str]) -> anyhow::Result<()> {
+    run(cargo()
+        .args(["build", "--locked", "--release"])
+        .args(HOST)
+        .args(targets))
+}
 
 /// The format of every crate.
 pub(crate) fn fmt() -> StepResult {
@@ -36,13 +48,14 @@ pub(crate) fn clippy() -> StepResult {
 }
 
 /// All host tests, doc tests and system tests. One failing test program does
-/// not hide the others.
+/// not hide the others. In the release build, which the later steps need anyway and whose
+/// arithmetic and assertions are checked: a second build of everything takes as long as the tests.
 pub(crate) fn test() -> StepResult {
     // One seed for the property tests, so that the same sources give the same
     // verdict; `cargo test` alone draws new cases every time.
     run(cargo()
-        .args(["test", "--locked", "--workspace", "--no-fail-fast"])
-        .args(["--exclude", "wheeleg-pil-unicorn"])
+        .args(["test", "--locked", "--release", "--no-fail-fast"])
+        .args(HOST)
         .env("PROPTEST_RNG_SEED", PROPTEST_SEED))?;
     Ok(())
 }

@@ -64,8 +64,9 @@ fn build(root: &Path, profile: &Path) {
         .args([
             "build",
             "--quiet",
-            "--package",
-            "wheeleg-sim",
+            "--workspace",
+            "--exclude",
+            "wheeleg-pil-unicorn",
             "--bin",
             "wheeleg",
         ])

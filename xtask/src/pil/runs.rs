@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
-use crate::process::{cargo, command, output, run, target_dir};
+use crate::process::{command, output, target_dir};
+use crate::rust;
 
 /// What is measured of each board.
 const MEASURED: [&str; 5] = [
@@ -35,7 +36,7 @@ pub(crate) fn three_steps(
 
 /// Builds the program.
 pub(super) fn build_wheeleg() -> anyhow::Result<()> {
-    run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-sim"]))
+    rust::build(&["--bin", "wheeleg"])
 }
 
 /// Builds the program and runs a scenario with it; gives its summary. `nodes` says which

@@ -1,0 +1,13 @@
+//! The system tests with emulated boards, in one program: `cargo xtask pil`.
+
+mod bench;
+mod program;
+mod sil;
+
+mod pil;
+mod pil_driver;
+mod pil_faults;
+mod pil_flips;
+mod pil_images;
+mod pil_mutants;
+mod pil_store;

@@ -1,0 +1,24 @@
+//! The system tests of the host: one program, because each program of its own would link
+//! the whole simulator once more. `hil` has its own for its real time, `determinism` for
+//! its working directory, which is the process's.
+
+mod program;
+mod sil;
+
+mod bus_budget;
+mod check_vectors;
+mod cli;
+mod closed_loop;
+mod compare;
+mod control_bars;
+mod cylinders;
+mod delay;
+mod fault_matrix;
+mod figures;
+mod foot_sides;
+mod off_data;
+mod precharge;
+mod restart;
+mod safe_states;
+mod service;
+mod workspace;
