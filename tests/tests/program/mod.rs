@@ -69,6 +69,9 @@ fn build(root: &Path, profile: &Path) {
             "wheeleg-pil-unicorn",
             "--bin",
             "wheeleg",
+            // With a test, the features are those that the tests are built with.
+            "--test",
+            "determinism",
         ])
         .args(["--profile", if release { "release" } else { "test" }])
         .arg("--target-dir")
