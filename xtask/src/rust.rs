@@ -28,13 +28,7 @@ pub(crate) fn fmt() -> StepResult {
 
 /// Lints of every member and every target, warnings being errors.
 pub(crate) fn clippy() -> StepResult {
-    run(cargo().args([
-        "clippy",
-        "--locked",
-        "--workspace",
-        // Its build tools may be missing; `cargo xtask pil` looks after it.
-        "--exclude",
-        "wheeleg-pil-unicorn",
+    run(cargo().args(["clippy", "--locked"]).args(HOST).args([
         "--all-targets",
         "--",
         "-D",
