@@ -10,7 +10,7 @@ use clap::Args;
 
 use crate::process::{ask, cargo, command, figures, output, root};
 use crate::report::{Report, StepResult};
-use crate::{fuzz, mutants, pil};
+use crate::{fuzz, mutants, pil, rust};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -18,7 +18,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 9] = [
+const CHECKS: [Check; 10] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -61,6 +61,12 @@ const CHECKS: [Check; 9] = [
         "flipped bits in the state of emulated boards, 20 times as many as in the suite",
         10,
         pil::state_flips,
+    ),
+    Check(
+        "pil-speed",
+        "three steps on eight emulated boards, times real time, while nobody else is at work",
+        3,
+        pil::speed,
     ),
     Check(
         "second-way",
@@ -131,16 +137,17 @@ pub(crate) fn note(name: &str, text: &str) -> Result<()> {
 }
 
 /// The line of a test program's output that has `marker`, with one of its tests run by
-/// name in an optimised build, as often as `variable` says. It is told of a test that
+/// name in the build of the suite, as often as `variable` says. It is told of a test that
 /// fails, too.
 fn measured(
-    [package, program, test]: [&str; 3],
+    [program, test]: [&str; 2],
     (variable, amount): (&str, u32),
     marker: &str,
 ) -> StepResult<String> {
     let found = figures(
         cargo()
-            .args(["test", "--release", "--package", package])
+            .args(["test", "--locked", "--release"])
+            .args(rust::HOST)
             .args(["--test", program, "--", "--exact", "--nocapture", test])
             .env(variable, amount.to_string()),
         |line| line.contains(marker),
@@ -152,33 +159,25 @@ fn measured(
 fn flips() -> StepResult<String> {
     let test = "no_one_or_two_bit_flip_makes_another_frame";
     let amount = ("WHEELEG_FLIP_FRAMES_PER_TYPE", 1_000);
-    measured(["wheeleg-protocol", "robustness", test], amount, " flips: ")
+    measured(["robustness", test], amount, " flips: ")
 }
 
 fn streams() -> StepResult<String> {
     let test = "a_million_random_streams_give_no_wrong_frame";
     let amount = ("WHEELEG_RANDOM_STREAMS", 10_000_000);
-    measured(
-        ["wheeleg-protocol", "robustness", test],
-        amount,
-        " streams: ",
-    )
+    measured(["robustness", test], amount, " streams: ")
 }
 
 fn off_data() -> StepResult<String> {
-    let test = "nothing_trips_on_a_robot_off_its_data";
+    let test = "off_data::nothing_trips_on_a_robot_off_its_data";
     let amount = ("WHEELEG_OFF_ROBOTS", 200);
-    measured(
-        ["wheeleg-tests", "off_data", test],
-        amount,
-        " false alarms; ",
-    )
+    measured(["system", test], amount, " false alarms; ")
 }
 
 fn cylinders() -> StepResult<String> {
-    let test = "few_combinations_miss_on_cylinders_drawn_at_random";
+    let test = "cylinders::few_combinations_miss_on_cylinders_drawn_at_random";
     measured(
-        ["wheeleg-tests", "cylinders", test],
+        ["system", test],
         ("WHEELEG_CYLINDERS", 240),
         " cylinders from number ",
     )

@@ -134,7 +134,11 @@ fn test(report: &mut Report) {
     firmware::steps(report);
     sizes::steps(report, &sizes::Options::default());
     qemu::steps(report, &qemu::Options::default());
-    pil::steps(report, &pil::Options::default());
+    let any_speed = pil::Options {
+        any_speed: true,
+        ..pil::Options::default()
+    };
+    pil::steps(report, &any_speed);
     vectors::steps(report);
     conformance::steps(report);
     fuzz::short_steps(report);
