@@ -134,11 +134,7 @@ fn test(report: &mut Report) {
     firmware::steps(report);
     sizes::steps(report, &sizes::Options::default());
     qemu::steps(report, &qemu::Options::default());
-    let any_speed = pil::Options {
-        any_speed: true,
-        ..pil::Options::default()
-    };
-    pil::steps(report, &any_speed);
+    pil::steps(report, &pil::Options::suite());
     vectors::steps(report);
     conformance::steps(report);
     fuzz::short_steps(report);

@@ -50,7 +50,17 @@ pub(crate) struct Options {
     profile: bool,
     /// How fast the boards run is told, not judged: in the suite, which runs on any machine.
     #[arg(skip)]
-    pub(crate) any_speed: bool,
+    any_speed: bool,
+}
+
+impl Options {
+    /// As in the suite.
+    pub(crate) fn suite() -> Self {
+        Self {
+            any_speed: true,
+            ..Self::default()
+        }
+    }
 }
 
 /// `cargo xtask pil`.
