@@ -108,7 +108,8 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         || tests(&emulator, &images),
     );
     let figures = report.step("three steps on eight emulated boards", || {
-        let (figures, speed) = figures(&emulator, &images.folder)?;
+        let times = if options.any_speed { 2 } else { TIMES_MOST };
+        let (figures, speed) = figures(&emulator, &images.folder, times)?;
         if !options.any_speed {
             speed.map_err(anyhow::Error::msg)?;
         }
@@ -248,7 +249,7 @@ pub(crate) fn second_way() -> StepResult<String> {
     let way = no_std::second_way()?;
     let images = Images::build(way, "firmware-debian", true)?;
     tests(&emulator, &images)?;
-    let (figures, _) = figures(&emulator, &images.folder)?;
+    let (figures, _) = figures(&emulator, &images.folder, 2)?;
     let eventful = eventful(&emulator, &images.folder)?;
     predictive(&emulator, &images.folder)?;
     let mixed = mixed(&emulator, &images.folder, way)?;
@@ -278,10 +279,17 @@ fn ensure_file(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Runs the paper's test twice on eight emulated boards, or up to four times where it is slower
+/// Runs of the boards in which they may show that they are fast enough.
+const TIMES_MOST: usize = 4;
+
+/// Runs the paper's test twice on eight emulated boards, or up to `times` where it is slower
 /// than it must be: no bit may differ from the host, nor between the runs. The second is the
 /// verdict on their speed.
-fn figures(emulator: &Path, images: &Path) -> StepResult<(Value, Result<String, String>)> {
+fn figures(
+    emulator: &Path,
+    images: &Path,
+    times: usize,
+) -> StepResult<(Value, Result<String, String>)> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let mut played = vec![
         watched("pil-run/first", &environment)?,
@@ -296,7 +304,7 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<(Value, Result<String, 
             .collect()
     };
     // Slower than it must be: was it us, or the machine?
-    while !is_met(&rated(&played)) && played.len() < 4 {
+    while !is_met(&rated(&played)) && played.len() < times {
         played.push(watched("pil-run/again", &environment)?);
     }
     let runs = rated(&played);
@@ -344,7 +352,7 @@ fn figures(emulator: &Path, images: &Path) -> StepResult<(Value, Result<String, 
 /// The speed of eight emulated boards, against its target.
 pub(crate) fn speed() -> StepResult<String> {
     let (emulator, images) = boards()?;
-    let (_, speed) = figures(&emulator, &images.folder)?;
+    let (_, speed) = figures(&emulator, &images.folder, TIMES_MOST)?;
     Ok(speed.map_err(anyhow::Error::msg)?)
 }
 

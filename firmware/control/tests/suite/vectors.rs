@@ -49,7 +49,7 @@ const SURFACE_TOLERANCE: f64 = 2.0;
 
 #[test]
 fn shipped_rule_bases_match_the_exact_surface() {
-    let vectors = load(include_str!("vectors/fuzzy.json"));
+    let vectors = load(include_str!("../vectors/fuzzy.json"));
     for (name, base) in [("pd", &rules::PD), ("id", &rules::ID)] {
         let rows = list(&vectors[name]);
         assert!(rows.len() > 1000);
@@ -94,7 +94,7 @@ fn four_bit_membership_matches_exactly() {
         [20, 90, 127],
     ];
     let base = GridRules::new(first, second, table).expect("valid");
-    let vectors = load(include_str!("vectors/fuzzy.json"));
+    let vectors = load(include_str!("../vectors/fuzzy.json"));
     let rows = list(&vectors["chip"]);
     assert!(rows.len() > 1500);
     for row in rows {
@@ -128,7 +128,7 @@ fn overlapping_sets_match_the_exact_surface() {
         [1000, 6000, 9000],
     ];
     let base = GridRules::new(first, second, table).expect("valid");
-    let vectors = load(include_str!("vectors/fuzzy.json"));
+    let vectors = load(include_str!("../vectors/fuzzy.json"));
     for row in list(&vectors["wide"]) {
         let got = f64::from(base.infer(short(&row[0]), short(&row[1])));
         assert!((got - real(&row[2])).abs() <= 1.5, "{row}: {got}");
@@ -155,7 +155,7 @@ fn three_input_rule_list_matches_the_exact_surface() {
         ],
     )
     .expect("valid");
-    let vectors = load(include_str!("vectors/fuzzy.json"));
+    let vectors = load(include_str!("../vectors/fuzzy.json"));
     let mut silent = 0;
     for row in list(&vectors["list"]) {
         let got = f64::from(base.infer([short(&row[0]), short(&row[1]), short(&row[2])]));
@@ -168,7 +168,7 @@ fn three_input_rule_list_matches_the_exact_surface() {
 
 #[test]
 fn lead_filter_matches_the_exact_recursion() {
-    let vectors = load(include_str!("vectors/wheel.json"));
+    let vectors = load(include_str!("../vectors/wheel.json"));
     for case in list(&vectors["filters"]) {
         let byte = |name: &str| u8::try_from(int(&case[name])).expect("a byte");
         let mut wheel = WheelController::new();
@@ -201,7 +201,7 @@ fn lead_filter_matches_the_exact_recursion() {
 
 #[test]
 fn profiles_match_the_exact_points() {
-    let vectors = load(include_str!("vectors/wheel.json"));
+    let vectors = load(include_str!("../vectors/wheel.json"));
     let cases = list(&vectors["profiles"]);
     assert_eq!(cases.len(), 15);
     for case in cases {
@@ -259,7 +259,7 @@ fn vector_gains() -> JointGains {
 fn joint_law_matches_the_exact_sequence() {
     let config = JointConfig::new(&vector_gains(), Micros(1000)).expect("valid gains");
     let mut joint = JointController::new(config);
-    let vectors = load(include_str!("vectors/joint.json"));
+    let vectors = load(include_str!("../vectors/joint.json"));
     let rows = list(&vectors);
     assert_eq!(rows.len(), 1400);
     let (mut settled_ticks, mut cut, mut extending, mut retracting) = (0, 0, 0, 0);

@@ -1,9 +1,7 @@
 //! The fast floating robot against the natural orthogonal complement, and both against the models
 //! with fewer freedoms; bad input.
 
-mod floating_states;
-
-use floating_states::{Draw, STATES, frictionless, rubbing};
+use crate::floating_states::{Draw, STATES, frictionless, rubbing};
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3, Vector4};
 use proptest::prelude::*;
 use wheeleg_kinematics::KinematicsError;

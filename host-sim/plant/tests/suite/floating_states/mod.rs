@@ -1,10 +1,5 @@
 //! Random states of the floating robot, and differentiation along a motion.
 
-#![allow(
-    dead_code,
-    reason = "each test program uses its own part of this module"
-)]
-
 use nalgebra::{Quaternion, SVector, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

@@ -15,7 +15,7 @@ const TOLERANCE: f64 = 1e-10;
 const STATES: usize = 1000;
 
 fn vectors() -> Value {
-    let text = include_str!("../../../tests/vectors/model-7.json");
+    let text = include_str!("../../../../tests/vectors/model-7.json");
     let value: Value = serde_json::from_str(text).unwrap();
     assert_eq!(value["schema"], "wheeleg-reference-vectors/1");
     assert_eq!(value["cases"].as_array().unwrap().len(), 50);

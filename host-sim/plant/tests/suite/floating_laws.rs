@@ -1,8 +1,8 @@
 //! Laws of mechanics that the floating robot must keep, over random states.
 
-mod floating_states;
-
-use floating_states::{Draw, STATES, along, derivative, derivative_over, frictionless, rubbing};
+use crate::floating_states::{
+    Draw, STATES, along, derivative, derivative_over, frictionless, rubbing,
+};
 use nalgebra::{Matrix3, SVector, Vector3};
 use wheeleg_plant::dynamics::floating::reference::BODIES;
 use wheeleg_plant::dynamics::floating::{

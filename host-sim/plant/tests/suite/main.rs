@@ -1,0 +1,15 @@
+//! All tests of the crate in one program, which is built and linked once.
+
+mod axis;
+mod axis_reference;
+mod chain;
+mod contact;
+mod dynamics;
+mod floating;
+mod floating_laws;
+mod floating_states;
+mod ground;
+mod kinematic_laws;
+mod never_nan;
+mod noc;
+mod robot;
