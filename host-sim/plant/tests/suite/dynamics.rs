@@ -277,18 +277,7 @@ fn energy_drift_j(torque: f64, steps: usize) -> f64 {
     let (start, angle) = (energy(&q, &v), fast.wheel_angle_rad(&array(&q)));
     let h = 0.4 / steps as f64;
     for _ in 0..steps {
-        let (v1, a1) = (v, rate(&q, &v));
-        let (v2, a2) = (
-            v + a1 * (h / 2.0),
-            rate(&(q + v1 * (h / 2.0)), &(v + a1 * (h / 2.0))),
-        );
-        let (v3, a3) = (
-            v + a2 * (h / 2.0),
-            rate(&(q + v2 * (h / 2.0)), &(v + a2 * (h / 2.0))),
-        );
-        let (v4, a4) = (v + a3 * h, rate(&(q + v3 * h), &(v + a3 * h)));
-        q += (v1 + (v2 + v3) * 2.0 + v4) * (h / 6.0);
-        v += (a1 + (a2 + a3) * 2.0 + a4) * (h / 6.0);
+        crate::rk4::step(&mut q, &mut v, h, rate);
     }
     let turned = fast.wheel_angle_rad(&array(&q)) - angle;
     assert!(turned.abs() > 0.1, "{turned}");

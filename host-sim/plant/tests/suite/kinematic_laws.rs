@@ -356,19 +356,7 @@ fn drift_j(start: [V4; 2], step_s: f64, steps: usize) -> f64 {
     let [mut q, mut v] = start;
     let before = energy(&q, &v);
     for _ in 0..steps {
-        let h = step_s;
-        let (v1, a1) = (v, rate(&q, &v));
-        let (v2, a2) = (
-            v + a1 * (h / 2.0),
-            rate(&(q + v1 * (h / 2.0)), &(v + a1 * (h / 2.0))),
-        );
-        let (v3, a3) = (
-            v + a2 * (h / 2.0),
-            rate(&(q + v2 * (h / 2.0)), &(v + a2 * (h / 2.0))),
-        );
-        let (v4, a4) = (v + a3 * h, rate(&(q + v3 * h), &(v + a3 * h)));
-        q += (v1 + (v2 + v3) * 2.0 + v4) * (h / 6.0);
-        v += (a1 + (a2 + a3) * 2.0 + a4) * (h / 6.0);
+        crate::rk4::step(&mut q, &mut v, step_s, rate);
     }
     energy(&q, &v) - before
 }

@@ -12,4 +12,5 @@ mod ground;
 mod kinematic_laws;
 mod never_nan;
 mod noc;
+mod rk4;
 mod robot;

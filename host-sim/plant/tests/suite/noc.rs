@@ -383,19 +383,7 @@ fn energy_drift_j(step_s: f64, steps: usize) -> f64 {
     let (mut q, mut v) = (Vector3::new(0.36, 0.14, 0.05), Vector3::new(0.4, -0.5, 0.2));
     let start = energy(&q, &v);
     for _ in 0..steps {
-        let h = step_s;
-        let (v1, a1) = (v, rate(&q, &v));
-        let (v2, a2) = (
-            v + a1 * (h / 2.0),
-            rate(&(q + v1 * (h / 2.0)), &(v + a1 * (h / 2.0))),
-        );
-        let (v3, a3) = (
-            v + a2 * (h / 2.0),
-            rate(&(q + v2 * (h / 2.0)), &(v + a2 * (h / 2.0))),
-        );
-        let (v4, a4) = (v + a3 * h, rate(&(q + v3 * h), &(v + a3 * h)));
-        q += (v1 + (v2 + v3) * 2.0 + v4) * (h / 6.0);
-        v += (a1 + (a2 + a3) * 2.0 + a4) * (h / 6.0);
+        crate::rk4::step(&mut q, &mut v, step_s, rate);
     }
     assert!(
         (energy(&q, &v) - leg_potential_j(&q, &gravity)) > 0.05,
