@@ -12,13 +12,12 @@
 //! is due to c; what the fastest has above that line is due to m, in J as in v.
 
 use super::model::AxisModel;
-use super::{part, quotient, scaled};
-use core::hash::{Hash, Hasher};
+use super::{mix, part, quotient, scaled};
 
-/// A move is looked at for so many ticks at most.
-const TICKS_MAX: u16 = 1000;
-/// Ticks without which there is no result.
-const TICKS_MIN: u16 = 80;
+/// A move is looked at for so many periods at most.
+const PERIODS_MAX: u16 = 250;
+/// Periods without which there is no result.
+const PERIODS_MIN: u16 = 20;
 /// Sliding faster than this is looked at, raw mm/s (20 mm/s).
 const SLIDES: i32 = 20 << 16;
 /// A move must have been this fast at least, raw mm/s (200 mm/s), …
@@ -33,11 +32,11 @@ const LEAST: i32 = 39_322;
 /// A moment of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Moment {
-    /// Ticks since the first.
-    ticks: u16,
+    /// Periods since the first.
+    periods: u16,
     /// Raw mm/s.
     speed: i32,
-    /// Impulse since the first, 16 mN × ticks.
+    /// Impulse since the first, 16 mN × periods.
     impulse: i32,
 }
 
@@ -52,34 +51,38 @@ pub struct Learner {
     mass: i32,
 }
 
-impl Hash for Learner {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Without a first
-        // moment nothing of it is read.
-        let Self {
-            first,
-            fastest,
-            last,
-            mass,
-        } = self;
-        state.write_i32(*mass);
-        state.write_i32(*first);
-        if *first != 0 {
-            state.write_u32(u32::from(fastest.ticks) | u32::from(last.ticks).wrapping_shl(16));
-            state.write_i32(fastest.speed);
-            state.write_i32(fastest.impulse);
-            state.write_i32(last.speed);
-            state.write_i32(last.impulse);
-        }
-    }
-}
-
 impl Learner {
     /// Nothing seen.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Adds itself to a sum. Without a first moment nothing of a move is read.
+    #[inline]
+    pub(super) fn sum(&self, sum: u32) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            first,
+            fastest,
+            last,
+            mass,
+        } = *self;
+        let mut sum = mix(mix(sum, mass), first);
+        if first != 0 {
+            let periods = i32::from(fastest.periods) | i32::from(last.periods).wrapping_shl(16);
+            sum = mix(sum, periods);
+            sum = mix(mix(sum, fastest.speed), fastest.impulse);
+            sum = mix(mix(sum, last.speed), last.impulse);
+        }
+        sum
+    }
+
+    /// Whether a mass waits to be taken.
+    #[inline]
+    #[must_use]
+    pub const fn has_mass(&self) -> bool {
+        self.mass > 0
     }
 
     /// A mass that was learnt and not yet taken, kg × 2^16.
@@ -89,7 +92,7 @@ impl Learner {
         (mass > 0).then_some(mass)
     }
 
-    /// One tick at `speed` (raw mm/s) with pressure force `force`, mN.
+    /// One period that ends at `speed` (raw mm/s), with the pressure force `force`, mN.
     #[inline]
     pub fn sample(&mut self, model: &AxisModel, speed: i32, force: i32) {
         let sliding = speed.wrapping_abs() > SLIDES;
@@ -104,17 +107,17 @@ impl Learner {
             return;
         }
         let used = force.saturating_sub(part(speed, model.viscous, 24));
-        // Forces below 2^24 mN (100 mm of bore at 2.1 MPa) in 16 mN, of up to 2^10 ticks.
+        // Forces below 2^24 mN (100 mm of bore at 2.1 MPa) in 16 mN, of up to 2^8 periods.
         let impulse = self.last.impulse.wrapping_add(used.wrapping_shr(4));
         self.last = Moment {
-            ticks: self.last.ticks.wrapping_add(1),
+            periods: self.last.periods.wrapping_add(1),
             speed,
             impulse,
         };
         if speed.wrapping_abs() > self.fastest.speed.wrapping_abs() {
             self.fastest = self.last;
         }
-        if !sliding || (speed ^ self.first) < 0 || self.last.ticks >= TICKS_MAX {
+        if !sliding || (speed ^ self.first) < 0 || self.last.periods >= PERIODS_MAX {
             self.finish(model);
         }
     }
@@ -131,13 +134,13 @@ impl Learner {
             ..
         } = *self;
         self.first = 0;
-        if last.ticks < TICKS_MIN || fastest.speed.wrapping_abs() < FAST {
+        if last.periods < PERIODS_MIN || fastest.speed.wrapping_abs() < FAST {
             return;
         }
-        // At least the least number of ticks: no division by nothing.
-        let share = u32::from(fastest.ticks)
+        // At least the least number of periods: no division by nothing.
+        let share = u32::from(fastest.periods)
             .wrapping_shl(16)
-            .checked_div(u32::from(last.ticks))
+            .checked_div(u32::from(last.periods))
             .unwrap_or(0) as i32;
         let line = |end: i32| part(end, share, 16);
         let speed = fastest
@@ -154,7 +157,7 @@ impl Learner {
             return;
         }
         // 16 mN × s × 2^32 over mm/s × 2^16.
-        let impulse = i64::from(impulse.max(0)).wrapping_mul(i64::from(model.tick));
+        let impulse = i64::from(impulse.max(0)).wrapping_mul(i64::from(model.period));
         let impulse = impulse.wrapping_shr(8).cast_unsigned();
         let mass = quotient(impulse, speed.cast_unsigned(), 12);
         let told = model.mass;

@@ -1,4 +1,4 @@
-//! The coefficients of a control tick, made of an axis's data.
+//! The coefficients of the predictive law, made of an axis's data.
 
 use super::data::{AxisData, AxisField};
 use super::gas::FlowCurve;
@@ -6,8 +6,8 @@ use super::valves::ValveTimes;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{Micros, PositionMm, divide};
 
-/// Coefficients for one control tick. Stroke and speed in raw I16F16,
-/// pressures in 1/256 Pa, forces in mN.
+/// Coefficients of the predictive law. Stroke and speed in raw I16F16,
+/// pressures in 1/256 Pa, forces in mN. A period is [`STROKES`] ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisModel {
     /// Valve timing.
@@ -60,12 +60,20 @@ pub struct AxisModel {
     pub breakaway: i32,
     /// Viscous friction, mN per mm/s, × 2^8.
     pub viscous: i32,
-    /// Look-ahead: a tick, t_on and the line, in s × 2^32.
+    /// Look-ahead from the moment of a period to that at which pulses of the next act: t_on and
+    /// the line behind its begin, in s × 2^32.
     pub horizon: i32,
     /// Look-ahead in µs.
     pub horizon_us: i32,
-    /// Tick in s × 2^32.
-    pub tick: i32,
+    /// Look-ahead in periods, × 2^16.
+    pub periods_ahead: i32,
+    /// Look-ahead from the tick that chooses the pulses, in s × 2^32.
+    pub horizon_reference: i32,
+    /// Moment for which a period's motion and pressures are worked out, µs after it begins: the
+    /// middle of the two ticks whose stroke is used.
+    pub moment: i32,
+    /// Period in s × 2^32.
+    pub period: i32,
     /// Mass, kg × 2^16, as told.
     pub mass: i32,
     /// Mass up to which the valves can follow the speed law, kg × 2^16.
@@ -84,11 +92,11 @@ pub struct AxisModel {
     pub observe_speed: i32,
     /// Observer: mm/s³ per mm: load per innovation and kg, in mN/(kg mm).
     pub observe_load: i32,
-    /// Growth of the force on a piston that sticks, mN per tick × 2^8.
+    /// Growth of the force on a piston that sticks, mN per period × 2^8.
     pub stick_step: i32,
     /// Rest band, raw mm.
     pub band: i32,
-    /// Square of the period of a swing on the air of both chambers, ticks² per kg × 2^8.
+    /// Square of the period of a swing on the air of both chambers, periods² per kg × 2^8.
     pub swing: i32,
 }
 
@@ -102,13 +110,32 @@ const AMBIENT_PA: u64 = 101_325;
 const EXPONENT_PERCENT: u64 = 120;
 /// Slope of the speed law times the dead time, × 100.
 const SLOPE_PERCENT: u64 = 28;
+#[cfg(not(target_os = "none"))]
+extern crate std;
+#[cfg(not(target_os = "none"))]
+pub(crate) fn knob(name: &str, default: u64) -> u64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default) }
+#[cfg(target_os = "none")]
+pub(crate) fn knob(_: &str, default: u64) -> u64 { default }
+
 /// Gain of the speed error times the dead time, × 100.
 const DAMPING_PERCENT: u64 = 66;
 /// Deceleration over slope times top speed, × 100.
 const BRAKE_PERCENT: u64 = 65;
-/// Bandwidth of the observer, rad/s: noise of a 12-bit converter with 16-fold
-/// oversampling gives 1 mm/s of speed.
-const OBSERVER: u64 = 150;
+/// What the observer keeps of an older period's weight (a fading memory of second order: the gains
+/// below are 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³), × 2^16.
+const MEMORY: u64 = 36_044;
+/// Share of the innovation in stroke, × 2^16.
+const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY) >> 16) * MEMORY / (1 << 16);
+/// In speed, per period, × 2^16.
+const OBSERVE_SPEED: u64 =
+    3 * ((((1 << 16) - MEMORY) * ((1 << 16) - MEMORY)) >> 16) * ((1 << 16) + MEMORY) / (1 << 17);
+/// In acceleration, per square of a period, × 2^16.
+const OBSERVE_LOAD: u64 =
+    ((((1 << 16) - MEMORY) * ((1 << 16) - MEMORY)) >> 16) * ((1 << 16) - MEMORY) / (1 << 16);
+/// Ticks of a period.
+pub(super) const STROKES: u64 = 4;
+/// Look-ahead into a period that pulses act in, µs.
+const HOLD: u64 = 0;
 /// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides
 /// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
 /// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
@@ -169,7 +196,10 @@ impl AxisModel {
             viscous,
             horizon,
             horizon_us,
-            tick,
+            periods_ahead,
+            horizon_reference,
+            moment,
+            period,
             mass,
             nimble_mass,
             slope,
@@ -200,7 +230,8 @@ impl AxisModel {
             }
             2 => {
                 (mean, low, high, force_out, force_in, coulomb).hash(state);
-                (breakaway, viscous, horizon, horizon_us, tick).hash(state);
+                (breakaway, viscous, horizon, horizon_us).hash(state);
+                (periods_ahead, horizon_reference, moment, period).hash(state);
             }
             _ => {
                 (mass, nimble_mass, slope, damping, brake, top_speed).hash(state);
@@ -236,9 +267,13 @@ impl AxisModel {
         let flow_a_16 = divide(flow_24.wrapping_shl(8), area_a_16);
         let flow_b_16 = divide(flow_24.wrapping_shl(8), area_b_16);
         let tick_us = micros(tick);
-        let horizon_us = tick_us
-            .wrapping_add(micros(data.valve_on))
-            .wrapping_add(micros(data.line_delay));
+        let period_us = tick_us.wrapping_mul(STROKES);
+        // Between the second and the third tick, and from there to the next period.
+        let moment_us = tick_us.wrapping_mul(3).wrapping_shr(1);
+        let valve_us = micros(data.valve_on)
+            .wrapping_add(micros(data.line_delay))
+            .wrapping_add(knob("HOLD",HOLD));
+        let horizon_us = less(period_us, moment_us).wrapping_add(valve_us);
         let seconds_32 = |us: u64| divide(us.wrapping_shl(32), 1_000_000);
 
         let ambient_8 = AMBIENT_PA << 8;
@@ -263,11 +298,11 @@ impl AxisModel {
         let per_horizon_8 = |percents: u64| divide(percents.wrapping_mul(2_560_000), horizon_us);
         // × 2^14, below 256/s: that of a dead time of 1.1 ms, and no steeper below it.
         // 2^22 × 2^37.
-        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, horizon_us).min(65_535 << 6);
+        let slope_14 = divide((knob("SLOPE",SLOPE_PERCENT) * 10_000) << 14, horizon_us).min(65_535 << 6);
         let slope_8 = slope_14.wrapping_shr(6);
         let brake = percent(
             slope_14.wrapping_mul(top_16).wrapping_shr(30),
-            BRAKE_PERCENT,
+            knob("BRAKE",BRAKE_PERCENT),
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
         // how fast the force can change, mN/s.
@@ -305,6 +340,7 @@ impl AxisModel {
         let critical = u64::from(data.critical_ratio.to_bits().unsigned_abs());
         let times = ValveTimes {
             tick: number(tick_us),
+            period: number(period_us),
             on: number(micros(data.valve_on)),
             off: number(micros(data.valve_off)),
             line: number(micros(data.line_delay)),
@@ -342,32 +378,33 @@ impl AxisModel {
             viscous: number(raw(data.viscous).wrapping_shr(8)),
             horizon: number(seconds_32(horizon_us)),
             horizon_us: number(horizon_us),
-            tick: number(seconds_32(tick_us)),
+            periods_ahead: number(divide(horizon_us.wrapping_shl(16), period_us)),
+            horizon_reference: number(seconds_32(tick_us.wrapping_add(valve_us))),
+            moment: number(moment_us),
+            period: number(seconds_32(period_us)),
             mass: number(raw(data.mass)),
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             slope: number(slope_8),
-            damping: number(per_horizon_8(DAMPING_PERCENT)),
+            damping: number(per_horizon_8(knob("DAMP",DAMPING_PERCENT))),
             brake: number(brake),
             top_speed: number(top_16),
-            observe_stroke: number(seconds_32(tick_us.wrapping_mul(3 * OBSERVER)).wrapping_shr(16)),
-            observe_speed: number(
-                seconds_32(tick_us.wrapping_mul(3 * OBSERVER * OBSERVER)).wrapping_shr(16),
-            ),
+            observe_stroke: number(obs().0),
+            observe_speed: number(divide(obs().1.wrapping_mul(1_000_000), period_us)),
             observe_load: number(divide(
-                tick_us.wrapping_mul(OBSERVER * OBSERVER * OBSERVER),
-                1_000_000,
+                obs().2.wrapping_mul(1_000_000_000_000).wrapping_shr(16),
+                period_us.wrapping_mul(period_us),
             )),
             // Five times the break-away force in a second, × 2^8.
             stick_step: number(divide(
                 to_mn(data.breakaway)
-                    .wrapping_mul(tick_us)
+                    .wrapping_mul(period_us)
                     .wrapping_mul(5 << 8),
                 1_000_000,
             )),
             band: number(raw(data.band)),
             swing: number(divide(
                 SWING,
-                swings.wrapping_mul(tick_us.wrapping_mul(tick_us)),
+                swings.saturating_mul(period_us.wrapping_mul(period_us)),
             )),
         }
     }
@@ -390,3 +427,5 @@ fn less(a: u64, b: u64) -> u64 {
 fn number(value: u64) -> i32 {
     i32::try_from(value).unwrap_or(i32::MAX)
 }
+
+fn obs() -> (u64,u64,u64) { let m = knob("MEM",MEMORY); let n=65536-m; (65536-((m*m)>>16)*m/65536, 3*((n*n)>>16)*(65536+m)/131072, ((n*n)>>16)*n/65536*knob("LOADG",100)/100) }

@@ -4,10 +4,13 @@
 //! falls; a pulse shorter than t_on never opens one, a gap shorter than t_off
 //! never shuts it. What the chamber sees comes later by the wave's way through
 //! the line. The same rules are followed here, in whole microseconds, on the
-//! on-times that were really sent.
+//! on-times that are sent: for a whole period of the law, or tick by tick where
+//! somebody else decides.
 
-use core::hash::{Hash, Hasher};
+use super::mix;
 
+/// A change of a coil is decided no longer ahead than this, µs: a period of 2 ms ticks.
+const LONGEST_PLAN: i32 = 8000;
 /// Changes that can be under way at once.
 const EDGES: usize = 4;
 /// Bits of a track's state: changes under way, the coil is on, the valve is open.
@@ -20,6 +23,8 @@ const OPEN: u32 = 1 << 9;
 pub struct ValveTimes {
     /// Control tick.
     pub tick: i32,
+    /// Ticks of one computation of the law, all its strokes.
+    pub period: i32,
     /// Coil on to open, 0…50 000.
     pub on: i32,
     /// Coil off to shut, 0…50 000.
@@ -63,29 +68,6 @@ impl Default for ValveTrack {
     }
 }
 
-impl Hash for ValveTrack {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Fields share a
-        // word such that a flipped bit of any flips one bit of it.
-        let Self {
-            state: own,
-            edges: [first, second, third, fourth],
-            changed,
-        } = self;
-        state.write_u32(changed ^ own);
-        let pending = own & PENDING;
-        if pending > 0 {
-            state.write_u32(*first);
-            state.write_u32(*second);
-            if pending > 2 {
-                state.write_u32(*third);
-                state.write_u32(*fourth);
-            }
-        }
-    }
-}
-
 impl ValveTrack {
     /// Shut for a long time, on a clock that begins at 0.
     #[must_use]
@@ -97,7 +79,30 @@ impl ValveTrack {
         }
     }
 
-    /// Whether the coil is on at the end of the ticks taken so far.
+    /// Adds itself to a sum. Fields share a word such that a flipped bit of any flips one bit
+    /// of it.
+    #[inline]
+    pub(super) fn sum(&self, sum: u32) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            state,
+            edges: [first, second, third, fourth],
+            changed,
+        } = *self;
+        let mut sum = mix(sum, (changed ^ state).cast_signed());
+        let pending = state & PENDING;
+        if pending > 0 {
+            sum = mix(sum, first.cast_signed());
+            sum = mix(sum, second.cast_signed());
+            if pending > 2 {
+                sum = mix(sum, third.cast_signed());
+                sum = mix(sum, fourth.cast_signed());
+            }
+        }
+        sum
+    }
+
+    /// Whether the coil is on at the end of what has been decided.
     #[must_use]
     pub const fn coil(&self) -> bool {
         self.state & COIL != 0
@@ -139,23 +144,61 @@ impl ValveTrack {
         }
     }
 
-    /// Takes the on-time of the tick that begins `now`, 0…tick µs from its edge; gives for
-    /// how long the chamber sees the valve open in that tick, µs.
+    /// Takes the on-time of the `span` µs that begin `now`: `on` µs from there.
     #[inline]
-    pub fn advance(&mut self, now: u32, on: i32, times: &ValveTimes) -> i32 {
+    pub fn energise(&mut self, now: u32, on: i32, span: i32, times: &ValveTimes) {
         if on > 0 && !self.coil() {
             self.change(now, times);
         }
-        if on < times.tick && self.coil() {
+        if on < span && self.coil() {
             self.change(now.wrapping_add(on as u32), times);
         }
+    }
+
+    /// A coil whose fall was planned for a moment after `at` falls there, because somebody
+    /// else decides from then on.
+    #[inline(never)]
+    pub fn cut(&mut self, at: u32, times: &ValveTimes) {
+        let late = self.changed.wrapping_sub(at) as i32;
+        if self.coil() || late <= 0 || late > LONGEST_PLAN {
+            return;
+        }
+        let falls = times.off.wrapping_add(times.line) as u32;
+        let rises = times.on.wrapping_add(times.line) as u32;
+        let planned = self.changed.wrapping_add(falls);
+        self.changed = at;
+        let pending = self.pending();
+        let [first, second, third, fourth] = self.edges;
+        let (last, before) = match pending {
+            1 => (first, None),
+            2 => (second, Some(first)),
+            3 => (third, Some(second)),
+            _ => (fourth, Some(third)),
+        };
+        if pending == 0 || last != planned {
+            // It does not open the valve.
+            return;
+        }
+        let risen = before.map(|before| before.wrapping_sub(rises));
+        if risen.is_some_and(|risen| (at.wrapping_sub(risen) as i32) < times.on) {
+            // Nor does one so short.
+            self.state = self.state.wrapping_sub(2);
+        } else if let Some(last) = self.edges.get_mut(pending.wrapping_sub(1) as usize) {
+            *last = at.wrapping_add(falls);
+        }
+    }
+
+    /// For how long the chamber sees the valve open within `span` µs from the moment `from`,
+    /// up to which all changes have passed.
+    #[inline]
+    pub fn passes(&mut self, from: u32, span: i32) -> i32 {
         if self.pending() > 0 {
             let [first, ..] = self.edges;
-            if first.wrapping_sub(now) as i32 <= times.tick {
-                return self.pass(now, times.tick);
+            if first.wrapping_sub(from) as i32 <= span {
+                return self.pass(from, span);
             }
         }
-        if self.open() { times.tick } else { 0 }
+        if self.open() { span } else { 0 }
     }
 
     /// Takes the changes within `span` µs from `now`; gives the time open.
@@ -182,40 +225,41 @@ impl ValveTrack {
         }
     }
 
-    /// What is left at `now` of the shortest pulse under way, µs.
+    /// What is left at `next` of the shortest pulse under way, µs.
     #[inline]
-    fn left(&self, now: u32, times: &ValveTimes) -> i32 {
-        let since = now.wrapping_sub(self.changed);
+    fn left(&self, next: u32, times: &ValveTimes) -> i32 {
+        let since = next.wrapping_sub(self.changed);
         (times.shortest_pulse as u32).saturating_sub(since) as i32
     }
 
-    /// For how long the chamber will still see the valve open after `now`, the end of the
-    /// ticks taken so far, if its coil falls as soon as the shortest pulse allows, µs.
+    /// For how long the chamber will still see the valve open after the moment `from`, up to
+    /// which all changes have passed, if its coil falls as soon after `next`, up to which it
+    /// is decided, as the shortest pulse allows, µs.
     ///
     /// The time open is the sum of the times of closing less the sum of those of
     /// opening: changes alternate, and the last closes.
     #[inline]
     #[must_use]
-    pub fn committed(&self, now: u32, times: &ValveTimes) -> i32 {
+    pub fn committed(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
         if self.state & (COIL | PENDING) == 0 {
             return 0;
         }
-        self.under_way(now, times)
+        self.under_way(from, next, times)
     }
 
     #[inline(never)]
-    fn under_way(&self, now: u32, times: &ValveTimes) -> i32 {
+    fn under_way(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
         let [first, second, third, fourth] = self.edges;
         // Without a loop: how many changes there are decides all that is to be done. The
         // moments of an even number of changes need no present to be told from.
         let sum = match self.pending() {
             0 => 0,
-            1 => first.wrapping_sub(now),
+            1 => first.wrapping_sub(from),
             2 => second.wrapping_sub(first),
             3 => third
                 .wrapping_sub(second)
                 .wrapping_add(first)
-                .wrapping_sub(now),
+                .wrapping_sub(from),
             _ => fourth
                 .wrapping_sub(third)
                 .wrapping_add(second)
@@ -228,25 +272,27 @@ impl ValveTrack {
             return 0;
         }
         // The fall is the last change, and closes.
-        let fall = self.left(now, times);
-        fall.wrapping_add(times.off)
+        let decided = next.wrapping_sub(from) as i32;
+        decided
+            .wrapping_add(self.left(next, times))
+            .wrapping_add(times.off)
             .wrapping_add(times.line)
             .wrapping_sub(sum)
     }
 
-    /// On-time of the tick that begins `now`, at the end of those taken so far, for `need`
+    /// On-time of the period that begins `next`, up to which the coil is decided, for `need`
     /// µs of opening beyond what is [`ValveTrack::committed`]; `rival` says that the
     /// chamber's other valve is on.
     #[inline]
     #[must_use]
-    pub fn on_time(&self, now: u32, need: i32, rival: bool, times: &ValveTimes) -> i32 {
+    pub fn on_time(&self, next: u32, need: i32, rival: bool, times: &ValveTimes) -> i32 {
         let pulse = if self.coil() {
             // A few microseconds are not worth a tick.
             let need = if need < 20 { 0 } else { need };
-            self.left(now, times).saturating_add(need)
+            self.left(next, times).saturating_add(need)
         } else if need > 0 && !rival {
             let shortest = times.shortest_opening();
-            let since = now.wrapping_sub(self.changed);
+            let since = next.wrapping_sub(self.changed);
             if since < times.shortest_gap as u32 || need <= shortest.wrapping_mul(5) >> 3 {
                 return 0;
             }
@@ -257,7 +303,7 @@ impl ValveTrack {
         } else {
             0
         };
-        pulse.min(times.tick)
+        pulse.min(times.period)
     }
 }
 
@@ -268,6 +314,7 @@ mod tests {
 
     const TIMES: ValveTimes = ValveTimes {
         tick: 1000,
+        period: 4000,
         on: 3500,
         off: 2000,
         line: 900,
@@ -275,13 +322,19 @@ mod tests {
         shortest_gap: 2350,
     };
 
+    /// A tick with an on-time; gives for how long the valve was open in it.
+    fn tick(track: &mut ValveTrack, now: u32, on: i32) -> i32 {
+        track.energise(now, on, 1000, &TIMES);
+        track.passes(now, 1000)
+    }
+
     fn pulse(length: i32) -> [i32; 20] {
         let mut track = ValveTrack::new();
         let mut left = length;
-        core::array::from_fn(|tick| {
+        core::array::from_fn(|k| {
             let on = left.clamp(0, 1000);
             left -= on;
-            track.advance(1000 * tick as u32, on, &TIMES)
+            tick(&mut track, 1000 * k as u32, on)
         })
     }
 
@@ -303,7 +356,7 @@ mod tests {
             1000, 1000, 0, 0, 0, 0, 1000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0,
         ];
         for (on, now) in on.into_iter().zip((0..).step_by(1000)) {
-            track.advance(now, on, &TIMES);
+            tick(&mut track, now, on);
         }
         assert!(!track.open() && track.pending() == 0);
     }
@@ -318,10 +371,47 @@ mod tests {
         // The clock may wrap meanwhile.
         let start = 4000_u32.wrapping_neg();
         track.changed = start.wrapping_sub(1 << 30);
-        for (on, tick) in on.into_iter().zip(0_u32..) {
-            opened += track.advance(start.wrapping_add(1000 * tick), on, &TIMES);
+        for (on, k) in on.into_iter().zip(0_u32..) {
+            opened += tick(&mut track, start.wrapping_add(1000 * k), on);
         }
         assert_eq!(opened, 11_000 - 4400);
+    }
+
+    /// What is seen open from `now` on if nothing is asked for any more.
+    fn rest_of(track: &mut ValveTrack, mut now: u32) -> i32 {
+        let mut seen = 0;
+        for _ in 0..20 {
+            let on = track.on_time(now, 0, false, &TIMES);
+            track.energise(now, on, 4000, &TIMES);
+            seen += track.passes(now, 4000);
+            now += 4000;
+        }
+        seen
+    }
+
+    #[test]
+    fn a_planned_fall_that_is_cut_is_as_one_that_was_sent() {
+        // From an idle valve, and from one that opened long ago.
+        for before in [0, 10] {
+            for cut in 0..4 {
+                let mut planned = ValveTrack::new();
+                let mut sent = ValveTrack::new();
+                let mut now = 0;
+                for _ in 0..before {
+                    tick(&mut planned, now, 1000);
+                    tick(&mut sent, now, 1000);
+                    now += 1000;
+                }
+                planned.energise(now, 3950, 4000, &TIMES);
+                planned.cut(now + 1000 * cut, &TIMES);
+                for k in 0..4 {
+                    sent.energise(now + 1000 * k, if k < cut { 1000 } else { 0 }, 1000, &TIMES);
+                }
+                let open = |track: &mut ValveTrack| track.passes(now, 30_000);
+                assert_eq!(open(&mut planned), open(&mut sent), "{before} {cut}");
+                assert!(!planned.coil() && planned.pending() == 0);
+            }
+        }
     }
 
     proptest! {
@@ -334,15 +424,38 @@ mod tests {
             let mut track = ValveTrack::new();
             let mut now = 0;
             for on in ticks {
-                track.advance(now, on, &TIMES);
+                tick(&mut track, now, on);
                 now += 1000;
             }
-            let committed = track.committed(now, &TIMES);
+            let committed = track.committed(now, now, &TIMES);
+            let seen = rest_of(&mut track, now);
+            prop_assert_eq!(seen, committed);
+            prop_assert!(!track.coil() && !track.open());
+        }
+
+        /// The same for a law that decides a period ahead and looks from before its begin.
+        #[test]
+        fn commitment_of_periods_is_kept(
+            periods in proptest::collection::vec(0_i32..=6000, 1..40), before in 0_u32..=3000,
+        ) {
+            let mut track = ValveTrack::new();
+            let mut next = 1 << 20;
+            let mut from = next - before;
+            for need in periods {
+                let on = track.on_time(next, need, false, &TIMES);
+                track.energise(next, on, 4000, &TIMES);
+                track.passes(from, 4000);
+                next += 4000;
+                from += 4000;
+            }
+            let committed = track.committed(from, next, &TIMES);
             let mut seen = 0;
-            for _ in 0..40 {
-                let on = track.on_time(now, 0, false, &TIMES);
-                seen += track.advance(now, on, &TIMES);
-                now += 1000;
+            for _ in 0..20 {
+                let on = track.on_time(next, 0, false, &TIMES);
+                track.energise(next, on, 4000, &TIMES);
+                seen += track.passes(from, 4000);
+                next += 4000;
+                from += 4000;
             }
             prop_assert_eq!(seen, committed);
             prop_assert!(!track.coil() && !track.open());

@@ -166,9 +166,7 @@ impl JointController {
     /// next [`JointController::step`] starts afresh with a valid velocity.
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
-            let velocity = law.follow(model, measured, &self.sent);
-            law.release();
-            return velocity;
+            return law.observe(model, measured, &self.sent);
         }
         self.settle = Settle::new();
         self.integral = 0;
@@ -189,21 +187,21 @@ impl JointController {
         limits.reference = reference != input.reference;
         let error = reference.saturating_sub(input.measured);
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
-            let velocity = law.follow(model, input.measured, &self.sent);
             let drive = law.drive(
                 model,
                 &JointInput {
                     reference,
                     ..*input
                 },
+                &self.sent,
             );
             limits.duty = drive.limited;
             return JointOutput {
-                duty: Predictive::duty(model, &drive),
+                duty: drive.duty,
                 openings: ValveOpenings::SHUT,
                 direct: Some(drive.on),
                 error,
-                velocity,
+                velocity: drive.velocity,
                 limits,
                 settled: drive.settled,
             };

@@ -4,8 +4,8 @@ use super::STILL;
 use super::rest::REFERENCE_RESTS;
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
-use crate::axis::motion::{Inertia, Motion};
-use crate::axis::{clip, part, scaled, square_root, within};
+use crate::axis::motion::{Inertia, Motion, rubbed};
+use crate::axis::{clip, mix, part, scaled, square_root, within};
 
 /// Fast enough for the sign of friction to be that of the motion (10 mm/s).
 const SLIDES: i32 = 10 << 16;
@@ -26,7 +26,7 @@ impl Ahead {
     /// would be squeezed that is not there.
     #[inline]
     pub(super) fn new(model: &AxisModel, motion: &Motion) -> Self {
-        let gained = scaled(motion.acceleration, model.horizon, 16);
+        let gained = scaled(motion.gained, model.periods_ahead, 16);
         let mean = motion.speed.saturating_add(gained.wrapping_shr(1));
         let free = motion.stroke.saturating_add(part(mean, model.horizon, 32));
         let stroke = free.max(0).min(model.stroke);
@@ -44,35 +44,45 @@ impl Ahead {
         model: &AxisModel,
         inertia: &Inertia,
         motion: &Motion,
+        force: i32,
         pressures: Pressures,
     ) {
-        let drive = model.pressure_force(pressures).saturating_add(motion.load);
+        let then = model.pressure_force(pressures);
+        let drive = then.saturating_add(motion.load);
         self.speed = if motion.stuck && drive.saturating_abs() < model.breakaway {
             0
         } else {
-            // Mean of the accelerations now and then.
-            let then = inertia.acceleration(drive.saturating_sub(motion.friction));
-            let mean = motion.acceleration.saturating_add(then).wrapping_shr(1);
-            motion.speed.saturating_add(scaled(mean, model.horizon, 16))
+            // Mean of the forces now and then.
+            let mean = force.saturating_add(then) >> 1;
+            let viscous = part(motion.speed, model.viscous, 24);
+            let sliding = mean.saturating_add(motion.load).saturating_sub(viscous);
+            let gained = scaled(inertia.acceleration(sliding), model.horizon, 16);
+            rubbed(motion.speed.saturating_add(gained), inertia.rubbed_ahead)
         };
     }
 }
 
 /// Extra force on a piston that sticks: it grows until the piston slips.
-#[derive(Clone, Copy, Debug, Default, Hash)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Push {
     /// mN × 2^8.
     force: i32,
 }
 
 impl Push {
-    /// One tick at `speed` raw mm/s with `missing` raw mm to a reference of
+    /// Adds itself to a sum.
+    #[inline]
+    pub(super) fn sum(self, sum: u32) -> u32 {
+        mix(sum, self.force)
+    }
+
+    /// One period at `speed` raw mm/s with `missing` raw mm to a reference of
     /// `reference_speed`. What moves slower than it slides only gives way by the spring
     /// of its friction: that takes nothing back.
     #[inline]
     fn update(&mut self, model: &AxisModel, speed: i32, missing: i32, reference_speed: i32) {
         if speed > SLIDES {
-            self.force = self.force.saturating_sub(self.force.wrapping_shr(3));
+            self.force = self.force.saturating_sub(part(self.force, 27_000, 16));
         } else if speed < STILL && reference_speed.wrapping_abs() <= REFERENCE_RESTS {
             let step = if missing > 0 {
                 model.stick_step
@@ -117,7 +127,7 @@ impl Wish<'_> {
         } = *self;
         let load = motion.load;
         let error = reference
-            .saturating_add(part(reference_speed, model.horizon, 32))
+            .saturating_add(part(reference_speed, model.horizon_reference, 32))
             .saturating_sub(ahead.stroke);
         // The force that can brake, beside the load: seven tenths of it are used.
         let left = if error > 0 {

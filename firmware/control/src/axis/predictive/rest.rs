@@ -3,29 +3,28 @@
 use super::STILL;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::Motion;
-use crate::axis::{part, scaled, square_root};
-use core::hash::{Hash, Hasher};
+use crate::axis::{mix, part, scaled, square_root};
 
 /// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
 const CATCH: i32 = 6 << 16;
 /// A reference slower than this is a step (1 mm/s).
 pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
-/// Ticks in the band before rest.
-const REST_TICKS: u16 = 30;
-/// Ticks near the target without coming to rest after which the band widens …
-const PATIENCE: u16 = 500;
-/// … by one band in so many ticks, up to three bands in all …
+/// Periods in the band before rest.
+const REST_PERIODS: u16 = 8;
+/// Periods near the target without coming to rest after which the band widens …
+const PATIENCE: u16 = 125;
+/// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
-const PATIENCE_SHIFT: u32 = 9;
+const PATIENCE_SHIFT: u32 = 7;
 /// … but never wider than this, raw mm (0.4 mm).
 const WIDEST: i32 = 26_214;
 /// A piston further from its target than this does not rest there, raw mm (0.45 mm).
 const LEFT: i32 = 29_491;
-/// Ticks outside before the end of rest at the same target, …
-const RELEASE_TICKS: u16 = 20;
+/// Periods outside before the end of rest at the same target, …
+const RELEASE_PERIODS: u16 = 5;
 /// … and with a new one.
-const START_TICKS: u16 = 4;
-/// Ticks of a pause that one counts for in which the piston stands beside the band.
+const START_PERIODS: u16 = 1;
+/// Periods of a pause that one counts for in which the piston stands beside the band.
 const PAUSE_SPENT: u16 = 8;
 /// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
 const GENTLE: i32 = 40 << 16;
@@ -39,20 +38,26 @@ pub(super) struct Rest {
     held: u16,
     released: u16,
     near: u16,
-    /// What is left of the pause under way, ticks.
+    /// What is left of the pause under way, periods.
     pause: u16,
-    /// In the band at the last tick.
+    /// In the band in the last period.
     inside: bool,
     /// The target has changed since the piston came to rest.
     aimed: bool,
     settled: bool,
 }
 
-impl Hash for Rest {
+impl Rest {
+    /// Adds itself to a sum. Fields that are narrower than a word share one, such that a
+    /// flipped bit of any flips one bit of it.
     #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Fields that are
-        // narrower than a word share one, such that a flipped bit of any flips one bit of it.
+    pub(super) fn sum(&self, sum: u32) -> u32 {
+        self.words().into_iter().fold(sum, mix)
+    }
+
+    #[inline]
+    fn words(&self) -> [i32; 3] {
+        // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             target,
             held,
@@ -62,20 +67,19 @@ impl Hash for Rest {
             inside,
             aimed,
             settled,
-        } = self;
-        state.write_i32(*target);
-        state.write_u32(u32::from(*held) | u32::from(*released).wrapping_shl(16));
-        state.write_u32(
-            u32::from(*near)
-                ^ u32::from(*pause).wrapping_shl(16)
-                ^ u32::from(*settled).wrapping_shl(16)
-                ^ u32::from(*inside).wrapping_shl(17)
-                ^ u32::from(*aimed).wrapping_shl(18),
-        );
+        } = *self;
+        let small = u32::from(near)
+            ^ u32::from(pause).wrapping_shl(16)
+            ^ u32::from(settled).wrapping_shl(16)
+            ^ u32::from(inside).wrapping_shl(17)
+            ^ u32::from(aimed).wrapping_shl(18);
+        [
+            target,
+            i32::from(held) | i32::from(released).wrapping_shl(16),
+            small.cast_signed(),
+        ]
     }
-}
 
-impl Rest {
     /// At rest.
     pub(super) const fn is_settled(&self) -> bool {
         self.settled
@@ -103,7 +107,7 @@ impl Rest {
         new
     }
 
-    /// One tick; whether the valves are to stay shut.
+    /// One period; whether the valves are to stay shut.
     #[inline]
     pub(super) fn quiet(&mut self, model: &AxisModel, now: &Approach) -> bool {
         let narrow = model.band;
@@ -134,7 +138,7 @@ impl Rest {
         } else {
             0
         };
-        if self.held > REST_TICKS && !self.settled {
+        if self.held > REST_PERIODS && !self.settled {
             self.settled = true;
             self.aimed = false;
         }
@@ -146,12 +150,12 @@ impl Rest {
         let outside = away > release;
         if self.settled && (outside || !steps) {
             self.released = self.released.saturating_add(1);
-            let ticks = if self.aimed {
-                START_TICKS
+            let periods = if self.aimed {
+                START_PERIODS
             } else {
-                RELEASE_TICKS
+                RELEASE_PERIODS
             };
-            if self.released >= ticks || !steps {
+            if self.released >= periods || !steps {
                 self.settled = false;
                 self.held = 0;
                 self.released = 0;
@@ -195,7 +199,7 @@ impl Rest {
         self.pause > 0
     }
 
-    /// Ticks near the target beyond what patience allows.
+    /// Periods near the target beyond what patience allows.
     fn beyond(&self) -> i32 {
         i32::from(self.near.saturating_sub(PATIENCE))
     }
@@ -211,13 +215,12 @@ impl Rest {
     }
 }
 
-/// Ticks of a swing of a mass (kg × 2^16) on the air of both chambers, 100…1000. The tick
-/// that asks for it keeps the valves shut, unless a move is announced.
+/// Periods of a swing of a mass (kg × 2^16) on the air of both chambers, 25…250.
 #[inline]
 fn swing(model: &AxisModel, mass: i32) -> u16 {
     let square_8 = scaled(mass, model.swing, 16);
-    let ticks = square_root(square_8.unsigned_abs()).wrapping_shr(4);
-    ticks.clamp(100, 1000) as u16
+    let periods = square_root(square_8.unsigned_abs()).wrapping_shr(4);
+    periods.clamp(25, 250) as u16
 }
 
 /// How the piston comes to its target.
@@ -273,28 +276,9 @@ mod tests {
     use crate::axis::AxisData;
     use wheeleg_units::{Micros, PositionMm};
 
-    /// The words that are sealed.
-    #[derive(Default, PartialEq, Eq, Debug)]
-    struct Words([u32; 4], usize);
-
-    impl Hasher for Words {
-        fn finish(&self) -> u64 {
-            0
-        }
-
-        fn write(&mut self, bytes: &[u8]) {
-            self.0[self.1] = u32::from_ne_bytes(bytes.try_into().expect("whole words"));
-            self.1 += 1;
-        }
-    }
-
     #[test]
     fn every_flipped_bit_of_the_rest_state_flips_one_that_is_sealed() {
-        let sealed = |rest: &Rest| {
-            let mut words = Words::default();
-            rest.hash(&mut words);
-            words.0
-        };
+        let sealed = Rest::words;
         let some = Rest {
             target: 0x12_3456,
             held: 77,
@@ -358,10 +342,10 @@ mod tests {
                 let model = AxisModel::new(&data, Micros(tick_us)).expect("in range");
                 for mass_kg in [0.5, 1.5, 10.0, 60.0] {
                     let period_s = core::f64::consts::TAU * f64::sqrt(mass_kg / stiffness);
-                    let exact = (period_s * 1e6 / f64::from(tick_us)).clamp(100.0, 1000.0);
-                    let ticks = f64::from(swing(&model, (mass_kg * 65_536.0) as i32));
-                    let off = (ticks - exact).abs();
-                    assert!(off < 1.0 + 0.1 * exact, "{bore} {mass_kg}: {ticks} {exact}");
+                    let exact = (period_s * 1e6 / f64::from(4 * tick_us)).clamp(25.0, 250.0);
+                    let periods = f64::from(swing(&model, (mass_kg * 65_536.0) as i32));
+                    let off = (periods - exact).abs();
+                    assert!(off < 1.0 + 0.1 * exact, "{bore} {mass_kg}: {periods} {exact}");
                 }
             }
         }
