@@ -19,7 +19,7 @@
 //! K = C ρ0 R T / area. So are the coefficients: there is no floating point in a
 //! board's control.
 
-pub mod air;
+mod air;
 mod data;
 pub mod gas;
 pub mod learn;

@@ -78,13 +78,6 @@ impl Learner {
         sum
     }
 
-    /// Whether a mass waits to be taken.
-    #[inline]
-    #[must_use]
-    pub const fn has_mass(&self) -> bool {
-        self.mass > 0
-    }
-
     /// A mass that was learnt and not yet taken, kg × 2^16.
     #[inline]
     pub fn take(&mut self) -> Option<i32> {

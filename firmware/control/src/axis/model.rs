@@ -67,7 +67,7 @@ pub struct AxisModel {
     pub horizon_us: i32,
     /// Look-ahead in periods, × 2^16.
     pub periods_ahead: i32,
-    /// Look-ahead from the tick that chooses the pulses, in s × 2^32.
+    /// Look-ahead from the tick that works out the force, in s × 2^32.
     pub horizon_reference: i32,
     /// Moment for which a period's motion and pressures are worked out, µs after it begins: the
     /// middle of the two ticks whose stroke is used.
@@ -379,7 +379,7 @@ impl AxisModel {
             horizon: number(seconds_32(horizon_us)),
             horizon_us: number(horizon_us),
             periods_ahead: number(divide(horizon_us.wrapping_shl(16), period_us)),
-            horizon_reference: number(seconds_32(tick_us.wrapping_add(valve_us))),
+            horizon_reference: number(seconds_32(tick_us.wrapping_shl(1).wrapping_add(valve_us))),
             moment: number(moment_us),
             period: number(seconds_32(period_us)),
             mass: number(raw(data.mass)),

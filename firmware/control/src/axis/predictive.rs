@@ -39,7 +39,7 @@ mod force;
 mod pressures;
 mod rest;
 
-use super::air::Air;
+use super::air::{Chamber, Clock, Piston};
 use super::gas::Pressures;
 use super::learn::Learner;
 use super::model::AxisModel;
@@ -48,7 +48,7 @@ use super::{mix, within};
 use crate::joint::{Announced, JointInput};
 use crate::pwm::OnTimes;
 use core::hash::{Hash, Hasher};
-use force::{Ahead, Push, Wish};
+use force::{Ahead, Course, Push, Wish};
 use pressures::{made_up, targets};
 use rest::{Approach, Rest};
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
@@ -61,7 +61,7 @@ const STILL: i32 = 3 << 16;
 pub struct Drive {
     /// On-times of the next tick, µs.
     pub on: OnTimes,
-    /// Speed, raw mm/s.
+    /// Estimated speed.
     pub velocity: VelocityMmS,
     /// Force asked for as a share of what the supply can give, in steps of 2^-14.
     pub duty: Duty,
@@ -71,18 +71,18 @@ pub struct Drive {
     pub limited: bool,
 }
 
-/// The quarters of the law.
+/// The quarters of the law, by the tick of its period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 enum Stroke {
-    /// The planned pulses begin: what the chambers see of them, and the flows.
+    /// Chamber A: what it sees of the pulses, its pressure at the moment and ahead.
     #[default]
-    Valves,
-    /// Pressures and motion up to the moment, pressures at the end of the dead time.
-    Air,
-    /// The motion is corrected by the strokes of this and the last tick; rest.
+    A,
+    /// Chamber B.
+    B,
+    /// Motion, and the force that is wanted.
     Motion,
-    /// Force, target pressures, pulses of the next period.
+    /// Rest, target pressures, pulses of the next period.
     Pulses,
 }
 
@@ -90,42 +90,53 @@ enum Stroke {
 /// axis, which must be the same from call to call.
 #[derive(Clone, Debug)]
 pub struct Predictive {
-    inertia: Inertia,
-    air: Air,
+    a: Chamber,
+    b: Chamber,
+
+    /// Where the chambers are followed to.
+    course: Course,
+    course_check: u32,
+
     motion: Motion,
     /// Pressure force at the moment, mN.
     force: i32,
-    /// Pressures at the end of the dead time.
-    expected: Pressures,
+    /// The force that is wanted at the end of the dead time, mN.
+    wanted: i32,
+    motion_check: u32,
+
+    inertia: Inertia,
     learner: Learner,
     push: Push,
+    push_check: u32,
+
     rest: Rest,
     /// Where the piston stood when the next move was announced.
     awaits: Option<i32>,
     /// The drive chamber makes up for what the counter chamber still has too much,
     /// in a move that extends (true) or retracts.
     makes_up: Option<bool>,
-    /// The force with which an announced move is awaited.
-    awaited: Option<i32>,
-    /// The valves are to stay shut.
+    /// The target is a new one.
+    fresh: bool,
+    /// The valves stay shut.
     quiet: bool,
-    /// Sum of what strokes leave to each other: air, motion, and what decides.
-    air_check: u32,
-    motion_check: u32,
-    decision_check: u32,
+    rest_check: u32,
 
     // What every tick uses, in the `Hash`.
     /// The stroke to come.
     stroke: Stroke,
+    primed: bool,
+    /// The law drives: the coils follow its plan.
+    drives: bool,
+    /// Begin of the next period, µs; wraps.
+    next: u32,
     /// Stroke of the last tick, raw mm.
     measured: i32,
-    /// What is left of the plan, µs.
-    left: OnTimes,
+    /// On-times of the present period from its begin, µs; in its last tick, of the next one.
+    plan: OnTimes,
+
+    // For the record.
     duty: Duty,
     limited: bool,
-    primed: bool,
-    /// The pulses under way are the law's plan; otherwise somebody else's.
-    planned: bool,
 }
 
 impl Hash for Predictive {
@@ -135,36 +146,40 @@ impl Hash for Predictive {
         // word, each in its own bits.
         let Self {
             // Sealed apart: see `kept_is_sound`.
-            inertia: _,
-            air: _,
+            a: _,
+            b: _,
+            course: _,
+            course_check: _,
             motion: _,
             force: _,
-            expected: _,
+            wanted: _,
+            motion_check: _,
+            inertia: _,
             learner: _,
             push: _,
+            push_check: _,
             rest: _,
             awaits: _,
             makes_up: _,
-            awaited: _,
+            fresh: _,
             quiet: _,
-            air_check: _,
-            motion_check: _,
-            decision_check: _,
+            rest_check: _,
             stroke,
-            measured,
-            left: [fill_a, vent_a, fill_b, vent_b],
-            duty,
-            limited,
             primed,
-            planned,
+            drives,
+            next,
+            measured,
+            plan: [fill_a, vent_a, fill_b, vent_b],
+            // They shape no output.
+            duty: _,
+            limited: _,
         } = self;
         let flags = u32::from(*stroke as u8)
-            | u32::from(*limited).wrapping_shl(8)
-            | u32::from(*primed).wrapping_shl(9)
-            | u32::from(*planned).wrapping_shl(10);
+            | u32::from(*primed).wrapping_shl(8)
+            | u32::from(*drives).wrapping_shl(16);
         state.write_u32(flags);
+        state.write_u32(*next);
         state.write_i32(*measured);
-        state.write_i32(duty.raw());
         state.write_u32(u32::from(*fill_a) | u32::from(*vent_a).wrapping_shl(16));
         state.write_u32(u32::from(*fill_b) | u32::from(*vent_b).wrapping_shl(16));
     }
@@ -174,94 +189,95 @@ impl Predictive {
     /// At rest, both chambers at the atmosphere.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
+        let pressures = Pressures {
+            a: model.ambient,
+            b: model.ambient,
+        };
         let mut law = Self {
-            inertia: Inertia::new(model, model.mass),
-            air: Air::new(model.ambient),
+            a: Chamber::new(pressures.a),
+            b: Chamber::new(pressures.b),
+            course: Course::default(),
+            course_check: 0,
             motion: Motion::default(),
-            force: 0,
-            expected: Pressures::default(),
+            force: model.pressure_force(pressures),
+            wanted: 0,
+            motion_check: 0,
+            inertia: Inertia::new(model, model.mass),
             learner: Learner::new(),
             push: Push::default(),
+            push_check: 0,
             rest: Rest::default(),
             awaits: None,
             makes_up: None,
-            awaited: None,
-            quiet: false,
-            air_check: 0,
-            motion_check: 0,
-            decision_check: 0,
+            fresh: false,
+            quiet: true,
+            rest_check: 0,
             stroke: Stroke::default(),
+            primed: false,
+            drives: false,
+            next: 0,
             measured: 0,
-            left: [0; 4],
+            plan: [0; 4],
             duty: Duty::ZERO,
             limited: false,
-            primed: false,
-            planned: false,
         };
-        law.force = model.pressure_force(law.air.pressures());
-        law.seal_air();
-        law.seal_motion();
-        law.seal_decision();
+        law.course_check = law.course.sum();
+        law.motion_check = law.sum_of_motion();
+        law.push_check = law.sum_of_push();
+        law.rest_check = law.sum_of_rest();
         law
     }
 
     #[inline]
-    fn sum_of_air(&self) -> u32 {
-        let Pressures { a, b } = self.expected;
-        mix(mix(self.air.sum(0), a), b)
-    }
-
-    #[inline]
     fn sum_of_motion(&self) -> u32 {
-        mix(self.motion.sum(0), self.force)
+        mix(mix(self.motion.sum(0), self.force), self.wanted)
     }
 
     #[inline]
-    fn sum_of_decision(&self) -> u32 {
-        let sum = self.learner.sum(0);
-        let sum = self.rest.sum(self.push.sum(sum));
-        let flags = u32::from(self.quiet)
-            | u32::from(self.awaits.is_some()).wrapping_shl(1)
-            | u32::from(self.makes_up.is_some()).wrapping_shl(2)
-            | u32::from(self.makes_up == Some(true)).wrapping_shl(3)
-            | u32::from(self.awaited.is_some()).wrapping_shl(4);
-        let sum = mix(sum, flags.cast_signed());
-        let sum = mix(sum, self.awaits.unwrap_or_default());
-        mix(sum, self.awaited.unwrap_or_default())
+    fn sum_of_push(&self) -> u32 {
+        self.push.sum(self.learner.sum(0))
     }
 
     #[inline]
-    fn decision_is_sound(&self) -> bool {
-        self.decision_check == self.sum_of_decision()
-    }
-
-    #[inline]
-    fn seal_air(&mut self) {
-        self.air_check = self.sum_of_air();
-    }
-
-    #[inline]
-    fn seal_motion(&mut self) {
-        self.motion_check = self.sum_of_motion();
-    }
-
-    #[inline]
-    fn seal_decision(&mut self) {
-        self.decision_check = self.sum_of_decision();
+    fn sum_of_rest(&self) -> u32 {
+        let flags = i32::from(self.fresh)
+            | i32::from(self.awaits.is_some()).wrapping_shl(1)
+            | i32::from(self.makes_up.is_some()).wrapping_shl(2)
+            | i32::from(self.makes_up == Some(true)).wrapping_shl(3)
+            | i32::from(self.quiet).wrapping_shl(4);
+        let sum = mix(self.rest.sum(0), flags);
+        mix(sum, self.awaits.unwrap_or_default())
     }
 
     /// Whether what the stroke to come uses, and the `Hash` leaves out, is as it was left.
     #[inline]
     #[must_use]
     pub fn kept_is_sound(&self) -> bool {
-        let air = || self.air_check == self.sum_of_air();
-        let motion = || self.motion_check == self.sum_of_motion() && self.inertia.is_sound();
+        let followed = |chamber: &Chamber| {
+            chamber.pulses_are_sound()
+                && chamber.pressures_are_sound()
+                && self.course_check == self.course.sum()
+        };
+        let motion = || self.motion_check == self.sum_of_motion();
+        let rest = || self.rest_check == self.sum_of_rest();
         match self.stroke {
-            Stroke::Valves => self.air.pulses_are_sound() && air(),
-            Stroke::Air => air() && motion(),
-            Stroke::Motion => motion() && self.decision_is_sound(),
+            Stroke::A => followed(&self.a),
+            Stroke::B => followed(&self.b),
+            Stroke::Motion => {
+                self.a.pressures_are_sound()
+                    && self.b.pressures_are_sound()
+                    && motion()
+                    && rest()
+                    && self.push_check == self.sum_of_push()
+                    && self.inertia.is_sound()
+            }
             Stroke::Pulses => {
-                self.air.pulses_are_sound() && air() && motion() && self.decision_is_sound()
+                self.a.pressures_are_sound()
+                    && self.b.pressures_are_sound()
+                    && self.a.means_are_sound()
+                    && self.b.means_are_sound()
+                    && motion()
+                    && rest()
             }
         }
     }
@@ -275,7 +291,10 @@ impl Predictive {
     /// Estimated pressures.
     #[must_use]
     pub const fn pressures(&self) -> Pressures {
-        self.air.pressures()
+        Pressures {
+            a: self.a.pressure,
+            b: self.b.pressure,
+        }
     }
 
     /// Mass in use, kg × 2^16: as told, or learnt.
@@ -291,56 +310,54 @@ impl Predictive {
     }
 
     /// A tick in which somebody else drives: `sent` are the on-times last given out. Follows
-    /// valves, chambers and piston.
+    /// valves, chambers and piston, and forgets that the piston rests.
     pub fn observe(
         &mut self,
         model: &AxisModel,
         measured: PositionMm,
         sent: &OnTimes,
     ) -> VelocityMmS {
-        let turn = self.stroke as i32;
-        if self.planned && turn != 0 {
-            self.air.cut(model, turn, sent);
+        self.prime(measured);
+        if self.drives {
+            self.yield_to_others(model, sent);
         } else {
-            self.air.energise(model, turn, sent);
+            self.energise(model, sent);
         }
-        self.planned = false;
-        self.left = [0; 4];
-        self.duty = Duty::ZERO;
-        self.limited = false;
-        // What was damaged before keeps its broken seal.
-        let sound = self.decision_is_sound();
-        self.follow(model, measured, sent);
-        if self.stroke == Stroke::Motion {
-            self.learner.sample(model, self.motion.speed, self.force);
+        match self.stroke {
+            Stroke::A => self.follow_a(model),
+            Stroke::B => self.follow_b(model),
+            Stroke::Motion => {
+                self.moves(model, measured);
+                self.push = Push::default();
+                self.push_check = self.sum_of_push();
+                self.motion_check = self.sum_of_motion();
+            }
+            Stroke::Pulses => self.release(),
         }
-        self.rest.release(self.motion.stroke);
-        self.push = Push::default();
-        self.awaits = None;
-        self.awaited = None;
-        self.quiet = false;
-        if sound {
-            self.seal_decision();
-        }
-        self.next(measured);
+        self.next_stroke(measured);
         VelocityMmS::from_raw(self.motion.speed)
     }
 
     /// A tick of the law's own; on-times for the next tick. `sent` are those last given out.
     #[inline]
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput, sent: &OnTimes) -> Drive {
-        if !self.planned {
-            self.air.energise(model, self.stroke as i32, sent);
+        self.prime(input.measured);
+        let begins = !self.drives;
+        if begins {
+            self.take_over(model, sent);
         }
-        self.follow(model, input.measured, sent);
         match self.stroke {
-            Stroke::Valves | Stroke::Air => {}
-            Stroke::Motion => self.decide(model, input),
-            Stroke::Pulses => self.plan(model, input),
+            Stroke::A => self.follow_a(model),
+            Stroke::B => self.follow_b(model),
+            Stroke::Motion => self.want(model, input),
+            // Nothing was wanted yet.
+            Stroke::Pulses if begins => {}
+            Stroke::Pulses => self.choose(model, input),
         }
-        self.next(input.measured);
+        let on = self.due(model);
+        self.next_stroke(input.measured);
         Drive {
-            on: self.due(model.times.tick as u16),
+            on,
             velocity: VelocityMmS::from_raw(self.motion.speed),
             duty: self.duty,
             settled: self.rest.is_settled(),
@@ -348,69 +365,210 @@ impl Predictive {
         }
     }
 
-    /// Valves, air and motion of this stroke.
+    /// The first stroke that is measured is where the piston stands.
     #[inline]
-    fn follow(&mut self, model: &AxisModel, measured: PositionMm, sent: &OnTimes) {
-        if !self.primed {
-            self.primed = true;
-            self.measured = measured.raw();
-            self.motion.stroke = measured.raw();
-            self.rest.release(measured.raw());
-            self.seal_motion();
-            self.seal_decision();
+    fn prime(&mut self, measured: PositionMm) {
+        if self.primed {
+            return;
         }
-        match self.stroke {
-            Stroke::Valves => {
-                if self.planned {
-                    // Its first tick has been given out.
-                    let mut plan = self.left;
-                    for (plan, sent) in plan.iter_mut().zip(sent) {
-                        *plan = plan.wrapping_add(*sent);
-                    }
-                    self.air.plan(model, &plan);
-                }
-                self.air.begin(model);
-                self.seal_air();
+        self.primed = true;
+        let stroke = measured.raw();
+        self.measured = stroke;
+        self.motion.stroke = stroke;
+        self.motion_check = self.sum_of_motion();
+        self.course = Course::at(stroke);
+        self.course_check = self.course.sum();
+        self.release();
+    }
+
+    /// Forgets the rest state. What was damaged before keeps its broken seal.
+    fn release(&mut self) {
+        let sound = self.rest_check == self.sum_of_rest();
+        self.rest.release(self.motion.stroke);
+        self.awaits = None;
+        self.quiet = true;
+        if sound {
+            self.rest_check = self.sum_of_rest();
+        }
+    }
+
+    /// Begin of the tick.
+    const fn edge(&self, model: &AxisModel) -> u32 {
+        let turn = self.stroke as i32;
+        if turn == 0 {
+            return self.next;
+        }
+        let left = model
+            .times
+            .period
+            .wrapping_sub(model.times.tick.wrapping_mul(turn));
+        self.next.wrapping_sub(left as u32)
+    }
+
+    /// Coils that somebody else decides.
+    fn energise(&mut self, model: &AxisModel, sent: &OnTimes) {
+        let now = self.edge(model);
+        let [fill_a, vent_a, fill_b, vent_b] = *sent;
+        self.a.energise(now, [fill_a, vent_a], &model.times);
+        self.b.energise(now, [fill_b, vent_b], &model.times);
+    }
+
+    /// What is planned for after this tick does not happen.
+    #[cold]
+    fn cut(&mut self, model: &AxisModel, sent: &OnTimes) {
+        let now = self.edge(model);
+        let [fill_a, vent_a, fill_b, vent_b] = *sent;
+        self.a.cut(now, [fill_a, vent_a], &model.times);
+        self.b.cut(now, [fill_b, vent_b], &model.times);
+    }
+
+    /// The law drives from now on: what others have sent still acts in this tick, and nothing
+    /// after it.
+    #[cold]
+    #[inline(never)]
+    fn take_over(&mut self, model: &AxisModel, sent: &OnTimes) {
+        self.energise(model, sent);
+        self.cut(model, sent);
+        self.drives = true;
+    }
+
+    /// Somebody else drives from now on.
+    #[cold]
+    #[inline(never)]
+    fn yield_to_others(&mut self, model: &AxisModel, sent: &OnTimes) {
+        if self.stroke == Stroke::A {
+            // The plan has not begun.
+            self.energise(model, sent);
+        } else {
+            if self.stroke == Stroke::B {
+                let clock = self.clock(model);
+                let [_, _, fill, vent] = self.plan;
+                self.b.plan(&clock, [fill, vent], &model.times);
             }
-            Stroke::Air => {
-                let before = self.force;
-                self.air.follow(model, self.motion.stroke, self.motion.speed);
-                self.force = model.pressure_force(self.air.pressures());
-                let mean = before.saturating_add(self.force) >> 1;
-                self.motion.predict(model, &self.inertia, mean);
-                let ahead = Ahead::new(model, &self.motion);
-                self.expected = self.air.ahead(model, ahead.stroke, ahead.mean);
-                self.seal_air();
-                self.seal_motion();
-            }
-            Stroke::Motion => {
-                let mean = self.measured.saturating_add(measured.raw()) >> 1;
-                self.motion.correct(model, &self.inertia, mean);
-                self.seal_motion();
-            }
-            Stroke::Pulses => {}
+            self.cut(model, sent);
+        }
+        self.drives = false;
+        self.plan = [0; 4];
+        self.duty = Duty::ZERO;
+        self.limited = false;
+        self.release();
+    }
+
+    /// The present period.
+    #[inline]
+    const fn clock(&self, model: &AxisModel) -> Clock {
+        let now = self.next.wrapping_sub(model.times.period as u32);
+        Clock {
+            now,
+            next: self.next,
+            moment: now.wrapping_add(model.moment as u32),
         }
     }
 
     /// To the next stroke.
     #[inline]
-    fn next(&mut self, measured: PositionMm) {
+    const fn next_stroke(&mut self, measured: PositionMm) {
         self.measured = measured.raw();
         self.stroke = match self.stroke {
-            Stroke::Valves => Stroke::Air,
-            Stroke::Air => Stroke::Motion,
+            Stroke::A => Stroke::B,
+            Stroke::B => Stroke::Motion,
             Stroke::Motion => Stroke::Pulses,
-            Stroke::Pulses => Stroke::Valves,
+            Stroke::Pulses => Stroke::A,
         };
     }
 
-    /// Whether the piston may rest, what is awaited, and a mass that has been learnt.
+    /// A period begins: chamber A.
     #[inline]
-    fn decide(&mut self, model: &AxisModel, input: &JointInput) {
+    fn follow_a(&mut self, model: &AxisModel) {
+        self.next = self.next.wrapping_add(model.times.period as u32);
+        let Course {
+            middle,
+            speed,
+            end,
+            mean,
+        } = self.course;
+        let piston = Piston {
+            flow: model.flow_a,
+            stiffness: [model.stiffness_a(middle), model.stiffness_a(end)],
+            speed: [speed.wrapping_neg(), mean.wrapping_neg()],
+        };
+        let [fill, vent, _, _] = self.plan;
+        let plan = self.drives.then_some([fill, vent]);
+        self.a.follow(model, &self.clock(model), &piston, plan);
+    }
+
+    /// Chamber B.
+    #[inline]
+    fn follow_b(&mut self, model: &AxisModel) {
+        let Course {
+            middle,
+            speed,
+            end,
+            mean,
+        } = self.course;
+        let piston = Piston {
+            flow: model.flow_b,
+            stiffness: [model.stiffness_b(middle), model.stiffness_b(end)],
+            speed: [speed, mean],
+        };
+        let [_, _, fill, vent] = self.plan;
+        let plan = self.drives.then_some([fill, vent]);
+        self.b.follow(model, &self.clock(model), &piston, plan);
+    }
+
+    /// The motion up to the moment, and where it will go.
+    #[inline]
+    fn moves(&mut self, model: &AxisModel, measured: PositionMm) {
+        let before = self.force;
+        self.force = model.pressure_force(self.pressures());
+        let mean = before.saturating_add(self.force) >> 1;
+        self.motion.predict(model, &self.inertia, mean);
+        let mean = self.measured.saturating_add(measured.raw()) >> 1;
+        self.motion.correct(model, &self.inertia, mean);
+        self.course = Course::of(model, &self.motion);
+        self.course_check = self.course.sum();
+        self.learner.sample(model, self.motion.speed, self.force);
+    }
+
+    /// Motion, and the force that is wanted.
+    #[inline]
+    fn want(&mut self, model: &AxisModel, input: &JointInput) {
+        self.moves(model, input.measured);
         let reference = input.reference.raw();
-        if self.rest.aim(model, reference) {
+        if self.fresh || self.rest.is_other(model, reference) {
             self.push = Push::default();
         }
+        let still = self.motion.speed.wrapping_abs() < STILL;
+        if still && let Some(mass) = self.learner.take() {
+            // It stands: what it wanted a period ago will do.
+            self.inertia = Inertia::new(model, mass);
+        } else {
+            let expected = Pressures {
+                a: self.a.expected,
+                b: self.b.expected,
+            };
+            let ahead = Ahead::new(model, &self.inertia, &self.motion, self.force, expected);
+            let wish = Wish {
+                reference,
+                reference_speed: input.reference_velocity.raw(),
+                motion: &self.motion,
+                ahead,
+                inertia: &self.inertia,
+            };
+            if !self.quiet {
+                wish.push(model, &mut self.push);
+            }
+            self.wanted = wish.force(model, self.push, &self.rest);
+        }
+        self.push_check = self.sum_of_push();
+        self.motion_check = self.sum_of_motion();
+    }
+
+    /// The pulses of the next period.
+    #[inline]
+    fn choose(&mut self, model: &AxisModel, input: &JointInput) {
+        let reference = input.reference.raw();
+        self.fresh = self.rest.aim(model, reference);
         self.quiet = self.rest.quiet(
             model,
             &Approach {
@@ -422,73 +580,53 @@ impl Predictive {
                 mass: self.inertia.mass,
             },
         );
-        let still = self.motion.speed.wrapping_abs() < STILL;
-        let stands = self.quiet || still;
+        let stands = self.quiet || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
-        self.awaited = None;
+        let mut awaited = None;
         match input.announced {
             Some(Announced { reference: next, .. }) if stands => {
-                self.awaited = self.preload(model, next.raw());
-                if self.awaited.is_some() {
+                awaited = self.preload(model, next.raw());
+                if awaited.is_some() {
                     to = next.raw();
                 }
             }
             Some(_) => {}
             None => self.awaits = None,
         }
-        if self.awaited.is_some() || (stands && self.motion.at_stop(model)) {
+        if awaited.is_some() || (stands && self.motion.at_stop(model)) {
             self.makes_up = Some(to > self.motion.stroke);
         }
-        self.learner.sample(model, self.motion.speed, self.force);
-        if still && let Some(mass) = self.learner.take() {
-            self.inertia = Inertia::new(model, mass);
-        }
-        self.seal_decision();
-    }
-
-    /// The pulses of the next period.
-    #[inline]
-    fn plan(&mut self, model: &AxisModel, input: &JointInput) {
-        self.planned = true;
-        if self.awaited.is_none() && self.quiet {
-            self.left = self.air.shut(model);
-            self.limited = false;
-            self.duty = Duty::ZERO;
-            return;
-        }
-        let force = self.awaited.unwrap_or_else(|| {
-            let mut ahead = Ahead::new(model, &self.motion);
-            ahead.correct(model, &self.inertia, &self.motion, self.force, self.expected);
-            let wish = Wish {
-                reference: input.reference.raw(),
-                reference_speed: input.reference_velocity.raw(),
-                motion: &self.motion,
-                ahead,
-                inertia: &self.inertia,
-            };
-            let rest = &self.rest;
-            wish.force(model, &mut self.push, |grip| rest.faded(grip))
-        });
+        let force = match awaited {
+            None if self.quiet => {
+                let ([fill_a, vent_a], [fill_b, vent_b]) = (self.a.shut(model), self.b.shut(model));
+                self.plan = [fill_a, vent_a, fill_b, vent_b];
+                self.limited = false;
+                self.duty = Duty::ZERO;
+                self.rest_check = self.sum_of_rest();
+                return;
+            }
+            None => self.wanted,
+            Some(force) => force,
+        };
         let possible = force
             .max(model.force_in.wrapping_neg())
             .min(model.force_out);
-        let expected = self.expected;
-        let target = self.target(model, possible, expected);
-        self.left = self.air.pulses(model, expected, target);
+        let target = self.target(model, possible);
+        let [fill_a, vent_a] = self.a.pulses(model, model.flow_a, target.a);
+        let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
+        self.plan = [fill_a, vent_a, fill_b, vent_b];
         self.limited = possible != force;
         self.duty = Self::duty(model, force);
-        self.seal_decision();
+        self.rest_check = self.sum_of_rest();
     }
 
     /// On-times of the next tick by the plan.
     #[inline]
-    fn due(&mut self, tick: u16) -> OnTimes {
-        let mut on = [0; 4];
-        for (on, left) in on.iter_mut().zip(&mut self.left) {
-            *on = (*left).min(tick);
-            *left = left.wrapping_sub(*on);
-        }
-        on
+    fn due(&self, model: &AxisModel) -> OnTimes {
+        let tick = model.times.tick as u16;
+        let turn = (self.stroke as u16).wrapping_add(1) & 3;
+        let gone = tick.wrapping_mul(turn);
+        self.plan.map(|on| on.saturating_sub(gone).min(tick))
     }
 
     /// A force as a share of what the supply can give, in steps of 2^-14.
@@ -528,12 +666,16 @@ impl Predictive {
         Some(edge.saturating_sub(self.motion.load))
     }
 
-    /// Chamber pressures for a force that the supply can give, where `expected` will be.
+    /// Chamber pressures for a force that the supply can give.
     #[inline]
-    fn target(&mut self, model: &AxisModel, force: i32, expected: Pressures) -> Pressures {
+    fn target(&mut self, model: &AxisModel, force: i32) -> Pressures {
         let target = targets(model, force);
         let Some(extends) = self.makes_up else {
             return target;
+        };
+        let expected = Pressures {
+            a: self.a.expected,
+            b: self.b.expected,
         };
         made_up(model, force, target, expected, extends).unwrap_or_else(|| {
             self.makes_up = None;

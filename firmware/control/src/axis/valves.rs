@@ -280,28 +280,68 @@ impl ValveTrack {
             .wrapping_sub(sum)
     }
 
-    /// On-time of the period that begins `next`, up to which the coil is decided, for `need`
-    /// µs of opening beyond what is [`ValveTrack::committed`]; `rival` says that the
-    /// chamber's other valve is on.
+    /// What it can do in the period that begins `next`, up to which the coil is decided.
     #[inline]
-    #[must_use]
-    pub fn on_time(&self, next: u32, need: i32, rival: bool, times: &ValveTimes) -> i32 {
+    pub(super) fn ready(&self, next: u32, times: &ValveTimes) -> Ready {
+        if self.coil() {
+            return Ready(self.left(next, times));
+        }
+        let since = next.wrapping_sub(self.changed);
+        if since < times.shortest_gap as u32 {
+            Ready::SHUTS
+        } else {
+            Ready::SHUT
+        }
+    }
+}
+
+/// What a valve can do in the next period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Ready(
+    /// What is left of the shortest pulse under way, µs; negative if the coil is off.
+    i32,
+);
+
+impl Default for Ready {
+    fn default() -> Self {
+        Self::SHUT
+    }
+}
+
+impl Ready {
+    /// Shut for long enough to begin a pulse.
+    const SHUT: Self = Self(-1);
+    /// It would not shut in between.
+    const SHUTS: Self = Self(-2);
+
+    /// As a word to be sealed.
+    #[inline]
+    pub(super) const fn word(self) -> i32 {
+        self.0
+    }
+
+    /// Whether the coil is on at the begin of the period.
+    #[inline]
+    pub(super) const fn coil(self) -> bool {
+        self.0 >= 0
+    }
+
+    /// On-time of the period for `need` µs of opening beyond what is
+    /// [`ValveTrack::committed`]; `rival` says that the chamber's other valve is on.
+    #[inline]
+    pub(super) fn on_time(self, need: i32, rival: bool, times: &ValveTimes) -> i32 {
         let pulse = if self.coil() {
             // A few microseconds are not worth a tick.
             let need = if need < 20 { 0 } else { need };
-            self.left(next, times).saturating_add(need)
-        } else if need > 0 && !rival {
+            self.0.saturating_add(need)
+        } else {
             let shortest = times.shortest_opening();
-            let since = next.wrapping_sub(self.changed);
-            if since < times.shortest_gap as u32 || need <= shortest.wrapping_mul(5) >> 3 {
+            if rival || self == Self::SHUTS || need <= shortest.wrapping_mul(5) >> 3 {
                 return 0;
             }
             need.max(shortest)
                 .saturating_add(times.on)
                 .saturating_sub(times.off)
-                .max(times.shortest_pulse)
-        } else {
-            0
         };
         pulse.min(times.period)
     }
@@ -381,7 +421,7 @@ mod tests {
     fn rest_of(track: &mut ValveTrack, mut now: u32) -> i32 {
         let mut seen = 0;
         for _ in 0..20 {
-            let on = track.on_time(now, 0, false, &TIMES);
+            let on = track.ready(now, &TIMES).on_time(0, false, &TIMES);
             track.energise(now, on, 4000, &TIMES);
             seen += track.passes(now, 4000);
             now += 4000;
@@ -442,7 +482,7 @@ mod tests {
             let mut next = 1 << 20;
             let mut from = next - before;
             for need in periods {
-                let on = track.on_time(next, need, false, &TIMES);
+                let on = track.ready(next, &TIMES).on_time(need, false, &TIMES);
                 track.energise(next, on, 4000, &TIMES);
                 track.passes(from, 4000);
                 next += 4000;
@@ -451,7 +491,7 @@ mod tests {
             let committed = track.committed(from, next, &TIMES);
             let mut seen = 0;
             for _ in 0..20 {
-                let on = track.on_time(next, 0, false, &TIMES);
+                let on = track.ready(next, &TIMES).on_time(0, false, &TIMES);
                 track.energise(next, on, 4000, &TIMES);
                 seen += track.passes(from, 4000);
                 next += 4000;

@@ -94,10 +94,16 @@ impl Rest {
         self.target = stroke;
     }
 
+    /// Whether the reference is another target.
+    #[inline]
+    pub(super) const fn is_other(&self, model: &AxisModel, reference: i32) -> bool {
+        reference.saturating_sub(self.target).saturating_abs() > model.band
+    }
+
     /// Takes over the reference; whether it is a new target.
     #[inline]
     pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
-        let new = reference.saturating_sub(self.target).saturating_abs() > model.band;
+        let new = self.is_other(model, reference);
         if new {
             self.target = reference;
             self.near = 0;
