@@ -222,6 +222,10 @@ impl Hash for Channel {
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],
+    /// Somebody else times the pulses, and the channels are idle.
+    direct: bool,
+    /// Valves that were on in the last such tick, a bit each.
+    given: u8,
 }
 
 impl ValvePwm {
@@ -231,6 +235,8 @@ impl ValvePwm {
         Self {
             timing,
             channels: [Channel::IDLE; VALVE_COUNT],
+            direct: false,
+            given: 0,
         }
     }
 
@@ -243,9 +249,8 @@ impl ValvePwm {
     /// What a tick changes: all but the timing, to be sealed apart from it.
     #[inline]
     #[must_use]
-    pub fn state(&self) -> impl Hash + '_ {
-        let [a, b, c, d] = &self.channels;
-        (a, b, c, d)
+    pub const fn state(&self) -> State<'_> {
+        State(self)
     }
 
     /// Changes the timing; running periods end by the new one.
@@ -257,6 +262,7 @@ impl ValvePwm {
     /// of a whole period or more keep a valve open without a gap. Never panics.
     #[must_use]
     pub fn tick(&mut self, openings: &ValveOpenings) -> OnTimes {
+        self.direct = false;
         let mut on = [0; VALVE_COUNT];
         // Pulse of the last opening: two valves mostly open alike.
         let (mut last, mut pulse) = (Micros::ZERO, 0);
@@ -281,35 +287,32 @@ impl ValvePwm {
         self.tick(&ValveOpenings::SHUT)
     }
 
-    /// On-times that a law chose itself: at most a tick each, passed through and
-    /// counted. A pulse that the PWM had under way is theirs to go on with.
+    /// On-times that a law chose itself, at most a tick each: passed through and
+    /// counted. Afterwards the PWM begins with idle valves.
     #[must_use]
     pub fn direct(&mut self, on: OnTimes) -> OnTimes {
-        let tick = self.timing.tick;
-        let mut sent = on;
-        for (on, channel) in sent.iter_mut().zip(&mut self.channels) {
-            if *on == 0 && channel.phase == Phase::Idle {
-                // A valve with nothing to do.
-                continue;
+        if !self.direct {
+            self.direct = true;
+            self.given = 0;
+            for channel in &mut self.channels {
+                let pulses = channel.pulses;
+                *channel = Channel {
+                    pulses,
+                    ..Channel::IDLE
+                };
             }
-            let time = u32::from(*on).min(tick);
-            // At most the tick, 2000.
-            *on = time as u16;
-            if time > 0 && channel.phase != Phase::Energised {
-                channel.pulses = channel.pulses.wrapping_add(1);
-                channel.elapsed = 0;
-            }
-            channel.elapsed = channel.elapsed.wrapping_add(time);
-            channel.phase = if time == tick {
-                Phase::Energised
-            } else if time > 0 {
-                Phase::Ended
-            } else {
-                Phase::Idle
-            };
-            channel.ended_at = 0;
         }
-        sent
+        let mut given = 0;
+        for ((on, channel), bit) in on.iter().zip(&mut self.channels).zip([1, 2, 4, 8]) {
+            if *on > 0 {
+                given |= bit;
+                if self.given & bit == 0 {
+                    channel.pulses = channel.pulses.wrapping_add(1);
+                }
+            }
+        }
+        self.given = given;
+        on
     }
 
     /// Pulses begun per valve since power-on, wrapping: the switching count.
@@ -317,5 +320,27 @@ impl ValvePwm {
     #[must_use]
     pub fn pulses(&self) -> [u32; VALVE_COUNT] {
         self.channels.map(|channel| channel.pulses)
+    }
+}
+
+/// See [`ValvePwm::state`].
+#[derive(Clone, Copy, Debug)]
+pub struct State<'a>(&'a ValvePwm);
+
+impl Hash for State<'_> {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let ValvePwm {
+            timing: _,
+            channels: [a, b, c, d],
+            direct,
+            // It shapes no output.
+            given: _,
+        } = self.0;
+        state.write_u32(u32::from(*direct));
+        if !direct {
+            (a, b, c, d).hash(state);
+        }
     }
 }

@@ -218,27 +218,33 @@ impl Chamber {
     }
 
     /// On-times of the next period that bring the chamber from what is expected to `target`,
-    /// µs.
-    #[inline(never)]
+    /// fill and vent, µs. The valve that would undo it shuts as soon as its pulse allows.
+    #[inline]
     pub(super) fn pulses(&self, model: &AxisModel, flow: i32, target: i32) -> [u16; 2] {
         let change = target.saturating_sub(self.expected);
-        let mut flows = self.flows;
-        flows.want(
-            model,
-            flow,
-            self.pressure,
-            Wanted {
-                fill: change > 0,
-                vent: change < 0,
-            },
-        );
-        let [fill, vent] = flows.needs(change, self.stiffness);
-        let times = &model.times;
         let [ready_fill, ready_vent] = self.ready;
-        [
-            microseconds(ready_fill.on_time(fill, ready_vent.coil(), times)),
-            microseconds(ready_vent.on_time(vent, ready_fill.coil(), times)),
-        ]
+        let times = &model.times;
+        if change > 0 {
+            let power = match self.flows.fill {
+                0 => model.curve.power(model.supply, self.pressure, flow),
+                known => known,
+            };
+            let need = ChamberFlows::need(power, change, self.stiffness);
+            [
+                microseconds(ready_fill.on_time(need, ready_vent.coil(), times)),
+                microseconds(ready_vent.rest(times)),
+            ]
+        } else {
+            let power = match self.flows.vent {
+                0 => model.curve.power(self.pressure, model.ambient, flow),
+                known => known,
+            };
+            let need = ChamberFlows::need(power, change.saturating_neg(), self.stiffness);
+            [
+                microseconds(ready_fill.rest(times)),
+                microseconds(ready_vent.on_time(need, ready_fill.coil(), times)),
+            ]
+        }
     }
 
     /// Everything shut as soon as the pulses under way allow.
@@ -246,7 +252,7 @@ impl Chamber {
     pub(super) fn shut(&self, model: &AxisModel) -> [u16; 2] {
         let times = &model.times;
         self.ready
-            .map(|ready| microseconds(ready.on_time(0, true, times)))
+            .map(|ready| microseconds(ready.rest(times)))
     }
 }
 

@@ -41,7 +41,7 @@ impl FlowCurve {
 
     /// The same as a power, for an open valve's `flow` as a speed of the piston.
     #[inline(never)]
-    fn power(&self, from: i32, to: i32, flow: i32) -> i32 {
+    pub(super) fn power(&self, from: i32, to: i32, flow: i32) -> i32 {
         power(self.drive(from, to), flow)
     }
 }
@@ -106,18 +106,16 @@ impl ChamberFlows {
         scaled(work, stiffness, 10)
     }
 
-    /// Openings of the fill and of the vent valve, µs, that change the pressure by
-    /// `change` (1/256 Pa). The flow that does it must be known.
+    /// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa,
+    /// not negative).
     #[inline]
     #[must_use]
-    pub fn needs(&self, change: i32, stiffness: i32) -> [i32; 2] {
-        let power = if change > 0 { self.fill } else { self.vent };
+    pub fn need(power: i32, change: i32, stiffness: i32) -> i32 {
         // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
         let rate = part(power, stiffness, 22).max(SLOWEST);
         // Below 2^31.
-        let size = change.saturating_abs().min(500_000 << 8).wrapping_shl(4);
-        let need = size.checked_div(rate).unwrap_or(0);
-        if change > 0 { [need, 0] } else { [0, need] }
+        let size = change.min(500_000 << 8).wrapping_shl(4);
+        size.checked_div(rate).unwrap_or(0)
     }
 }
 

@@ -47,6 +47,8 @@ pub struct Learner {
     first: i32,
     fastest: Moment,
     last: Moment,
+    /// The move has ended, and tells something: to be worked out.
+    ended: bool,
     /// Mass of the last move, kg × 2^16, until it is taken; 0 if none.
     mass: i32,
 }
@@ -66,16 +68,26 @@ impl Learner {
             first,
             fastest,
             last,
+            ended,
             mass,
         } = *self;
         let mut sum = mix(mix(sum, mass), first);
         if first != 0 {
-            let periods = i32::from(fastest.periods) | i32::from(last.periods).wrapping_shl(16);
+            let periods = i32::from(fastest.periods)
+                ^ i32::from(last.periods).wrapping_shl(16)
+                ^ i32::from(ended).wrapping_shl(15);
             sum = mix(sum, periods);
             sum = mix(mix(sum, fastest.speed), fastest.impulse);
             sum = mix(mix(sum, last.speed), last.impulse);
         }
         sum
+    }
+
+    /// Whether a move has ended that tells a mass: [`Learner::finish`] is to be called.
+    #[inline]
+    #[must_use]
+    pub const fn has_ended(&self) -> bool {
+        self.ended
     }
 
     /// A mass that was learnt and not yet taken, kg × 2^16.
@@ -88,6 +100,9 @@ impl Learner {
     /// One period that ends at `speed` (raw mm/s), with the pressure force `force`, mN.
     #[inline]
     pub fn sample(&mut self, model: &AxisModel, speed: i32, force: i32) {
+        if self.ended {
+            return;
+        }
         let sliding = speed.wrapping_abs() > SLIDES;
         if self.first == 0 {
             if sliding {
@@ -111,15 +126,19 @@ impl Learner {
             self.fastest = self.last;
         }
         if !sliding || (speed ^ self.first) < 0 || self.last.periods >= PERIODS_MAX {
-            self.finish(model);
+            self.ended = self.last.periods >= PERIODS_MIN
+                && self.fastest.speed.wrapping_abs() >= FAST;
+            if !self.ended {
+                self.first = 0;
+            }
         }
     }
 
-    /// The move has ended: solves for the mass.
+    /// Solves for the mass of the move that has ended.
     // Seldom: small rather than fast.
     #[cold]
     #[inline(never)]
-    fn finish(&mut self, model: &AxisModel) {
+    pub fn finish(&mut self, model: &AxisModel) {
         let Self {
             first,
             fastest,
@@ -127,9 +146,7 @@ impl Learner {
             ..
         } = *self;
         self.first = 0;
-        if last.periods < PERIODS_MIN || fastest.speed.wrapping_abs() < FAST {
-            return;
-        }
+        self.ended = false;
         // At least the least number of periods: no division by nothing.
         let share = u32::from(fastest.periods)
             .wrapping_shl(16)
@@ -169,24 +186,33 @@ mod tests {
     use std::vec::Vec;
     use wheeleg_units::Micros;
 
+    /// The mass, worked out and taken.
+    fn taken(learner: &mut Learner, model: &AxisModel) -> Option<i32> {
+        if learner.has_ended() {
+            assert_eq!(learner.take(), None, "not before it is worked out");
+            learner.finish(model);
+        }
+        learner.take()
+    }
+
     /// A mass under a known force, with friction and a load: up to speed, and down again.
     fn moved(model: &AxisModel, mass_kg: f64, sign: f64, load: f64) -> Option<f64> {
         let mut learner = Learner::new();
         let mut speed = 0.0_f64;
-        for tick in 0..300 {
-            // mm/s a tick.
-            let acceleration = if tick < 120 { 3.0 } else { -2.6 };
+        for period in 0..75 {
+            // mm/s a period.
+            let acceleration = if period < 30 { 12.0 } else { -10.4 };
             let viscous = speed * f64::from(model.viscous) / 256e3;
-            let force = acceleration * mass_kg + 10.0 + viscous;
+            let force = acceleration * mass_kg / 4.0 + 10.0 + viscous;
             let force = (sign * force - load) * 1e3;
             assert_eq!(learner.mass, 0, "not before the end");
             learner.sample(model, (sign * speed * 65_536.0) as i32, force as i32);
-            if tick > 120 && learner.first == 0 {
+            if learner.ended {
                 break;
             }
             speed = f64::max(speed + acceleration, 0.0);
         }
-        let learnt = learner.take().map(|mass| f64::from(mass) / 65_536.0);
+        let learnt = taken(&mut learner, model).map(|mass| f64::from(mass) / 65_536.0);
         assert_eq!(learner.take(), None, "taken once");
         learnt
     }
@@ -220,28 +246,66 @@ mod tests {
     fn what_tells_nothing_is_left() {
         let model = model();
         // At one speed for ever; too short; too slow.
-        let steady = vec![300; 1100];
+        let steady = vec![300; 300];
         let short = vec![100, 300, 500, 300, 0];
-        let slow: Vec<_> = (0..=150).chain((0..150).rev()).collect();
+        let slow: Vec<_> = (0..=38).chain((0..38).rev()).map(|v| 4 * v).collect();
         for speeds in [steady, short, slow] {
             let mut learner = Learner::new();
             for speed in speeds {
                 learner.sample(&model, speed << 16, 20_000);
             }
-            assert_eq!(learner.take(), None);
+            assert_eq!(taken(&mut learner, &model), None);
         }
     }
 
     #[test]
-    fn a_mass_waits_through_the_next_short_slide() {
+    fn a_move_that_has_ended_waits_until_it_is_worked_out() {
         let model = model();
-        let mut learner = Learner {
-            mass: 3 << 16,
-            ..Learner::new()
-        };
-        for speed in [30, 40, 0] {
-            learner.sample(&model, speed << 16, 0);
+        let mut learner = Learner::new();
+        for speed in (0..40).chain((0..40).rev()).chain(40..60) {
+            learner.sample(&model, 8 * speed << 16, speed * 1000);
         }
-        assert_eq!(learner.take(), Some(3 << 16));
+        assert!(learner.ended);
+        let waiting = learner;
+        learner.sample(&model, 500 << 16, 0);
+        assert_eq!(learner, waiting);
+        assert!(taken(&mut learner, &model).is_some_and(|mass| mass > 0));
+    }
+
+    #[test]
+    fn every_flipped_bit_of_what_is_read_changes_the_sum() {
+        let some = Learner {
+            first: 30 << 16,
+            fastest: Moment {
+                periods: 77,
+                speed: 400 << 16,
+                impulse: 12_345,
+            },
+            last: Moment {
+                periods: 130,
+                speed: 19 << 16,
+                impulse: 23_456,
+            },
+            ended: true,
+            mass: 3 << 16,
+        };
+        let differs = |flip: &dyn Fn(&mut Learner)| {
+            let mut flipped = some;
+            flip(&mut flipped);
+            assert_ne!(flipped.sum(0), some.sum(0), "{flipped:?}");
+        };
+        for bit in 0..32 {
+            differs(&|own| own.mass ^= 1 << bit);
+            differs(&|own| own.first ^= 1 << bit);
+            differs(&|own| own.fastest.speed ^= 1 << bit);
+            differs(&|own| own.fastest.impulse ^= 1 << bit);
+            differs(&|own| own.last.speed ^= 1 << bit);
+            differs(&|own| own.last.impulse ^= 1 << bit);
+        }
+        for bit in 0..16 {
+            differs(&|own| own.fastest.periods ^= 1 << bit);
+            differs(&|own| own.last.periods ^= 1 << bit);
+        }
+        differs(&|own| own.ended ^= true);
     }
 }

@@ -429,3 +429,6 @@ fn number(value: u64) -> i32 {
 }
 
 fn obs() -> (u64,u64,u64) { let m = knob("MEM",MEMORY); let n=65536-m; (65536-((m*m)>>16)*m/65536, 3*((n*n)>>16)*(65536+m)/131072, ((n*n)>>16)*n/65536*knob("LOADG",100)/100) }
+
+#[cfg(not(target_os = "none"))]
+pub(crate) fn dbg(n: &str, v: i32) { if std::env::var("DBG").is_ok() { std::eprintln!("{n} {}", v as f64/65536.0); } }

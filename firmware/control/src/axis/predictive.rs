@@ -56,6 +56,21 @@ use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 /// Slower than this, raw mm/s, the piston stands (3 mm/s).
 const STILL: i32 = 3 << 16;
 
+/// No move is awaited.
+const NOTHING: i32 = i32::MIN;
+
+/// The drive chamber makes up for what the counter chamber still has too much.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+enum MakesUp {
+    /// It does not.
+    No,
+    /// In a move that extends.
+    Extends,
+    /// In one that retracts.
+    Retracts,
+}
+
 /// What the law gives in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drive {
@@ -110,11 +125,10 @@ pub struct Predictive {
     push_check: u32,
 
     rest: Rest,
-    /// Where the piston stood when the next move was announced.
-    awaits: Option<i32>,
-    /// The drive chamber makes up for what the counter chamber still has too much,
-    /// in a move that extends (true) or retracts.
-    makes_up: Option<bool>,
+    /// Where the piston stood when the next move was announced; [`NOTHING`] without one.
+    awaits: i32,
+    /// The drive chamber makes up for what the counter chamber still has too much.
+    makes_up: MakesUp,
     /// The target is a new one.
     fresh: bool,
     /// The valves stay shut.
@@ -207,8 +221,8 @@ impl Predictive {
             push: Push::default(),
             push_check: 0,
             rest: Rest::default(),
-            awaits: None,
-            makes_up: None,
+            awaits: NOTHING,
+            makes_up: MakesUp::No,
             fresh: false,
             quiet: true,
             rest_check: 0,
@@ -240,13 +254,15 @@ impl Predictive {
 
     #[inline]
     fn sum_of_rest(&self) -> u32 {
-        let flags = i32::from(self.fresh)
-            | i32::from(self.awaits.is_some()).wrapping_shl(1)
-            | i32::from(self.makes_up.is_some()).wrapping_shl(2)
-            | i32::from(self.makes_up == Some(true)).wrapping_shl(3)
-            | i32::from(self.quiet).wrapping_shl(4);
-        let sum = mix(self.rest.sum(0), flags);
-        mix(sum, self.awaits.unwrap_or_default())
+        let Self {
+            awaits,
+            makes_up,
+            fresh,
+            quiet,
+            ..
+        } = *self;
+        let flags = i32::from(fresh) | i32::from(quiet) << 8 | (makes_up as i32) << 16;
+        mix(mix(self.rest.sum(0), awaits), flags)
     }
 
     /// Whether what the stroke to come uses, and the `Hash` leaves out, is as it was left.
@@ -385,7 +401,7 @@ impl Predictive {
     fn release(&mut self) {
         let sound = self.rest_check == self.sum_of_rest();
         self.rest.release(self.motion.stroke);
-        self.awaits = None;
+        self.awaits = NOTHING;
         self.quiet = true;
         if sound {
             self.rest_check = self.sum_of_rest();
@@ -538,10 +554,13 @@ impl Predictive {
         if self.fresh || self.rest.is_other(model, reference) {
             self.push = Push::default();
         }
-        let still = self.motion.speed.wrapping_abs() < STILL;
-        if still && let Some(mass) = self.learner.take() {
-            // It stands: what it wanted a period ago will do.
+        // While the piston is slow, what was wanted a period ago will do.
+        if self.learner.has_ended() {
+            self.learner.finish(model);
+            #[cfg(not(target_os="none"))] super::model::dbg("finish", self.motion.speed);
+        } else if let Some(mass) = self.learner.take() {
             self.inertia = Inertia::new(model, mass);
+            #[cfg(not(target_os="none"))] super::model::dbg("take", mass);
         } else {
             let expected = Pressures {
                 a: self.a.expected,
@@ -591,10 +610,14 @@ impl Predictive {
                 }
             }
             Some(_) => {}
-            None => self.awaits = None,
+            None => self.awaits = NOTHING,
         }
         if awaited.is_some() || (stands && self.motion.at_stop(model)) {
-            self.makes_up = Some(to > self.motion.stroke);
+            self.makes_up = if to > self.motion.stroke {
+                MakesUp::Extends
+            } else {
+                MakesUp::Retracts
+            };
         }
         let force = match awaited {
             None if self.quiet => {
@@ -650,7 +673,10 @@ impl Predictive {
     /// the piston has begun to move, or the move is none.
     fn preload(&mut self, model: &AxisModel, next: i32) -> Option<i32> {
         let stroke = self.motion.stroke;
-        let place = *self.awaits.get_or_insert(stroke);
+        if self.awaits == NOTHING {
+            self.awaits = stroke;
+        }
+        let place = self.awaits;
         let distance = next.saturating_sub(place);
         let gone = stroke.saturating_sub(place).saturating_abs();
         let band = model.band;
@@ -670,15 +696,17 @@ impl Predictive {
     #[inline]
     fn target(&mut self, model: &AxisModel, force: i32) -> Pressures {
         let target = targets(model, force);
-        let Some(extends) = self.makes_up else {
-            return target;
+        let extends = match self.makes_up {
+            MakesUp::No => return target,
+            MakesUp::Extends => true,
+            MakesUp::Retracts => false,
         };
         let expected = Pressures {
             a: self.a.expected,
             b: self.b.expected,
         };
         made_up(model, force, target, expected, extends).unwrap_or_else(|| {
-            self.makes_up = None;
+            self.makes_up = MakesUp::No;
             target
         })
     }

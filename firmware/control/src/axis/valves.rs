@@ -326,6 +326,12 @@ impl Ready {
         self.0 >= 0
     }
 
+    /// On-time of the period for no opening beyond what is [`ValveTrack::committed`].
+    #[inline]
+    pub(super) fn rest(self, times: &ValveTimes) -> i32 {
+        self.0.max(0).min(times.period)
+    }
+
     /// On-time of the period for `need` µs of opening beyond what is
     /// [`ValveTrack::committed`]; `rival` says that the chamber's other valve is on.
     #[inline]

@@ -324,8 +324,9 @@ impl JointConfig {
         self.axis.as_ref()
     }
 
-    /// Part `0..PARTS` for sealing memory: of about equal size, together the whole
-    /// configuration. Rule bases, which are constants, count by their address.
+    /// Part `0..PARTS` for sealing memory: of about equal size, together all of the
+    /// configuration that the law in use reads in a tick. Rule bases, which are constants, count
+    /// by their address.
     #[inline]
     pub fn hash_part<H: Hasher>(&self, part: usize, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here.
@@ -344,25 +345,24 @@ impl JointConfig {
             bumpless_ticks,
             axis,
         } = self;
-        if let (Some(axis), 0..=3) = (axis, part) {
-            axis.hash_quarter(part, state);
-        }
-        match part {
-            0 => (settle_ticks, release_ticks, bumpless_ticks, axis.is_some()).hash(state),
-            1 => {
+        match (axis, part) {
+            (Some(axis), 0..=3) => axis.hash_quarter(part, state),
+            (Some(_), _) => {}
+            // What the predictive law has no use for.
+            (None, 0) => (settle_ticks, release_ticks, bumpless_ticks).hash(state),
+            (None, 1) => {
                 core::ptr::hash(*rules_pd, state);
                 core::ptr::hash(*rules_id, state);
-            }
-            2 => gains.hash_forces(state),
-            3 => {
-                gains.hash_rest(state);
-                window.hash(state);
-            }
-            _ => {
-                (&gains.axis, tick).hash(state);
                 (error_to_input, velocity_to_input).hash(state);
-                (integral_to_input, integral_limit).hash(state);
             }
+            (None, 2) => gains.hash_forces(state),
+            (None, 3) => window.hash(state),
+            (None, _) => (integral_to_input, integral_limit).hash(state),
+        }
+        match part {
+            3 => gains.hash_rest(state),
+            4 => (tick, axis.is_some()).hash(state),
+            _ => {}
         }
     }
 }
@@ -430,6 +430,7 @@ impl JointGains {
             integral: _,
             derivative: _,
             sliding_time,
+            // Read when coefficients are made of it.
             axis: _,
             pwm_period,
         } = self;

@@ -52,7 +52,8 @@ impl Rest {
     /// flipped bit of any flips one bit of it.
     #[inline]
     pub(super) fn sum(&self, sum: u32) -> u32 {
-        self.words().into_iter().fold(sum, mix)
+        let [first, second, third] = self.words();
+        mix(mix(mix(sum, first), second), third)
     }
 
     #[inline]
