@@ -24,11 +24,11 @@ pub(super) struct Clock {
 pub(super) struct Piston {
     /// Flow of an open valve as a speed of the piston, raw mm/s.
     pub(super) flow: i32,
-    /// Stiffness in the middle of the period that ends at the moment, and where the dead time
-    /// ends ([`AxisModel::stiffness_a`]).
-    pub(super) stiffness: [i32; 2],
+    /// Length of the chamber in the middle of the period that ends at the moment, and where the
+    /// dead time ends, raw mm.
+    pub(super) lengths: [i32; 2],
     /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
-    pub(super) speed: [i32; 2],
+    pub(super) speeds: [i32; 2],
 }
 
 /// Pulses under way and pressure of one chamber.
@@ -111,54 +111,33 @@ impl Chamber {
         self.means_check == self.sum_of_means()
     }
 
-    /// Coils that somebody else decides: on for these times of the tick that begins `now`, fill
-    /// and vent, µs.
+    /// Coils that are on for these times of the `span` µs that begin `now`, fill and vent, µs,
+    /// where others decide than the plan; `cut` says that what was planned for later does not
+    /// happen. What was damaged before keeps its broken seal.
     #[inline(never)]
-    pub(super) fn energise(&mut self, now: u32, on: [u16; 2], times: &ValveTimes) {
-        if on == [0; 2] && !self.fill.coil() && !self.vent.coil() {
+    pub(super) fn energise(
+        &mut self,
+        now: u32,
+        on: [u16; 2],
+        span: i32,
+        cut: bool,
+        times: &ValveTimes,
+    ) {
+        if on == [0; 2] && !cut && !self.fill.coil() && !self.vent.coil() {
             return;
         }
-        self.change(|valve, on| valve.energise(now, on, times.tick, times), on);
-    }
-
-    /// Somebody else decides after the tick that begins `now`, in which the coils are still on
-    /// for these times: what was planned for later does not happen.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn cut(&mut self, now: u32, on: [u16; 2], times: &ValveTimes) {
-        self.change(
-            |valve, on| {
-                if valve.coil() {
-                    // It falls at the end of the tick at the latest.
-                    valve.energise(now, on, times.tick.wrapping_add(1), times);
-                } else {
-                    valve.cut(now.wrapping_add(on as u32), times);
-                }
-            },
-            on,
-        );
-    }
-
-    /// A change between two strokes. What was damaged before keeps its broken seal.
-    #[inline]
-    fn change(&mut self, change: impl Fn(&mut ValveTrack, i32), on: [u16; 2]) {
         let sound = self.pulses_are_sound();
-        let [fill, vent] = on;
-        change(&mut self.fill, i32::from(fill));
-        change(&mut self.vent, i32::from(vent));
+        for (valve, on) in [&mut self.fill, &mut self.vent].into_iter().zip(on) {
+            let on = i32::from(on);
+            if cut && !valve.coil() {
+                valve.cut(now.wrapping_add(on as u32), times);
+            } else {
+                valve.energise(now, on, span, times);
+            }
+        }
         if sound {
             self.pulses_check = self.sum_of_pulses();
         }
-    }
-
-    /// The coils are on for these times of the present period, from its begin, µs.
-    #[inline]
-    pub(super) fn plan(&mut self, clock: &Clock, plan: [u16; 2], times: &ValveTimes) {
-        let [fill, vent] = plan;
-        let (now, period) = (clock.now, times.period);
-        self.fill.energise(now, i32::from(fill), period, times);
-        self.vent.energise(now, i32::from(vent), period, times);
-        self.pulses_check = self.sum_of_pulses();
     }
 
     /// Pressures at the moment and at the end of the dead time, and what the next pulses are
@@ -193,9 +172,10 @@ impl Chamber {
 
         let Piston {
             flow,
-            stiffness: [stiffness, ahead],
-            speed: [speed, speed_ahead],
+            lengths,
+            speeds: [speed, speed_ahead],
         } = *piston;
+        let [stiffness, ahead] = lengths.map(|length| model.stiffness(length));
         let p = self.pressure;
         let [[fill, vent], [more_fill, more_vent]] = [open, committed];
         let wanted = Wanted {

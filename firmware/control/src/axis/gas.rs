@@ -1,7 +1,8 @@
 //! The two chambers: pressures from what the valves let through.
 
 use super::model::AxisModel;
-use super::{part, scaled, square_root};
+use super::{clip, part, scaled, square_root, within};
+use wheeleg_units::Duty;
 
 /// Subsonic flow of ISO 6358: constants of one critical ratio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -90,7 +91,7 @@ impl ChamberFlows {
 
     /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
     /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
-    /// `stiffness` ([`AxisModel::stiffness_a`]).
+    /// `stiffness` ([`AxisModel::stiffness`]).
     #[inline]
     #[must_use]
     pub fn change(&self, open: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
@@ -102,7 +103,7 @@ impl ChamberFlows {
             .wrapping_add(product(squeeze, span))
             .wrapping_add(1 << 15)
             .wrapping_shr(16) as i32;
-        // × n/L: see `stiffness_a`.
+        // × n/L: see `AxisModel::stiffness`.
         scaled(work, stiffness, 10)
     }
 
@@ -134,24 +135,25 @@ pub struct Wanted {
 }
 
 impl AxisModel {
-    /// n / L of chamber A with the piston at `stroke` (raw mm), × 1.048576 × 2^22 / mm:
+    /// Length of chamber A with the piston at `stroke`, raw mm.
+    #[inline]
+    #[must_use]
+    pub(super) const fn length_a(&self, stroke: i32) -> i32 {
+        stroke.saturating_add(self.lead_a)
+    }
+
+    /// Length of chamber B.
+    #[inline]
+    #[must_use]
+    pub(super) const fn length_b(&self, stroke: i32) -> i32 {
+        self.stroke.saturating_sub(stroke).saturating_add(self.lead_b)
+    }
+
+    /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:
     /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
     #[inline]
     #[must_use]
-    pub fn stiffness_a(&self, stroke: i32) -> i32 {
-        self.stiffness(stroke.saturating_add(self.lead_a))
-    }
-
-    /// n / L of chamber B.
-    #[inline]
-    #[must_use]
-    pub fn stiffness_b(&self, stroke: i32) -> i32 {
-        let length = self.stroke.saturating_sub(stroke);
-        self.stiffness(length.saturating_add(self.lead_b))
-    }
-
-    #[inline]
-    fn stiffness(&self, length: i32) -> i32 {
+    pub(super) fn stiffness(&self, length: i32) -> i32 {
         let short = length.wrapping_shr(8).max(SHORTEST);
         self.exponent.checked_div(short).unwrap_or(0)
     }
@@ -163,5 +165,18 @@ impl AxisModel {
         part(p.a, self.force_a, 32)
             .saturating_sub(part(p.b, self.force_b, 32))
             .saturating_sub(self.force_rod)
+    }
+
+    /// A force as a share of what the supply can give, in steps of 2^-14.
+    #[inline]
+    pub(super) fn duty(&self, force: i32) -> Duty {
+        let share = if force > 0 {
+            self.share_out
+        } else {
+            self.share_in
+        };
+        // Forces below 2^26 mN, shares below 2^31: below 2^31.
+        let share = part(clip::<26>(force), share, 26);
+        Duty::from_raw(within(share, 1 << 14).wrapping_shl(16))
     }
 }

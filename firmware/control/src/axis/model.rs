@@ -28,7 +28,7 @@ pub struct AxisModel {
     pub flow_a: i32,
     /// The same for B.
     pub flow_b: i32,
-    /// Polytropic exponent × 1.048576 × 2^30: see [`AxisModel::stiffness_a`].
+    /// Polytropic exponent × 1.048576 × 2^30: see `AxisModel::stiffness`.
     pub exponent: i32,
     /// mN per 1/256 Pa, × 2^32, of A and B.
     pub force_a: i32,
@@ -54,6 +54,10 @@ pub struct AxisModel {
     pub force_out: i32,
     /// Largest retracting force, mN, positive.
     pub force_in: i32,
+    /// Share of the largest extending force per force, 1/mN × 2^40.
+    pub share_out: i32,
+    /// Share of the largest retracting force, likewise.
+    pub share_in: i32,
     /// Coulomb friction, mN.
     pub coulomb: i32,
     /// Break-away friction, mN.
@@ -191,6 +195,8 @@ impl AxisModel {
             high,
             force_out,
             force_in,
+            share_out,
+            share_in,
             coulomb,
             breakaway,
             viscous,
@@ -230,6 +236,7 @@ impl AxisModel {
             }
             2 => {
                 (mean, low, high, force_out, force_in, coulomb).hash(state);
+                (share_out, share_in).hash(state);
                 (breakaway, viscous, horizon, horizon_us).hash(state);
                 (periods_ahead, horizon_reference, moment, period).hash(state);
             }
@@ -373,6 +380,8 @@ impl AxisModel {
             high: number(high_8),
             force_out: number(force_out),
             force_in: number(force_in),
+            share_out: number(divide(1 << 40, force_out.max(1 << 9))),
+            share_in: number(divide(1 << 40, force_in.max(1 << 9))),
             coulomb: number(to_mn(data.coulomb)),
             breakaway: number(to_mn(data.breakaway)),
             viscous: number(raw(data.viscous).wrapping_shr(8)),

@@ -44,7 +44,7 @@ use super::gas::Pressures;
 use super::learn::Learner;
 use super::model::AxisModel;
 use super::motion::{Inertia, Motion};
-use super::{mix, within};
+use super::mix;
 use crate::joint::{Announced, JointInput};
 use crate::pwm::OnTimes;
 use core::hash::{Hash, Hasher};
@@ -269,31 +269,29 @@ impl Predictive {
     #[inline]
     #[must_use]
     pub fn kept_is_sound(&self) -> bool {
-        let followed = |chamber: &Chamber| {
-            chamber.pulses_are_sound()
-                && chamber.pressures_are_sound()
-                && self.course_check == self.course.sum()
-        };
+        let Self { a, b, .. } = self;
+        let pressures = || a.pressures_are_sound() && b.pressures_are_sound();
         let motion = || self.motion_check == self.sum_of_motion();
-        let rest = || self.rest_check == self.sum_of_rest();
         match self.stroke {
-            Stroke::A => followed(&self.a),
-            Stroke::B => followed(&self.b),
+            Stroke::A | Stroke::B => {
+                let chamber = if self.stroke == Stroke::A { a } else { b };
+                chamber.pulses_are_sound()
+                    && chamber.pressures_are_sound()
+                    && self.course_check == self.course.sum()
+            }
             Stroke::Motion => {
-                self.a.pressures_are_sound()
-                    && self.b.pressures_are_sound()
+                pressures()
                     && motion()
-                    && rest()
+                    && self.rest_check == self.sum_of_rest()
                     && self.push_check == self.sum_of_push()
                     && self.inertia.is_sound()
             }
             Stroke::Pulses => {
-                self.a.pressures_are_sound()
-                    && self.b.pressures_are_sound()
-                    && self.a.means_are_sound()
-                    && self.b.means_are_sound()
+                pressures()
                     && motion()
-                    && rest()
+                    && self.rest_check == self.sum_of_rest()
+                    && a.means_are_sound()
+                    && b.means_are_sound()
             }
         }
     }
@@ -333,15 +331,17 @@ impl Predictive {
         measured: PositionMm,
         sent: &OnTimes,
     ) -> VelocityMmS {
-        self.prime(measured);
+        if !self.primed {
+            self.prime(measured);
+        }
         if self.drives {
             self.yield_to_others(model, sent);
         } else {
-            self.energise(model, sent);
+            self.energise(model, sent, model.times.tick, false);
         }
         match self.stroke {
-            Stroke::A => self.follow_a(model),
-            Stroke::B => self.follow_b(model),
+            Stroke::A => self.follow(model, true),
+            Stroke::B => self.follow(model, false),
             Stroke::Motion => {
                 self.moves(model, measured);
                 self.push = Push::default();
@@ -357,14 +357,16 @@ impl Predictive {
     /// A tick of the law's own; on-times for the next tick. `sent` are those last given out.
     #[inline]
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput, sent: &OnTimes) -> Drive {
-        self.prime(input.measured);
+        if !self.primed {
+            self.prime(input.measured);
+        }
         let begins = !self.drives;
         if begins {
             self.take_over(model, sent);
         }
         match self.stroke {
-            Stroke::A => self.follow_a(model),
-            Stroke::B => self.follow_b(model),
+            Stroke::A => self.follow(model, true),
+            Stroke::B => self.follow(model, false),
             Stroke::Motion => self.want(model, input),
             // Nothing was wanted yet.
             Stroke::Pulses if begins => {}
@@ -382,11 +384,9 @@ impl Predictive {
     }
 
     /// The first stroke that is measured is where the piston stands.
-    #[inline]
+    #[cold]
+    #[inline(never)]
     fn prime(&mut self, measured: PositionMm) {
-        if self.primed {
-            return;
-        }
         self.primed = true;
         let stroke = measured.raw();
         self.measured = stroke;
@@ -398,6 +398,7 @@ impl Predictive {
     }
 
     /// Forgets the rest state. What was damaged before keeps its broken seal.
+    #[inline(never)]
     fn release(&mut self) {
         let sound = self.rest_check == self.sum_of_rest();
         self.rest.release(self.motion.stroke);
@@ -421,21 +422,14 @@ impl Predictive {
         self.next.wrapping_sub(left as u32)
     }
 
-    /// Coils that somebody else decides.
-    fn energise(&mut self, model: &AxisModel, sent: &OnTimes) {
+    /// Coils that somebody else decides, for `span` µs from this tick on.
+    #[inline(never)]
+    fn energise(&mut self, model: &AxisModel, sent: &OnTimes, span: i32, cut: bool) {
         let now = self.edge(model);
         let [fill_a, vent_a, fill_b, vent_b] = *sent;
-        self.a.energise(now, [fill_a, vent_a], &model.times);
-        self.b.energise(now, [fill_b, vent_b], &model.times);
-    }
-
-    /// What is planned for after this tick does not happen.
-    #[cold]
-    fn cut(&mut self, model: &AxisModel, sent: &OnTimes) {
-        let now = self.edge(model);
-        let [fill_a, vent_a, fill_b, vent_b] = *sent;
-        self.a.cut(now, [fill_a, vent_a], &model.times);
-        self.b.cut(now, [fill_b, vent_b], &model.times);
+        let times = &model.times;
+        self.a.energise(now, [fill_a, vent_a], span, cut, times);
+        self.b.energise(now, [fill_b, vent_b], span, cut, times);
     }
 
     /// The law drives from now on: what others have sent still acts in this tick, and nothing
@@ -443,26 +437,30 @@ impl Predictive {
     #[cold]
     #[inline(never)]
     fn take_over(&mut self, model: &AxisModel, sent: &OnTimes) {
-        self.energise(model, sent);
-        self.cut(model, sent);
+        // So a coil that is on until the end of the tick falls there.
+        self.energise(model, sent, model.times.tick.wrapping_add(1), false);
         self.drives = true;
     }
 
-    /// Somebody else drives from now on.
+    /// Somebody else drives from now on: what is planned for after this tick does not happen.
     #[cold]
     #[inline(never)]
     fn yield_to_others(&mut self, model: &AxisModel, sent: &OnTimes) {
-        if self.stroke == Stroke::A {
-            // The plan has not begun.
-            self.energise(model, sent);
-        } else {
-            if self.stroke == Stroke::B {
-                let clock = self.clock(model);
-                let [_, _, fill, vent] = self.plan;
-                self.b.plan(&clock, [fill, vent], &model.times);
-            }
-            self.cut(model, sent);
+        let times = &model.times;
+        if self.stroke == Stroke::B {
+            let [_, _, fill, vent] = self.plan;
+            let begun = self.clock(model).now;
+            self.b
+                .energise(begun, [fill, vent], times.period, false, times);
         }
+        // Before the first stroke of its period the plan has not begun.
+        let begun = self.stroke != Stroke::A;
+        self.energise(
+            model,
+            sent,
+            times.tick.wrapping_add(i32::from(begun)),
+            begun,
+        );
         self.drives = false;
         self.plan = [0; 4];
         self.duty = Duty::ZERO;
@@ -493,43 +491,36 @@ impl Predictive {
         };
     }
 
-    /// A period begins: chamber A.
-    #[inline]
-    fn follow_a(&mut self, model: &AxisModel) {
-        self.next = self.next.wrapping_add(model.times.period as u32);
+    /// One of the chambers, A at the begin of a period.
+    #[inline(never)]
+    fn follow(&mut self, model: &AxisModel, first: bool) {
+        if first {
+            self.next = self.next.wrapping_add(model.times.period as u32);
+        }
+        let clock = self.clock(model);
         let Course {
             middle,
             speed,
             end,
             mean,
         } = self.course;
-        let piston = Piston {
-            flow: model.flow_a,
-            stiffness: [model.stiffness_a(middle), model.stiffness_a(end)],
-            speed: [speed.wrapping_neg(), mean.wrapping_neg()],
+        let [fill_a, vent_a, fill_b, vent_b] = self.plan;
+        let (chamber, piston, plan) = if first {
+            let piston = Piston {
+                flow: model.flow_a,
+                lengths: [model.length_a(middle), model.length_a(end)],
+                speeds: [speed.wrapping_neg(), mean.wrapping_neg()],
+            };
+            (&mut self.a, piston, [fill_a, vent_a])
+        } else {
+            let piston = Piston {
+                flow: model.flow_b,
+                lengths: [model.length_b(middle), model.length_b(end)],
+                speeds: [speed, mean],
+            };
+            (&mut self.b, piston, [fill_b, vent_b])
         };
-        let [fill, vent, _, _] = self.plan;
-        let plan = self.drives.then_some([fill, vent]);
-        self.a.follow(model, &self.clock(model), &piston, plan);
-    }
-
-    /// Chamber B.
-    #[inline]
-    fn follow_b(&mut self, model: &AxisModel) {
-        let Course {
-            middle,
-            speed,
-            end,
-            mean,
-        } = self.course;
-        let piston = Piston {
-            flow: model.flow_b,
-            stiffness: [model.stiffness_b(middle), model.stiffness_b(end)],
-            speed: [speed, mean],
-        };
-        let [_, _, fill, vent] = self.plan;
-        let plan = self.drives.then_some([fill, vent]);
-        self.b.follow(model, &self.clock(model), &piston, plan);
+        chamber.follow(model, &clock, &piston, self.drives.then_some(plan));
     }
 
     /// The motion up to the moment, and where it will go.
@@ -639,7 +630,7 @@ impl Predictive {
         let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
         self.plan = [fill_a, vent_a, fill_b, vent_b];
         self.limited = possible != force;
-        self.duty = Self::duty(model, force);
+        self.duty = model.duty(force);
         self.rest_check = self.sum_of_rest();
     }
 
@@ -650,23 +641,6 @@ impl Predictive {
         let turn = (self.stroke as u16).wrapping_add(1) & 3;
         let gone = tick.wrapping_mul(turn);
         self.plan.map(|on| on.saturating_sub(gone).min(tick))
-    }
-
-    /// A force as a share of what the supply can give, in steps of 2^-14.
-    #[inline]
-    fn duty(model: &AxisModel, force: i32) -> Duty {
-        let most = if force > 0 {
-            model.force_out
-        } else {
-            model.force_in
-        };
-        let most = most.max(1 << 8);
-        // Below 2^31: forces are below 2^25 mN.
-        let share = within(force, most)
-            .wrapping_shl(6)
-            .checked_div(most.wrapping_shr(8))
-            .unwrap_or(0);
-        Duty::from_raw(within(share, 1 << 14).wrapping_shl(16))
     }
 
     /// The force with which an announced move to `next` is awaited; `None` if
@@ -680,7 +654,7 @@ impl Predictive {
         let distance = next.saturating_sub(place);
         let gone = stroke.saturating_sub(place).saturating_abs();
         let band = model.band;
-        if distance.saturating_abs() <= band || gone > band.saturating_mul(2) {
+        if distance.saturating_abs() <= band || gone > band.wrapping_shl(1) {
             return None;
         }
         let edge = model.coulomb.wrapping_shr(1);

@@ -117,15 +117,16 @@ impl Rest {
     /// One period; whether the valves are to stay shut.
     #[inline]
     pub(super) fn quiet(&mut self, model: &AxisModel, now: &Approach) -> bool {
+        // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
         let narrow = model.band;
         let error = now
             .reference
             .saturating_sub(now.motion.stroke)
             .saturating_abs();
         let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        let near = steps && !self.settled && error < narrow.saturating_mul(24);
+        let near = steps && !self.settled && error < narrow.wrapping_mul(24);
         if near {
-            self.near = self.near.saturating_add(1).min(PATIENCE.saturating_mul(4));
+            self.near = self.near.saturating_add(1).min(PATIENCE * 4);
         } else if !self.settled {
             self.near = self.near.saturating_sub(1);
         }
@@ -150,9 +151,9 @@ impl Rest {
             self.aimed = false;
         }
         let release = narrow
-            .saturating_mul(2)
-            .saturating_add(band)
-            .min(LEFT.max(band.saturating_add(narrow >> 1)));
+            .wrapping_shl(1)
+            .wrapping_add(band)
+            .min(LEFT.max(band.wrapping_add(narrow >> 1)));
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
         let outside = away > release;
         if self.settled && (outside || !steps) {
@@ -254,7 +255,7 @@ impl Approach<'_> {
     fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
         let speed = self.motion.speed.wrapping_shr(8);
         let error = self.reference.saturating_sub(self.motion.stroke);
-        if error.saturating_abs() > band.saturating_mul(12) {
+        if error.saturating_abs() > band.wrapping_mul(12) {
             return false;
         }
         let net = self.force.saturating_add(self.motion.load);
