@@ -1,6 +1,6 @@
 //! The air of a cylinder: what was sent to the valves, followed into the chambers.
 
-use super::gas::{ChamberFlows, Wanted, power};
+use super::gas::{ChamberFlows, power};
 use super::mix;
 use super::model::AxisModel;
 use super::valves::{Ready, ValveTimes, ValveTrack};
@@ -178,12 +178,7 @@ impl Chamber {
         let [stiffness, ahead] = lengths.map(|length| model.stiffness(length));
         let p = self.pressure;
         let [[fill, vent], [more_fill, more_vent]] = [open, committed];
-        let wanted = Wanted {
-            fill: fill | more_fill != 0,
-            vent: vent | more_vent != 0,
-        };
-        let mut flows = ChamberFlows::default();
-        flows.want(model, flow, p, wanted);
+        let flows = ChamberFlows::of(model, flow, p, fill | more_fill, vent | more_vent);
         let change = flows.change(open, power(p, speed), times.period, stiffness);
         // Never below half the atmosphere: a vacuum needs a motion of its own.
         let least = model.ambient.wrapping_shr(1);

@@ -4,13 +4,13 @@ use super::model::AxisModel;
 use super::{clip, part, scaled, square_root, within};
 use wheeleg_units::Duty;
 
-/// Subsonic flow of ISO 6358: constants of one critical ratio.
+/// Subsonic flow of ISO 6358: constants of one critical ratio b.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct FlowCurve {
-    /// Critical ratio b, × 2^15.
-    pub critical: u32,
-    /// 1/(1 − b), × 2^15.
-    pub stretch: u32,
+    /// 1/(1 − b), × 2^19.
+    pub stretch: i32,
+    /// b/(1 − b), × 2^19.
+    pub choked: i32,
 }
 
 impl FlowCurve {
@@ -22,20 +22,15 @@ impl FlowCurve {
     pub fn drive(&self, from: i32, to: i32) -> i32 {
         let forward = from >= to;
         let (high, low) = if forward { (from, to) } else { (to, from) };
-        // In 32 Pa: 16 bits.
-        let coarse = |pressure: i32| pressure.max(0).wrapping_shr(13) as u32;
-        let (p1, p2) = (coarse(high), coarse(low));
-        let above = p2
-            .wrapping_shl(15)
-            .saturating_sub(p1.wrapping_mul(self.critical));
-        let drive = if above == 0 {
+        // In 32 Pa: 17 bits.
+        let y = part(low, self.stretch, 32).wrapping_sub(part(high, self.choked, 32));
+        let drive = if y <= 0 {
             high
         } else {
-            let y = u64::from(above)
-                .wrapping_mul(u64::from(self.stretch))
-                .wrapping_shr(30) as u32;
-            let square = p1.saturating_sub(y).wrapping_mul(p1.wrapping_add(y));
-            square_root(square).wrapping_shl(13) as i32
+            let p1 = high.max(0).wrapping_shr(13);
+            // Rounded, y may be more than p₁ by one.
+            let square = p1.wrapping_sub(y).max(0).wrapping_mul(p1.wrapping_add(y));
+            square_root(square.cast_unsigned()).wrapping_shl(13) as i32
         };
         if forward { drive } else { drive.wrapping_neg() }
     }
@@ -77,15 +72,22 @@ pub(super) const fn power(pressure: i32, speed: i32) -> i32 {
 }
 
 impl ChamberFlows {
-    /// Works out the flows that are `wanted` and not yet known, for an open valve's
-    /// `flow` as a speed of the piston, raw mm/s.
+    /// Those of the valves that are open at times, `fill` and `vent` not 0, at `pressure`, for an
+    /// open valve's `flow` as a speed of the piston, raw mm/s.
     #[inline]
-    pub fn want(&mut self, model: &AxisModel, flow: i32, pressure: i32, wanted: Wanted) {
-        if wanted.fill && self.fill == 0 {
-            self.fill = model.curve.power(model.supply, pressure, flow);
-        }
-        if wanted.vent && self.vent == 0 {
-            self.vent = model.curve.power(pressure, model.ambient, flow);
+    pub(super) fn of(model: &AxisModel, flow: i32, pressure: i32, fill: i32, vent: i32) -> Self {
+        let curve = &model.curve;
+        Self {
+            fill: if fill == 0 {
+                0
+            } else {
+                curve.power(model.supply, pressure, flow)
+            },
+            vent: if vent == 0 {
+                0
+            } else {
+                curve.power(pressure, model.ambient, flow)
+            },
         }
     }
 
@@ -124,15 +126,6 @@ impl ChamberFlows {
 const SHORTEST: i32 = 4 << 8;
 /// Slowest change of pressure that is counted on, 1/256 Pa per 16 µs (50 Pa/ms).
 const SLOWEST: i32 = 205;
-
-/// Which flows of a chamber are wanted; what is not costs nothing.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Wanted {
-    /// Filling.
-    pub fill: bool,
-    /// Venting.
-    pub vent: bool,
-}
 
 impl AxisModel {
     /// Length of chamber A with the piston at `stroke`, raw mm.

@@ -357,8 +357,8 @@ impl AxisModel {
         Self {
             times,
             curve: FlowCurve {
-                critical: critical.wrapping_shr(9) as u32,
-                stretch: divide(1 << 39, less(1 << 24, critical)) as u32,
+                stretch: number(divide(1 << 43, less(1 << 24, critical))),
+                choked: number(divide(critical << 19, less(1 << 24, critical))),
             },
             supply: number(supply_8),
             ambient: number(ambient_8),

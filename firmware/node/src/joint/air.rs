@@ -134,7 +134,7 @@ impl AirModel {
             b: Chamber::new(axis, axis.lead_b, axis.flow_b, axis.force_b),
             stroke: axis.stroke,
             ambient: clipped(divide_signed(share, i64::from(axis.supply))),
-            fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
+            fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 11),
             rod: axis.force_rod,
             known: u16::try_from(known).unwrap_or(u16::MAX),
             slow: slow.div_ceil(WHOLE).saturating_mul(ONE),

@@ -131,11 +131,16 @@ impl Rest {
             self.near = self.near.saturating_sub(1);
         }
         // Patience: what has not come to rest for long may do so in a wider band.
-        let beyond = self.beyond().min(2 * PATIENCE_STEP);
-        // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
-        let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
-        let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
-        let catch = CATCH.wrapping_add(extra(CATCH));
+        let beyond = self.beyond();
+        let (band, catch) = if beyond > 0 {
+            let beyond = beyond.min(2 * PATIENCE_STEP);
+            // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
+            let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
+            let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
+            (band, CATCH.wrapping_add(extra(CATCH)))
+        } else {
+            (narrow, CATCH)
+        };
 
         let inside = error < band;
         let waits = self.waits(model, now, steps, error, inside);
