@@ -356,13 +356,15 @@ impl JointConfig {
                 (error_to_input, velocity_to_input).hash(state);
             }
             (None, 2) => gains.hash_forces(state),
-            (None, 3) => window.hash(state),
+            (None, 3) => {
+                gains.hash_rest(state);
+                window.hash(state);
+            }
             (None, _) => (integral_to_input, integral_limit).hash(state),
         }
-        match part {
-            3 => gains.hash_rest(state),
-            4 => (tick, axis.is_some()).hash(state),
-            _ => {}
+        if part == 4 {
+            (gains.stroke_min, gains.stroke_max, gains.law).hash(state);
+            (tick, axis.is_some()).hash(state);
         }
     }
 }
@@ -424,9 +426,10 @@ impl JointGains {
             release_dwell,
             bumpless_time,
             velocity_window,
-            stroke_min,
-            stroke_max,
-            law,
+            // With the part of all laws.
+            stroke_min: _,
+            stroke_max: _,
+            law: _,
             integral: _,
             derivative: _,
             sliding_time,
@@ -436,8 +439,7 @@ impl JointGains {
         } = self;
         (settle_band, settle_velocity, settle_dwell).hash(state);
         (release_band, release_dwell, bumpless_time).hash(state);
-        (velocity_window, stroke_min, stroke_max).hash(state);
-        (law, sliding_time, pwm_period).hash(state);
+        (velocity_window, sliding_time, pwm_period).hash(state);
     }
 }
 

@@ -307,9 +307,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.controller.config().hash_part(part, sum);
             // With each part of the configuration another part of the rest.
             match part {
-                0 => (&self.core.times, self.pwm.timing()).hash(sum),
+                0 => self.core.times.hash(sum),
                 1 => self.settings.motion.hash_air(sum),
                 2 => self.settings.motion.hash_forces(sum),
+                3 => self.pwm.timing().hash(sum),
                 4 => self.settings.hash_own(sum),
                 _ => {}
             }
