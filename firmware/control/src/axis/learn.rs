@@ -97,7 +97,7 @@ impl Learner {
         (mass > 0).then_some(mass)
     }
 
-    /// One period that ends at `speed` (raw mm/s), with the pressure force `force`, mN.
+    /// One period that ends at `speed` (raw mm/s), with the pressure force `force` in it, mN.
     #[inline]
     pub fn sample(&mut self, model: &AxisModel, speed: i32, force: i32) {
         if self.ended {
@@ -202,6 +202,8 @@ mod tests {
         for period in 0..75 {
             // mm/s a period.
             let acceleration = if period < 30 { 12.0 } else { -10.4 };
+            // The force of the period that ends at the speed.
+            speed = f64::max(speed + acceleration, 0.0);
             let viscous = speed * f64::from(model.viscous) / 256e3;
             let force = acceleration * mass_kg / 4.0 + 10.0 + viscous;
             let force = (sign * force - load) * 1e3;
@@ -210,7 +212,6 @@ mod tests {
             if learner.ended {
                 break;
             }
-            speed = f64::max(speed + acceleration, 0.0);
         }
         let learnt = taken(&mut learner, model).map(|mass| f64::from(mass) / 65_536.0);
         assert_eq!(learner.take(), None, "taken once");

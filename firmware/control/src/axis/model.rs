@@ -113,7 +113,7 @@ const AMBIENT_PA: u64 = 101_325;
 /// Polytropic exponent × 100 (ASSUMED: usual for small cylinders).
 const EXPONENT_PERCENT: u64 = 120;
 /// Slope of the speed law times the dead time, × 100.
-const SLOPE_PERCENT: u64 = 28;
+const SLOPE_PERCENT: u64 = 36;
 #[cfg(not(target_os = "none"))]
 extern crate std;
 #[cfg(not(target_os = "none"))]
@@ -122,12 +122,12 @@ pub(crate) fn knob(name: &str, default: u64) -> u64 { std::env::var(name).ok().a
 pub(crate) fn knob(_: &str, default: u64) -> u64 { default }
 
 /// Gain of the speed error times the dead time, × 100.
-const DAMPING_PERCENT: u64 = 66;
+const DAMPING_PERCENT: u64 = 85;
 /// Deceleration over slope times top speed, × 100.
 const BRAKE_PERCENT: u64 = 65;
 /// What the observer keeps of an older period's weight (a fading memory of second order: the gains
 /// below are 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³), × 2^16.
-const MEMORY: u64 = 36_044;
+const MEMORY: u64 = 28_000;
 /// Share of the innovation in stroke, × 2^16.
 const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY) >> 16) * MEMORY / (1 << 16);
 /// In speed, per period, × 2^16.
@@ -437,7 +437,7 @@ fn number(value: u64) -> i32 {
     i32::try_from(value).unwrap_or(i32::MAX)
 }
 
-fn obs() -> (u64,u64,u64) { let m = knob("MEM",MEMORY); let n=65536-m; (65536-((m*m)>>16)*m/65536, 3*((n*n)>>16)*(65536+m)/131072, ((n*n)>>16)*n/65536*knob("LOADG",100)/100) }
+fn obs() -> (u64,u64,u64) { let m = knob("MEM",MEMORY); let n=65536-m; (65536-((m*m)>>16)*m/65536, 3*((n*n)>>16)*(65536+m)/131072, ((n*n)>>16)*n/65536*knob("LOADG",60)/100) }
 
 #[cfg(not(target_os = "none"))]
 pub(crate) fn dbg(n: &str, v: i32) { if std::env::var("DBG").is_ok() { std::eprintln!("{n} {}", v as f64/65536.0); } }

@@ -528,13 +528,13 @@ impl Predictive {
     fn moves(&mut self, model: &AxisModel, measured: PositionMm) {
         let before = self.force;
         self.force = model.pressure_force(self.pressures());
-        let mean = before.saturating_add(self.force) >> 1;
-        self.motion.predict(model, &self.inertia, mean);
+        let force = before.saturating_add(self.force) >> 1;
+        self.motion.predict(model, &self.inertia, force);
         let mean = self.measured.saturating_add(measured.raw()) >> 1;
         self.motion.correct(model, &self.inertia, mean);
         self.course = Course::of(model, &self.motion);
         self.course_check = self.course.sum();
-        self.learner.sample(model, self.motion.speed, self.force);
+        self.learner.sample(model, self.motion.speed, force);
     }
 
     /// Motion, and the force that is wanted.
@@ -685,3 +685,6 @@ impl Predictive {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;
