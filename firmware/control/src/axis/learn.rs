@@ -60,9 +60,9 @@ impl Learner {
         Self::default()
     }
 
-    /// Adds itself to a sum. Without a first moment nothing of a move is read.
-    #[inline]
-    pub(super) fn sum(&self, sum: u32) -> u32 {
+    /// Sum of it. Without a first moment nothing of a move is read.
+    #[inline(never)]
+    pub(super) fn sum(&self) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             first,
@@ -71,7 +71,7 @@ impl Learner {
             ended,
             mass,
         } = *self;
-        let mut sum = mix(mix(sum, mass), first);
+        let mut sum = mix(mix(0, mass), first);
         if first != 0 {
             let periods = i32::from(fastest.periods)
                 ^ i32::from(last.periods).wrapping_shl(16)
@@ -83,18 +83,23 @@ impl Learner {
         sum
     }
 
-    /// Whether a move has ended that tells a mass: [`Learner::finish`] is to be called.
+    /// Whether a move has ended that tells a mass, or a mass was learnt: [`Learner::news`] is to
+    /// be called.
     #[inline]
     #[must_use]
-    pub const fn has_ended(&self) -> bool {
-        self.ended
+    pub const fn has_news(&self) -> bool {
+        self.ended || self.mass > 0
     }
 
-    /// A mass that was learnt and not yet taken, kg × 2^16.
+    /// One of two steps from a move that has ended to its mass, kg × 2^16: the first works it
+    /// out.
     #[inline]
-    pub fn take(&mut self) -> Option<i32> {
-        let mass = core::mem::take(&mut self.mass);
-        (mass > 0).then_some(mass)
+    pub fn news(&mut self, model: &AxisModel) -> Option<i32> {
+        if self.ended {
+            self.finish(model);
+            return None;
+        }
+        Some(core::mem::take(&mut self.mass))
     }
 
     /// One period that ends at `speed` (raw mm/s), with the pressure force `force` in it, mN.
@@ -138,7 +143,7 @@ impl Learner {
     // Seldom: small rather than fast.
     #[cold]
     #[inline(never)]
-    pub fn finish(&mut self, model: &AxisModel) {
+    fn finish(&mut self, model: &AxisModel) {
         let Self {
             first,
             fastest,
@@ -188,11 +193,10 @@ mod tests {
 
     /// The mass, worked out and taken.
     fn taken(learner: &mut Learner, model: &AxisModel) -> Option<i32> {
-        if learner.has_ended() {
-            assert_eq!(learner.take(), None, "not before it is worked out");
-            learner.finish(model);
+        if learner.ended {
+            assert_eq!(learner.news(model), None, "it is worked out first");
         }
-        learner.take()
+        learner.has_news().then(|| learner.news(model))?
     }
 
     /// A mass under a known force, with friction and a load: up to speed, and down again.
@@ -214,7 +218,7 @@ mod tests {
             }
         }
         let learnt = taken(&mut learner, model).map(|mass| f64::from(mass) / 65_536.0);
-        assert_eq!(learner.take(), None, "taken once");
+        assert!(!learner.has_news(), "taken once");
         learnt
     }
 
@@ -293,7 +297,7 @@ mod tests {
         let differs = |flip: &dyn Fn(&mut Learner)| {
             let mut flipped = some;
             flip(&mut flipped);
-            assert_ne!(flipped.sum(0), some.sum(0), "{flipped:?}");
+            assert_ne!(flipped.sum(), some.sum(), "{flipped:?}");
         };
         for bit in 0..32 {
             differs(&|own| own.mass ^= 1 << bit);

@@ -120,9 +120,11 @@ pub struct Predictive {
     motion_check: u32,
 
     inertia: Inertia,
-    learner: Learner,
     push: Push,
     push_check: u32,
+
+    learner: Learner,
+    learner_check: u32,
 
     rest: Rest,
     /// Where the piston stood when the next move was announced; [`NOTHING`] without one.
@@ -169,9 +171,10 @@ impl Hash for Predictive {
             wanted: _,
             motion_check: _,
             inertia: _,
-            learner: _,
             push: _,
             push_check: _,
+            learner: _,
+            learner_check: _,
             rest: _,
             awaits: _,
             makes_up: _,
@@ -217,9 +220,10 @@ impl Predictive {
             wanted: 0,
             motion_check: 0,
             inertia: Inertia::new(model, model.mass),
-            learner: Learner::new(),
             push: Push::default(),
             push_check: 0,
+            learner: Learner::new(),
+            learner_check: 0,
             rest: Rest::default(),
             awaits: NOTHING,
             makes_up: MakesUp::No,
@@ -237,7 +241,8 @@ impl Predictive {
         };
         law.course_check = law.course.sum();
         law.motion_check = law.sum_of_motion();
-        law.push_check = law.sum_of_push();
+        law.push_check = law.push.sum();
+        law.learner_check = law.learner.sum();
         law.rest_check = law.sum_of_rest();
         law
     }
@@ -245,11 +250,6 @@ impl Predictive {
     #[inline]
     fn sum_of_motion(&self) -> u32 {
         mix(mix(self.motion.sum(0), self.force), self.wanted)
-    }
-
-    #[inline]
-    fn sum_of_push(&self) -> u32 {
-        self.push.sum(self.learner.sum(0))
     }
 
     #[inline]
@@ -274,16 +274,18 @@ impl Predictive {
         let motion = || self.motion_check == self.sum_of_motion();
         match self.stroke {
             Stroke::A | Stroke::B => {
-                let chamber = if self.stroke == Stroke::A { a } else { b };
+                let first = self.stroke == Stroke::A;
+                let chamber = if first { a } else { b };
                 chamber.pulses_are_sound()
                     && chamber.pressures_are_sound()
                     && self.course_check == self.course.sum()
+                    && (first || self.learner_check == self.learner.sum())
             }
             Stroke::Motion => {
                 pressures()
                     && motion()
                     && self.rest_check == self.sum_of_rest()
-                    && self.push_check == self.sum_of_push()
+                    && self.push_check == self.push.sum()
                     && self.inertia.is_sound()
             }
             Stroke::Pulses => {
@@ -345,7 +347,7 @@ impl Predictive {
             Stroke::Motion => {
                 self.moves(model, measured);
                 self.push = Push::default();
-                self.push_check = self.sum_of_push();
+                self.push_check = self.push.sum();
                 self.motion_check = self.sum_of_motion();
             }
             Stroke::Pulses => self.release(),
@@ -503,6 +505,8 @@ impl Predictive {
             speed,
             end,
             mean,
+            now,
+            force,
         } = self.course;
         let [fill_a, vent_a, fill_b, vent_b] = self.plan;
         let (chamber, piston, plan) = if first {
@@ -521,6 +525,11 @@ impl Predictive {
             (&mut self.b, piston, [fill_b, vent_b])
         };
         chamber.follow(model, &clock, &piston, self.drives.then_some(plan));
+        if !first {
+            // Of the period before.
+            self.learner.sample(model, now, force);
+            self.learner_check = self.learner.sum();
+        }
     }
 
     /// The motion up to the moment, and where it will go.
@@ -532,9 +541,8 @@ impl Predictive {
         self.motion.predict(model, &self.inertia, force);
         let mean = self.measured.saturating_add(measured.raw()) >> 1;
         self.motion.correct(model, &self.inertia, mean);
-        self.course = Course::of(model, &self.motion);
+        self.course = Course::of(model, &self.motion, force);
         self.course_check = self.course.sum();
-        self.learner.sample(model, self.motion.speed, force);
     }
 
     /// Motion, and the force that is wanted.
@@ -545,13 +553,12 @@ impl Predictive {
         if self.fresh || self.rest.is_other(model, reference) {
             self.push = Push::default();
         }
-        // While the piston is slow, what was wanted a period ago will do.
-        if self.learner.has_ended() {
-            self.learner.finish(model);
-            #[cfg(not(target_os="none"))] super::model::dbg("finish", self.motion.speed);
-        } else if let Some(mass) = self.learner.take() {
-            self.inertia = Inertia::new(model, mass);
-            #[cfg(not(target_os="none"))] super::model::dbg("take", mass);
+        if self.learner.has_news() && self.learner_check == self.learner.sum() {
+            // Twice after a move: what was wanted a period ago will do.
+            if let Some(mass) = self.learner.news(model) {
+                self.inertia = Inertia::new(model, mass);
+            }
+            self.learner_check = self.learner.sum();
         } else {
             let expected = Pressures {
                 a: self.a.expected,
@@ -570,7 +577,7 @@ impl Predictive {
             }
             self.wanted = wish.force(model, self.push, &self.rest);
         }
-        self.push_check = self.sum_of_push();
+        self.push_check = self.push.sum();
         self.motion_check = self.sum_of_motion();
     }
 

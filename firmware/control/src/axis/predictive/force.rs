@@ -21,6 +21,10 @@ pub(super) struct Course {
     pub(super) end: i32,
     /// Mean speed in that, raw mm/s; 0 if that would end beyond an end stop.
     pub(super) mean: i32,
+    /// Speed now, raw mm/s …
+    pub(super) now: i32,
+    /// … and the pressure force in the period up to now, mN: for the learner.
+    pub(super) force: i32,
 }
 
 impl Course {
@@ -31,6 +35,8 @@ impl Course {
             speed: 0,
             end: stroke,
             mean: 0,
+            now: 0,
+            force: 0,
         }
     }
 
@@ -43,14 +49,17 @@ impl Course {
             speed,
             end,
             mean,
+            now,
+            force,
         } = *self;
-        mix(mix(mix(mix(0, middle), speed), end), mean)
+        let sum = mix(mix(mix(mix(0, middle), speed), end), mean);
+        mix(mix(sum, now), force)
     }
 
     /// Where the present acceleration takes the piston: not beyond an end stop, where air
     /// would be squeezed that is not there.
     #[inline]
-    pub(super) fn of(model: &AxisModel, motion: &Motion) -> Self {
+    pub(super) fn of(model: &AxisModel, motion: &Motion, force: i32) -> Self {
         let speed = motion.speed.saturating_add(motion.gained >> 1);
         let half = part(speed, model.period >> 1, 32);
         let middle = motion.stroke.saturating_add(half);
@@ -67,6 +76,8 @@ impl Course {
             speed,
             end,
             mean: if end == free { mean } else { 0 },
+            now: motion.speed,
+            force,
         }
     }
 }
@@ -120,10 +131,10 @@ pub(super) struct Push {
 }
 
 impl Push {
-    /// Adds itself to a sum.
+    /// Its sum.
     #[inline]
-    pub(super) fn sum(self, sum: u32) -> u32 {
-        mix(sum, self.force)
+    pub(super) const fn sum(self) -> u32 {
+        mix(0, self.force)
     }
 
     /// One period at `speed` raw mm/s with `missing` raw mm to a reference of
@@ -266,7 +277,7 @@ mod tests {
                 speed: speed_mm_s << 16,
                 ..Motion::default()
             };
-            Course::of(&model, &motion)
+            Course::of(&model, &motion, 0)
         };
         assert_eq!(model.stroke, 180 << 16);
         for (stroke, speed, end) in [(1, -400, 0), (179, 400, 180)] {

@@ -30,7 +30,7 @@ fn moving(model: &AxisModel, ticks: u32) -> Predictive {
 type Flip = fn(&mut Predictive, u32);
 
 /// All that the `Hash` leaves out, a word each.
-const KEPT: [Flip; 23] = [
+const KEPT: [Flip; 26] = [
     |law, bit| law.a.pressure ^= 1 << bit,
     |law, bit| law.b.pressure ^= 1 << bit,
     |law, bit| law.a.expected ^= 1 << bit,
@@ -39,7 +39,10 @@ const KEPT: [Flip; 23] = [
     |law, bit| law.course.speed ^= 1 << bit,
     |law, bit| law.course.end ^= 1 << bit,
     |law, bit| law.course.mean ^= 1 << bit,
+    |law, bit| law.course.now ^= 1 << bit,
+    |law, bit| law.course.force ^= 1 << bit,
     |law, bit| law.course_check ^= 1 << bit,
+    |law, bit| law.learner_check ^= 1 << bit,
     |law, bit| law.motion.stroke ^= 1 << bit,
     |law, bit| law.motion.speed ^= 1 << bit,
     |law, bit| law.motion.load ^= 1 << bit,
@@ -90,6 +93,7 @@ fn every_flipped_bit_of_what_is_kept_is_seen_before_it_is_used() {
                     assert_eq!(flipped.sum_of_motion(), twin.sum_of_motion());
                     assert_eq!(flipped.sum_of_rest(), twin.sum_of_rest());
                     assert_eq!(flipped.course.sum(), twin.course.sum());
+                    assert_eq!(flipped.learner, twin.learner);
                 }
             }
         }
