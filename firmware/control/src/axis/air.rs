@@ -29,6 +29,8 @@ pub(super) struct Piston {
     pub(super) lengths: [i32; 2],
     /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
     pub(super) speeds: [i32; 2],
+    /// Not 0: the stroke has time for the flows of valves that are shut.
+    pub(super) all_flows: i32,
 }
 
 /// Pulses under way and pressure of one chamber.
@@ -142,8 +144,8 @@ impl Chamber {
 
     /// Pressures at the moment and at the end of the dead time, and what the next pulses are
     /// made with. Flows are those at the pressure of the last moment.
-    // One copy, compiled for speed: inlined, it would be where it is called.
-    #[inline(never)]
+    // Called in one place.
+    #[inline(always)]
     pub(super) fn follow(
         &mut self,
         model: &AxisModel,
@@ -174,11 +176,20 @@ impl Chamber {
             flow,
             lengths,
             speeds: [speed, speed_ahead],
+            all_flows,
         } = *piston;
-        let [stiffness, ahead] = lengths.map(|length| model.stiffness(length));
+        let [length, length_ahead] = lengths;
+        let stiffness = model.stiffness(length);
+        let ahead = model.stiffness(length_ahead);
         let p = self.pressure;
         let [[fill, vent], [more_fill, more_vent]] = [open, committed];
-        let flows = ChamberFlows::of(model, flow, p, fill | more_fill, vent | more_vent);
+        let flows = ChamberFlows::of(
+            model,
+            flow,
+            p,
+            fill | more_fill | all_flows != 0,
+            vent | more_vent | all_flows != 0,
+        );
         let change = flows.change(open, power(p, speed), times.period, stiffness);
         // Never below half the atmosphere: a vacuum needs a motion of its own.
         let least = model.ambient.wrapping_shr(1);

@@ -72,21 +72,21 @@ pub(super) const fn power(pressure: i32, speed: i32) -> i32 {
 }
 
 impl ChamberFlows {
-    /// Those of the valves that are open at times, `fill` and `vent` not 0, at `pressure`, for an
-    /// open valve's `flow` as a speed of the piston, raw mm/s.
+    /// Those that are asked for, at `pressure`, for an open valve's `flow` as a speed of the
+    /// piston, raw mm/s.
     #[inline]
-    pub(super) fn of(model: &AxisModel, flow: i32, pressure: i32, fill: i32, vent: i32) -> Self {
+    pub(super) fn of(model: &AxisModel, flow: i32, pressure: i32, fill: bool, vent: bool) -> Self {
         let curve = &model.curve;
         Self {
-            fill: if fill == 0 {
-                0
-            } else {
+            fill: if fill {
                 curve.power(model.supply, pressure, flow)
-            },
-            vent: if vent == 0 {
-                0
             } else {
+                0
+            },
+            vent: if vent {
                 curve.power(pressure, model.ambient, flow)
+            } else {
+                0
             },
         }
     }

@@ -78,7 +78,10 @@ impl Learner {
                 ^ i32::from(ended).wrapping_shl(15);
             sum = mix(sum, periods);
             sum = mix(mix(sum, fastest.speed), fastest.impulse);
-            sum = mix(mix(sum, last.speed), last.impulse);
+            sum = mix(sum, last.impulse);
+            if ended {
+                sum = mix(sum, last.speed);
+            }
         }
         sum
     }

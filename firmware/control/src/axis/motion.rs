@@ -53,10 +53,7 @@ impl Inertia {
         // 1/kg = mm/s² per mN: 2^(24+16) / raw kg.
         let per_force = quotient(1 << 40, unsigned, 0);
         let share = if mass > model.nimble_mass {
-            cube_root(
-                quotient(u64::from(model.nimble_mass.cast_unsigned()), unsigned, 16)
-                    .cast_unsigned(),
-            )
+            cube_root(part(model.nimble_mass, per_force, 24).cast_unsigned())
         } else {
             1 << 16
         };

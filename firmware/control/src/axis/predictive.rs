@@ -151,6 +151,8 @@ pub struct Predictive {
     plan: OnTimes,
 
     // For the record.
+    /// Force that was asked for, mN; the duty follows in the tick after it.
+    asked: i32,
     duty: Duty,
     limited: bool,
 }
@@ -188,6 +190,7 @@ impl Hash for Predictive {
             measured,
             plan: [fill_a, vent_a, fill_b, vent_b],
             // They shape no output.
+            asked: _,
             duty: _,
             limited: _,
         } = self;
@@ -236,6 +239,7 @@ impl Predictive {
             next: 0,
             measured: 0,
             plan: [0; 4],
+            asked: 0,
             duty: Duty::ZERO,
             limited: false,
         };
@@ -366,15 +370,28 @@ impl Predictive {
         if begins {
             self.take_over(model, sent);
         }
-        match self.stroke {
-            Stroke::A => self.follow(model, true),
-            Stroke::B => self.follow(model, false),
-            Stroke::Motion => self.want(model, input),
-            // Nothing was wanted yet.
-            Stroke::Pulses if begins => {}
-            Stroke::Pulses => self.choose(model, input),
-        }
-        let on = self.due(model);
+        let on = match self.stroke {
+            Stroke::A => {
+                self.follow(model, true);
+                self.duty = model.duty(self.asked);
+                self.due(model, 1)
+            }
+            Stroke::B => {
+                self.follow(model, false);
+                self.due(model, 2)
+            }
+            Stroke::Motion => {
+                self.want(model, input);
+                self.due(model, 3)
+            }
+            Stroke::Pulses => {
+                // When it begins, nothing was wanted yet.
+                if !begins {
+                    self.choose(model, input);
+                }
+                self.due(model, 0)
+            }
+        };
         self.next_stroke(input.measured);
         Drive {
             on,
@@ -465,6 +482,7 @@ impl Predictive {
         );
         self.drives = false;
         self.plan = [0; 4];
+        self.asked = 0;
         self.duty = Duty::ZERO;
         self.limited = false;
         self.release();
@@ -514,6 +532,7 @@ impl Predictive {
                 flow: model.flow_a,
                 lengths: [model.length_a(middle), model.length_a(end)],
                 speeds: [speed.wrapping_neg(), mean.wrapping_neg()],
+                all_flows: 1,
             };
             (&mut self.a, piston, [fill_a, vent_a])
         } else {
@@ -521,6 +540,7 @@ impl Predictive {
                 flow: model.flow_b,
                 lengths: [model.length_b(middle), model.length_b(end)],
                 speeds: [speed, mean],
+                all_flows: 0,
             };
             (&mut self.b, piston, [fill_b, vent_b])
         };
@@ -622,7 +642,7 @@ impl Predictive {
                 let ([fill_a, vent_a], [fill_b, vent_b]) = (self.a.shut(model), self.b.shut(model));
                 self.plan = [fill_a, vent_a, fill_b, vent_b];
                 self.limited = false;
-                self.duty = Duty::ZERO;
+                self.asked = 0;
                 self.rest_check = self.sum_of_rest();
                 return;
             }
@@ -637,16 +657,15 @@ impl Predictive {
         let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
         self.plan = [fill_a, vent_a, fill_b, vent_b];
         self.limited = possible != force;
-        self.duty = model.duty(force);
+        self.asked = force;
         self.rest_check = self.sum_of_rest();
     }
 
-    /// On-times of the next tick by the plan.
+    /// On-times of the next tick by the plan, of which so many ticks are gone by then.
     #[inline]
-    fn due(&self, model: &AxisModel) -> OnTimes {
+    fn due(&self, model: &AxisModel, ticks: u16) -> OnTimes {
         let tick = model.times.tick as u16;
-        let turn = (self.stroke as u16).wrapping_add(1) & 3;
-        let gone = tick.wrapping_mul(turn);
+        let gone = tick.wrapping_mul(ticks);
         self.plan.map(|on| on.saturating_sub(gone).min(tick))
     }
 

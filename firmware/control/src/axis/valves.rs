@@ -201,23 +201,33 @@ impl ValveTrack {
         if self.open() { span } else { 0 }
     }
 
-    /// Takes the changes within `span` µs from `now`; gives the time open.
+    /// Takes the changes within `span` µs from `now`, at least one; gives the time open.
+    ///
+    /// Without a loop: the time open is that to the end of the span, if the valve is open then,
+    /// less the moments of opening, plus those of closing.
     #[inline(never)]
     fn pass(&mut self, now: u32, span: i32) -> i32 {
-        // The time open is that to the end of the span, if the valve is open then, less the
-        // moments of opening, plus those of closing.
-        let mut opened = 0_i32;
-        while self.pending() > 0 {
-            let [first, second, third, fourth] = self.edges;
-            let moment = first.wrapping_sub(now) as i32;
-            if moment > span {
-                break;
-            }
-            opened = moment.wrapping_sub(opened);
-            // One change less, and the other way.
-            self.state = self.state.wrapping_sub(1) ^ OPEN;
+        let [first, second, third, fourth] = self.edges;
+        let [one, two, three, four] = self.edges.map(|edge| edge.wrapping_sub(now) as i32);
+        let pending = self.pending();
+        let opened = if pending < 2 || two > span {
             self.edges = [second, third, fourth, first];
-        }
+            self.state = self.state.wrapping_sub(1) ^ OPEN;
+            one
+        } else if pending < 3 || three > span {
+            self.edges = [third, fourth, first, second];
+            self.state = self.state.wrapping_sub(2);
+            two.wrapping_sub(one)
+        } else if pending < 4 || four > span {
+            self.edges = [fourth, first, second, third];
+            self.state = self.state.wrapping_sub(3) ^ OPEN;
+            three.wrapping_sub(two).wrapping_add(one)
+        } else {
+            self.state = self.state.wrapping_sub(4);
+            four.wrapping_sub(three)
+                .wrapping_add(two)
+                .wrapping_sub(one)
+        };
         if self.open() {
             span.wrapping_sub(opened)
         } else {
@@ -241,34 +251,23 @@ impl ValveTrack {
     #[inline]
     #[must_use]
     pub fn committed(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
-        if self.state & (COIL | PENDING) == 0 {
-            return 0;
-        }
-        self.under_way(from, next, times)
-    }
-
-    #[inline(never)]
-    fn under_way(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
-        let [first, second, third, fourth] = self.edges;
-        // Without a loop: how many changes there are decides all that is to be done. The
-        // moments of an even number of changes need no present to be told from.
-        let sum = match self.pending() {
-            0 => 0,
-            1 => first.wrapping_sub(from),
-            2 => second.wrapping_sub(first),
-            3 => third
-                .wrapping_sub(second)
-                .wrapping_add(first)
-                .wrapping_sub(from),
-            _ => fourth
-                .wrapping_sub(third)
-                .wrapping_add(second)
-                .wrapping_sub(first),
-        } as i32;
+        let [first, second, ..] = self.edges;
+        let pending = self.pending();
         if !self.coil() {
-            return sum;
+            return match pending {
+                0 => 0,
+                1 => first.wrapping_sub(from) as i32,
+                2 => second.wrapping_sub(first) as i32,
+                _ => self.under_way(from),
+            };
         }
-        if self.pending() as usize >= EDGES {
+        // The moments of an even number of changes need no present to be told from.
+        let sum = match pending {
+            0 => 0,
+            1 => first.wrapping_sub(from) as i32,
+            _ => self.under_way(from),
+        };
+        if pending as usize >= EDGES {
             return 0;
         }
         // The fall is the last change, and closes.
@@ -278,6 +277,24 @@ impl ValveTrack {
             .wrapping_add(times.off)
             .wrapping_add(times.line)
             .wrapping_sub(sum)
+    }
+
+    /// The last moment under way less the one before it, and so on.
+    #[cold]
+    #[inline(never)]
+    fn under_way(&self, from: u32) -> i32 {
+        let [first, second, third, fourth] = self.edges;
+        match self.pending() {
+            2 => second.wrapping_sub(first) as i32,
+            3 => third
+                .wrapping_sub(second)
+                .wrapping_add(first)
+                .wrapping_sub(from) as i32,
+            _ => fourth
+                .wrapping_sub(third)
+                .wrapping_add(second)
+                .wrapping_sub(first) as i32,
+        }
     }
 
     /// What it can do in the period that begins `next`, up to which the coil is decided.

@@ -119,17 +119,26 @@ impl Rest {
     pub(super) fn quiet(&mut self, model: &AxisModel, now: &Approach) -> bool {
         // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
         let narrow = model.band;
+        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        if self.settled && self.stays(narrow, now, steps) {
+            return true;
+        }
         let error = now
             .reference
             .saturating_sub(now.motion.stroke)
             .saturating_abs();
-        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        let near = steps && !self.settled && error < narrow.wrapping_mul(24);
-        if near {
-            self.near = self.near.saturating_add(1).min(PATIENCE * 4);
-        } else if !self.settled {
+        if !steps {
             self.near = self.near.saturating_sub(1);
+            self.held = 0;
+            self.pause = 0;
+            self.inside = false;
+            return false;
         }
+        self.near = if error < narrow.wrapping_mul(24) {
+            self.near.wrapping_add(1).min(PATIENCE * 4)
+        } else {
+            self.near.saturating_sub(1)
+        };
         // Patience: what has not come to rest for long may do so in a wider band.
         let beyond = self.beyond();
         let (band, catch) = if beyond > 0 {
@@ -141,43 +150,50 @@ impl Rest {
         } else {
             (narrow, CATCH)
         };
-
+        let speed = now.motion.speed.wrapping_abs();
         let inside = error < band;
-        let waits = self.waits(model, now, steps, error, inside);
-        let slow = inside && now.motion.speed.wrapping_abs() < catch;
-        let quiet = steps && (slow || now.stops_within(model, band));
-        self.held = if quiet {
-            self.held.saturating_add(1)
-        } else {
-            0
-        };
-        if self.held > REST_PERIODS && !self.settled {
+        let waits = self.waits(model, now, speed, error, inside);
+        if !(inside && speed < catch || now.stops_within(model, band)) {
+            self.held = 0;
+            return waits;
+        }
+        self.held = self.held.wrapping_add(1);
+        if self.held > REST_PERIODS {
             self.settled = true;
             self.aimed = false;
+            self.released = 0;
         }
+        true
+    }
+
+    /// One period of a piston that rests; whether it stays so.
+    #[inline]
+    fn stays(&mut self, narrow: i32, now: &Approach, steps: bool) -> bool {
+        let beyond = self.beyond().min(2 * PATIENCE_STEP);
+        let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
+        let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
         let release = narrow
             .wrapping_shl(1)
             .wrapping_add(band)
             .min(LEFT.max(band.wrapping_add(narrow >> 1)));
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
-        let outside = away > release;
-        if self.settled && (outside || !steps) {
-            self.released = self.released.saturating_add(1);
-            let periods = if self.aimed {
-                START_PERIODS
-            } else {
-                RELEASE_PERIODS
-            };
-            if self.released >= periods || !steps {
-                self.settled = false;
-                self.held = 0;
-                self.released = 0;
-                self.near = self.near.max(PATIENCE);
-            }
-        } else {
+        if steps && away <= release {
             self.released = 0;
+            return true;
         }
-        self.settled || quiet || waits
+        self.released = self.released.wrapping_add(1);
+        let periods = if self.aimed {
+            START_PERIODS
+        } else {
+            RELEASE_PERIODS
+        };
+        if steps && self.released < periods {
+            return true;
+        }
+        self.settled = false;
+        self.held = 0;
+        self.near = self.near.max(PATIENCE);
+        false
     }
 
     /// Act and wait. Where acting alone has not brought the piston to rest for long,
@@ -190,14 +206,13 @@ impl Rest {
         &mut self,
         model: &AxisModel,
         now: &Approach,
-        steps: bool,
+        speed: i32,
         error: i32,
         inside: bool,
     ) -> bool {
-        let speed = now.motion.speed.wrapping_abs();
         let entered = inside && !self.inside;
         self.inside = inside;
-        if !steps || speed > GENTLE || (error > FLED && !inside) {
+        if speed > GENTLE || (error > FLED && !inside) {
             self.pause = 0;
         } else if self.pause > 0 {
             let spent = if inside || speed >= STILL {
