@@ -129,14 +129,9 @@ impl Chamber {
             return;
         }
         let sound = self.pulses_are_sound();
-        for (valve, on) in [&mut self.fill, &mut self.vent].into_iter().zip(on) {
-            let on = i32::from(on);
-            if cut && !valve.coil() {
-                valve.cut(now.wrapping_add(on as u32), times);
-            } else {
-                valve.energise(now, on, span, times);
-            }
-        }
+        let [fill, vent] = on;
+        self.fill.decide(now, i32::from(fill), span, cut, times);
+        self.vent.decide(now, i32::from(vent), span, cut, times);
         if sound {
             self.pulses_check = self.sum_of_pulses();
         }

@@ -122,7 +122,7 @@ pub(crate) fn knob(name: &str, default: u64) -> u64 { std::env::var(name).ok().a
 pub(crate) fn knob(_: &str, default: u64) -> u64 { default }
 
 /// Gain of the speed error times the dead time, × 100.
-const DAMPING_PERCENT: u64 = 85;
+const DAMPING_PERCENT: u64 = 95;
 /// Deceleration over slope times top speed, × 100.
 const BRAKE_PERCENT: u64 = 65;
 /// What the observer keeps of an older period's weight (a fading memory of second order: the gains
@@ -259,12 +259,7 @@ impl AxisModel {
     fn coefficients(data: &AxisData, tick: Micros) -> Self {
         // Formats as "value × 2^bits": the two digits at the end of a name. What a
         // 64-bit product needs at most is said beside it; data are within `check`.
-        let raw = |value: PositionMm| u64::from(value.raw().unsigned_abs());
         let micros = |value: Micros| u64::from(value.get());
-        let circle_16 = |diameter: PositionMm| {
-            let square_16 = raw(diameter).wrapping_mul(raw(diameter)).wrapping_shr(16);
-            square_16.wrapping_mul(QUARTER_PI).wrapping_shr(30)
-        };
         let area_a_16 = circle_16(data.bore);
         let area_rod_16 = circle_16(data.rod);
         let area_b_16 = less(area_a_16, area_rod_16);
@@ -281,7 +276,6 @@ impl AxisModel {
             .wrapping_add(micros(data.line_delay))
             .wrapping_add(knob("HOLD",HOLD));
         let horizon_us = less(period_us, moment_us).wrapping_add(valve_us);
-        let seconds_32 = |us: u64| divide(us.wrapping_shl(32), 1_000_000);
 
         let ambient_8 = AMBIENT_PA << 8;
         // kPa × 2^16 to Pa × 2^8: × 1000 / 256.
@@ -289,9 +283,6 @@ impl AxisModel {
         let low_8 = percent(ambient_8, 103);
         let high_8 = divide(supply_8.wrapping_mul(985), 1000);
         let mean_8 = ambient_8.wrapping_add(supply_8).wrapping_shr(1);
-        // mN per 1/256 Pa × 2^32: 2^24 / 1000 × mm².
-        let force_32 = |area_16: u64| divide(area_16.wrapping_mul(256), 1000);
-        let force = |pa_8: u64, area_16: u64| pa_8.wrapping_mul(force_32(area_16)).wrapping_shr(32);
         let rod = force(ambient_8, area_rod_16);
         let force_out = less(less(force(high_8, area_a_16), force(low_8, area_b_16)), rod);
         let force_in = less(
@@ -313,16 +304,8 @@ impl AxisModel {
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
         // how fast the force can change, mN/s.
-        let volume_8 = |dead: PositionMm, area_16: u64| {
-            let dead_8 = raw(dead).wrapping_mul(1000).wrapping_shr(8);
-            dead_8.wrapping_add(area_16.wrapping_mul(raw(data.stroke)).wrapping_shr(25))
-        };
-        let stiffness_8 = |pa_8: u64, area_16: u64, dead: PositionMm| {
-            // 2^29 × 2^29, Pa/mm.
-            divide(pa_8.wrapping_mul(area_16), volume_8(dead, area_16)).wrapping_shr(8)
-        };
-        let both_8 = percent(stiffness_8(supply_8, area_a_16, data.dead_a), 90)
-            .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b));
+        let both_8 = percent(stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke), 90)
+            .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke));
         // Half of both; 2^29 × 2^31 × 2^-12.
         let slew = flow_24
             .wrapping_shr(20)
@@ -357,8 +340,8 @@ impl AxisModel {
         Self {
             times,
             curve: FlowCurve {
-                stretch: number(divide(1 << 43, less(1 << 24, critical))),
-                choked: number(divide(critical << 19, less(1 << 24, critical))),
+                stretch: ratio(1 << 43, less(1 << 24, critical)),
+                choked: ratio(critical << 19, less(1 << 24, critical)),
             },
             supply: number(supply_8),
             ambient: number(ambient_8),
@@ -372,7 +355,7 @@ impl AxisModel {
             force_b: number(force_32(area_b_16)),
             force_rod: number(rod),
             half_pressure_a: number(per_force_12(area_a_16.wrapping_shl(1))),
-            area_ratio: number(divide(area_a_16.wrapping_shl(24), area_b_16)),
+            area_ratio: ratio(area_a_16.wrapping_shl(24), area_b_16),
             pressure_b: number(per_force_12(area_b_16)),
             pressure_a: number(per_force_12(area_a_16)),
             mean: number(mean_8),
@@ -380,17 +363,17 @@ impl AxisModel {
             high: number(high_8),
             force_out: number(force_out),
             force_in: number(force_in),
-            share_out: number(divide(1 << 40, force_out.max(1 << 9))),
-            share_in: number(divide(1 << 40, force_in.max(1 << 9))),
+            share_out: ratio(1 << 40, force_out.max(1 << 9)),
+            share_in: ratio(1 << 40, force_in.max(1 << 9)),
             coulomb: number(to_mn(data.coulomb)),
             breakaway: number(to_mn(data.breakaway)),
             viscous: number(raw(data.viscous).wrapping_shr(8)),
-            horizon: number(seconds_32(horizon_us)),
+            horizon: seconds_32(horizon_us),
             horizon_us: number(horizon_us),
-            periods_ahead: number(divide(horizon_us.wrapping_shl(16), period_us)),
-            horizon_reference: number(seconds_32(tick_us.wrapping_shl(1).wrapping_add(valve_us))),
+            periods_ahead: ratio(horizon_us.wrapping_shl(16), period_us),
+            horizon_reference: seconds_32(tick_us.wrapping_shl(1).wrapping_add(valve_us)),
             moment: number(moment_us),
-            period: number(seconds_32(period_us)),
+            period: seconds_32(period_us),
             mass: number(raw(data.mass)),
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             slope: number(slope_8),
@@ -398,23 +381,23 @@ impl AxisModel {
             brake: number(brake),
             top_speed: number(top_16),
             observe_stroke: number(obs().0),
-            observe_speed: number(divide(obs().1.wrapping_mul(1_000_000), period_us)),
-            observe_load: number(divide(
+            observe_speed: ratio(obs().1.wrapping_mul(1_000_000), period_us),
+            observe_load: ratio(
                 obs().2.wrapping_mul(1_000_000_000_000).wrapping_shr(16),
                 period_us.wrapping_mul(period_us),
-            )),
+            ),
             // Five times the break-away force in a second, × 2^8.
-            stick_step: number(divide(
+            stick_step: ratio(
                 to_mn(data.breakaway)
                     .wrapping_mul(period_us)
                     .wrapping_mul(5 << 8),
                 1_000_000,
-            )),
+            ),
             band: number(raw(data.band)),
-            swing: number(divide(
+            swing: ratio(
                 SWING,
                 swings.saturating_mul(period_us.wrapping_mul(period_us)),
-            )),
+            ),
         }
     }
 }
@@ -429,6 +412,52 @@ fn percent(value: u64, percents: u64) -> u64 {
 #[inline(never)]
 fn less(a: u64, b: u64) -> u64 {
     a.saturating_sub(b)
+}
+
+/// A number of the data, × 2^16.
+#[inline]
+fn raw(value: PositionMm) -> u64 {
+    u64::from(value.raw().unsigned_abs())
+}
+
+/// Area of a circle, mm² × 2^16.
+#[inline(never)]
+fn circle_16(diameter: PositionMm) -> u64 {
+    let square_16 = raw(diameter).wrapping_mul(raw(diameter)).wrapping_shr(16);
+    square_16.wrapping_mul(QUARTER_PI).wrapping_shr(30)
+}
+
+/// mN per 1/256 Pa × 2^32: 2^24 / 1000 × mm².
+#[inline(never)]
+fn force_32(area_16: u64) -> u64 {
+    divide(area_16.wrapping_mul(256), 1000)
+}
+
+/// Force of a pressure (1/256 Pa) on an area, mN.
+#[inline(never)]
+fn force(pa_8: u64, area_16: u64) -> u64 {
+    pa_8.wrapping_mul(force_32(area_16)).wrapping_shr(32)
+}
+
+/// Pressure (1/256 Pa) per length of a chamber at mid stroke, Pa/mm.
+#[inline(never)]
+fn stiffness_8(pa_8: u64, area_16: u64, dead: PositionMm, stroke: PositionMm) -> u64 {
+    let dead_8 = raw(dead).wrapping_mul(1000).wrapping_shr(8);
+    let volume_8 = dead_8.wrapping_add(area_16.wrapping_mul(raw(stroke)).wrapping_shr(25));
+    // 2^29 × 2^29.
+    divide(pa_8.wrapping_mul(area_16), volume_8).wrapping_shr(8)
+}
+
+/// µs in s × 2^32, saturating.
+#[inline(never)]
+fn seconds_32(us: u64) -> i32 {
+    ratio(us.wrapping_shl(32), 1_000_000)
+}
+
+/// `a / b` as a coefficient, saturating.
+#[inline(never)]
+fn ratio(a: u64, b: u64) -> i32 {
+    number(divide(a, b))
 }
 
 /// As a coefficient, saturating.

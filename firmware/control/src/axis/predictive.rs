@@ -243,12 +243,19 @@ impl Predictive {
             duty: Duty::ZERO,
             limited: false,
         };
-        law.course_check = law.course.sum();
-        law.motion_check = law.sum_of_motion();
-        law.push_check = law.push.sum();
-        law.learner_check = law.learner.sum();
-        law.rest_check = law.sum_of_rest();
+        law.seal();
         law
+    }
+
+    /// Seals what begins.
+    #[cold]
+    #[inline(never)]
+    fn seal(&mut self) {
+        self.course_check = self.course.sum();
+        self.motion_check = self.sum_of_motion();
+        self.push_check = self.push.sum();
+        self.learner_check = self.learner.sum();
+        self.rest_check = self.sum_of_rest();
     }
 
     #[inline]
@@ -274,32 +281,24 @@ impl Predictive {
     #[must_use]
     pub fn kept_is_sound(&self) -> bool {
         let Self { a, b, .. } = self;
-        let pressures = || a.pressures_are_sound() && b.pressures_are_sound();
-        let motion = || self.motion_check == self.sum_of_motion();
-        match self.stroke {
-            Stroke::A | Stroke::B => {
-                let first = self.stroke == Stroke::A;
-                let chamber = if first { a } else { b };
-                chamber.pulses_are_sound()
-                    && chamber.pressures_are_sound()
-                    && self.course_check == self.course.sum()
-                    && (first || self.learner_check == self.learner.sum())
-            }
-            Stroke::Motion => {
-                pressures()
-                    && motion()
-                    && self.rest_check == self.sum_of_rest()
-                    && self.push_check == self.push.sum()
-                    && self.inertia.is_sound()
-            }
-            Stroke::Pulses => {
-                pressures()
-                    && motion()
-                    && self.rest_check == self.sum_of_rest()
-                    && a.means_are_sound()
-                    && b.means_are_sound()
-            }
+        if matches!(self.stroke, Stroke::A | Stroke::B) {
+            let first = self.stroke == Stroke::A;
+            let chamber = if first { a } else { b };
+            return chamber.pulses_are_sound()
+                && chamber.pressures_are_sound()
+                && self.course_check == self.course.sum()
+                && (first || self.learner_check == self.learner.sum());
         }
+        let sound = a.pressures_are_sound()
+            && b.pressures_are_sound()
+            && self.motion_check == self.sum_of_motion()
+            && self.rest_check == self.sum_of_rest();
+        sound
+            && if self.stroke == Stroke::Motion {
+                self.push_check == self.push.sum() && self.inertia.is_sound()
+            } else {
+                a.means_are_sound() && b.means_are_sound()
+            }
     }
 
     /// Estimated motion and load.
@@ -410,10 +409,10 @@ impl Predictive {
         let stroke = measured.raw();
         self.measured = stroke;
         self.motion.stroke = stroke;
-        self.motion_check = self.sum_of_motion();
         self.course = Course::at(stroke);
-        self.course_check = self.course.sum();
-        self.release();
+        self.rest.release(stroke);
+        self.quiet = true;
+        self.seal();
     }
 
     /// Forgets the rest state. What was damaged before keeps its broken seal.

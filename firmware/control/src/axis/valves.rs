@@ -155,9 +155,19 @@ impl ValveTrack {
         }
     }
 
+    /// As [`ValveTrack::energise`], or with `cut` as [`ValveTrack::cut`] of a coil that is off.
+    #[inline(never)]
+    pub(super) fn decide(&mut self, now: u32, on: i32, span: i32, cut: bool, times: &ValveTimes) {
+        if cut && !self.coil() {
+            self.cut(now.wrapping_add(on as u32), times);
+        } else {
+            self.energise(now, on, span, times);
+        }
+    }
+
     /// A coil whose fall was planned for a moment after `at` falls there, because somebody
     /// else decides from then on.
-    #[inline(never)]
+    #[inline]
     pub fn cut(&mut self, at: u32, times: &ValveTimes) {
         let late = self.changed.wrapping_sub(at) as i32;
         if self.coil() || late <= 0 || late > LONGEST_PLAN {
@@ -359,7 +369,7 @@ impl Ready {
             self.0.saturating_add(need)
         } else {
             let shortest = times.shortest_opening();
-            if rival || self == Self::SHUTS || need <= shortest.wrapping_mul(5) >> 3 {
+            if rival || self == Self::SHUTS || need <= shortest.wrapping_mul(super::model::knob("NEED",5) as i32) >> 3 {
                 return 0;
             }
             need.max(shortest)

@@ -6,7 +6,7 @@ use crate::axis::motion::Motion;
 use crate::axis::{mix, part, scaled, square_root};
 
 /// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
-const CATCH: i32 = 6 << 16;
+#[allow(non_snake_case)] fn CATCH() -> i32 { (crate::axis::model::knob("CATCH",40) as i32) * 6554 }
 /// A reference slower than this is a step (1 mm/s).
 pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
@@ -146,19 +146,20 @@ impl Rest {
             // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
             let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
             let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
-            (band, CATCH.wrapping_add(extra(CATCH)))
+            (band, CATCH().wrapping_add(extra(CATCH())))
         } else {
-            (narrow, CATCH)
+            (narrow, CATCH())
         };
         let speed = now.motion.speed.wrapping_abs();
         let inside = error < band;
         let waits = self.waits(model, now, speed, error, inside);
-        if !(inside && speed < catch || now.stops_within(model, band)) {
+        let slow = inside && speed < catch;
+        if !(slow || now.stops_within(model, band)) {
             self.held = 0;
             return waits;
         }
         self.held = self.held.wrapping_add(1);
-        if self.held > REST_PERIODS {
+        if self.held > crate::axis::model::knob("RESTP", 8) as u16 {
             self.settled = true;
             self.aimed = false;
             self.released = 0;
@@ -172,8 +173,7 @@ impl Rest {
         let beyond = self.beyond().min(2 * PATIENCE_STEP);
         let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
         let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
-        let release = narrow
-            .wrapping_shl(1)
+        let release = (narrow.wrapping_mul(crate::axis::model::knob("REL",20) as i32) / 10)
             .wrapping_add(band)
             .min(LEFT.max(band.wrapping_add(narrow >> 1)));
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
@@ -263,6 +263,7 @@ pub(super) struct Approach<'a> {
     pub(super) motion: &'a Motion,
     /// Pressure force, mN.
     pub(super) force: i32,
+
     /// kg × 2^16.
     pub(super) mass: i32,
 }
