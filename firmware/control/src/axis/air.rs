@@ -228,6 +228,8 @@ impl Chamber {
         }
     }
 
+    pub(super) fn idle(&self) -> bool { let [a, b] = self.ready; !a.coil() && !b.coil() }
+
     /// Everything shut as soon as the pulses under way allow.
     #[inline]
     pub(super) fn shut(&self, model: &AxisModel) -> [u16; 2] {

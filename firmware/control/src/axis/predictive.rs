@@ -655,6 +655,14 @@ impl Predictive {
         let [fill_a, vent_a] = self.a.pulses(model, model.flow_a, target.a);
         let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
         self.plan = [fill_a, vent_a, fill_b, vent_b];
+        let one = super::model::knob("ONE", 0) as i32;
+        if one > 0 && (reference - self.motion.stroke).abs() < model.band * one {
+            let (a, b) = (fill_a.max(vent_a), fill_b.max(vent_b));
+            let alt = super::model::knob("ALT", 0);
+            if self.a.idle() && self.b.idle() && a > 0 && b > 0 {
+                if alt == 0 && b >= a || alt == 1 && (self.next >> 12) & 1 == 0 { self.plan[0] = 0; self.plan[1] = 0; } else { self.plan[2] = 0; self.plan[3] = 0; }
+            }
+        }
         self.limited = possible != force;
         self.asked = force;
         self.rest_check = self.sum_of_rest();

@@ -12,7 +12,7 @@ pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
 const REST_PERIODS: u16 = 8;
 /// Periods near the target without coming to rest after which the band widens …
-const PATIENCE: u16 = 125;
+#[allow(non_snake_case)] fn PATIENCE() -> u16 { crate::axis::model::knob("PAT",125) as u16 }
 /// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 7;
@@ -135,7 +135,7 @@ impl Rest {
             return false;
         }
         self.near = if error < narrow.wrapping_mul(24) {
-            self.near.wrapping_add(1).min(PATIENCE * 4)
+            self.near.wrapping_add(1).min(PATIENCE() * 4)
         } else {
             self.near.saturating_sub(1)
         };
@@ -192,7 +192,7 @@ impl Rest {
         }
         self.settled = false;
         self.held = 0;
-        self.near = self.near.max(PATIENCE);
+        self.near = self.near.max(PATIENCE());
         false
     }
 
@@ -229,7 +229,7 @@ impl Rest {
 
     /// Periods near the target beyond what patience allows.
     fn beyond(&self) -> i32 {
-        i32::from(self.near.saturating_sub(PATIENCE))
+        i32::from(self.near.saturating_sub(PATIENCE()))
     }
 
     /// What is fed forward for friction that is less than told makes a relay: where
