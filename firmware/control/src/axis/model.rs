@@ -314,7 +314,7 @@ impl AxisModel {
         let slew = divide(slew.wrapping_mul(EXPONENT_PERCENT), 100_000);
         // kg = mN/s over mm/s³. 2^37 × 2^24.
         let nimble_16 = divide(
-            percent(slew, knob("NIMBLE",90)).wrapping_shl(24),
+            percent(slew, knob("NIMBLE",60)).wrapping_shl(24),
             brake.wrapping_mul(slope_8),
         );
 

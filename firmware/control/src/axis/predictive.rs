@@ -655,7 +655,7 @@ impl Predictive {
         let [fill_a, vent_a] = self.a.pulses(model, model.flow_a, target.a);
         let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
         self.plan = [fill_a, vent_a, fill_b, vent_b];
-        let one = super::model::knob("ONE", 0) as i32;
+        let one = super::model::knob("ONE", 12) as i32;
         if one > 0 && (reference - self.motion.stroke).abs() < model.band * one {
             let (a, b) = (fill_a.max(vent_a), fill_b.max(vent_b));
             let alt = super::model::knob("ALT", 0);

@@ -12,7 +12,7 @@ pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
 const REST_PERIODS: u16 = 8;
 /// Periods near the target without coming to rest after which the band widens …
-#[allow(non_snake_case)] fn PATIENCE() -> u16 { crate::axis::model::knob("PAT",125) as u16 }
+#[allow(non_snake_case)] fn PATIENCE() -> u16 { crate::axis::model::knob("PAT",90) as u16 }
 /// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 7;
