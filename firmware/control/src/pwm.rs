@@ -131,34 +131,22 @@ impl PwmTiming {
     }
 }
 
-/// Where a valve is in its period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-enum Phase {
-    /// In none: a pulse may begin.
-    #[default]
-    Idle,
-    /// The pulse has not ended yet.
-    Energised,
-    /// The pulse has ended, and a new one may not begin yet.
-    Ended,
-}
-
 /// One valve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Channel {
-    phase: Phase,
-    /// Time since the pulse began, at the next tick edge.
+    /// Time since the pulse began, at the next tick edge; 0 if there was none.
     elapsed: u32,
-    /// Length of the pulse that ended.
+    /// Length of the pulse that ended; 0 before it ends. [`DIRECT`]: no pulse is the PWM's.
     ended_at: u32,
     /// Pulses begun since power-on, wrapping.
     pulses: u32,
 }
 
+/// No length of a pulse, and no single bit away from one.
+const DIRECT: u32 = u32::MAX;
+
 impl Channel {
     const IDLE: Self = Self {
-        phase: Phase::Idle,
         elapsed: 0,
         ended_at: 0,
         pulses: 0,
@@ -167,22 +155,20 @@ impl Channel {
     /// On-time of the next tick for a pulse of [`PwmTiming::pulse`].
     #[inline]
     fn tick(&mut self, timing: &PwmTiming, pulse: u32) -> u16 {
-        if self.phase == Phase::Ended {
+        if self.ended_at != 0 {
             // A new pulse may begin once the valve has had the time to shut.
             let off = self.elapsed.wrapping_sub(self.ended_at);
             if self.elapsed < timing.period || off < timing.shortest_gap {
                 self.elapsed = self.elapsed.wrapping_add(timing.tick);
                 return 0;
             }
-            self.phase = Phase::Idle;
+            self.elapsed = 0;
+            self.ended_at = 0;
         }
-        if self.phase == Phase::Idle {
+        if self.elapsed == 0 {
             if pulse == 0 {
                 return 0;
             }
-            self.phase = Phase::Energised;
-            self.elapsed = 0;
-            self.ended_at = 0;
             self.pulses = self.pulses.wrapping_add(1);
         } else if self.elapsed >= timing.period && pulse > 0 {
             // A full pulse goes on: the next period follows without a gap.
@@ -191,28 +177,34 @@ impl Channel {
         // Below twice the period of at most a second.
         let on = pulse.saturating_sub(self.elapsed).min(timing.tick);
         if on < timing.tick {
-            self.phase = Phase::Ended;
+            // Not zero: a pulse that begins has some length.
             self.ended_at = self.elapsed.wrapping_add(on);
         }
         self.elapsed = self.elapsed.wrapping_add(timing.tick);
         // At most the tick, 2000.
         on as u16
     }
+
+    /// As it was, without what it was doing.
+    const fn freed(self) -> Self {
+        Self {
+            pulses: self.pulses,
+            ..Self::IDLE
+        }
+    }
 }
 
 impl Hash for Channel {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. The phase goes into
-        // the word of the time: a flipped bit of either flips one of it. The count
-        // shapes no output.
+        // Taken apart, so that a new field cannot be forgotten here. The count shapes no
+        // output.
         let Self {
-            phase,
             elapsed,
             ended_at,
             pulses: _,
         } = self;
-        state.write_u32(elapsed ^ (*phase as u32).rotate_right(8));
+        state.write_u32(*elapsed);
         state.write_u32(*ended_at);
     }
 }
@@ -222,9 +214,7 @@ impl Hash for Channel {
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],
-    /// Somebody else times the pulses, and the channels are idle.
-    direct: bool,
-    /// Valves that were on in the last such tick, a bit each.
+    /// Valves that were on in the last tick of [`ValvePwm::direct`], a bit each.
     given: u8,
 }
 
@@ -235,7 +225,6 @@ impl ValvePwm {
         Self {
             timing,
             channels: [Channel::IDLE; VALVE_COUNT],
-            direct: false,
             given: 0,
         }
     }
@@ -262,7 +251,9 @@ impl ValvePwm {
     /// of a whole period or more keep a valve open without a gap. Never panics.
     #[must_use]
     pub fn tick(&mut self, openings: &ValveOpenings) -> OnTimes {
-        self.direct = false;
+        if self.is_direct() {
+            self.channels = self.channels.map(Channel::freed);
+        }
         let mut on = [0; VALVE_COUNT];
         // Pulse of the last opening: two valves mostly open alike.
         let (mut last, mut pulse) = (Micros::ZERO, 0);
@@ -291,16 +282,11 @@ impl ValvePwm {
     /// counted. Afterwards the PWM begins with idle valves.
     #[must_use]
     pub fn direct(&mut self, on: OnTimes) -> OnTimes {
-        if !self.direct {
-            self.direct = true;
+        if !self.is_direct() {
+            self.channels = self.channels.map(Channel::freed);
+            let [first, ..] = &mut self.channels;
+            first.ended_at = DIRECT;
             self.given = 0;
-            for channel in &mut self.channels {
-                let pulses = channel.pulses;
-                *channel = Channel {
-                    pulses,
-                    ..Channel::IDLE
-                };
-            }
         }
         let mut given = 0;
         for ((on, channel), bit) in on.iter().zip(&mut self.channels).zip([1, 2, 4, 8]) {
@@ -313,6 +299,13 @@ impl ValvePwm {
         }
         self.given = given;
         on
+    }
+
+    /// Whether the last tick was one of [`ValvePwm::direct`].
+    #[inline]
+    const fn is_direct(&self) -> bool {
+        let [first, ..] = &self.channels;
+        first.ended_at == DIRECT
     }
 
     /// Pulses begun per valve since power-on, wrapping: the switching count.
@@ -333,14 +326,14 @@ impl Hash for State<'_> {
         // Taken apart, so that a new field cannot be forgotten here.
         let ValvePwm {
             timing: _,
-            channels: [a, b, c, d],
-            direct,
+            channels: [first, rest @ ..],
             // It shapes no output.
             given: _,
         } = self.0;
-        state.write_u32(u32::from(*direct));
-        if !direct {
-            (a, b, c, d).hash(state);
+        first.hash(state);
+        if first.ended_at != DIRECT {
+            let [a, b, c] = rest;
+            (a, b, c).hash(state);
         }
     }
 }

@@ -181,14 +181,14 @@ impl AirModel {
         (Micros(opening), (chamber.force >> 10).wrapping_mul(parts))
     }
 
-    /// What a valve that is open for `on` µs lets through a chamber: the way of the piston that it
-    /// is worth, raw mm, times the pressure that drives it and falls off below `drop`.
+    /// What a valve that is open for `on` µs lets into a chamber: the way of the piston that it
+    /// is worth, raw mm, times the pressure that drives it, which falls off below `drop` to none.
     #[inline(always)]
-    fn through(&self, chamber: &Chamber, on: u32, drop: i32, most: i32) -> i64 {
+    fn through(&self, chamber: &Chamber, on: u32, drop: i32, [least, most]: [i32; 2]) -> i64 {
         // A round at most, and flows of at most 2^19: below 2^31.
         let way = ((on as i32).wrapping_mul(chamber.flow) >> 8).min(STEP);
         let chord = drop.wrapping_mul(self.fall) >> 8;
-        i64::from(chord.min(most)).wrapping_mul(i64::from(way))
+        i64::from(chord.max(least).min(most)).wrapping_mul(i64::from(way))
     }
 
     /// Pressure of a chamber of `length` (1/256 mm) at `p` that gains `sum`, pressure × raw mm.
@@ -264,27 +264,28 @@ impl Content {
         }
         let p = self.p;
         // No piston goes that far: another calibration, or the first reading.
-        let growth = if moved.wrapping_abs() > STEP {
+        let shrinks = if moved.wrapping_abs() > STEP {
             0
         } else {
-            moved.wrapping_mul(EXPONENT) >> 8
+            moved.wrapping_mul(EXPONENT.wrapping_neg()) >> 8
         };
         // Pressures below 2^19, lengths of a round up to 2^18: sums below 2^39.
-        let mut sum = i64::from(p).wrapping_mul(i64::from(growth)).wrapping_neg();
+        let mut sum = i64::from(p).wrapping_mul(i64::from(shrinks));
         // Of a valve of which nothing is ever certain the rounds begin anew after 15.
         let mut next = 0;
         if open & 0xFFFF != 0 {
             let (time, sure, rounds) = taken(open, model.slow);
             let on = if certain { sure } else { time };
             let drop = SUPPLY.wrapping_sub(p);
-            sum = sum.wrapping_add(model.through(chamber, on, drop, SUPPLY));
+            sum = sum.wrapping_add(model.through(chamber, on, drop, [i32::MIN, SUPPLY]));
             next = rounds & 0xFFFF;
         }
         if open > 0xFFFF {
             let (time, sure, rounds) = taken(open.wrapping_shr(16), model.slow);
             let on = if certain { sure } else { time };
-            let drop = p.wrapping_sub(model.ambient);
-            sum = sum.wrapping_sub(model.through(chamber, on, drop, p));
+            let drop = model.ambient.wrapping_sub(p);
+            let most = [p.wrapping_neg(), i32::MAX];
+            sum = sum.wrapping_add(model.through(chamber, on, drop, most));
             next |= rounds.wrapping_shl(16);
             // Below 2^16.
             self.vented = self.vented.saturating_add((sure >> VENTED_SHIFT) as u16);
