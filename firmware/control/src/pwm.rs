@@ -214,8 +214,8 @@ impl Hash for Channel {
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],
-    /// Valves that were on in the last tick of [`ValvePwm::direct`], a bit each.
-    given: u8,
+    /// Valves that were on in the last tick of [`ValvePwm::direct`], a bit each: 15, 31, 14, 30.
+    given: u32,
 }
 
 impl ValvePwm {
@@ -288,13 +288,17 @@ impl ValvePwm {
             first.ended_at = DIRECT;
             self.given = 0;
         }
-        let mut given = 0;
-        for ((on, channel), bit) in on.iter().zip(&mut self.channels).zip([1, 2, 4, 8]) {
-            if *on > 0 {
-                given |= bit;
-                if self.given & bit == 0 {
-                    channel.pulses = channel.pulses.wrapping_add(1);
-                }
+        // Two on-times a word; each, below 2^15, carries into its sixteenth bit unless it is 0.
+        let given = |low: u16, high: u16| {
+            let both = u32::from(low) | u32::from(high).wrapping_shl(16);
+            both.wrapping_add(0x7FFF_7FFF) & 0x8000_8000
+        };
+        let [a, b, c, d] = on;
+        let given = given(a, b) | given(c, d).wrapping_shr(1);
+        let begun = given & !self.given;
+        if begun != 0 {
+            for (channel, bit) in self.channels.iter_mut().zip([15, 31, 14, 30]) {
+                channel.pulses = channel.pulses.wrapping_add((begun >> bit) & 1);
             }
         }
         self.given = given;

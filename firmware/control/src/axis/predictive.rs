@@ -90,7 +90,8 @@ pub struct Drive {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 enum Stroke {
-    /// Chamber A: what it sees of the pulses, its pressure at the moment and ahead.
+    /// Chamber A: what it sees of the pulses, its pressure at the moment and ahead; the mass is
+    /// learnt.
     #[default]
     A,
     /// Chamber B.
@@ -287,7 +288,7 @@ impl Predictive {
             return chamber.pulses_are_sound()
                 && chamber.pressures_are_sound()
                 && self.course_check == self.course.sum()
-                && (first || self.learner_check == self.learner.sum());
+                && (!first || self.learner_check == self.learner.sum());
         }
         let sound = a.pressures_are_sound()
             && b.pressures_are_sound()
@@ -372,11 +373,11 @@ impl Predictive {
         let on = match self.stroke {
             Stroke::A => {
                 self.follow(model, true);
-                self.duty = model.duty(self.asked);
                 self.due(model, 1)
             }
             Stroke::B => {
                 self.follow(model, false);
+                self.duty = model.duty(self.asked);
                 self.due(model, 2)
             }
             Stroke::Motion => {
@@ -544,7 +545,7 @@ impl Predictive {
             (&mut self.b, piston, [fill_b, vent_b])
         };
         chamber.follow(model, &clock, &piston, self.drives.then_some(plan));
-        if !first {
+        if first {
             // Of the period before.
             self.learner.sample(model, now, force);
             self.learner_check = self.learner.sum();
