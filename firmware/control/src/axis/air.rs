@@ -181,20 +181,18 @@ impl Chamber {
         let flows = ChamberFlows::of(
             model,
             flow,
-            p,
+            match super::model::knob("MID", 2) { 0 => p, 1 => p.saturating_add(self.expected.wrapping_sub(p) >> 2), 2 => p.saturating_add(self.expected) >> 1, _ => self.expected },
             fill | more_fill | all_flows != 0,
             vent | more_vent | all_flows != 0,
         );
         let change = flows.change(open, power(p, speed), times.period, stiffness);
-        // Never below half the atmosphere: a vacuum needs a motion of its own.
-        let least = model.ambient.wrapping_shr(1);
-        let p = p.saturating_add(change).max(least).min(MOST);
+        let p = changed(model, p, change, open);
         let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
         self.flows = flows;
         self.stiffness = ahead;
         self.means_check = self.sum_of_means();
         self.pressure = p;
-        self.expected = p.saturating_add(change);
+        self.expected = changed(model, p, change, committed);
         self.pressures_check = self.sum_of_pressures();
     }
 
@@ -228,7 +226,12 @@ impl Chamber {
         }
     }
 
-    pub(super) fn idle(&self) -> bool { let [a, b] = self.ready; !a.coil() && !b.coil() }
+    /// Whether both coils are off at the begin of the next period.
+    #[inline]
+    pub(super) const fn idle(&self) -> bool {
+        let [fill, vent] = self.ready;
+        !fill.coil() && !vent.coil()
+    }
 
     /// Everything shut as soon as the pulses under way allow.
     #[inline]
@@ -237,6 +240,21 @@ impl Chamber {
         self.ready
             .map(|ready| microseconds(ready.rest(times)))
     }
+}
+
+/// The pressure `p` after a `change` with the valves `open` for these times: no valve fills
+/// beyond the supply or vents below the atmosphere, however long a step is for a small chamber.
+#[inline]
+fn changed(model: &AxisModel, p: i32, change: i32, open: [i32; 2]) -> i32 {
+    let [fill, vent] = open;
+    let most = if fill > 0 { p.max(model.supply) } else { MOST };
+    // Never below half the atmosphere: a vacuum needs a motion of its own.
+    let least = if vent > 0 {
+        p.min(model.ambient)
+    } else {
+        model.ambient.wrapping_shr(1)
+    };
+    p.saturating_add(change).max(least).min(most)
 }
 
 /// An on-time, 0…period (at most 8000).

@@ -656,13 +656,19 @@ impl Predictive {
         let [fill_a, vent_a] = self.a.pulses(model, model.flow_a, target.a);
         let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
         self.plan = [fill_a, vent_a, fill_b, vent_b];
-        let one = super::model::knob("ONE", 12) as i32;
-        if one > 0 && (reference - self.motion.stroke).abs() < model.band * one {
-            let (a, b) = (fill_a.max(vent_a), fill_b.max(vent_b));
-            let alt = super::model::knob("ALT", 0);
-            if self.a.idle() && self.b.idle() && a > 0 && b > 0 {
-                if alt == 0 && b >= a || alt == 1 && (self.next >> 12) & 1 == 0 { self.plan[0] = 0; self.plan[1] = 0; } else { self.plan[2] = 0; self.plan[3] = 0; }
+        if self.rest.is_near() && fill_a | vent_a != 0 && self.a.idle() && self.b.idle() {
+            // Near the target a pulse of one chamber alone: two may be too much of valves that
+            // cannot open for less.
+            if fill_a.max(vent_a) > fill_b.max(vent_b) {
+                self.plan = [fill_a, vent_a, 0, 0];
+            } else if fill_b | vent_b != 0 {
+                self.plan = [0, 0, fill_b, vent_b];
             }
+        }
+        #[cfg(not(target_os = "none"))]
+        if super::model::knob("DBG", 0) == 1 {
+            extern crate std;
+            std::println!("   t {} F* {:.1} lim {:.1} load {:.1} F {:.1} v {:.1} x {:.2} pa {:.0}>{:.0} * {:.0} pb {:.0}>{:.0} * {:.0} plan {:?} stuck {} push {} mass {:.2} gains slope {:.1} damp {:.1} brake {}", self.next/1000, f64::from(force)/1e3, f64::from(possible)/1e3, f64::from(self.motion.load)/1e3, f64::from(self.force)/1e3, f64::from(self.motion.speed)/65536., f64::from(self.motion.stroke)/65536., f64::from(self.a.pressure)/256e3, f64::from(self.a.expected)/256e3, f64::from(target.a)/256e3, f64::from(self.b.pressure)/256e3, f64::from(self.b.expected)/256e3, f64::from(target.b)/256e3, self.plan, self.motion.stuck, self.push.sum() as i32, f64::from(self.inertia.mass)/65536., f64::from(self.inertia.slope)/256., f64::from(self.inertia.damping)/256., self.inertia.brake);
         }
         self.limited = possible != force;
         self.asked = force;

@@ -86,6 +86,12 @@ impl Rest {
         self.settled
     }
 
+    /// Whether the piston has been near its target (24 bands) more than far from it since it has it.
+    #[inline]
+    pub(super) fn is_near(&self) -> bool {
+        self.near > crate::axis::model::knob("NEAR",0) as u16
+    }
+
     /// Forgets the rest state with the piston at `stroke`.
     #[inline]
     pub(super) const fn release(&mut self, stroke: i32) {
