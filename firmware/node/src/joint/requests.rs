@@ -158,6 +158,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     /// Sets one parameter, or changes nothing.
+    #[inline(never)]
     fn set_parameter(&mut self, id: u16, raw: i32, at: Micros) -> Result<(), NackReason> {
         // With other units or limits the watches start anew; what they have found stands.
         if let Some(fault) = self.found() {
@@ -165,7 +166,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
         let disarmed = self.core.mode().is_disarmed();
         let trial = self.parameters.with(id, raw, disarmed)?;
-        let settings = JointSettings::new(&trial).ok_or(NackReason::OutOfRange)?;
+        // By reference: each move of the settings would be hundreds of bytes of code.
+        let Some(settings) = &JointSettings::new(&trial) else {
+            return Err(NackReason::OutOfRange);
+        };
         self.change(|node| {
             if settings.tick.sensor != node.settings.sensor {
                 // Another calibration moves the stroke without a motion: neither
