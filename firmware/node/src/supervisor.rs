@@ -332,15 +332,20 @@ impl Supervisor {
     pub fn sync(&mut self, counter: u16, emergency: bool, at: Micros) -> bool {
         if emergency {
             // Even with a frozen counter: stopping needs no proof of freshness.
-            self.change(|own| own.emergency = true);
+            self.set_emergency(true);
             self.fault(Fault::EmergencyStop, Event::EmergencyStop, at);
         }
         let at_us = self.time_us(at);
         let fresh = self.link.on_sync(counter, at_us);
         if fresh && emergency != self.emergency {
-            self.change(|own| own.emergency = emergency);
+            self.set_emergency(emergency);
         }
         fresh
+    }
+
+    #[inline(never)]
+    fn set_emergency(&mut self, emergency: bool) {
+        self.change(|own| own.emergency = emergency);
     }
 
     /// Takes the link-loss action of a fresh SYNC slot: whether the gait phase
