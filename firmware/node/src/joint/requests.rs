@@ -171,16 +171,15 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             return Err(NackReason::OutOfRange);
         };
         self.change(|node| {
-            if settings.tick.sensor != node.settings.sensor {
+            let sensor_differs = settings.tick.sensor != node.settings.sensor;
+            if sensor_differs {
                 // Another calibration moves the stroke without a motion: neither
                 // a rate fault nor a velocity. The new one has to prove itself
                 // before the board may arm.
                 node.monitor = SensorMonitor::new();
                 node.controller.reset();
             }
-            if settings.tick.sensor != node.settings.sensor
-                || settings.tick.motion != node.settings.motion
-            {
+            if sensor_differs || settings.tick.motion != node.settings.motion {
                 // Other units, other places: nothing that was learnt holds.
                 node.state.motion = MotionWatch::new(&settings.tick.motion, node.state.measured);
             }
