@@ -186,13 +186,25 @@ impl Chamber {
             vent | more_vent | all_flows != 0,
         );
         let change = flows.change(open, power(p, speed), times.period, stiffness);
-        let p = changed(model, p, change, open);
+        // No valve fills beyond the supply or vents below the atmosphere, however long a step is
+        // for a small chamber. A vacuum of more than half of it needs a motion of its own.
+        let most = if fill | more_fill > 0 {
+            model.supply
+        } else {
+            MOST
+        };
+        let least = if vent | more_vent > 0 {
+            model.ambient
+        } else {
+            model.ambient.wrapping_shr(1)
+        };
+        let p = p.saturating_add(change).max(least).min(most);
         let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
         self.flows = flows;
         self.stiffness = ahead;
         self.means_check = self.sum_of_means();
         self.pressure = p;
-        self.expected = changed(model, p, change, committed);
+        self.expected = p.saturating_add(change).max(least).min(most);
         self.pressures_check = self.sum_of_pressures();
     }
 
@@ -240,21 +252,6 @@ impl Chamber {
         self.ready
             .map(|ready| microseconds(ready.rest(times)))
     }
-}
-
-/// The pressure `p` after a `change` with the valves `open` for these times: no valve fills
-/// beyond the supply or vents below the atmosphere, however long a step is for a small chamber.
-#[inline]
-fn changed(model: &AxisModel, p: i32, change: i32, open: [i32; 2]) -> i32 {
-    let [fill, vent] = open;
-    let most = if fill > 0 { p.max(model.supply) } else { MOST };
-    // Never below half the atmosphere: a vacuum needs a motion of its own.
-    let least = if vent > 0 {
-        p.min(model.ambient)
-    } else {
-        model.ambient.wrapping_shr(1)
-    };
-    p.saturating_add(change).max(least).min(most)
 }
 
 /// An on-time, 0…period (at most 8000).

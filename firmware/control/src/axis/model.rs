@@ -69,8 +69,6 @@ pub struct AxisModel {
     pub horizon: i32,
     /// Look-ahead in µs.
     pub horizon_us: i32,
-    /// Look-ahead in periods, × 2^16.
-    pub periods_ahead: i32,
     /// Look-ahead from the tick that works out the force, in s × 2^32.
     pub horizon_reference: i32,
     /// Moment for which a period's motion and pressures are worked out, µs after it begins: the
@@ -202,7 +200,6 @@ impl AxisModel {
             viscous,
             horizon,
             horizon_us,
-            periods_ahead,
             horizon_reference,
             moment,
             period,
@@ -238,7 +235,7 @@ impl AxisModel {
                 (mean, low, high, force_out, force_in, coulomb).hash(state);
                 (share_out, share_in).hash(state);
                 (breakaway, viscous, horizon, horizon_us).hash(state);
-                (periods_ahead, horizon_reference, moment, period).hash(state);
+                (horizon_reference, moment, period).hash(state);
             }
             _ => {
                 (mass, nimble_mass, slope, damping, brake, top_speed).hash(state);
@@ -370,7 +367,6 @@ impl AxisModel {
             viscous: number(raw(data.viscous).wrapping_shr(8)),
             horizon: seconds_32(horizon_us),
             horizon_us: number(horizon_us),
-            periods_ahead: ratio(horizon_us.wrapping_shl(16), period_us),
             horizon_reference: seconds_32(tick_us.wrapping_shl(1).wrapping_add(valve_us)),
             moment: number(moment_us),
             period: seconds_32(period_us),

@@ -522,7 +522,7 @@ impl Predictive {
             middle,
             speed,
             end,
-            mean,
+            ahead,
             now,
             force,
         } = self.course;
@@ -531,16 +531,16 @@ impl Predictive {
             let piston = Piston {
                 flow: model.flow_a,
                 lengths: [model.length_a(middle), model.length_a(end)],
-                speeds: [speed.wrapping_neg(), mean.wrapping_neg()],
-                all_flows: 1,
+                speeds: [speed.wrapping_neg(), ahead.wrapping_neg()],
+                all_flows: 0,
             };
             (&mut self.a, piston, [fill_a, vent_a])
         } else {
             let piston = Piston {
                 flow: model.flow_b,
                 lengths: [model.length_b(middle), model.length_b(end)],
-                speeds: [speed, mean],
-                all_flows: 0,
+                speeds: [speed, ahead],
+                all_flows: 1,
             };
             (&mut self.b, piston, [fill_b, vent_b])
         };

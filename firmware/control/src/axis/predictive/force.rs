@@ -19,8 +19,8 @@ pub(super) struct Course {
     pub(super) speed: i32,
     /// Stroke at the end of the dead time after it, raw mm.
     pub(super) end: i32,
-    /// Mean speed in that, raw mm/s; 0 if that would end beyond an end stop.
-    pub(super) mean: i32,
+    /// Speed in that, raw mm/s; 0 if that would end beyond an end stop.
+    pub(super) ahead: i32,
     /// Speed now, raw mm/s …
     pub(super) now: i32,
     /// … and the pressure force in the period up to now, mN: for the learner.
@@ -34,7 +34,7 @@ impl Course {
             middle: stroke,
             speed: 0,
             end: stroke,
-            mean: 0,
+            ahead: 0,
             now: 0,
             force: 0,
         }
@@ -48,34 +48,30 @@ impl Course {
             middle,
             speed,
             end,
-            mean,
+            ahead,
             now,
             force,
         } = *self;
-        let sum = mix(mix(mix(mix(0, middle), speed), end), mean);
+        let sum = mix(mix(mix(mix(0, middle), speed), end), ahead);
         mix(mix(sum, now), force)
     }
 
-    /// Where the present acceleration takes the piston: not beyond an end stop, where air
-    /// would be squeezed that is not there.
+    /// Where the present speed takes the piston: not beyond an end stop, where air would be
+    /// squeezed that is not there. The acceleration is not counted on: the air that is squeezed
+    /// pushes back, the more the shorter a chamber is.
     #[inline]
     pub(super) fn of(model: &AxisModel, motion: &Motion, force: i32) -> Self {
         let speed = motion.speed.saturating_add(motion.gained >> 1);
         let half = part(speed, model.period >> 1, 32);
         let middle = motion.stroke.saturating_add(half);
-        let ahead = part(motion.gained, model.periods_ahead, 17);
-        let mean = motion
-            .speed
-            .saturating_add(motion.gained)
-            .saturating_add(ahead);
-        let way = half.saturating_add(part(mean, model.horizon, 32));
+        let way = half.saturating_add(part(motion.speed, model.horizon, 32));
         let free = middle.saturating_add(way);
         let end = free.max(0).min(model.stroke);
         Self {
             middle,
             speed,
             end,
-            mean: if end == free { mean } else { 0 },
+            ahead: if end == free { motion.speed } else { 0 },
             now: motion.speed,
             force,
         }
@@ -111,7 +107,7 @@ impl Ahead {
             let mean = force.saturating_add(then) >> 1;
             let viscous = part(motion.speed, model.viscous, 24);
             let sliding = mean.saturating_add(motion.load).saturating_sub(viscous);
-            let gained = scaled(inertia.acceleration(sliding), model.horizon, 16);
+            let gained = scaled(inertia.acceleration(sliding), model.horizon, 16) / 100 * crate::axis::model::knob("X3", 100) as i32;
             rubbed(motion.speed.saturating_add(gained), inertia.rubbed_ahead)
         };
         let mean = motion.speed.saturating_add(speed) >> 1;
@@ -271,7 +267,7 @@ mod tests {
     #[test]
     fn nothing_is_squeezed_beyond_an_end_stop() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
-        let ahead = |stroke_mm: i32, speed_mm_s: i32| {
+        let course = |stroke_mm: i32, speed_mm_s: i32| {
             let motion = Motion {
                 stroke: stroke_mm << 16,
                 speed: speed_mm_s << 16,
@@ -281,13 +277,13 @@ mod tests {
         };
         assert_eq!(model.stroke, 180 << 16);
         for (stroke, speed, end) in [(1, -400, 0), (179, 400, 180)] {
-            let ahead = ahead(stroke, speed);
-            assert_eq!((ahead.end, ahead.mean), (end << 16, 0));
+            let course = course(stroke, speed);
+            assert_eq!((course.end, course.ahead), (end << 16, 0));
         }
-        let free = ahead(90, 400);
+        let free = course(90, 400);
         let way = f64::from(free.end) / 65_536.0 - 90.0;
         let time_us = model.times.period + model.horizon_us;
         assert!((way - 400e-6 * f64::from(time_us)).abs() < 1e-2, "{way}");
-        assert_eq!(free.mean, 400 << 16);
+        assert_eq!(free.ahead, 400 << 16);
     }
 }
