@@ -12,7 +12,7 @@
 //! is due to c; what the fastest has above that line is due to m, in J as in v.
 
 use super::model::AxisModel;
-use super::{mix, part, quotient, scaled};
+use super::{mix, part, quotient, scaled, weight};
 
 /// A move is looked at for so many periods at most.
 const PERIODS_MAX: u16 = 250;
@@ -40,18 +40,31 @@ struct Moment {
     impulse: i32,
 }
 
-/// The move under way.
+/// The move under way. Its seal is kept up with each change: what was damaged before keeps a
+/// broken one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Learner {
     /// Speed at the first moment, raw mm/s; 0 before it.
     first: i32,
     fastest: Moment,
+    /// The last moment; its speed is noted when the move has ended.
     last: Moment,
-    /// The move has ended, and tells something: to be worked out.
+    /// The move has ended: to be worked out, or to be forgotten.
     ended: bool,
     /// Mass of the last move, kg × 2^16, until it is taken; 0 if none.
     mass: i32,
+    check: u32,
 }
+
+/// Weights in the seal.
+const LAST_PERIOD: u32 = FASTEST_PERIOD.wrapping_shl(16);
+const FASTEST_PERIOD: u32 = weight(4);
+const FASTEST_SPEED: u32 = weight(3);
+const FASTEST_IMPULSE: u32 = weight(2);
+const LAST_IMPULSE: u32 = weight(1);
+const FIRST: u32 = weight(5);
+const MASS: u32 = weight(6);
+const ENDED: u32 = FASTEST_PERIOD.wrapping_shl(15);
 
 impl Learner {
     /// Nothing seen.
@@ -60,9 +73,9 @@ impl Learner {
         Self::default()
     }
 
-    /// Sum of it. Without a first moment nothing of a move is read.
+    /// Sum of it.
     #[inline(never)]
-    pub(super) fn sum(&self) -> u32 {
+    fn sum(&self) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             first,
@@ -70,23 +83,24 @@ impl Learner {
             last,
             ended,
             mass,
+            check: _,
         } = *self;
-        let mut sum = mix(mix(0, mass), first);
-        if first != 0 {
-            let periods = i32::from(fastest.periods)
-                ^ i32::from(last.periods).wrapping_shl(16)
-                ^ i32::from(ended).wrapping_shl(15);
-            sum = mix(sum, periods);
-            sum = mix(mix(sum, fastest.speed), fastest.impulse);
-            sum = mix(sum, last.impulse);
-            if ended {
-                sum = mix(sum, last.speed);
-            }
-        }
-        sum
+        let periods = u32::from(fastest.periods)
+            .wrapping_add(u32::from(last.periods).wrapping_shl(16))
+            .wrapping_add(u32::from(ended).wrapping_shl(15));
+        let sum = mix(mix(mix(0, mass), first), periods.cast_signed());
+        let sum = mix(mix(sum, fastest.speed), fastest.impulse);
+        mix(mix(sum, last.impulse), last.speed)
     }
 
-    /// Whether a move has ended that tells a mass, or a mass was learnt: [`Learner::news`] is to
+    /// Whether all of it is as it was left.
+    #[inline]
+    #[must_use]
+    pub(super) fn is_sound(&self) -> bool {
+        self.check == self.sum()
+    }
+
+    /// Whether a move has ended, or a mass was learnt: [`Learner::news`] is to
     /// be called.
     #[inline]
     #[must_use]
@@ -102,7 +116,10 @@ impl Learner {
             self.finish(model);
             return None;
         }
-        Some(core::mem::take(&mut self.mass))
+        let mass = core::mem::take(&mut self.mass);
+        let less = MASS.wrapping_mul(mass.cast_unsigned());
+        self.check = self.check.wrapping_sub(less);
+        Some(mass)
     }
 
     /// One period that ends at `speed` (raw mm/s), with the pressure force `force` in it, mN.
@@ -112,34 +129,47 @@ impl Learner {
             return;
         }
         let sliding = speed.wrapping_abs() > SLIDES;
+        let more = |weight: u32, by: i32| weight.wrapping_mul(by.cast_unsigned());
         if self.first == 0 {
             if sliding {
-                *self = Self {
-                    first: speed,
-                    mass: self.mass,
-                    ..Self::default()
-                };
+                // All else is zero.
+                self.first = speed;
+                self.check = self.check.wrapping_add(more(FIRST, speed));
             }
             return;
         }
         let used = force.saturating_sub(part(speed, model.viscous, 24));
         // Forces below 2^24 mN (100 mm of bore at 2.1 MPa) in 16 mN, of up to 2^8 periods.
-        let impulse = self.last.impulse.wrapping_add(used.wrapping_shr(4));
-        self.last = Moment {
-            periods: self.last.periods.wrapping_add(1),
-            speed,
-            impulse,
-        };
-        if speed.wrapping_abs() > self.fastest.speed.wrapping_abs() {
-            self.fastest = self.last;
+        let used = used.wrapping_shr(4);
+        let mut check = self.check.wrapping_add(more(LAST_IMPULSE, used));
+        let impulse = self.last.impulse.wrapping_add(used);
+        let periods = self.last.periods.wrapping_add(1);
+        check = check.wrapping_add(LAST_PERIOD);
+        self.last.impulse = impulse;
+        self.last.periods = periods;
+        let fastest = self.fastest;
+        if speed.wrapping_abs() > fastest.speed.wrapping_abs() {
+            self.fastest = Moment {
+                periods,
+                speed,
+                impulse,
+            };
+            let later = periods.wrapping_sub(fastest.periods);
+            check = check
+                .wrapping_add(more(FASTEST_PERIOD, i32::from(later)))
+                .wrapping_add(more(FASTEST_SPEED, speed.wrapping_sub(fastest.speed)))
+                .wrapping_add(more(
+                    FASTEST_IMPULSE,
+                    impulse.wrapping_sub(fastest.impulse),
+                ));
         }
-        if !sliding || (speed ^ self.first) < 0 || self.last.periods >= PERIODS_MAX {
-            self.ended = self.last.periods >= PERIODS_MIN
-                && self.fastest.speed.wrapping_abs() >= FAST;
-            if !self.ended {
-                self.first = 0;
-            }
+        if !sliding || (speed ^ self.first) < 0 || periods >= PERIODS_MAX {
+            let other = speed.wrapping_sub(self.last.speed);
+            check = check.wrapping_add(ENDED).wrapping_add(more(1, other));
+            self.ended = true;
+            self.last.speed = speed;
         }
+        self.check = check;
     }
 
     /// Solves for the mass of the move that has ended.
@@ -147,14 +177,24 @@ impl Learner {
     #[cold]
     #[inline(never)]
     fn finish(&mut self, model: &AxisModel) {
+        let mass = self.solved(model).unwrap_or(self.mass);
+        let damage = self.check.wrapping_sub(self.sum());
+        *self = Self {
+            mass,
+            ..Self::default()
+        };
+        self.check = self.sum().wrapping_add(damage);
+    }
+
+    /// The mass, if it can be told.
+    #[inline]
+    fn solved(&self, model: &AxisModel) -> Option<i32> {
         let Self {
             first,
             fastest,
             last,
             ..
         } = *self;
-        self.first = 0;
-        self.ended = false;
         // At least the least number of periods: no division by nothing.
         let share = u32::from(fastest.periods)
             .wrapping_shl(16)
@@ -171,17 +211,21 @@ impl Learner {
         } else {
             (speed, impulse)
         };
-        if speed < ABOVE {
-            return;
+        if last.periods < PERIODS_MIN
+            || fastest.speed.wrapping_abs() < FAST
+            || speed < ABOVE
+        {
+            return None;
         }
         // 16 mN × s × 2^32 over mm/s × 2^16.
         let impulse = i64::from(impulse.max(0)).wrapping_mul(i64::from(model.period));
         let impulse = impulse.wrapping_shr(8).cast_unsigned();
         let mass = quotient(impulse, speed.cast_unsigned(), 12);
         let told = model.mass;
-        self.mass = mass
-            .max(scaled(told, LEAST, 16))
-            .min(told.saturating_mul(MOST));
+        Some(
+            mass.max(scaled(told, LEAST, 16))
+                .min(told.saturating_mul(MOST)),
+        )
     }
 }
 
@@ -280,40 +324,46 @@ mod tests {
         assert!(taken(&mut learner, &model).is_some_and(|mass| mass > 0));
     }
 
+    /// A move under way, with all that can be in it.
+    fn under_way(model: &AxisModel) -> Learner {
+        let mut learner = Learner::new();
+        learner.mass = 3 << 16;
+        learner.check = learner.sum();
+        for speed in (3..60).chain((40..60).rev()) {
+            learner.sample(model, 8 * speed << 16, speed * 1000);
+            assert!(learner.is_sound(), "{learner:?}");
+        }
+        assert!(learner.fastest.periods < learner.last.periods);
+        learner
+    }
+
     #[test]
-    fn every_flipped_bit_of_what_is_read_changes_the_sum() {
-        let some = Learner {
-            first: 30 << 16,
-            fastest: Moment {
-                periods: 77,
-                speed: 400 << 16,
-                impulse: 12_345,
-            },
-            last: Moment {
-                periods: 130,
-                speed: 19 << 16,
-                impulse: 23_456,
-            },
-            ended: true,
-            mass: 3 << 16,
-        };
-        let differs = |flip: &dyn Fn(&mut Learner)| {
+    fn a_flipped_bit_is_seen_whatever_is_sampled_after_it() {
+        let model = model();
+        let some = under_way(&model);
+        let seen = |flip: &dyn Fn(&mut Learner)| {
             let mut flipped = some;
             flip(&mut flipped);
-            assert_ne!(flipped.sum(), some.sum(), "{flipped:?}");
+            assert!(!flipped.is_sound(), "{flipped:?}");
+            // To the end of the move, and the next one.
+            for speed in (0..40).rev().chain(0..30) {
+                flipped.sample(&model, 8 * speed << 16, speed * 1000);
+                assert!(!flipped.is_sound(), "{flipped:?}");
+            }
         };
         for bit in 0..32 {
-            differs(&|own| own.mass ^= 1 << bit);
-            differs(&|own| own.first ^= 1 << bit);
-            differs(&|own| own.fastest.speed ^= 1 << bit);
-            differs(&|own| own.fastest.impulse ^= 1 << bit);
-            differs(&|own| own.last.speed ^= 1 << bit);
-            differs(&|own| own.last.impulse ^= 1 << bit);
+            seen(&|own| own.mass ^= 1 << bit);
+            seen(&|own| own.first ^= 1 << bit);
+            seen(&|own| own.fastest.speed ^= 1 << bit);
+            seen(&|own| own.fastest.impulse ^= 1 << bit);
+            seen(&|own| own.last.speed ^= 1 << bit);
+            seen(&|own| own.last.impulse ^= 1 << bit);
+            seen(&|own| own.check ^= 1 << bit);
         }
         for bit in 0..16 {
-            differs(&|own| own.fastest.periods ^= 1 << bit);
-            differs(&|own| own.last.periods ^= 1 << bit);
+            seen(&|own| own.fastest.periods ^= 1 << bit);
+            seen(&|own| own.last.periods ^= 1 << bit);
         }
-        differs(&|own| own.ended ^= true);
+        seen(&|own| own.ended ^= true);
     }
 }

@@ -53,7 +53,7 @@ impl Inertia {
         // 1/kg = mm/s² per mN: 2^(24+16) / raw kg.
         let per_force = quotient(1 << 40, unsigned, 0);
         let share = if mass > model.nimble_mass {
-            cube_root(part(model.nimble_mass, per_force, 24).cast_unsigned())
+            cube_root(part(model.nimble_mass, per_force, 10).cast_unsigned())
         } else {
             1 << 16
         };
@@ -126,20 +126,19 @@ impl Inertia {
     }
 }
 
-/// Cube root of a share × 2^16 of at most one.
+/// Cube root, × 2^16, of a share × 2^30 of at most one.
 ///
 /// Newton's method on a share that is brought into 1/8…1 by shifts of three bits: the
 /// chord is within a ninth of the root there, and a step squares that.
 fn cube_root(share: u32) -> i32 {
-    if share >= 1 << 16 {
+    if share >= 1 << 30 {
         return 1 << 16;
     }
     if share == 0 {
         return 0;
     }
-    // Below 2^16: it fits 32 bits with 16 bits more.
-    let third = share.leading_zeros().wrapping_sub(16) / 3;
-    let near = share.wrapping_shl(third.wrapping_mul(3));
+    let third = share.leading_zeros().wrapping_sub(2) / 3;
+    let near = share.wrapping_shl(third.wrapping_mul(3)).wrapping_shr(14);
     // The chord from 1/8 to 1.
     let mut root = near
         .wrapping_mul(9362)
@@ -323,7 +322,6 @@ mod tests {
                 (inertia.brake, f64::from(model.brake) * share * share),
                 (inertia.linear, 2_f64.powi(47) / (slope * slope)),
             ] {
-                // The ratio of the masses is in steps of 2^-16.
                 let difference = (f64::from(value) - exact).abs();
                 assert!(
                     difference <= 2.0 + 2e-3 * exact,
@@ -360,9 +358,9 @@ mod tests {
     #[test]
     fn cube_roots() {
         assert_eq!(cube_root(0), 0);
-        assert_eq!(cube_root(1 << 16), 1 << 16);
-        for share in [1_u32, 100, 8192, 30_000, 65_000] {
-            let exact = (f64::from(share) / 65_536.0).cbrt() * 65_536.0;
+        assert_eq!(cube_root(1 << 30), 1 << 16);
+        for share in [1_u32, 20_000, 100 << 14, 8192 << 14, 30_000 << 14, 65_000 << 14] {
+            let exact = (f64::from(share) / f64::from(1 << 30)).cbrt() * 65_536.0;
             assert!((f64::from(cube_root(share)) - exact).abs() < 2.0, "{share}");
         }
     }

@@ -102,6 +102,9 @@ enum Stroke {
     Pulses,
 }
 
+/// How many they are.
+const STROKES: u8 = super::model::STROKES as u8;
+
 /// State of the law. It keeps no coefficients: every call is given those of the
 /// axis, which must be the same from call to call.
 #[derive(Clone, Debug)]
@@ -125,7 +128,6 @@ pub struct Predictive {
     push_check: u32,
 
     learner: Learner,
-    learner_check: u32,
 
     rest: Rest,
     /// Where the piston stood when the next move was announced; [`NOTHING`] without one.
@@ -177,7 +179,6 @@ impl Hash for Predictive {
             push: _,
             push_check: _,
             learner: _,
-            learner_check: _,
             rest: _,
             awaits: _,
             makes_up: _,
@@ -227,7 +228,6 @@ impl Predictive {
             push: Push::default(),
             push_check: 0,
             learner: Learner::new(),
-            learner_check: 0,
             rest: Rest::default(),
             awaits: NOTHING,
             makes_up: MakesUp::No,
@@ -255,7 +255,6 @@ impl Predictive {
         self.course_check = self.course.sum();
         self.motion_check = self.sum_of_motion();
         self.push_check = self.push.sum();
-        self.learner_check = self.learner.sum();
         self.rest_check = self.sum_of_rest();
     }
 
@@ -288,7 +287,7 @@ impl Predictive {
             return chamber.pulses_are_sound()
                 && chamber.pressures_are_sound()
                 && self.course_check == self.course.sum()
-                && (!first || self.learner_check == self.learner.sum());
+                && (first || self.learner.is_sound());
         }
         let sound = a.pressures_are_sound()
             && b.pressures_are_sound()
@@ -296,7 +295,9 @@ impl Predictive {
             && self.rest_check == self.sum_of_rest();
         sound
             && if self.stroke == Stroke::Motion {
-                self.push_check == self.push.sum() && self.inertia.is_sound()
+                self.push_check == self.push.sum()
+                    && self.inertia.is_sound()
+                    && (!self.learner.has_news() || self.learner.is_sound())
             } else {
                 a.means_are_sound() && b.means_are_sound()
             }
@@ -503,11 +504,11 @@ impl Predictive {
     #[inline]
     const fn next_stroke(&mut self, measured: PositionMm) {
         self.measured = measured.raw();
-        self.stroke = match self.stroke {
-            Stroke::A => Stroke::B,
-            Stroke::B => Stroke::Motion,
-            Stroke::Motion => Stroke::Pulses,
-            Stroke::Pulses => Stroke::A,
+        self.stroke = match (self.stroke as u8).wrapping_add(1) % STROKES {
+            0 => Stroke::A,
+            1 => Stroke::B,
+            2 => Stroke::Motion,
+            _ => Stroke::Pulses,
         };
     }
 
@@ -548,7 +549,6 @@ impl Predictive {
         if first {
             // Of the period before.
             self.learner.sample(model, now, force);
-            self.learner_check = self.learner.sum();
         }
     }
 
@@ -573,12 +573,11 @@ impl Predictive {
         if self.fresh || self.rest.is_other(model, reference) {
             self.push = Push::default();
         }
-        if self.learner.has_news() && self.learner_check == self.learner.sum() {
+        if self.learner.has_news() {
             // Twice after a move: what was wanted a period ago will do.
             if let Some(mass) = self.learner.news(model) {
                 self.inertia = Inertia::new(model, mass);
             }
-            self.learner_check = self.learner.sum();
         } else {
             let expected = Pressures {
                 a: self.a.expected,
@@ -606,17 +605,6 @@ impl Predictive {
     fn choose(&mut self, model: &AxisModel, input: &JointInput) {
         let reference = input.reference.raw();
         self.fresh = self.rest.aim(model, reference);
-        self.quiet = self.rest.quiet(
-            model,
-            &Approach {
-                reference,
-                reference_speed: input.reference_velocity.raw(),
-                measured: input.measured.raw(),
-                motion: &self.motion,
-                force: self.force,
-                mass: self.inertia.mass,
-            },
-        );
         let stands = self.quiet || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
         let mut awaited = None;
@@ -629,6 +617,19 @@ impl Predictive {
             }
             Some(_) => {}
             None => self.awaits = NOTHING,
+        }
+        if awaited.is_none() {
+            self.quiet = self.rest.quiet(
+                model,
+                &Approach {
+                    reference,
+                    reference_speed: input.reference_velocity.raw(),
+                    measured: input.measured.raw(),
+                    motion: &self.motion,
+                    force: self.force,
+                    mass: self.inertia.mass,
+                },
+            );
         }
         if awaited.is_some() || (stands && self.motion.at_stop(model)) {
             self.makes_up = if to > self.motion.stroke {

@@ -30,7 +30,7 @@ fn moving(model: &AxisModel, ticks: u32) -> Predictive {
 type Flip = fn(&mut Predictive, u32);
 
 /// All that the `Hash` leaves out, a word each.
-const KEPT: [Flip; 26] = [
+const KEPT: [Flip; 25] = [
     |law, bit| law.a.pressure ^= 1 << bit,
     |law, bit| law.b.pressure ^= 1 << bit,
     |law, bit| law.a.expected ^= 1 << bit,
@@ -38,11 +38,10 @@ const KEPT: [Flip; 26] = [
     |law, bit| law.course.middle ^= 1 << bit,
     |law, bit| law.course.speed ^= 1 << bit,
     |law, bit| law.course.end ^= 1 << bit,
-    |law, bit| law.course.mean ^= 1 << bit,
+    |law, bit| law.course.ahead ^= 1 << bit,
     |law, bit| law.course.now ^= 1 << bit,
     |law, bit| law.course.force ^= 1 << bit,
     |law, bit| law.course_check ^= 1 << bit,
-    |law, bit| law.learner_check ^= 1 << bit,
     |law, bit| law.motion.stroke ^= 1 << bit,
     |law, bit| law.motion.speed ^= 1 << bit,
     |law, bit| law.motion.load ^= 1 << bit,
