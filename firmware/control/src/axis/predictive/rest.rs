@@ -147,8 +147,9 @@ impl Rest {
         };
         // Patience: what has not come to rest for long may do so in a wider band.
         let beyond = self.beyond();
-        let (band, catch) = if beyond > 0 {
-            let beyond = beyond.min(2 * PATIENCE_STEP);
+        let wid = crate::axis::model::knob("WID", 0) as i32;
+        let (band, catch) = if beyond > wid {
+            let beyond = (beyond - wid).min(2 * PATIENCE_STEP);
             // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
             let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
             let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
@@ -176,7 +177,8 @@ impl Rest {
     /// One period of a piston that rests; whether it stays so.
     #[inline]
     fn stays(&mut self, narrow: i32, now: &Approach, steps: bool) -> bool {
-        let beyond = self.beyond().min(2 * PATIENCE_STEP);
+        let wid = crate::axis::model::knob("WID", 0) as i32;
+        let beyond = (self.beyond() - wid).max(0).min(2 * PATIENCE_STEP);
         let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
         let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
         let release = (narrow.wrapping_mul(crate::axis::model::knob("REL",20) as i32) / 10)
