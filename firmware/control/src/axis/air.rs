@@ -181,7 +181,7 @@ impl Chamber {
         let flows = ChamberFlows::of(
             model,
             flow,
-            match super::model::knob("MID", 2) { 0 => p, 1 => p.saturating_add(self.expected.wrapping_sub(p) >> 2), 2 => p.saturating_add(self.expected) >> 1, _ => self.expected },
+            p,
             fill | more_fill | all_flows != 0,
             vent | more_vent | all_flows != 0,
         );
@@ -249,8 +249,7 @@ impl Chamber {
     #[inline]
     pub(super) fn shut(&self, model: &AxisModel) -> [u16; 2] {
         let times = &model.times;
-        self.ready
-            .map(|ready| microseconds(ready.rest(times)))
+        self.ready.map(|ready| microseconds(ready.rest(times)))
     }
 }
 

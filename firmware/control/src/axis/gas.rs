@@ -139,7 +139,9 @@ impl AxisModel {
     #[inline]
     #[must_use]
     pub(super) const fn length_b(&self, stroke: i32) -> i32 {
-        self.stroke.saturating_sub(stroke).saturating_add(self.lead_b)
+        self.stroke
+            .saturating_sub(stroke)
+            .saturating_add(self.lead_b)
     }
 
     /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:

@@ -158,10 +158,7 @@ impl Learner {
             check = check
                 .wrapping_add(more(FASTEST_PERIOD, i32::from(later)))
                 .wrapping_add(more(FASTEST_SPEED, speed.wrapping_sub(fastest.speed)))
-                .wrapping_add(more(
-                    FASTEST_IMPULSE,
-                    impulse.wrapping_sub(fastest.impulse),
-                ));
+                .wrapping_add(more(FASTEST_IMPULSE, impulse.wrapping_sub(fastest.impulse)));
         }
         if !sliding || (speed ^ self.first) < 0 || periods >= PERIODS_MAX {
             let other = speed.wrapping_sub(self.last.speed);
@@ -211,10 +208,7 @@ impl Learner {
         } else {
             (speed, impulse)
         };
-        if last.periods < PERIODS_MIN
-            || fastest.speed.wrapping_abs() < FAST
-            || speed < ABOVE
-        {
+        if last.periods < PERIODS_MIN || fastest.speed.wrapping_abs() < FAST || speed < ABOVE {
             return None;
         }
         // 16 mN × s × 2^32 over mm/s × 2^16.

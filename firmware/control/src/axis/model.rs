@@ -112,32 +112,26 @@ const AMBIENT_PA: u64 = 101_325;
 const EXPONENT_PERCENT: u64 = 120;
 /// Slope of the speed law times the dead time, × 100.
 const SLOPE_PERCENT: u64 = 36;
-#[cfg(not(target_os = "none"))]
-extern crate std;
-#[cfg(not(target_os = "none"))]
-pub(crate) fn knob(name: &str, default: u64) -> u64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default) }
-#[cfg(target_os = "none")]
-pub(crate) fn knob(_: &str, default: u64) -> u64 { default }
-
 /// Gain of the speed error times the dead time, × 100.
 const DAMPING_PERCENT: u64 = 95;
 /// Deceleration over slope times top speed, × 100.
 const BRAKE_PERCENT: u64 = 65;
-/// What the observer keeps of an older period's weight (a fading memory of second order: the gains
-/// below are 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³), × 2^16.
-const MEMORY: u64 = 28_000;
+/// Mass that the valves can make follow the speed law, over what half of both chambers could, × 100.
+const NIMBLE_PERCENT: u64 = 62;
+/// What the observer keeps of an older period's weight, × 2^16 (θ): a fading memory of second
+/// order, whose gains are 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³.
+const MEMORY: u64 = 28400;
+/// The rest of it.
+const FRESH: u64 = (1 << 16) - MEMORY;
 /// Share of the innovation in stroke, × 2^16.
-const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY) >> 16) * MEMORY / (1 << 16);
+const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY * MEMORY) >> 32);
 /// In speed, per period, × 2^16.
-const OBSERVE_SPEED: u64 =
-    3 * ((((1 << 16) - MEMORY) * ((1 << 16) - MEMORY)) >> 16) * ((1 << 16) + MEMORY) / (1 << 17);
-/// In acceleration, per square of a period, × 2^16.
-const OBSERVE_LOAD: u64 =
-    ((((1 << 16) - MEMORY) * ((1 << 16) - MEMORY)) >> 16) * ((1 << 16) - MEMORY) / (1 << 16);
+const OBSERVE_SPEED: u64 = (3 * ((FRESH * FRESH) >> 16) * ((1 << 16) + MEMORY)) >> 17;
+/// In acceleration, per square of a period, × 2^16; a share of it (60 hundredths), because a load
+/// also takes what the pressures have wrong.
+const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * 60 / 100;
 /// Ticks of a period.
 pub(super) const STROKES: u64 = 4;
-/// Look-ahead into a period that pulses act in, µs.
-const HOLD: u64 = 0;
 /// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides
 /// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
 /// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
@@ -149,7 +143,7 @@ impl AxisModel {
     /// Checks the data and works out the coefficients for a tick of `tick`.
     ///
     /// The speed law is scaled by two facts of the axis: the dead time
-    /// T = tick + t_on + line, which bounds its slope and damping,
+    /// T = 2.5 ticks + t_on + line, which bounds its slope and damping,
     /// and the speed at which a choked outlet lets the piston go, which bounds
     /// its top. The three factors were searched on the bench axis (bore 20 × 180 mm,
     /// VQ110U-class valves), three other and 120 random cylinders, all with loads, masses,
@@ -269,9 +263,7 @@ impl AxisModel {
         let period_us = tick_us.wrapping_mul(STROKES);
         // Between the second and the third tick, and from there to the next period.
         let moment_us = tick_us.wrapping_mul(3).wrapping_shr(1);
-        let valve_us = micros(data.valve_on)
-            .wrapping_add(micros(data.line_delay))
-            .wrapping_add(knob("HOLD",HOLD));
+        let valve_us = micros(data.valve_on).wrapping_add(micros(data.line_delay));
         let horizon_us = less(period_us, moment_us).wrapping_add(valve_us);
 
         let ambient_8 = AMBIENT_PA << 8;
@@ -291,18 +283,21 @@ impl AxisModel {
         // C ρ0 R T / area.
         let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(3).wrapping_shr(1));
         let per_horizon_8 = |percents: u64| divide(percents.wrapping_mul(2_560_000), horizon_us);
-        // × 2^14, below 256/s: that of a dead time of 1.1 ms, and no steeper below it.
+        // × 2^14, below 256/s: that of a dead time of 1.4 ms, and no steeper below it.
         // 2^22 × 2^37.
-        let slope_14 = divide((knob("SLOPE",SLOPE_PERCENT) * 10_000) << 14, horizon_us).min(65_535 << 6);
+        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, horizon_us).min(65_535 << 6);
         let slope_8 = slope_14.wrapping_shr(6);
         let brake = percent(
             slope_14.wrapping_mul(top_16).wrapping_shr(30),
-            knob("BRAKE",BRAKE_PERCENT),
+            BRAKE_PERCENT,
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
         // how fast the force can change, mN/s.
-        let both_8 = percent(stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke), 90)
-            .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke));
+        let both_8 = percent(
+            stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke),
+            90,
+        )
+        .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke));
         // Half of both; 2^29 × 2^31 × 2^-12.
         let slew = flow_24
             .wrapping_shr(20)
@@ -311,7 +306,7 @@ impl AxisModel {
         let slew = divide(slew.wrapping_mul(EXPONENT_PERCENT), 100_000);
         // kg = mN/s over mm/s³. 2^37 × 2^24.
         let nimble_16 = divide(
-            percent(slew, knob("NIMBLE",60)).wrapping_shl(24),
+            percent(slew, NIMBLE_PERCENT).wrapping_shl(24),
             brake.wrapping_mul(slope_8),
         );
 
@@ -373,13 +368,15 @@ impl AxisModel {
             mass: number(raw(data.mass)),
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             slope: number(slope_8),
-            damping: number(per_horizon_8(knob("DAMP",DAMPING_PERCENT))),
+            damping: number(per_horizon_8(DAMPING_PERCENT)),
             brake: number(brake),
             top_speed: number(top_16),
-            observe_stroke: number(obs().0),
-            observe_speed: ratio(obs().1.wrapping_mul(1_000_000), period_us),
+            observe_stroke: number(OBSERVE_STROKE),
+            observe_speed: ratio(OBSERVE_SPEED.wrapping_mul(1_000_000), period_us),
             observe_load: ratio(
-                obs().2.wrapping_mul(1_000_000_000_000).wrapping_shr(16),
+                OBSERVE_LOAD
+                    .wrapping_mul(1_000_000_000_000)
+                    .wrapping_shr(16),
                 period_us.wrapping_mul(period_us),
             ),
             // Five times the break-away force in a second, × 2^8.
@@ -461,8 +458,3 @@ fn ratio(a: u64, b: u64) -> i32 {
 fn number(value: u64) -> i32 {
     i32::try_from(value).unwrap_or(i32::MAX)
 }
-
-fn obs() -> (u64,u64,u64) { let m = knob("MEM",MEMORY); let n=65536-m; (65536-((m*m)>>16)*m/65536, 3*((n*n)>>16)*(65536+m)/131072, ((n*n)>>16)*n/65536*knob("LOADG",60)/100) }
-
-#[cfg(not(target_os = "none"))]
-pub(crate) fn dbg(n: &str, v: i32) { if std::env::var("DBG").is_ok() { std::eprintln!("{n} {}", v as f64/65536.0); } }

@@ -359,7 +359,14 @@ mod tests {
     fn cube_roots() {
         assert_eq!(cube_root(0), 0);
         assert_eq!(cube_root(1 << 30), 1 << 16);
-        for share in [1_u32, 20_000, 100 << 14, 8192 << 14, 30_000 << 14, 65_000 << 14] {
+        for share in [
+            1_u32,
+            20_000,
+            100 << 14,
+            8192 << 14,
+            30_000 << 14,
+            65_000 << 14,
+        ] {
             let exact = (f64::from(share) / f64::from(1 << 30)).cbrt() * 65_536.0;
             assert!((f64::from(cube_root(share)) - exact).abs() < 2.0, "{share}");
         }

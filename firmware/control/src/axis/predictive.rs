@@ -36,21 +36,21 @@
 //! at before the next uses it ([`Predictive::kept_is_sound`]).
 
 mod force;
+mod handover;
+mod plan;
 mod pressures;
 mod rest;
+mod seals;
 
 use super::air::{Chamber, Clock, Piston};
 use super::gas::Pressures;
 use super::learn::Learner;
 use super::model::AxisModel;
 use super::motion::{Inertia, Motion};
-use super::mix;
-use crate::joint::{Announced, JointInput};
+use crate::joint::JointInput;
 use crate::pwm::OnTimes;
-use core::hash::{Hash, Hasher};
 use force::{Ahead, Course, Push, Wish};
-use pressures::{made_up, targets};
-use rest::{Approach, Rest};
+use rest::Rest;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 /// Slower than this, raw mm/s, the piston stands (3 mm/s).
@@ -160,53 +160,6 @@ pub struct Predictive {
     limited: bool,
 }
 
-impl Hash for Predictive {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Flags share a
-        // word, each in its own bits.
-        let Self {
-            // Sealed apart: see `kept_is_sound`.
-            a: _,
-            b: _,
-            course: _,
-            course_check: _,
-            motion: _,
-            force: _,
-            wanted: _,
-            motion_check: _,
-            inertia: _,
-            push: _,
-            push_check: _,
-            learner: _,
-            rest: _,
-            awaits: _,
-            makes_up: _,
-            fresh: _,
-            quiet: _,
-            rest_check: _,
-            stroke,
-            primed,
-            drives,
-            next,
-            measured,
-            plan: [fill_a, vent_a, fill_b, vent_b],
-            // They shape no output.
-            asked: _,
-            duty: _,
-            limited: _,
-        } = self;
-        let flags = u32::from(*stroke as u8)
-            | u32::from(*primed).wrapping_shl(8)
-            | u32::from(*drives).wrapping_shl(16);
-        state.write_u32(flags);
-        state.write_u32(*next);
-        state.write_i32(*measured);
-        state.write_u32(u32::from(*fill_a) | u32::from(*vent_a).wrapping_shl(16));
-        state.write_u32(u32::from(*fill_b) | u32::from(*vent_b).wrapping_shl(16));
-    }
-}
-
 impl Predictive {
     /// At rest, both chambers at the atmosphere.
     #[must_use]
@@ -248,61 +201,6 @@ impl Predictive {
         law
     }
 
-    /// Seals what begins.
-    #[cold]
-    #[inline(never)]
-    fn seal(&mut self) {
-        self.course_check = self.course.sum();
-        self.motion_check = self.sum_of_motion();
-        self.push_check = self.push.sum();
-        self.rest_check = self.sum_of_rest();
-    }
-
-    #[inline]
-    fn sum_of_motion(&self) -> u32 {
-        mix(mix(self.motion.sum(0), self.force), self.wanted)
-    }
-
-    #[inline]
-    fn sum_of_rest(&self) -> u32 {
-        let Self {
-            awaits,
-            makes_up,
-            fresh,
-            quiet,
-            ..
-        } = *self;
-        let flags = i32::from(fresh) | i32::from(quiet) << 8 | (makes_up as i32) << 16;
-        mix(mix(self.rest.sum(0), awaits), flags)
-    }
-
-    /// Whether what the stroke to come uses, and the `Hash` leaves out, is as it was left.
-    #[inline]
-    #[must_use]
-    pub fn kept_is_sound(&self) -> bool {
-        let Self { a, b, .. } = self;
-        if matches!(self.stroke, Stroke::A | Stroke::B) {
-            let first = self.stroke == Stroke::A;
-            let chamber = if first { a } else { b };
-            return chamber.pulses_are_sound()
-                && chamber.pressures_are_sound()
-                && self.course_check == self.course.sum()
-                && (first || self.learner.is_sound());
-        }
-        let sound = a.pressures_are_sound()
-            && b.pressures_are_sound()
-            && self.motion_check == self.sum_of_motion()
-            && self.rest_check == self.sum_of_rest();
-        sound
-            && if self.stroke == Stroke::Motion {
-                self.push_check == self.push.sum()
-                    && self.inertia.is_sound()
-                    && (!self.learner.has_news() || self.learner.is_sound())
-            } else {
-                a.means_are_sound() && b.means_are_sound()
-            }
-    }
-
     /// Estimated motion and load.
     #[must_use]
     pub const fn motion(&self) -> &Motion {
@@ -328,37 +226,6 @@ impl Predictive {
     #[must_use]
     pub const fn is_settled(&self) -> bool {
         self.rest.is_settled()
-    }
-
-    /// A tick in which somebody else drives: `sent` are the on-times last given out. Follows
-    /// valves, chambers and piston, and forgets that the piston rests.
-    pub fn observe(
-        &mut self,
-        model: &AxisModel,
-        measured: PositionMm,
-        sent: &OnTimes,
-    ) -> VelocityMmS {
-        if !self.primed {
-            self.prime(measured);
-        }
-        if self.drives {
-            self.yield_to_others(model, sent);
-        } else {
-            self.energise(model, sent, model.times.tick, false);
-        }
-        match self.stroke {
-            Stroke::A => self.follow(model, true),
-            Stroke::B => self.follow(model, false),
-            Stroke::Motion => {
-                self.moves(model, measured);
-                self.push = Push::default();
-                self.push_check = self.push.sum();
-                self.motion_check = self.sum_of_motion();
-            }
-            Stroke::Pulses => self.release(),
-        }
-        self.next_stroke(measured);
-        VelocityMmS::from_raw(self.motion.speed)
     }
 
     /// A tick of the law's own; on-times for the next tick. `sent` are those last given out.
@@ -401,92 +268,6 @@ impl Predictive {
             settled: self.rest.is_settled(),
             limited: self.limited,
         }
-    }
-
-    /// The first stroke that is measured is where the piston stands.
-    #[cold]
-    #[inline(never)]
-    fn prime(&mut self, measured: PositionMm) {
-        self.primed = true;
-        let stroke = measured.raw();
-        self.measured = stroke;
-        self.motion.stroke = stroke;
-        self.course = Course::at(stroke);
-        self.rest.release(stroke);
-        self.quiet = true;
-        self.seal();
-    }
-
-    /// Forgets the rest state. What was damaged before keeps its broken seal.
-    #[inline(never)]
-    fn release(&mut self) {
-        let sound = self.rest_check == self.sum_of_rest();
-        self.rest.release(self.motion.stroke);
-        self.awaits = NOTHING;
-        self.quiet = true;
-        if sound {
-            self.rest_check = self.sum_of_rest();
-        }
-    }
-
-    /// Begin of the tick.
-    const fn edge(&self, model: &AxisModel) -> u32 {
-        let turn = self.stroke as i32;
-        if turn == 0 {
-            return self.next;
-        }
-        let left = model
-            .times
-            .period
-            .wrapping_sub(model.times.tick.wrapping_mul(turn));
-        self.next.wrapping_sub(left as u32)
-    }
-
-    /// Coils that somebody else decides, for `span` µs from this tick on.
-    #[inline(never)]
-    fn energise(&mut self, model: &AxisModel, sent: &OnTimes, span: i32, cut: bool) {
-        let now = self.edge(model);
-        let [fill_a, vent_a, fill_b, vent_b] = *sent;
-        let times = &model.times;
-        self.a.energise(now, [fill_a, vent_a], span, cut, times);
-        self.b.energise(now, [fill_b, vent_b], span, cut, times);
-    }
-
-    /// The law drives from now on: what others have sent still acts in this tick, and nothing
-    /// after it.
-    #[cold]
-    #[inline(never)]
-    fn take_over(&mut self, model: &AxisModel, sent: &OnTimes) {
-        // So a coil that is on until the end of the tick falls there.
-        self.energise(model, sent, model.times.tick.wrapping_add(1), false);
-        self.drives = true;
-    }
-
-    /// Somebody else drives from now on: what is planned for after this tick does not happen.
-    #[cold]
-    #[inline(never)]
-    fn yield_to_others(&mut self, model: &AxisModel, sent: &OnTimes) {
-        let times = &model.times;
-        if self.stroke == Stroke::B {
-            let [_, _, fill, vent] = self.plan;
-            let begun = self.clock(model).now;
-            self.b
-                .energise(begun, [fill, vent], times.period, false, times);
-        }
-        // Before the first stroke of its period the plan has not begun.
-        let begun = self.stroke != Stroke::A;
-        self.energise(
-            model,
-            sent,
-            times.tick.wrapping_add(i32::from(begun)),
-            begun,
-        );
-        self.drives = false;
-        self.plan = [0; 4];
-        self.asked = 0;
-        self.duty = Duty::ZERO;
-        self.limited = false;
-        self.release();
     }
 
     /// The present period.
@@ -600,130 +381,12 @@ impl Predictive {
         self.motion_check = self.sum_of_motion();
     }
 
-    /// The pulses of the next period.
-    #[inline]
-    fn choose(&mut self, model: &AxisModel, input: &JointInput) {
-        let reference = input.reference.raw();
-        self.fresh = self.rest.aim(model, reference);
-        let stands = self.quiet || self.motion.speed.wrapping_abs() < STILL;
-        let mut to = reference;
-        let mut awaited = None;
-        match input.announced {
-            Some(Announced { reference: next, .. }) if stands => {
-                awaited = self.preload(model, next.raw());
-                if awaited.is_some() {
-                    to = next.raw();
-                }
-            }
-            Some(_) => {}
-            None => self.awaits = NOTHING,
-        }
-        if awaited.is_none() {
-            self.quiet = self.rest.quiet(
-                model,
-                &Approach {
-                    reference,
-                    reference_speed: input.reference_velocity.raw(),
-                    measured: input.measured.raw(),
-                    motion: &self.motion,
-                    force: self.force,
-                    mass: self.inertia.mass,
-                },
-            );
-        }
-        if awaited.is_some() || (stands && self.motion.at_stop(model)) {
-            self.makes_up = if to > self.motion.stroke {
-                MakesUp::Extends
-            } else {
-                MakesUp::Retracts
-            };
-        }
-        let force = match awaited {
-            None if self.quiet => {
-                let ([fill_a, vent_a], [fill_b, vent_b]) = (self.a.shut(model), self.b.shut(model));
-                self.plan = [fill_a, vent_a, fill_b, vent_b];
-                self.limited = false;
-                self.asked = 0;
-                self.rest_check = self.sum_of_rest();
-                return;
-            }
-            None => self.wanted,
-            Some(force) => force,
-        };
-        let possible = force
-            .max(model.force_in.wrapping_neg())
-            .min(model.force_out);
-        let target = self.target(model, possible);
-        let [fill_a, vent_a] = self.a.pulses(model, model.flow_a, target.a);
-        let [fill_b, vent_b] = self.b.pulses(model, model.flow_b, target.b);
-        self.plan = [fill_a, vent_a, fill_b, vent_b];
-        if self.rest.is_near() && fill_a | vent_a != 0 && self.a.idle() && self.b.idle() {
-            // Near the target a pulse of one chamber alone: two may be too much of valves that
-            // cannot open for less.
-            if fill_a.max(vent_a) > fill_b.max(vent_b) {
-                self.plan = [fill_a, vent_a, 0, 0];
-            } else if fill_b | vent_b != 0 {
-                self.plan = [0, 0, fill_b, vent_b];
-            }
-        }
-        #[cfg(not(target_os = "none"))]
-        if super::model::knob("DBG", 0) == 1 {
-            extern crate std;
-            std::println!("   t {} F* {:.1} lim {:.1} load {:.1} F {:.1} v {:.1} x {:.2} pa {:.0}>{:.0} * {:.0} pb {:.0}>{:.0} * {:.0} plan {:?} stuck {} push {} mass {:.2} gains slope {:.1} damp {:.1} brake {}", self.next/1000, f64::from(force)/1e3, f64::from(possible)/1e3, f64::from(self.motion.load)/1e3, f64::from(self.force)/1e3, f64::from(self.motion.speed)/65536., f64::from(self.motion.stroke)/65536., f64::from(self.a.pressure)/256e3, f64::from(self.a.expected)/256e3, f64::from(target.a)/256e3, f64::from(self.b.pressure)/256e3, f64::from(self.b.expected)/256e3, f64::from(target.b)/256e3, self.plan, self.motion.stuck, self.push.sum() as i32, f64::from(self.inertia.mass)/65536., f64::from(self.inertia.slope)/256., f64::from(self.inertia.damping)/256., self.inertia.brake);
-        }
-        self.limited = possible != force;
-        self.asked = force;
-        self.rest_check = self.sum_of_rest();
-    }
-
     /// On-times of the next tick by the plan, of which so many ticks are gone by then.
     #[inline]
     fn due(&self, model: &AxisModel, ticks: u16) -> OnTimes {
         let tick = model.times.tick as u16;
         let gone = tick.wrapping_mul(ticks);
         self.plan.map(|on| on.saturating_sub(gone).min(tick))
-    }
-
-    /// The force with which an announced move to `next` is awaited; `None` if
-    /// the piston has begun to move, or the move is none.
-    fn preload(&mut self, model: &AxisModel, next: i32) -> Option<i32> {
-        let stroke = self.motion.stroke;
-        if self.awaits == NOTHING {
-            self.awaits = stroke;
-        }
-        let place = self.awaits;
-        let distance = next.saturating_sub(place);
-        let gone = stroke.saturating_sub(place).saturating_abs();
-        let band = model.band;
-        if distance.saturating_abs() <= band || gone > band.wrapping_shl(1) {
-            return None;
-        }
-        let edge = model.coulomb.wrapping_shr(1);
-        let edge = if distance > 0 {
-            edge
-        } else {
-            edge.wrapping_neg()
-        };
-        Some(edge.saturating_sub(self.motion.load))
-    }
-
-    /// Chamber pressures for a force that the supply can give.
-    #[inline]
-    fn target(&mut self, model: &AxisModel, force: i32) -> Pressures {
-        let target = targets(model, force);
-        let extends = match self.makes_up {
-            MakesUp::No => return target,
-            MakesUp::Extends => true,
-            MakesUp::Retracts => false,
-        };
-        let expected = Pressures {
-            a: self.a.expected,
-            b: self.b.expected,
-        };
-        made_up(model, force, target, expected, extends).unwrap_or_else(|| {
-            self.makes_up = MakesUp::No;
-            target
-        })
     }
 }
 

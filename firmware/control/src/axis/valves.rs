@@ -234,9 +234,7 @@ impl ValveTrack {
             three.wrapping_sub(two).wrapping_add(one)
         } else {
             self.state = self.state.wrapping_sub(4);
-            four.wrapping_sub(three)
-                .wrapping_add(two)
-                .wrapping_sub(one)
+            four.wrapping_sub(three).wrapping_add(two).wrapping_sub(one)
         };
         if self.open() {
             span.wrapping_sub(opened)
@@ -369,7 +367,7 @@ impl Ready {
             self.0.saturating_add(need)
         } else {
             let shortest = times.shortest_opening();
-            if rival || self == Self::SHUTS || need <= shortest.wrapping_mul(super::model::knob("NEED",5) as i32) >> 3 {
+            if rival || self == Self::SHUTS || need <= shortest >> 1 {
                 return 0;
             }
             need.max(shortest)

@@ -269,10 +269,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
             "observe_load",
             0.6 * (1.0 - theta).powi(3) / (period * period),
         ),
-        (
-            "stick_step",
-            5e3 * number(data.breakaway) * period * two(8),
-        ),
+        ("stick_step", 5e3 * number(data.breakaway) * period * two(8)),
         ("period", period * two(32)),
         ("horizon_reference", (2e3 + on + line) * 1e-6 * two(32)),
         ("stretch", two(19) / 0.7),

@@ -107,7 +107,7 @@ impl Ahead {
             let mean = force.saturating_add(then) >> 1;
             let viscous = part(motion.speed, model.viscous, 24);
             let sliding = mean.saturating_add(motion.load).saturating_sub(viscous);
-            let gained = scaled(inertia.acceleration(sliding), model.horizon, 16) / 100 * crate::axis::model::knob("X3", 100) as i32;
+            let gained = scaled(inertia.acceleration(sliding), model.horizon, 16);
             rubbed(motion.speed.saturating_add(gained), inertia.rubbed_ahead)
         };
         let mean = motion.speed.saturating_add(speed) >> 1;

@@ -5,14 +5,16 @@ use crate::axis::model::AxisModel;
 use crate::axis::motion::Motion;
 use crate::axis::{mix, part, scaled, square_root};
 
-/// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
-#[allow(non_snake_case)] fn CATCH() -> i32 { (crate::axis::model::knob("CATCH",40) as i32) * 6554 }
+/// Slower than this a piston in the band is caught by shutting the valves, raw mm/s (4.0 mm/s).
+const CATCH: i32 = 262160;
 /// A reference slower than this is a step (1 mm/s).
 pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
 const REST_PERIODS: u16 = 8;
-/// Periods near the target without coming to rest after which the band widens …
-#[allow(non_snake_case)] fn PATIENCE() -> u16 { crate::axis::model::knob("PAT",90) as u16 }
+/// Periods near the target without coming to rest after which the law acts and waits …
+const PATIENCE: u16 = 90;
+/// … and, so many periods later, the band widens …
+const WIDENS: i32 = 40;
 /// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 7;
@@ -20,6 +22,11 @@ const PATIENCE_SHIFT: u32 = 7;
 const WIDEST: i32 = 26_214;
 /// A piston further from its target than this does not rest there, raw mm (0.45 mm).
 const LEFT: i32 = 29_491;
+/// A piston that rests may be so much further from its target than one that comes to rest, in
+/// sixteenths of the band.
+const RELEASE: i32 = 27;
+/// Periods near the target (24 bands) after which the piston counts as near.
+const NEAR: u16 = 4;
 /// Periods outside before the end of rest at the same target, …
 const RELEASE_PERIODS: u16 = 5;
 /// … and with a new one.
@@ -86,10 +93,10 @@ impl Rest {
         self.settled
     }
 
-    /// Whether the piston has been near its target (24 bands) more than far from it since it has it.
+    /// Whether the piston has been near its target for some time.
     #[inline]
-    pub(super) fn is_near(&self) -> bool {
-        self.near > crate::axis::model::knob("NEAR",0) as u16
+    pub(super) const fn is_near(&self) -> bool {
+        self.near > NEAR
     }
 
     /// Forgets the rest state with the piston at `stroke`.
@@ -141,21 +148,20 @@ impl Rest {
             return false;
         }
         self.near = if error < narrow.wrapping_mul(24) {
-            self.near.wrapping_add(1).min(PATIENCE() * 4)
+            self.near.wrapping_add(1).min(PATIENCE * 4)
         } else {
             self.near.saturating_sub(1)
         };
         // Patience: what has not come to rest for long may do so in a wider band.
         let beyond = self.beyond();
-        let wid = crate::axis::model::knob("WID", 0) as i32;
-        let (band, catch) = if beyond > wid {
-            let beyond = (beyond - wid).min(2 * PATIENCE_STEP);
+        let (band, catch) = if beyond > WIDENS {
+            let beyond = beyond.wrapping_sub(WIDENS).min(2 * PATIENCE_STEP);
             // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
             let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
             let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
-            (band, CATCH().wrapping_add(extra(CATCH())))
+            (band, CATCH.wrapping_add(extra(CATCH)))
         } else {
-            (narrow, CATCH())
+            (narrow, CATCH)
         };
         let speed = now.motion.speed.wrapping_abs();
         let inside = error < band;
@@ -166,7 +172,7 @@ impl Rest {
             return waits;
         }
         self.held = self.held.wrapping_add(1);
-        if self.held > crate::axis::model::knob("RESTP", 8) as u16 {
+        if self.held > REST_PERIODS {
             self.settled = true;
             self.aimed = false;
             self.released = 0;
@@ -177,11 +183,13 @@ impl Rest {
     /// One period of a piston that rests; whether it stays so.
     #[inline]
     fn stays(&mut self, narrow: i32, now: &Approach, steps: bool) -> bool {
-        let wid = crate::axis::model::knob("WID", 0) as i32;
-        let beyond = (self.beyond() - wid).max(0).min(2 * PATIENCE_STEP);
+        let beyond = self.beyond().wrapping_sub(WIDENS);
+        let beyond = beyond.max(0).min(2 * PATIENCE_STEP);
         let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
         let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
-        let release = (narrow.wrapping_mul(crate::axis::model::knob("REL",20) as i32) / 10)
+        let release = narrow
+            .wrapping_mul(RELEASE)
+            .wrapping_shr(4)
             .wrapping_add(band)
             .min(LEFT.max(band.wrapping_add(narrow >> 1)));
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
@@ -200,7 +208,7 @@ impl Rest {
         }
         self.settled = false;
         self.held = 0;
-        self.near = self.near.max(PATIENCE());
+        self.near = self.near.max(PATIENCE);
         false
     }
 
@@ -237,7 +245,7 @@ impl Rest {
 
     /// Periods near the target beyond what patience allows.
     fn beyond(&self) -> i32 {
-        i32::from(self.near.saturating_sub(PATIENCE()))
+        i32::from(self.near.saturating_sub(PATIENCE))
     }
 
     /// What is fed forward for friction that is less than told makes a relay: where
@@ -382,7 +390,10 @@ mod tests {
                     let exact = (period_s * 1e6 / f64::from(4 * tick_us)).clamp(25.0, 250.0);
                     let periods = f64::from(swing(&model, (mass_kg * 65_536.0) as i32));
                     let off = (periods - exact).abs();
-                    assert!(off < 1.0 + 0.1 * exact, "{bore} {mass_kg}: {periods} {exact}");
+                    assert!(
+                        off < 1.0 + 0.1 * exact,
+                        "{bore} {mass_kg}: {periods} {exact}"
+                    );
                 }
             }
         }
