@@ -127,9 +127,9 @@ const FRESH: u64 = (1 << 16) - MEMORY;
 const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY * MEMORY) >> 32);
 /// In speed, per period, × 2^16.
 const OBSERVE_SPEED: u64 = (3 * ((FRESH * FRESH) >> 16) * ((1 << 16) + MEMORY)) >> 17;
-/// In acceleration, per square of a period, × 2^16; a share of it (60 hundredths), because a load
+/// In acceleration, per square of a period, × 2^16; a share of it (59 hundredths), because a load
 /// also takes what the pressures have wrong.
-const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * 60 / 100;
+const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * 59 / 100;
 /// Ticks of a period.
 pub(super) const STROKES: u64 = 4;
 /// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides

@@ -6,11 +6,18 @@ use super::{clip, mix, part, quotient, scaled, within};
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
 const STICK: i32 = 4 << 16;
 
+/// Slower than this, raw mm/s, a piston that is pressed against an end stop stays there (20 mm/s).
+const REBOUND: i32 = 20 << 16;
+
 /// A piston that stands so near to an end stop leans on it, raw mm (1 mm).
 const STOP_ZONE: i32 = 1 << 16;
 
 /// Length before an end stop in which a cushion may act, raw mm (6 mm).
 const CUSHION: i32 = 6 << 16;
+
+/// Share of the friction told that the observer counts on, × 2^16 (0.92): what is less than told
+/// would let it overlook speed.
+const RUBS: i32 = 60_293;
 
 /// Least mass that is counted on, kg × 2^16 (0.02 kg): the least that may be told.
 const LIGHTEST: i32 = 1311;
@@ -62,7 +69,7 @@ impl Inertia {
         let slope = part(model.slope, share, 16).max(1 << 8);
         // 2^32 / (2 slope²) with slope × 2^8, below 2^16: 2^47 / slope².
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
-        let rubs = scaled(model.coulomb, per_force, 24);
+        let rubs = scaled(part(model.coulomb, RUBS, 16), per_force, 24);
         let made = Self {
             mass,
             per_force,
@@ -206,8 +213,12 @@ impl Motion {
         } else {
             self.stroke < STOP_ZONE
         };
-        self.stuck = self.speed.wrapping_abs() < STICK
-            && (against_stop || drive.saturating_abs() < model.breakaway);
+        // A rebound from it is over within the period.
+        self.stuck = if against_stop {
+            (self.speed ^ drive) >= 0 || self.speed.wrapping_abs() < REBOUND
+        } else {
+            self.speed.wrapping_abs() < STICK && drive.saturating_abs() < model.breakaway
+        };
         let speed = if self.stuck {
             // A bit more than half of it.
             part(self.speed, 38_400, 16)

@@ -227,9 +227,9 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let brake = 0.65 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
-    let nimble = 0.9 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
+    let nimble = 0.62 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
     let two = |bits: i32| 2_f64.powi(bits);
-    let theta: f64 = 28_000.0 / 65_536.0;
+    let theta: f64 = 28_400.0 / 65_536.0;
     vec![
         ("flow_a", flow_a * two(16)),
         ("flow_b", flow_b * two(16)),
@@ -256,7 +256,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ),
         ("horizon", horizon * two(32)),
         ("slope", slope * two(8)),
-        ("damping", 0.85 / horizon * two(8)),
+        ("damping", 0.95 / horizon * two(8)),
         ("brake", brake),
         ("top_speed", top * two(16)),
         ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),
@@ -267,7 +267,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ),
         (
             "observe_load",
-            0.6 * (1.0 - theta).powi(3) / (period * period),
+            0.59 * (1.0 - theta).powi(3) / (period * period),
         ),
         ("stick_step", 5e3 * number(data.breakaway) * period * two(8)),
         ("period", period * two(32)),

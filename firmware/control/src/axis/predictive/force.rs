@@ -171,7 +171,11 @@ impl Wish<'_> {
     #[inline]
     pub(super) fn push(&self, model: &AxisModel, push: &mut Push) {
         let missing = self.reference.saturating_sub(self.motion.stroke);
-        let speed = self.motion.speed.wrapping_abs();
+        let speed = if self.motion.stuck {
+            0
+        } else {
+            self.motion.speed.wrapping_abs()
+        };
         push.update(model, speed, missing, self.reference_speed);
     }
 

@@ -10,9 +10,9 @@ const CATCH: i32 = 262160;
 /// A reference slower than this is a step (1 mm/s).
 pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
-const REST_PERIODS: u16 = 8;
+const REST_PERIODS: u16 = 6;
 /// Periods near the target without coming to rest after which the law acts and waits …
-const PATIENCE: u16 = 90;
+const PATIENCE: u16 = 80;
 /// … and, so many periods later, the band widens …
 const WIDENS: i32 = 40;
 /// … by one band in so many periods, up to three bands in all …
@@ -297,8 +297,10 @@ impl Approach<'_> {
         }
         let net = self.force.saturating_add(self.motion.load);
         let along = if speed < 0 { net.saturating_neg() } else { net };
-        let stopping = model.coulomb.saturating_sub(along);
-        if stopping < model.coulomb >> 2 {
+        // Three quarters of the friction told are counted on: it may be less.
+        let quarter = model.coulomb >> 2;
+        let stopping = model.coulomb.saturating_sub(quarter).saturating_sub(along);
+        if stopping < quarter {
             return false;
         }
         // kg × mm²/s² = µJ = mN × mm, all × 2^16.
