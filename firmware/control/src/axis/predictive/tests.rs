@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::axis::AxisData;
+use crate::joint::Announced;
 use wheeleg_units::{Micros, Ticks};
 
 fn model() -> AxisModel {
