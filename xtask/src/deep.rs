@@ -112,7 +112,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
             let result = run();
             let text = match &result {
                 Ok(text) => text.clone(),
-                Err(error) => format!("FAILED: {error:?}"),
+                Err(error) => format!("FAILED: {error}"),
             };
             println!("    {text}");
             note(name, &text)?;

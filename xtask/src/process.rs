@@ -102,8 +102,12 @@ pub(crate) fn ask(command: &mut Command) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
+/// A command as it is told: the program by its name, since where it stands is a matter of the
+/// machine, and DEEP.md keeps what failed.
 fn line(command: &Command) -> String {
-    let mut line = command.get_program().to_string_lossy().into_owned();
+    let program = Path::new(command.get_program());
+    let name = program.file_name().unwrap_or(program.as_os_str());
+    let mut line = name.to_string_lossy().into_owned();
     for argument in command.get_args() {
         line.push(' ');
         line.push_str(&argument.to_string_lossy());
@@ -114,6 +118,12 @@ fn line(command: &Command) -> String {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_command_is_told_without_the_place_of_its_program() {
+        let told = line(Command::new("/opt/tools/bin/cargo").args(["test", "--locked"]));
+        assert_eq!(told, "cargo test --locked");
+    }
 
     fn measure(script: &str) -> Result<Vec<String>> {
         let wanted = |line: &str| line.contains(" flips: ");

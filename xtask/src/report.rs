@@ -27,6 +27,15 @@ impl StepError {
     }
 }
 
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Failed(error) => write!(f, "{error:#}"),
+            Self::Missing { tool, install } => write!(f, "missing {tool}; install with: {install}"),
+        }
+    }
+}
+
 impl<E: Into<anyhow::Error>> From<E> for StepError {
     fn from(error: E) -> Self {
         Self::Failed(error.into())
@@ -74,7 +83,7 @@ impl Report {
         let took = begin.elapsed();
         let (value, outcome) = match result {
             Ok(value) => (Some(value), Outcome::Passed),
-            Err(StepError::Failed(error)) => (None, Outcome::Failed(format!("{error:#}"))),
+            Err(error @ StepError::Failed(_)) => (None, Outcome::Failed(error.to_string())),
             Err(StepError::Missing { tool, install }) => (None, Outcome::NotRun { tool, install }),
         };
         match &outcome {
