@@ -1,7 +1,7 @@
 //! The predictive law on cylinders that nobody tuned it for, drawn at random, with loads, masses,
 //! friction and valve times off their data.
 //!
-//! A few cylinders here; `cargo xtask deep cylinders` draws as many as it takes to know a rate.
+//! 160 cylinders here; `cargo xtask deep cylinders` draws as many as it takes to know a rate.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -73,7 +73,10 @@ fn number(variable: &str, default: u64) -> u64 {
 /// The bars of the combinations on the bench axis, after one learning move, and no false alarm.
 #[test]
 fn few_combinations_miss_on_cylinders_drawn_at_random() {
-    let (first, cylinders) = (number(FIRST_VARIABLE, 9000), number(CYLINDERS_VARIABLE, 6));
+    let (first, cylinders) = (
+        number(FIRST_VARIABLE, 9000),
+        number(CYLINDERS_VARIABLE, 160),
+    );
     let mut times = Vec::new();
     let mut missed = Vec::new();
     // Of fine and of coarse valves: combinations, missed, by a fault.

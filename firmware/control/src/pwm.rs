@@ -293,6 +293,7 @@ impl ValvePwm {
             let both = u32::from(low) | u32::from(high).wrapping_shl(16);
             both.wrapping_add(0x7FFF_7FFF) & 0x8000_8000
         };
+        debug_assert!(on.iter().all(|on| u32::from(*on) <= self.timing.tick));
         let [a, b, c, d] = on;
         let given = given(a, b) | given(c, d).wrapping_shr(1);
         let begun = given & !self.given;

@@ -27,7 +27,7 @@ unsafe extern "C" {
     fn __aeabi_memclr8(place: *mut u8, bytes: usize);
 }
 
-type Copy = unsafe extern "C" fn(*mut u8, *const u8, usize);
+type Routine = unsafe extern "C" fn(*mut u8, *const u8, usize);
 type Clear = unsafe extern "C" fn(*mut u8, usize);
 
 #[panic_handler]
@@ -54,7 +54,7 @@ impl Place {
     }
 }
 
-fn copies(copy: Copy, to: usize, from: usize, bytes: usize) -> bool {
+fn copies(copy: Routine, to: usize, from: usize, bytes: usize) -> bool {
     let source = Place(core::array::from_fn(|at| at as u8));
     let mut place = Place([GUARD; PLACE]);
     let pieces = (place.0.get_mut(to..), source.0.get(from..));
@@ -77,7 +77,7 @@ fn clears(clear: Clear, offset: usize, bytes: usize) -> bool {
 }
 
 fn all_is_right(bytes: usize) -> bool {
-    let aligned = [__aeabi_memcpy4 as Copy, __aeabi_memcpy8];
+    let aligned = [__aeabi_memcpy4 as Routine, __aeabi_memcpy8];
     let aligned = aligned.into_iter().all(|copy| copies(copy, 0, 0, bytes));
     let cleared = [__aeabi_memclr4 as Clear, __aeabi_memclr8];
     let cleared = cleared.into_iter().all(|clear| clears(clear, 0, bytes));

@@ -1,4 +1,5 @@
-//! Copying and clearing of memory, which the compiler calls by name.
+//! Copying and clearing of memory, which the compiler calls by name. Moving and setting stay those
+//! of the compiler's library.
 //!
 //! The routines of the compiler's own library take 1.6 KB of flash, most of it for cores
 //! that cannot access unaligned words. This one can, so that one loop serves every
@@ -10,6 +11,7 @@ use core::arch::global_asm;
 // r0 to, r1 from, r2 bytes. Both places are memory, and do not overlap.
 global_asm!(
     ".pushsection .text.__aeabi_memcpy, \"ax\", %progbits",
+    ".p2align 2",
     ".global __aeabi_memcpy",
     ".global __aeabi_memcpy4",
     ".global __aeabi_memcpy8",
@@ -50,6 +52,7 @@ global_asm!(
 // r0 place, r1 bytes.
 global_asm!(
     ".pushsection .text.__aeabi_memclr, \"ax\", %progbits",
+    ".p2align 2",
     ".global __aeabi_memclr",
     ".global __aeabi_memclr4",
     ".global __aeabi_memclr8",

@@ -188,23 +188,22 @@ impl Chamber {
         let change = flows.change(open, power(p, speed), times.period, stiffness);
         // No valve fills beyond the supply or vents below the atmosphere, however long a step is
         // for a small chamber. A vacuum of more than half of it needs a motion of its own.
-        let most = if fill | more_fill > 0 {
-            model.supply
-        } else {
-            MOST
+        let within = |p: i32, fill: i32, vent: i32| {
+            let most = if fill > 0 { model.supply } else { MOST };
+            let least = if vent > 0 {
+                model.ambient
+            } else {
+                model.ambient.wrapping_shr(1)
+            };
+            p.max(least).min(most)
         };
-        let least = if vent | more_vent > 0 {
-            model.ambient
-        } else {
-            model.ambient.wrapping_shr(1)
-        };
-        let p = p.saturating_add(change).max(least).min(most);
+        let p = within(p.saturating_add(change), fill, vent);
         let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
         self.flows = flows;
         self.stiffness = ahead;
         self.means_check = self.sum_of_means();
         self.pressure = p;
-        self.expected = p.saturating_add(change).max(least).min(most);
+        self.expected = within(p.saturating_add(change), fill | more_fill, vent | more_vent);
         self.pressures_check = self.sum_of_pressures();
     }
 

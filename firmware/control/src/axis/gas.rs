@@ -99,7 +99,7 @@ impl ChamberFlows {
     pub fn change(&self, open: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
         let [fill, vent] = open;
         let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
-        // Powers below 2^28, times below 2^17: 2^24 Pa mm/s µs below 2^31.
+        // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
         let work = product(self.fill, fill)
             .wrapping_sub(product(self.vent, vent))
             .wrapping_add(product(squeeze, span))

@@ -93,6 +93,12 @@ impl Learner {
         mix(mix(sum, last.impulse), last.speed)
     }
 
+    /// Flips a bit, for tests of those who keep it.
+    #[cfg(test)]
+    pub(super) const fn damage(&mut self) {
+        self.first ^= 1 << 20;
+    }
+
     /// Whether all of it is as it was left.
     #[inline]
     #[must_use]
@@ -316,6 +322,19 @@ mod tests {
         learner.sample(&model, 500 << 16, 0);
         assert_eq!(learner, waiting);
         assert!(taken(&mut learner, &model).is_some_and(|mass| mass > 0));
+    }
+
+    #[test]
+    fn a_mass_waits_through_the_next_short_slide() {
+        let model = model();
+        let mut learner = Learner::new();
+        learner.mass = 3 << 16;
+        learner.check = learner.sum();
+        for speed in [30, 40, 0] {
+            learner.sample(&model, speed << 16, 0);
+        }
+        assert_eq!(taken(&mut learner, &model), Some(3 << 16));
+        assert!(learner.is_sound());
     }
 
     /// A move under way, with all that can be in it.

@@ -78,7 +78,8 @@ impl Inertia {
             // Below 2^18 mm/s², 27 g: the speed law takes it × 2^13.
             brake: part(model.brake, squared, 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
-            load_gain: part(model.observe_load, mass, 16),
+            // Below 2^27: times an innovation it fits.
+            load_gain: part(model.observe_load, mass, 16).min((1 << 27) - 1),
             rubbed: scaled(rubs, model.period, 16),
             rubbed_ahead: scaled(rubs, model.horizon, 16),
             check: 0,
@@ -192,7 +193,7 @@ impl Motion {
             gained,
             stuck,
         } = *self;
-        // Speeds stay below 2^30.
+        // A flipped bit of either flips one of it.
         let gained = gained ^ i32::from(stuck).wrapping_shl(31);
         mix(mix(mix(mix(sum, stroke), speed), load), gained)
     }

@@ -102,6 +102,19 @@ enum Stroke {
     Pulses,
 }
 
+/// Who decides about the coils.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+enum Driver {
+    /// Somebody else.
+    #[default]
+    Others,
+    /// The law, from the middle of a period on: what its chambers can do is known with the next.
+    Begins,
+    /// The law.
+    Law,
+}
+
 /// How many they are.
 const STROKES: u8 = super::model::STROKES as u8;
 
@@ -144,8 +157,7 @@ pub struct Predictive {
     /// The stroke to come.
     stroke: Stroke,
     primed: bool,
-    /// The law drives: the coils follow its plan.
-    drives: bool,
+    driver: Driver,
     /// Begin of the next period, µs; wraps.
     next: u32,
     /// Stroke of the last tick, raw mm.
@@ -154,7 +166,7 @@ pub struct Predictive {
     plan: OnTimes,
 
     // For the record.
-    /// Force that was asked for, mN; the duty follows in the tick after it.
+    /// Force that was asked for, mN; the duty follows two ticks later.
     asked: i32,
     duty: Duty,
     limited: bool,
@@ -189,7 +201,7 @@ impl Predictive {
             rest_check: 0,
             stroke: Stroke::default(),
             primed: false,
-            drives: false,
+            driver: Driver::Others,
             next: 0,
             measured: 0,
             plan: [0; 4],
@@ -234,12 +246,12 @@ impl Predictive {
         if !self.primed {
             self.prime(input.measured);
         }
-        let begins = !self.drives;
-        if begins {
+        if self.driver == Driver::Others {
             self.take_over(model, sent);
         }
         let on = match self.stroke {
             Stroke::A => {
+                self.driver = Driver::Law;
                 self.follow(model, true);
                 self.due(model, 1)
             }
@@ -253,8 +265,7 @@ impl Predictive {
                 self.due(model, 3)
             }
             Stroke::Pulses => {
-                // When it begins, nothing was wanted yet.
-                if !begins {
+                if self.driver == Driver::Law {
                     self.choose(model, input);
                 }
                 self.due(model, 0)
@@ -326,7 +337,12 @@ impl Predictive {
             };
             (&mut self.b, piston, [fill_b, vent_b])
         };
-        chamber.follow(model, &clock, &piston, self.drives.then_some(plan));
+        chamber.follow(
+            model,
+            &clock,
+            &piston,
+            (self.driver != Driver::Others).then_some(plan),
+        );
         if first {
             // Of the period before.
             self.learner.sample(model, now, force);
@@ -351,14 +367,14 @@ impl Predictive {
     fn want(&mut self, model: &AxisModel, input: &JointInput) {
         self.moves(model, input.measured);
         let reference = input.reference.raw();
-        if self.fresh || self.rest.is_other(model, reference) {
+        // Also one that came between this stroke and the last of the period before.
+        let other = self.fresh || self.rest.is_other(model, reference);
+        if other {
             self.push = Push::default();
         }
-        if self.learner.has_news() {
+        if !other && self.learner.has_news() {
             // Twice after a move: what was wanted a period ago will do.
-            if let Some(mass) = self.learner.news(model) {
-                self.inertia = Inertia::new(model, mass);
-            }
+            self.learn(model);
         } else {
             let expected = Pressures {
                 a: self.a.expected,
@@ -379,6 +395,16 @@ impl Predictive {
         }
         self.push_check = self.push.sum();
         self.motion_check = self.sum_of_motion();
+    }
+
+    /// Takes what a move has told of the mass, a step of it in a period.
+    #[inline]
+    fn learn(&mut self, model: &AxisModel) {
+        if self.learner.has_news()
+            && let Some(mass) = self.learner.news(model)
+        {
+            self.inertia = Inertia::new(model, mass);
+        }
     }
 
     /// On-times of the next tick by the plan, of which so many ticks are gone by then.

@@ -1,14 +1,18 @@
 //! Who decides about the valves: the law, or somebody else.
 
 use super::force::{Course, Push};
-use super::{NOTHING, Predictive, Stroke};
+use super::{Driver, NOTHING, Predictive, Stroke};
+use crate::axis::learn::Learner;
 use crate::axis::model::AxisModel;
+use crate::axis::motion::Inertia;
 use crate::pwm::OnTimes;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 impl Predictive {
     /// A tick in which somebody else drives: `sent` are the on-times last given out. Follows
-    /// valves, chambers and piston, and forgets that the piston rests.
+    /// valves, chambers and piston, and forgets that the piston rests. Damage that the caller was
+    /// told of before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke that it
+    /// concerns: nothing of it is used here.
     pub fn observe(
         &mut self,
         model: &AxisModel,
@@ -18,21 +22,34 @@ impl Predictive {
         if !self.primed {
             self.prime(measured);
         }
-        if self.drives {
+        if self.driver != Driver::Others {
             self.yield_to_others(model, sent);
         } else {
             self.energise(model, sent, model.times.tick, false);
         }
         match self.stroke {
             Stroke::A => self.follow(model, true),
-            Stroke::B => self.follow(model, false),
+            Stroke::B => {
+                self.follow(model, false);
+                if !self.learner.is_sound() {
+                    self.learner = Learner::new();
+                }
+            }
             Stroke::Motion => {
+                self.learn(model);
+                if !self.inertia.is_sound() {
+                    self.inertia = Inertia::new(model, model.mass);
+                }
                 self.moves(model, measured);
+                self.wanted = 0;
                 self.push = Push::default();
                 self.push_check = self.push.sum();
                 self.motion_check = self.sum_of_motion();
             }
-            Stroke::Pulses => self.release(),
+            Stroke::Pulses => {
+                self.release();
+                self.rest_check = self.sum_of_rest();
+            }
         }
         self.next_stroke(measured);
         VelocityMmS::from_raw(self.motion.speed)
@@ -94,7 +111,11 @@ impl Predictive {
     pub(super) fn take_over(&mut self, model: &AxisModel, sent: &OnTimes) {
         // So a coil that is on until the end of the tick falls there.
         self.energise(model, sent, model.times.tick.wrapping_add(1), false);
-        self.drives = true;
+        self.driver = if self.stroke == Stroke::A {
+            Driver::Law
+        } else {
+            Driver::Begins
+        };
     }
 
     /// Somebody else drives from now on: what is planned for after this tick does not happen.
@@ -116,7 +137,7 @@ impl Predictive {
             times.tick.wrapping_add(i32::from(begun)),
             begun,
         );
-        self.drives = false;
+        self.driver = Driver::Others;
         self.plan = [0; 4];
         self.asked = 0;
         self.duty = Duty::ZERO;

@@ -8,12 +8,13 @@ use crate::axis::model::AxisModel;
 use crate::joint::{Announced, JointInput};
 
 impl Predictive {
-    /// The pulses of the next period.
+    /// The pulses of the next period. Those towards a reference that came in this very tick
+    /// begin with the force of the last one.
     #[inline]
     pub(super) fn choose(&mut self, model: &AxisModel, input: &JointInput) {
         let reference = input.reference.raw();
         self.fresh = self.rest.aim(model, reference);
-        let stands = self.quiet || self.motion.speed.wrapping_abs() < STILL;
+        let stands = self.rest.is_settled() || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
         let mut awaited = None;
         match input.announced {

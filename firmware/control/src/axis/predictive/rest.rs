@@ -5,8 +5,8 @@ use crate::axis::model::AxisModel;
 use crate::axis::motion::Motion;
 use crate::axis::{mix, part, scaled, square_root};
 
-/// Slower than this a piston in the band is caught by shutting the valves, raw mm/s (4.0 mm/s).
-const CATCH: i32 = 262160;
+/// Slower than this a piston in the band is caught by shutting the valves, raw mm/s (4 mm/s).
+const CATCH: i32 = 4 << 16;
 /// A reference slower than this is a step (1 mm/s).
 pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
@@ -14,7 +14,7 @@ const REST_PERIODS: u16 = 6;
 /// Periods near the target without coming to rest after which the law acts and waits …
 const PATIENCE: u16 = 80;
 /// … and, so many periods later, the band widens …
-const WIDENS: i32 = 40;
+const WIDENS: i32 = 90;
 /// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 7;
@@ -24,7 +24,7 @@ const WIDEST: i32 = 26_214;
 const LEFT: i32 = 29_491;
 /// A piston that rests may be so much further from its target than one that comes to rest, in
 /// sixteenths of the band.
-const RELEASE: i32 = 27;
+const RELEASE: i32 = 16;
 /// Periods near the target (24 bands) after which the piston counts as near.
 const NEAR: u16 = 4;
 /// Periods outside before the end of rest at the same target, …
@@ -33,6 +33,8 @@ const RELEASE_PERIODS: u16 = 5;
 const START_PERIODS: u16 = 1;
 /// Periods of a pause that one counts for in which the piston stands beside the band.
 const PAUSE_SPENT: u16 = 8;
+/// Share of the friction told that is counted on to stop a piston, × 2^16 (0.85).
+const STOPS: i32 = 55_705;
 /// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
 const GENTLE: i32 = 40 << 16;
 /// Nor does one that is further from its target than this, raw mm (2 mm), and outside its band.
@@ -279,7 +281,6 @@ pub(super) struct Approach<'a> {
     pub(super) motion: &'a Motion,
     /// Pressure force, mN.
     pub(super) force: i32,
-
     /// kg × 2^16.
     pub(super) mass: i32,
 }
@@ -297,10 +298,8 @@ impl Approach<'_> {
         }
         let net = self.force.saturating_add(self.motion.load);
         let along = if speed < 0 { net.saturating_neg() } else { net };
-        // Three quarters of the friction told are counted on: it may be less.
-        let quarter = model.coulomb >> 2;
-        let stopping = model.coulomb.saturating_sub(quarter).saturating_sub(along);
-        if stopping < quarter {
+        let stopping = part(model.coulomb, STOPS, 16).saturating_sub(along);
+        if stopping < model.coulomb >> 2 {
             return false;
         }
         // kg × mm²/s² = µJ = mN × mm, all × 2^16.

@@ -31,7 +31,7 @@ impl Hash for Predictive {
             rest_check: _,
             stroke,
             primed,
-            drives,
+            driver,
             next,
             measured,
             plan: [fill_a, vent_a, fill_b, vent_b],
@@ -42,7 +42,9 @@ impl Hash for Predictive {
         } = self;
         let flags = u32::from(*stroke as u8)
             | u32::from(*primed).wrapping_shl(8)
-            | u32::from(*drives).wrapping_shl(16);
+            | u32::from(*driver as u8).wrapping_shl(16)
+            // There is such a law.
+            | 1 << 24;
         state.write_u32(flags);
         state.write_u32(*next);
         state.write_i32(*measured);
@@ -64,7 +66,9 @@ impl Predictive {
 
     #[inline]
     pub(super) fn sum_of_motion(&self) -> u32 {
-        mix(mix(self.motion.sum(0), self.force), self.wanted)
+        // The last stroke uses the mass, too.
+        let sum = mix(self.motion.sum(0), self.inertia.mass);
+        mix(mix(sum, self.force), self.wanted)
     }
 
     #[inline]
@@ -80,7 +84,8 @@ impl Predictive {
         mix(mix(self.rest.sum(0), awaits), flags)
     }
 
-    /// Whether what the stroke to come uses, and the `Hash` leaves out, is as it was left.
+    /// Whether what the stroke to come works with, and the `Hash` leaves out, is as it was left.
+    /// Speed and rest that every tick tells are those of the last look.
     #[inline]
     #[must_use]
     pub fn kept_is_sound(&self) -> bool {

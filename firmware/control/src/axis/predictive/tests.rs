@@ -30,7 +30,7 @@ fn moving(model: &AxisModel, ticks: u32) -> Predictive {
 
 type Flip = fn(&mut Predictive, u32);
 
-/// All that the `Hash` leaves out, a word each.
+/// Words of all blocks that the `Hash` leaves out and that have no test of their own.
 const KEPT: [Flip; 25] = [
     |law, bit| law.a.pressure ^= 1 << bit,
     |law, bit| law.b.pressure ^= 1 << bit,
@@ -121,6 +121,86 @@ fn damage_is_seen_while_somebody_else_drives() {
             let same = law.sum_of_motion() == twin.sum_of_motion()
                 && law.sum_of_rest() == twin.sum_of_rest();
             assert!(seen || same, "{ticks}: {before:?}");
+        }
+    }
+}
+
+/// What was seen is mended while somebody else drives, so that a cleared fault stays cleared.
+#[test]
+fn damage_that_was_seen_is_mended_while_somebody_else_drives() {
+    let model = model();
+    let flips = KEPT.into_iter().chain([
+        (|law: &mut Predictive, bit: u32| law.inertia.mass ^= 1 << bit) as Flip,
+        |law, _| law.learner = flipped_learner(&law.learner),
+    ]);
+    for flip in flips {
+        for ticks in 200..204 {
+            let mut law = moving(&model, ticks);
+            flip(&mut law, 7);
+            for _ in 0..8 {
+                law.observe(&model, PositionMm::from_int(70), &[0; 4]);
+            }
+            for tick in 0..8 {
+                assert!(law.kept_is_sound(), "{ticks} {tick}: {law:?}");
+                law.observe(&model, PositionMm::from_int(70), &[0; 4]);
+            }
+        }
+    }
+}
+
+/// One of a move that nobody has sealed.
+fn flipped_learner(learner: &Learner) -> Learner {
+    let mut other = *learner;
+    other.damage();
+    other
+}
+
+/// After a stop in the middle of a move nothing of its force is left.
+#[test]
+fn a_move_after_a_stop_does_not_begin_with_the_force_of_the_one_before() {
+    let model = model();
+    for ticks in 200..204 {
+        let mut law = moving(&model, ticks);
+        let mut sent = [0; 4];
+        for _ in 0..1000 {
+            law.observe(&model, PositionMm::from_int(70), &sent);
+        }
+        for tick in 0..12 {
+            sent = law.drive(&model, &input(70, 20), &sent).on;
+            let [fill_a, _, _, vent_b] = sent;
+            assert_eq!((fill_a, vent_b), (0, 0), "{ticks} {tick}: {sent:?}");
+        }
+    }
+}
+
+/// A law that takes over at its target begins no pulse, whatever others had on.
+#[test]
+fn taking_over_in_the_middle_of_pulses_begins_none() {
+    for valve_on in [3500, 10_000, 40_000] {
+        let data = AxisData {
+            valve_on: Micros(valve_on),
+            ..AxisData::default()
+        };
+        let model = AxisModel::new(&data, Micros(1000)).expect("in range");
+        for observed in 400..404 {
+            let mut law = Predictive::new(&model);
+            for _ in 0..observed {
+                law.observe(&model, PositionMm::from_int(90), &[0; 4]);
+            }
+            for _ in 0..2 {
+                law.observe(&model, PositionMm::from_int(90), &[1000, 0, 1000, 0]);
+            }
+            // The coil is on in the tick that begins, and off from then on.
+            let mut sent = [1000, 0, 1000, 0];
+            let mut before = [0; 4];
+            for tick in 0..16 {
+                sent = law.drive(&model, &input(90, 90), &sent).on;
+                for (on, before) in sent.iter().zip(before) {
+                    let rises = *on > 0 && before == 0;
+                    assert!(!rises || tick > 6, "{valve_on} {observed} {tick}: {sent:?}");
+                }
+                before = sent;
+            }
         }
     }
 }
