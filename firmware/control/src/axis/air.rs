@@ -138,7 +138,7 @@ impl Chamber {
     }
 
     /// Pressures at the moment and at the end of the dead time, and what the next pulses are
-    /// made with. Flows are those at the pressure of the last moment.
+    /// made with.
     // Called in one place.
     #[inline(always)]
     pub(super) fn follow(
@@ -178,10 +178,11 @@ impl Chamber {
         let ahead = model.stiffness(length_ahead);
         let p = self.pressure;
         let [[fill, vent], [more_fill, more_vent]] = [open, committed];
+        // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
         let flows = ChamberFlows::of(
             model,
             flow,
-            p,
+            p.saturating_add(self.expected) >> 1,
             fill | more_fill | all_flows != 0,
             vent | more_vent | all_flows != 0,
         );

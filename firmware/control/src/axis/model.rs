@@ -117,7 +117,7 @@ const DAMPING_PERCENT: u64 = 95;
 /// Deceleration over slope times top speed, × 100.
 const BRAKE_PERCENT: u64 = 65;
 /// Mass that the valves can make follow the speed law, over what half of both chambers could, × 100.
-const NIMBLE_PERCENT: u64 = 59;
+const NIMBLE_PERCENT: u64 = 60;
 /// What the observer keeps of an older period's weight, × 2^16 (θ): a fading memory of second
 /// order, whose gains are 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³.
 const MEMORY: u64 = 28400;

@@ -229,7 +229,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let brake = 0.65 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
-    let nimble = 0.59 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
+    let nimble = 0.60 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
     let two = |bits: i32| 2_f64.powi(bits);
     let theta: f64 = 28_400.0 / 65_536.0;
     vec![

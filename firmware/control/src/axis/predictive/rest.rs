@@ -12,9 +12,9 @@ pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
 /// Periods in the band before rest.
 const REST_PERIODS: u16 = 6;
 /// Periods near the target without coming to rest after which the law acts and waits …
-const PATIENCE: u16 = 80;
+const PATIENCE: u16 = 100;
 /// … and, so many periods later, the band widens …
-const WIDENS: i32 = 90;
+const WIDENS: i32 = 120;
 /// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
 const PATIENCE_SHIFT: u32 = 7;
