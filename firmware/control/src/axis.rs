@@ -99,7 +99,7 @@ pub(crate) const fn weight(place: u32) -> u32 {
     let mut at = 0;
     while at < place {
         weight = mix(weight, 0);
-        at += 1;
+        at = at.wrapping_add(1);
     }
     weight
 }

@@ -315,7 +315,7 @@ mod tests {
         let model = model();
         let mut learner = Learner::new();
         for speed in (0..40).chain((0..40).rev()).chain(40..60) {
-            learner.sample(&model, 8 * speed << 16, speed * 1000);
+            learner.sample(&model, (8 * speed) << 16, speed * 1000);
         }
         assert!(learner.ended);
         let waiting = learner;
@@ -343,7 +343,7 @@ mod tests {
         learner.mass = 3 << 16;
         learner.check = learner.sum();
         for speed in (3..60).chain((40..60).rev()) {
-            learner.sample(model, 8 * speed << 16, speed * 1000);
+            learner.sample(model, (8 * speed) << 16, speed * 1000);
             assert!(learner.is_sound(), "{learner:?}");
         }
         assert!(learner.fastest.periods < learner.last.periods);
@@ -360,7 +360,7 @@ mod tests {
             assert!(!flipped.is_sound(), "{flipped:?}");
             // To the end of the move, and the next one.
             for speed in (0..40).rev().chain(0..30) {
-                flipped.sample(&model, 8 * speed << 16, speed * 1000);
+                flipped.sample(&model, (8 * speed) << 16, speed * 1000);
                 assert!(!flipped.is_sound(), "{flipped:?}");
             }
         };

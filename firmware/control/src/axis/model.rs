@@ -115,7 +115,7 @@ const SLOPE_PERCENT: u64 = 36;
 /// Gain of the speed error times the dead time, × 100.
 const DAMPING_PERCENT: u64 = 95;
 /// Deceleration over slope times top speed, × 100.
-const BRAKE_PERCENT: u64 = 65;
+const BRAKE_PERCENT: u64 = 60;
 /// Mass that the valves can make follow the speed law, over what half of both chambers could, × 100.
 const NIMBLE_PERCENT: u64 = 60;
 /// What the observer keeps of an older period's weight, × 2^16 (θ): a fading memory of second

@@ -186,7 +186,7 @@ impl Rest {
     #[inline]
     fn stays(&mut self, narrow: i32, now: &Approach, steps: bool) -> bool {
         let beyond = self.beyond().wrapping_sub(WIDENS);
-        let beyond = beyond.max(0).min(2 * PATIENCE_STEP);
+        let beyond = beyond.clamp(0, 2 * PATIENCE_STEP);
         let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
         let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
         let release = narrow
