@@ -54,8 +54,8 @@ pub struct Pressures {
 /// What flows through the valves of one chamber while they are open, as powers:
 /// pressure times a speed of the piston, in 2^8 Pa mm/s.
 ///
-/// Neither the piston's place nor the time is in them, so that those of one tick
-/// serve for that tick and for the dead time ahead.
+/// Neither the piston's place nor the time is in them, so that those of one period
+/// serve for that period and for the dead time ahead.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ChamberFlows {
     /// Through the open fill valve; 0 until asked for.

@@ -57,8 +57,8 @@ impl Course {
     }
 
     /// Where the present speed takes the piston: not beyond an end stop, where air would be
-    /// squeezed that is not there. The acceleration is not counted on: the air that is squeezed
-    /// pushes back, the more the shorter a chamber is.
+    /// squeezed that is not there. The acceleration is not counted on beyond the period: the air
+    /// that is squeezed pushes back, the more the shorter a chamber is.
     #[inline]
     pub(super) fn of(model: &AxisModel, motion: &Motion, force: i32) -> Self {
         let speed = motion.speed.saturating_add(motion.gained >> 1);
