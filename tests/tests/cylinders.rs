@@ -130,8 +130,8 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
         share(50),
         share(90)
     );
-    // The bar is none. More than is allowed here would be a step back: of 720 cylinders 2.3 %
-    // and 16 % were missed, 3 of 5,040 and 43 of 720 by a fault.
+    // The bar is none. More than is allowed here would be a step back: of 240 cylinders 2.8 %
+    // and 18 % were missed, none of 1,688 and 17 of 232 by a fault.
     let [
         [fine, fine_missed, fine_alarms],
         [coarse, coarse_missed, coarse_alarms],
