@@ -259,7 +259,6 @@ impl Supervisor {
     }
 
     /// Sends an event through the mode table: the only place that changes the mode.
-    #[inline(never)]
     pub fn apply(&mut self, event: Event, at: Micros) -> Result<Mode, Refusal> {
         let before = self.mode;
         let next = before.after(event)?;
@@ -310,8 +309,6 @@ impl Supervisor {
     }
 
     /// Latches a fault and applies the event it stands for.
-    #[cold]
-    #[inline(never)]
     pub fn fault(&mut self, fault: Fault, event: Event, at: Micros) {
         if self.faults.latch(fault, at) {
             let mode = u16::from(self.mode as u8);

@@ -1,7 +1,7 @@
 //! The two chambers: pressures from what the valves let through.
 
 use super::model::AxisModel;
-use super::{clip, part, scaled, square_root, within};
+use super::{part, scaled, square_root};
 use wheeleg_units::Duty;
 
 /// Subsonic flow of ISO 6358: constants of one critical ratio b.
@@ -162,7 +162,7 @@ impl AxisModel {
             .saturating_sub(self.force_rod)
     }
 
-    /// A force as a share of what the supply can give, in steps of 2^-14.
+    /// A force that the supply can give as a share of its largest, in steps of 2^-14.
     #[inline]
     pub(super) fn duty(&self, force: i32) -> Duty {
         let share = if force > 0 {
@@ -170,8 +170,7 @@ impl AxisModel {
         } else {
             self.share_in
         };
-        // Forces below 2^26 mN, shares below 2^31: below 2^31.
-        let share = part(clip::<26>(force), share, 26);
-        Duty::from_raw(within(share, 1 << 14).wrapping_shl(16))
+        // Within ±2^14.
+        Duty::from_raw(part(force, share, 26).wrapping_shl(16))
     }
 }

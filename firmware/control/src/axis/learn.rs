@@ -74,7 +74,7 @@ impl Learner {
     }
 
     /// Sum of it.
-    #[inline(never)]
+    #[inline]
     fn sum(&self) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {

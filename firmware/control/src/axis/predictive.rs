@@ -166,7 +166,7 @@ pub struct Predictive {
     plan: OnTimes,
 
     // For the record.
-    /// Force that was asked for, mN; the duty follows two ticks later.
+    /// Force that was asked for, as far as it is possible, mN; the duty follows two ticks later.
     asked: i32,
     duty: Duty,
     limited: bool,

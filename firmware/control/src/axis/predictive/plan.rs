@@ -83,7 +83,7 @@ impl Predictive {
             }
         }
         self.limited = possible != force;
-        self.asked = force;
+        self.asked = possible;
         self.rest_check = self.sum_of_rest();
     }
 

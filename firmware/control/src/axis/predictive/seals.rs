@@ -66,9 +66,7 @@ impl Predictive {
 
     #[inline]
     pub(super) fn sum_of_motion(&self) -> u32 {
-        // The last stroke uses the mass, too.
-        let sum = mix(self.motion.sum(0), self.inertia.mass);
-        mix(mix(sum, self.force), self.wanted)
+        mix(mix(self.motion.sum(0), self.force), self.wanted)
     }
 
     #[inline]
@@ -85,7 +83,8 @@ impl Predictive {
     }
 
     /// Whether what the stroke to come works with, and the `Hash` leaves out, is as it was left.
-    /// Speed and rest that every tick tells are those of the last look.
+    /// Speed and rest that every tick tells are those of the last look; the mass, by which the last
+    /// stroke judges rest, is looked at by the stroke before it.
     #[inline]
     #[must_use]
     pub fn kept_is_sound(&self) -> bool {
