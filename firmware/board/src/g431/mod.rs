@@ -25,7 +25,6 @@ pub mod identity;
 pub mod inhibit;
 #[cfg(feature = "outputs")]
 pub mod latch;
-mod memory;
 #[cfg(feature = "mutant")]
 mod mutant;
 #[cfg(feature = "outputs")]
