@@ -8,8 +8,8 @@
 //! that come and go: they say which limit shaped the output in this tick, and
 //! never stop anything.
 
+use crate::le;
 use crate::wire::{UnknownValue, WireSize};
-use postcard::fixint::le;
 use serde::{Deserialize, Serialize};
 
 /// What a number means by its range.

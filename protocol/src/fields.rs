@@ -1,7 +1,7 @@
 //! Field types of messages: enumerations and checked numbers.
 
+use crate::le;
 use crate::wire::{WireSize, wire_bits, wire_enum};
-use postcard::fixint::le;
 use serde::{Deserialize, Serialize};
 use wheeleg_units::WheelCount;
 

@@ -48,6 +48,7 @@ pub mod decoder;
 pub mod fault;
 pub mod fields;
 pub mod frame;
+mod le;
 pub mod link;
 pub mod log;
 pub mod message;

@@ -13,9 +13,9 @@ use crate::fields::{
     OpenMode, ResetCause, Speed7, WheelControlMode,
 };
 use crate::frame::MAX_PAYLOAD;
+use crate::le;
 use crate::sync::{SyncFlags, SyncSlots};
 use crate::wire::{FieldSchema, MessageSchema, WireSize};
-use postcard::fixint::le;
 use serde::{Deserialize, Serialize};
 use wheeleg_units::{Duty, PositionMm, VelocityMmS, WheelCount, WireDuty, WireVelocity};
 

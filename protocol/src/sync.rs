@@ -1,9 +1,10 @@
 //! The set-point slot of SYNC: ten bytes per node, with a joint and a wheel view.
 
+use crate::le;
 use crate::wire::{FieldSchema, WireSize, wire_bits, wire_enum};
 use core::num::NonZeroU8;
-use postcard::fixint::le;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use wheeleg_units::{PositionMm, VelocityMmS, WheelCount, WirePosition, WireVelocity};
 
 use crate::address::{Address, NODES};
@@ -286,8 +287,8 @@ impl JointSetpoint {
 /// The eight slots of SYNC, in address order: joints 1–6, wheels 7 and 8.
 ///
 /// Slots 6 and 7 can hold only what a wheel can use.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "[SyncSlot; NODES]", into = "[SyncSlot; NODES]")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(into = "[SyncSlot; NODES]")]
 pub struct SyncSlots([SyncSlot; NODES]);
 
 impl SyncSlots {
@@ -353,6 +354,32 @@ impl TryFrom<[SyncSlot; NODES]> for SyncSlots {
             .zip(&slots)
             .all(|(address, slot)| address.is_joint() || !slot.is_valid() || slot.fits_wheel());
         if sound { Ok(Self(slots)) } else { Err(BadSlot) }
+    }
+}
+
+/// In a loop: that of an array holds the code of a slot once for each.
+impl<'de> Deserialize<'de> for SyncSlots {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_tuple(NODES, Slots)
+    }
+}
+
+struct Slots;
+
+impl<'de> Visitor<'de> for Slots {
+    type Value = SyncSlots;
+
+    fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{NODES} slots")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut given: A) -> Result<SyncSlots, A::Error> {
+        let mut slots = [SyncSlot::NONE; NODES];
+        for (at, slot) in slots.iter_mut().enumerate() {
+            let missing = || A::Error::invalid_length(at, &self);
+            *slot = given.next_element()?.ok_or_else(missing)?;
+        }
+        SyncSlots::try_from(slots).map_err(A::Error::custom)
     }
 }
 

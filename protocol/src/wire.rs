@@ -2,7 +2,7 @@
 //!
 //! postcard writes most integers with variable length. Every message of this
 //! bus has one exact size, so multi-byte integers are written with
-//! `postcard::fixint::le`, and each field type states its size here. A test
+//! [`crate::le`], and each field type states its size here. A test
 //! serialises extreme values of every message and compares the two.
 
 /// A type with one exact size on the wire.

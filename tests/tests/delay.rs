@@ -112,8 +112,9 @@ fn the_default_law_starts_no_later_than_the_papers_from_a_stop() {
         Start::StopRest,
     ] {
         let (paper, ours) = (median_s(Law::Paper, start), median_s(Law::Default, start));
+        // It decides once in four ticks.
         assert!(
-            ours <= paper + 2e-3 && ours > 0.02,
+            ours <= paper + 4e-3 && ours > 0.02,
             "{start:?}: {ours} {paper}"
         );
     }

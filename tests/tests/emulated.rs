@@ -9,5 +9,6 @@ mod pil_driver;
 mod pil_faults;
 mod pil_flips;
 mod pil_images;
+mod pil_memory;
 mod pil_mutants;
 mod pil_store;

@@ -67,8 +67,8 @@ const MUTANTS: [(&str, &str, &[&str]); 5] = [
 /// The mark that such an image carries (firmware/board/src/g431/mutant.rs).
 const MUTANT_MARK: &str = "THIS_IMAGE_IS_WRONG_ON_PURPOSE";
 
-/// Saves parameters, for power cuts in mid-save.
-const PROBE: &str = "probe_store";
+/// What saves parameters, for power cuts in mid-save, and what copies and clears memory.
+const PROBES: [&str; 2] = ["probe_store", "probe_memory"];
 
 /// What a reachable panic leaves for the linker to complain about.
 const PANIC_SYMBOL: &str = "this_image_can_panic";
@@ -161,10 +161,12 @@ pub(crate) fn build_into(way: Way, folder: &Path) -> StepResult<Vec<Image>> {
 
 /// Builds the programs that exercise one driver on an emulated board.
 pub(crate) fn probes(way: Way, folder: &Path) -> StepResult {
-    run(&mut cargo(way, "build", "probe", PROBE)?)?;
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    fs::copy(product(way, PROBE), folder.join(format!("{PROBE}.elf")))
-        .with_context(|| format!("cannot copy the image {PROBE}"))?;
+    for probe in PROBES {
+        run(&mut cargo(way, "build", "probe", probe)?)?;
+        fs::copy(product(way, probe), folder.join(format!("{probe}.elf")))
+            .with_context(|| format!("cannot copy the image {probe}"))?;
+    }
     Ok(())
 }
 

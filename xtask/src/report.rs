@@ -31,7 +31,7 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Failed(error) => write!(f, "{error:#}"),
-            Self::Missing { tool, install } => f.write_str(&missing(tool, install)),
+            Self::Missing { tool, install } => write!(f, "missing {tool}; install with: {install}"),
         }
     }
 }
@@ -105,12 +105,8 @@ impl Report {
     }
 }
 
-fn missing(tool: &str, install: &str) -> String {
-    format!("missing {tool}; install with: {install}")
-}
-
 fn not_run(step: &str, tool: &str, install: &str) -> String {
-    format!("NOT RUN: {step}: {}", missing(tool, install))
+    format!("NOT RUN: {step}: missing {tool}; install with: {install}")
 }
 
 impl fmt::Display for Report {

@@ -19,7 +19,7 @@
 //! K = C ρ0 R T / area. So are the coefficients: there is no floating point in a
 //! board's control.
 
-pub mod air;
+mod air;
 mod data;
 pub mod gas;
 pub mod learn;
@@ -91,6 +91,17 @@ pub(crate) const fn mix(sum: u32, word: i32) -> u32 {
     // Odd multiplier (Knuth, 2^32 / golden ratio).
     sum.wrapping_mul(0x9E37_79B1)
         .wrapping_add(word.cast_unsigned())
+}
+
+/// What a word that is the `place`-th from the end of such a sum adds to it, per one.
+pub(crate) const fn weight(place: u32) -> u32 {
+    let mut weight = 1_u32;
+    let mut at = 0;
+    while at < place {
+        weight = mix(weight, 0);
+        at = at.wrapping_add(1);
+    }
+    weight
 }
 
 /// `value` limited to ±`bound`.

@@ -131,34 +131,22 @@ impl PwmTiming {
     }
 }
 
-/// Where a valve is in its period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-enum Phase {
-    /// In none: a pulse may begin.
-    #[default]
-    Idle,
-    /// The pulse has not ended yet.
-    Energised,
-    /// The pulse has ended, and a new one may not begin yet.
-    Ended,
-}
-
 /// One valve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Channel {
-    phase: Phase,
-    /// Time since the pulse began, at the next tick edge.
+    /// Time since the pulse began, at the next tick edge; 0 if there was none.
     elapsed: u32,
-    /// Length of the pulse that ended.
+    /// Length of the pulse that ended; 0 before it ends. [`DIRECT`]: no pulse is the PWM's.
     ended_at: u32,
     /// Pulses begun since power-on, wrapping.
     pulses: u32,
 }
 
+/// No length of a pulse, and no single bit away from one.
+const DIRECT: u32 = u32::MAX;
+
 impl Channel {
     const IDLE: Self = Self {
-        phase: Phase::Idle,
         elapsed: 0,
         ended_at: 0,
         pulses: 0,
@@ -167,22 +155,20 @@ impl Channel {
     /// On-time of the next tick for a pulse of [`PwmTiming::pulse`].
     #[inline]
     fn tick(&mut self, timing: &PwmTiming, pulse: u32) -> u16 {
-        if self.phase == Phase::Ended {
+        if self.ended_at != 0 {
             // A new pulse may begin once the valve has had the time to shut.
             let off = self.elapsed.wrapping_sub(self.ended_at);
             if self.elapsed < timing.period || off < timing.shortest_gap {
                 self.elapsed = self.elapsed.wrapping_add(timing.tick);
                 return 0;
             }
-            self.phase = Phase::Idle;
+            self.elapsed = 0;
+            self.ended_at = 0;
         }
-        if self.phase == Phase::Idle {
+        if self.elapsed == 0 {
             if pulse == 0 {
                 return 0;
             }
-            self.phase = Phase::Energised;
-            self.elapsed = 0;
-            self.ended_at = 0;
             self.pulses = self.pulses.wrapping_add(1);
         } else if self.elapsed >= timing.period && pulse > 0 {
             // A full pulse goes on: the next period follows without a gap.
@@ -191,28 +177,34 @@ impl Channel {
         // Below twice the period of at most a second.
         let on = pulse.saturating_sub(self.elapsed).min(timing.tick);
         if on < timing.tick {
-            self.phase = Phase::Ended;
+            // Not zero: a pulse that begins has some length.
             self.ended_at = self.elapsed.wrapping_add(on);
         }
         self.elapsed = self.elapsed.wrapping_add(timing.tick);
         // At most the tick, 2000.
         on as u16
     }
+
+    /// As it was, without what it was doing.
+    const fn freed(self) -> Self {
+        Self {
+            pulses: self.pulses,
+            ..Self::IDLE
+        }
+    }
 }
 
 impl Hash for Channel {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. The phase goes into
-        // the word of the time: a flipped bit of either flips one of it. The count
-        // shapes no output.
+        // Taken apart, so that a new field cannot be forgotten here. The count shapes no
+        // output.
         let Self {
-            phase,
             elapsed,
             ended_at,
             pulses: _,
         } = self;
-        state.write_u32(elapsed ^ (*phase as u32).rotate_right(8));
+        state.write_u32(*elapsed);
         state.write_u32(*ended_at);
     }
 }
@@ -222,6 +214,8 @@ impl Hash for Channel {
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],
+    /// Valves that were on in the last tick of [`ValvePwm::direct`], a bit each: 15, 31, 14, 30.
+    given: u32,
 }
 
 impl ValvePwm {
@@ -231,6 +225,7 @@ impl ValvePwm {
         Self {
             timing,
             channels: [Channel::IDLE; VALVE_COUNT],
+            given: 0,
         }
     }
 
@@ -243,9 +238,8 @@ impl ValvePwm {
     /// What a tick changes: all but the timing, to be sealed apart from it.
     #[inline]
     #[must_use]
-    pub fn state(&self) -> impl Hash + '_ {
-        let [a, b, c, d] = &self.channels;
-        (a, b, c, d)
+    pub const fn state(&self) -> State<'_> {
+        State(self)
     }
 
     /// Changes the timing; running periods end by the new one.
@@ -257,6 +251,9 @@ impl ValvePwm {
     /// of a whole period or more keep a valve open without a gap. Never panics.
     #[must_use]
     pub fn tick(&mut self, openings: &ValveOpenings) -> OnTimes {
+        if self.is_direct() {
+            self.channels = self.channels.map(Channel::freed);
+        }
         let mut on = [0; VALVE_COUNT];
         // Pulse of the last opening: two valves mostly open alike.
         let (mut last, mut pulse) = (Micros::ZERO, 0);
@@ -281,35 +278,39 @@ impl ValvePwm {
         self.tick(&ValveOpenings::SHUT)
     }
 
-    /// On-times that a law chose itself: at most a tick each, passed through and
-    /// counted. A pulse that the PWM had under way is theirs to go on with.
+    /// On-times that a law chose itself, at most a tick each: passed through and
+    /// counted. Afterwards the PWM begins with idle valves.
     #[must_use]
     pub fn direct(&mut self, on: OnTimes) -> OnTimes {
-        let tick = self.timing.tick;
-        let mut sent = on;
-        for (on, channel) in sent.iter_mut().zip(&mut self.channels) {
-            if *on == 0 && channel.phase == Phase::Idle {
-                // A valve with nothing to do.
-                continue;
-            }
-            let time = u32::from(*on).min(tick);
-            // At most the tick, 2000.
-            *on = time as u16;
-            if time > 0 && channel.phase != Phase::Energised {
-                channel.pulses = channel.pulses.wrapping_add(1);
-                channel.elapsed = 0;
-            }
-            channel.elapsed = channel.elapsed.wrapping_add(time);
-            channel.phase = if time == tick {
-                Phase::Energised
-            } else if time > 0 {
-                Phase::Ended
-            } else {
-                Phase::Idle
-            };
-            channel.ended_at = 0;
+        if !self.is_direct() {
+            self.channels = self.channels.map(Channel::freed);
+            let [first, ..] = &mut self.channels;
+            first.ended_at = DIRECT;
+            self.given = 0;
         }
-        sent
+        // Two on-times a word; each, below 2^15, carries into its sixteenth bit unless it is 0.
+        let given = |low: u16, high: u16| {
+            let both = u32::from(low) | u32::from(high).wrapping_shl(16);
+            both.wrapping_add(0x7FFF_7FFF) & 0x8000_8000
+        };
+        debug_assert!(on.iter().all(|on| u32::from(*on) <= self.timing.tick));
+        let [a, b, c, d] = on;
+        let given = given(a, b) | given(c, d).wrapping_shr(1);
+        let begun = given & !self.given;
+        if begun != 0 {
+            for (channel, bit) in self.channels.iter_mut().zip([15, 31, 14, 30]) {
+                channel.pulses = channel.pulses.wrapping_add((begun >> bit) & 1);
+            }
+        }
+        self.given = given;
+        on
+    }
+
+    /// Whether the last tick was one of [`ValvePwm::direct`].
+    #[inline]
+    const fn is_direct(&self) -> bool {
+        let [first, ..] = &self.channels;
+        first.ended_at == DIRECT
     }
 
     /// Pulses begun per valve since power-on, wrapping: the switching count.
@@ -317,5 +318,27 @@ impl ValvePwm {
     #[must_use]
     pub fn pulses(&self) -> [u32; VALVE_COUNT] {
         self.channels.map(|channel| channel.pulses)
+    }
+}
+
+/// See [`ValvePwm::state`].
+#[derive(Clone, Copy, Debug)]
+pub struct State<'a>(&'a ValvePwm);
+
+impl Hash for State<'_> {
+    #[inline]
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let ValvePwm {
+            timing: _,
+            channels: [first, rest @ ..],
+            // It shapes no output.
+            given: _,
+        } = self.0;
+        first.hash(state);
+        if first.ended_at != DIRECT {
+            let [a, b, c] = rest;
+            (a, b, c).hash(state);
+        }
     }
 }

@@ -17,6 +17,19 @@ impl Clock {
     /// The unwrapped time of `now`.
     #[inline]
     pub fn unwrap(&mut self, now: Micros) -> u64 {
+        let low = (self.time_us & 0xFFFF_FFFF) as u32;
+        let step = now.get().wrapping_sub(low);
+        if !self.started || now.get() < low || step > i32::MAX as u32 {
+            return self.unwrap_far(now);
+        }
+        self.time_us = (self.time_us & !0xFFFF_FFFF) | u64::from(now.get());
+        self.time_us
+    }
+
+    /// The first instant, one in the past, or one in the counter's next round.
+    #[cold]
+    #[inline(never)]
+    fn unwrap_far(&mut self, now: Micros) -> u64 {
         if !self.started {
             self.started = true;
             self.time_us = u64::from(now.get());

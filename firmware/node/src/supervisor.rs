@@ -201,7 +201,7 @@ impl Supervisor {
     /// The oldest records of the log, which goes on for `lease_ms`.
     pub(crate) fn read_log(&mut self, lease_ms: u16, at: Micros) -> LogRecords {
         self.settle_log();
-        let now_us = self.clock.unwrap(at);
+        let now_us = self.time_us(at);
         self.log.read(lease_ms, now_us)
     }
 
@@ -246,7 +246,8 @@ impl Supervisor {
         self.link.state() == LinkState::Up
     }
 
-    /// The unwrapped time of `now`, µs since reset.
+    /// The unwrapped time of `now`, µs since reset. One copy for all but the tick.
+    #[inline(never)]
     pub fn time_us(&mut self, now: Micros) -> u64 {
         self.clock.unwrap(now)
     }
@@ -328,15 +329,20 @@ impl Supervisor {
     pub fn sync(&mut self, counter: u16, emergency: bool, at: Micros) -> bool {
         if emergency {
             // Even with a frozen counter: stopping needs no proof of freshness.
-            self.change(|own| own.emergency = true);
+            self.set_emergency(true);
             self.fault(Fault::EmergencyStop, Event::EmergencyStop, at);
         }
-        let at_us = self.clock.unwrap(at);
+        let at_us = self.time_us(at);
         let fresh = self.link.on_sync(counter, at_us);
         if fresh && emergency != self.emergency {
-            self.change(|own| own.emergency = emergency);
+            self.set_emergency(emergency);
         }
         fresh
+    }
+
+    #[inline(never)]
+    fn set_emergency(&mut self, emergency: bool) {
+        self.change(|own| own.emergency = emergency);
     }
 
     /// Takes the link-loss action of a fresh SYNC slot: whether the gait phase
@@ -408,7 +414,7 @@ impl Supervisor {
         if !healthy || self.emergency {
             return Err(Refusal::CausePresent);
         }
-        let now_us = self.clock.unwrap(at);
+        let now_us = self.time_us(at);
         self.link.clear(now_us).map_err(|_| Refusal::NoLink)?;
         let next = self.apply(Event::ClearFault, at)?;
         self.note(LogEvent::Cleared, 0, self.faults.latched().raw(), at);

@@ -11,10 +11,10 @@ use wheeleg_plant::chamber::GasModel;
 
 use super::design::axis_data;
 
-/// Steps above this share of what friction holds are coarse. Measured on 720 cylinders drawn
-/// at random, with 5,760 combinations of load, mass, supply, friction and delay
-/// (`cargo xtask deep cylinders` draws 240 of them): up to it 2.3 % of 5,040 missed their
-/// bars, three by a fault; above it 16 % of 720, 43 by a fault.
+/// Steps above this share of what friction holds are coarse. Measured on the 240 cylinders that
+/// `cargo xtask deep cylinders` draws at random, with 1,920 combinations of load, mass, supply,
+/// friction and delay: up to it 2.8 % of 1,688 missed their bars, none by a fault; above it 18 %
+/// of 232, 17 by a fault.
 pub const COARSE: f64 = 0.5;
 
 /// Smallest step of force, against what friction holds.

@@ -25,6 +25,7 @@ pub mod identity;
 pub mod inhibit;
 #[cfg(feature = "outputs")]
 pub mod latch;
+mod memory;
 #[cfg(feature = "mutant")]
 mod mutant;
 #[cfg(feature = "outputs")]

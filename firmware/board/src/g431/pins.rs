@@ -13,6 +13,7 @@ enum Mode {
 }
 
 /// Sets up one pin, 0…15. Outputs keep the level that ODR holds.
+#[inline(never)]
 fn configure(port: Gpio, pin: usize, mode: Mode) {
     // So that the compiler sees that the register crate's bounds hold.
     let pin = pin & 15;

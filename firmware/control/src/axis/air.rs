@@ -1,197 +1,259 @@
 //! The air of a cylinder: what was sent to the valves, followed into the chambers.
 
-use super::gas::{ChamberFlows, Pressures, Wanted, power};
+use super::gas::{ChamberFlows, power};
+use super::mix;
 use super::model::AxisModel;
-use super::valves::ValveTrack;
-use crate::pwm::OnTimes;
-use core::hash::{Hash, Hasher};
+use super::valves::{Ready, ValveTimes, ValveTrack};
 
 /// Highest pressure that is followed, 1/256 Pa (2.1 MPa).
 const MOST: i32 = (1 << 29) - 1;
 
-/// Pulses under way and pressures; valves in the order of [`OnTimes`].
+/// A moment of the periods, µs; wraps.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    /// Begin of the present period.
+    pub(super) now: u32,
+    /// Begin of the next one.
+    pub(super) next: u32,
+    /// The moment for which pressures are worked out: [`AxisModel::moment`] after the begin.
+    pub(super) moment: u32,
+}
+
+/// What a chamber is told of its geometry and of the piston.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piston {
+    /// Flow of an open valve as a speed of the piston, raw mm/s.
+    pub(super) flow: i32,
+    /// Length of the chamber in the middle of the period that ends at the moment, and where the
+    /// dead time ends, raw mm.
+    pub(super) lengths: [i32; 2],
+    /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
+    pub(super) speeds: [i32; 2],
+    /// Not 0: the stroke has time for the flows of valves that are shut.
+    pub(super) all_flows: i32,
+}
+
+/// Pulses under way and pressure of one chamber.
 #[derive(Clone, Debug)]
-pub struct Air {
-    valves: [ValveTrack; 4],
-    /// Open times of the tick that begins now, µs.
-    opening: [i32; 4],
-    pressures: Pressures,
-    /// End of the ticks taken so far, µs; wraps.
-    now: u32,
-    /// Flows of A and B at these pressures, as far as they are known.
-    flows: [ChamberFlows; 2],
-    /// Stiffness of A and B where they were last followed or looked ahead to.
-    stiffness: [i32; 2],
+pub(super) struct Chamber {
+    fill: ValveTrack,
+    vent: ValveTrack,
+    /// Sum of the pulses.
+    pulses_check: u32,
+    /// Pressure at the moment, 1/256 Pa.
+    pub(super) pressure: i32,
+    /// The same at the end of the dead time, with what has been committed to by then.
+    pub(super) expected: i32,
+    /// Sum of the pressures.
+    pressures_check: u32,
+    /// Flows at this pressure, as far as they are known.
+    flows: ChamberFlows,
+    /// Stiffness at the end of the dead time.
+    stiffness: i32,
+    /// What the valves can do in the next period.
+    ready: [Ready; 2],
+    /// Sum of these three.
+    means_check: u32,
 }
 
-impl Hash for Air {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Openings are
-        // narrower than a word: two share one.
-        let Self {
-            valves: [fill_a, vent_a, fill_b, vent_b],
-            opening: [first, second, third, fourth],
-            pressures,
-            now,
-            // Worked out anew in every tick.
-            flows: _,
-            stiffness: _,
-        } = self;
-        (fill_a, vent_a, fill_b, vent_b).hash(state);
-        state.write_i32(first ^ second.rotate_left(16));
-        state.write_i32(third ^ fourth.rotate_left(16));
-        pressures.hash(state);
-        state.write_u32(*now);
-    }
-}
-
-impl Air {
-    /// Valves shut, chambers at `pressure` (1/256 Pa absolute).
-    #[must_use]
-    pub fn new(pressure: i32) -> Self {
-        Self {
-            valves: [ValveTrack::new(); 4],
-            opening: [0; 4],
-            pressures: Pressures {
-                a: pressure,
-                b: pressure,
-            },
-            now: 0,
-            flows: [ChamberFlows::default(); 2],
-            stiffness: [0; 2],
-        }
-    }
-
-    /// Estimated pressures.
-    #[must_use]
-    pub const fn pressures(&self) -> Pressures {
-        self.pressures
-    }
-
-    /// One tick in which `sent` were the on-times last given out, with the piston at
-    /// `stroke` (raw mm) and `speed` (raw mm/s).
-    #[inline]
-    pub fn follow(&mut self, model: &AxisModel, stroke: i32, speed: i32, sent: &OnTimes) {
-        self.flows = [ChamberFlows::default(); 2];
-        let passed = self.after(model, self.opening, stroke, speed, model.times.tick);
-        // Never below half the atmosphere: a vacuum needs a motion of its own.
-        let least = model.ambient.wrapping_shr(1);
-        self.pressures = Pressures {
-            a: passed.a.max(least).min(MOST),
-            b: passed.b.max(least).min(MOST),
+impl Chamber {
+    /// Valves shut, at `pressure` (1/256 Pa absolute).
+    pub(super) fn new(pressure: i32) -> Self {
+        let mut chamber = Self {
+            fill: ValveTrack::new(),
+            vent: ValveTrack::new(),
+            pulses_check: 0,
+            pressure,
+            expected: pressure,
+            pressures_check: 0,
+            flows: ChamberFlows::default(),
+            stiffness: 0,
+            ready: [Ready::default(); 2],
+            means_check: 0,
         };
-        for ((opening, valve), &on) in self.opening.iter_mut().zip(&mut self.valves).zip(sent) {
-            *opening = valve.advance(self.now, i32::from(on), &model.times);
-        }
-        self.now = self.now.wrapping_add(model.times.tick as u32);
+        chamber.pulses_check = chamber.sum_of_pulses();
+        chamber.pressures_check = chamber.sum_of_pressures();
+        chamber.means_check = chamber.sum_of_means();
+        chamber
     }
 
-    /// Pressures at the end of the dead time, with what has been committed to by
-    /// then; the piston is at `stroke` then, and moves at `speed` until then.
     #[inline]
-    pub fn ahead(&mut self, model: &AxisModel, stroke: i32, speed: i32) -> Pressures {
-        let mut open = self.opening;
-        for (open, valve) in open.iter_mut().zip(&self.valves) {
-            *open = open.wrapping_add(valve.committed(self.now, &model.times));
-        }
-        self.after(model, open, stroke, speed, model.horizon_us)
+    fn sum_of_pulses(&self) -> u32 {
+        self.vent.sum(self.fill.sum(0))
     }
 
-    /// Pressures after the valves were `open` and the piston moved at `speed` for
-    /// `span` µs. Flows are those at the present pressures.
-    // One copy, compiled for speed: inlined, it would be where it is called.
+    #[inline]
+    const fn sum_of_pressures(&self) -> u32 {
+        mix(mix(0, self.pressure), self.expected)
+    }
+
+    #[inline]
+    const fn sum_of_means(&self) -> u32 {
+        let ChamberFlows { fill, vent } = self.flows;
+        let [first, second] = self.ready;
+        let sum = mix(mix(mix(0, fill), vent), self.stiffness);
+        mix(mix(sum, first.word()), second.word())
+    }
+
+    /// Whether the pulses under way are as they were left.
+    #[inline]
+    pub(super) fn pulses_are_sound(&self) -> bool {
+        self.pulses_check == self.sum_of_pulses()
+    }
+
+    /// Whether the pressures are as they were left.
+    #[inline]
+    pub(super) const fn pressures_are_sound(&self) -> bool {
+        self.pressures_check == self.sum_of_pressures()
+    }
+
+    /// Whether what the next pulses are made with is as it was left.
+    #[inline]
+    pub(super) const fn means_are_sound(&self) -> bool {
+        self.means_check == self.sum_of_means()
+    }
+
+    /// Coils that are on for these times of the `span` µs that begin `now`, fill and vent, µs,
+    /// where others decide than the plan; `cut` says that what was planned for later does not
+    /// happen. What was damaged before keeps its broken seal.
     #[inline(never)]
-    fn after(
+    pub(super) fn energise(
+        &mut self,
+        now: u32,
+        on: [u16; 2],
+        span: i32,
+        cut: bool,
+        times: &ValveTimes,
+    ) {
+        if on == [0; 2] && !cut && !self.fill.coil() && !self.vent.coil() {
+            return;
+        }
+        let sound = self.pulses_are_sound();
+        let [fill, vent] = on;
+        self.fill.decide(now, i32::from(fill), span, cut, times);
+        self.vent.decide(now, i32::from(vent), span, cut, times);
+        if sound {
+            self.pulses_check = self.sum_of_pulses();
+        }
+    }
+
+    /// Pressures at the moment and at the end of the dead time, and what the next pulses are
+    /// made with.
+    // Called in one place.
+    #[inline(always)]
+    pub(super) fn follow(
         &mut self,
         model: &AxisModel,
-        open: [i32; 4],
-        stroke: i32,
-        speed: i32,
-        span: i32,
-    ) -> Pressures {
-        let [fill_a, vent_a, fill_b, vent_b] = open;
-        let Pressures { a, b } = self.pressures;
-        let [flows_a, flows_b] = &mut self.flows;
-        flows_a.want(model, model.flow_a, a, wanted(fill_a, vent_a));
-        flows_b.want(model, model.flow_b, b, wanted(fill_b, vent_b));
-        let squeeze_a = power(a, speed.saturating_neg());
-        let squeeze_b = power(b, speed);
-        let (stiff_a, stiff_b) = (model.stiffness_a(stroke), model.stiffness_b(stroke));
-        let change_a = flows_a.change([fill_a, vent_a], squeeze_a, span, stiff_a);
-        let change_b = flows_b.change([fill_b, vent_b], squeeze_b, span, stiff_b);
-        self.stiffness = [stiff_a, stiff_b];
-        Pressures {
-            a: a.saturating_add(change_a),
-            b: b.saturating_add(change_b),
+        clock: &Clock,
+        piston: &Piston,
+        plan: Option<[u16; 2]>,
+    ) {
+        let times = &model.times;
+        let Clock { now, next, moment } = *clock;
+        let from = moment.wrapping_sub(times.period as u32);
+        let Self { fill, vent, .. } = self;
+        if let Some([fill_on, vent_on]) = plan {
+            fill.energise(now, i32::from(fill_on), times.period, times);
+            vent.energise(now, i32::from(vent_on), times.period, times);
+        }
+        let open = [
+            fill.passes(from, times.period),
+            vent.passes(from, times.period),
+        ];
+        let committed = [
+            fill.committed(moment, next, times),
+            vent.committed(moment, next, times),
+        ];
+        self.ready = [fill.ready(next, times), vent.ready(next, times)];
+        self.pulses_check = self.sum_of_pulses();
+
+        let Piston {
+            flow,
+            lengths,
+            speeds: [speed, speed_ahead],
+            all_flows,
+        } = *piston;
+        let [length, length_ahead] = lengths;
+        let stiffness = model.stiffness(length);
+        let ahead = model.stiffness(length_ahead);
+        let p = self.pressure;
+        let [[fill, vent], [more_fill, more_vent]] = [open, committed];
+        // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
+        let flows = ChamberFlows::of(
+            model,
+            flow,
+            p.saturating_add(self.expected) >> 1,
+            fill | more_fill | all_flows != 0,
+            vent | more_vent | all_flows != 0,
+        );
+        let change = flows.change(open, power(p, speed), times.period, stiffness);
+        // No valve fills beyond the supply or vents below the atmosphere, however long a step is
+        // for a small chamber. A vacuum of more than half of it needs a motion of its own.
+        let within = |p: i32, fill: i32, vent: i32| {
+            let most = if fill > 0 { model.supply } else { MOST };
+            let least = if vent > 0 {
+                model.ambient
+            } else {
+                model.ambient.wrapping_shr(1)
+            };
+            p.max(least).min(most)
+        };
+        let p = within(p.saturating_add(change), fill, vent);
+        let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
+        self.flows = flows;
+        self.stiffness = ahead;
+        self.means_check = self.sum_of_means();
+        self.pressure = p;
+        self.expected = within(p.saturating_add(change), fill | more_fill, vent | more_vent);
+        self.pressures_check = self.sum_of_pressures();
+    }
+
+    /// On-times of the next period that bring the chamber from what is expected to `target`,
+    /// fill and vent, µs. The valve that would undo it shuts as soon as its pulse allows.
+    #[inline]
+    pub(super) fn pulses(&self, model: &AxisModel, flow: i32, target: i32) -> [u16; 2] {
+        let change = target.saturating_sub(self.expected);
+        let [ready_fill, ready_vent] = self.ready;
+        let times = &model.times;
+        if change > 0 {
+            let power = match self.flows.fill {
+                0 => model.curve.power(model.supply, self.pressure, flow),
+                known => known,
+            };
+            let need = ChamberFlows::need(power, change, self.stiffness);
+            [
+                microseconds(ready_fill.on_time(need, ready_vent.coil(), times)),
+                microseconds(ready_vent.rest(times)),
+            ]
+        } else {
+            let power = match self.flows.vent {
+                0 => model.curve.power(self.pressure, model.ambient, flow),
+                known => known,
+            };
+            let need = ChamberFlows::need(power, change.saturating_neg(), self.stiffness);
+            [
+                microseconds(ready_fill.rest(times)),
+                microseconds(ready_vent.on_time(need, ready_fill.coil(), times)),
+            ]
         }
     }
 
-    /// On-times of the next tick that bring the chambers from `expected`, where they were
-    /// last looked [`Air::ahead`] to, to `target`.
+    /// Whether both coils are off at the begin of the next period.
     #[inline]
-    pub fn pulses(&mut self, model: &AxisModel, expected: Pressures, target: Pressures) -> OnTimes {
-        let [fill_a, vent_a, fill_b, vent_b] = &self.valves;
-        let [flows_a, flows_b] = &mut self.flows;
-        let [stiff_a, stiff_b] = self.stiffness;
-        let change = target.a.saturating_sub(expected.a);
-        flows_a.want(
-            model,
-            model.flow_a,
-            self.pressures.a,
-            wanted(change, change.saturating_neg()),
-        );
-        let needs = flows_a.needs(change, stiff_a);
-        let [first, second] = pair(model, self.now, needs, fill_a, vent_a);
-        let change = target.b.saturating_sub(expected.b);
-        flows_b.want(
-            model,
-            model.flow_b,
-            self.pressures.b,
-            wanted(change, change.saturating_neg()),
-        );
-        let needs = flows_b.needs(change, stiff_b);
-        let [third, fourth] = pair(model, self.now, needs, fill_b, vent_b);
-        [first, second, third, fourth]
+    pub(super) const fn idle(&self) -> bool {
+        let [fill, vent] = self.ready;
+        !fill.coil() && !vent.coil()
     }
 
     /// Everything shut as soon as the pulses under way allow.
     #[inline]
-    #[must_use]
-    pub fn shut(&self, model: &AxisModel) -> OnTimes {
-        let mut on = [0; 4];
-        for (on, valve) in on.iter_mut().zip(&self.valves) {
-            *on = microseconds(valve.on_time(self.now, 0, true, &model.times));
-        }
-        on
+    pub(super) fn shut(&self, model: &AxisModel) -> [u16; 2] {
+        let times = &model.times;
+        self.ready.map(|ready| microseconds(ready.rest(times)))
     }
 }
 
-#[inline]
-const fn wanted(fill: i32, vent: i32) -> Wanted {
-    Wanted {
-        fill: fill > 0,
-        vent: vent > 0,
-    }
-}
-
-/// On-times of a chamber's two valves for the openings that they need, µs.
-#[inline]
-fn pair(
-    model: &AxisModel,
-    now: u32,
-    needs: [i32; 2],
-    fill: &ValveTrack,
-    vent: &ValveTrack,
-) -> [u16; 2] {
-    let [fill_need, vent_need] = needs;
-    [
-        microseconds(fill.on_time(now, fill_need, vent.coil(), &model.times)),
-        microseconds(vent.on_time(now, vent_need, fill.coil(), &model.times)),
-    ]
-}
-
-/// An on-time, 0…tick (at most 2000).
+/// An on-time, 0…period (at most 8000).
 #[inline]
 const fn microseconds(on: i32) -> u16 {
     on as u16

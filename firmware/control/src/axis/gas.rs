@@ -2,14 +2,15 @@
 
 use super::model::AxisModel;
 use super::{part, scaled, square_root};
+use wheeleg_units::Duty;
 
-/// Subsonic flow of ISO 6358: constants of one critical ratio.
+/// Subsonic flow of ISO 6358: constants of one critical ratio b.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct FlowCurve {
-    /// Critical ratio b, × 2^15.
-    pub critical: u32,
-    /// 1/(1 − b), × 2^15.
-    pub stretch: u32,
+    /// 1/(1 − b), × 2^19.
+    pub stretch: i32,
+    /// b/(1 − b), × 2^19.
+    pub choked: i32,
 }
 
 impl FlowCurve {
@@ -21,27 +22,22 @@ impl FlowCurve {
     pub fn drive(&self, from: i32, to: i32) -> i32 {
         let forward = from >= to;
         let (high, low) = if forward { (from, to) } else { (to, from) };
-        // In 32 Pa: 16 bits.
-        let coarse = |pressure: i32| pressure.max(0).wrapping_shr(13) as u32;
-        let (p1, p2) = (coarse(high), coarse(low));
-        let above = p2
-            .wrapping_shl(15)
-            .saturating_sub(p1.wrapping_mul(self.critical));
-        let drive = if above == 0 {
+        // In 32 Pa: 17 bits.
+        let y = part(low, self.stretch, 32).wrapping_sub(part(high, self.choked, 32));
+        let drive = if y <= 0 {
             high
         } else {
-            let y = u64::from(above)
-                .wrapping_mul(u64::from(self.stretch))
-                .wrapping_shr(30) as u32;
-            let square = p1.saturating_sub(y).wrapping_mul(p1.wrapping_add(y));
-            square_root(square).wrapping_shl(13) as i32
+            let p1 = high.max(0).wrapping_shr(13);
+            // Rounded, y may be more than p₁ by one.
+            let square = p1.wrapping_sub(y).max(0).wrapping_mul(p1.wrapping_add(y));
+            square_root(square.cast_unsigned()).wrapping_shl(13) as i32
         };
         if forward { drive } else { drive.wrapping_neg() }
     }
 
     /// The same as a power, for an open valve's `flow` as a speed of the piston.
     #[inline(never)]
-    fn power(&self, from: i32, to: i32, flow: i32) -> i32 {
+    pub(super) fn power(&self, from: i32, to: i32, flow: i32) -> i32 {
         power(self.drive(from, to), flow)
     }
 }
@@ -58,8 +54,8 @@ pub struct Pressures {
 /// What flows through the valves of one chamber while they are open, as powers:
 /// pressure times a speed of the piston, in 2^8 Pa mm/s.
 ///
-/// Neither the piston's place nor the time is in them, so that those of one tick
-/// serve for that tick and for the dead time ahead.
+/// Neither the piston's place nor the time is in them, so that those of one period
+/// serve for that period and for the dead time ahead.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ChamberFlows {
     /// Through the open fill valve; 0 until asked for.
@@ -76,48 +72,53 @@ pub(super) const fn power(pressure: i32, speed: i32) -> i32 {
 }
 
 impl ChamberFlows {
-    /// Works out the flows that are `wanted` and not yet known, for an open valve's
-    /// `flow` as a speed of the piston, raw mm/s.
+    /// Those that are asked for, at `pressure`, for an open valve's `flow` as a speed of the
+    /// piston, raw mm/s.
     #[inline]
-    pub fn want(&mut self, model: &AxisModel, flow: i32, pressure: i32, wanted: Wanted) {
-        if wanted.fill && self.fill == 0 {
-            self.fill = model.curve.power(model.supply, pressure, flow);
-        }
-        if wanted.vent && self.vent == 0 {
-            self.vent = model.curve.power(pressure, model.ambient, flow);
+    pub(super) fn of(model: &AxisModel, flow: i32, pressure: i32, fill: bool, vent: bool) -> Self {
+        let curve = &model.curve;
+        Self {
+            fill: if fill {
+                curve.power(model.supply, pressure, flow)
+            } else {
+                0
+            },
+            vent: if vent {
+                curve.power(pressure, model.ambient, flow)
+            } else {
+                0
+            },
         }
     }
 
     /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
     /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
-    /// `stiffness` ([`AxisModel::stiffness_a`]).
+    /// `stiffness` ([`AxisModel::stiffness`]).
     #[inline]
     #[must_use]
     pub fn change(&self, open: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
         let [fill, vent] = open;
         let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
-        // Powers below 2^28, times below 2^17: 2^24 Pa mm/s µs below 2^31.
+        // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
         let work = product(self.fill, fill)
             .wrapping_sub(product(self.vent, vent))
             .wrapping_add(product(squeeze, span))
             .wrapping_add(1 << 15)
             .wrapping_shr(16) as i32;
-        // × n/L: see `stiffness_a`.
+        // × n/L: see `AxisModel::stiffness`.
         scaled(work, stiffness, 10)
     }
 
-    /// Openings of the fill and of the vent valve, µs, that change the pressure by
-    /// `change` (1/256 Pa). The flow that does it must be known.
+    /// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa,
+    /// not negative).
     #[inline]
     #[must_use]
-    pub fn needs(&self, change: i32, stiffness: i32) -> [i32; 2] {
-        let power = if change > 0 { self.fill } else { self.vent };
+    pub fn need(power: i32, change: i32, stiffness: i32) -> i32 {
         // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
         let rate = part(power, stiffness, 22).max(SLOWEST);
         // Below 2^31.
-        let size = change.saturating_abs().min(500_000 << 8).wrapping_shl(4);
-        let need = size.checked_div(rate).unwrap_or(0);
-        if change > 0 { [need, 0] } else { [0, need] }
+        let size = change.min(500_000 << 8).wrapping_shl(4);
+        size.checked_div(rate).unwrap_or(0)
     }
 }
 
@@ -126,34 +127,28 @@ const SHORTEST: i32 = 4 << 8;
 /// Slowest change of pressure that is counted on, 1/256 Pa per 16 µs (50 Pa/ms).
 const SLOWEST: i32 = 205;
 
-/// Which flows of a chamber are wanted; what is not costs nothing.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Wanted {
-    /// Filling.
-    pub fill: bool,
-    /// Venting.
-    pub vent: bool,
-}
-
 impl AxisModel {
-    /// n / L of chamber A with the piston at `stroke` (raw mm), × 1.048576 × 2^22 / mm:
+    /// Length of chamber A with the piston at `stroke`, raw mm.
+    #[inline]
+    #[must_use]
+    pub(super) const fn length_a(&self, stroke: i32) -> i32 {
+        stroke.saturating_add(self.lead_a)
+    }
+
+    /// Length of chamber B.
+    #[inline]
+    #[must_use]
+    pub(super) const fn length_b(&self, stroke: i32) -> i32 {
+        self.stroke
+            .saturating_sub(stroke)
+            .saturating_add(self.lead_b)
+    }
+
+    /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:
     /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
     #[inline]
     #[must_use]
-    pub fn stiffness_a(&self, stroke: i32) -> i32 {
-        self.stiffness(stroke.saturating_add(self.lead_a))
-    }
-
-    /// n / L of chamber B.
-    #[inline]
-    #[must_use]
-    pub fn stiffness_b(&self, stroke: i32) -> i32 {
-        let length = self.stroke.saturating_sub(stroke);
-        self.stiffness(length.saturating_add(self.lead_b))
-    }
-
-    #[inline]
-    fn stiffness(&self, length: i32) -> i32 {
+    pub(super) fn stiffness(&self, length: i32) -> i32 {
         let short = length.wrapping_shr(8).max(SHORTEST);
         self.exponent.checked_div(short).unwrap_or(0)
     }
@@ -165,5 +160,17 @@ impl AxisModel {
         part(p.a, self.force_a, 32)
             .saturating_sub(part(p.b, self.force_b, 32))
             .saturating_sub(self.force_rod)
+    }
+
+    /// A force that the supply can give as a share of its largest, in steps of 2^-14.
+    #[inline]
+    pub(super) fn duty(&self, force: i32) -> Duty {
+        let share = if force > 0 {
+            self.share_out
+        } else {
+            self.share_in
+        };
+        // Within ±2^14.
+        Duty::from_raw(part(force, share, 26).wrapping_shl(16))
     }
 }

@@ -2,16 +2,22 @@
 
 use super::model::AxisModel;
 use super::{clip, mix, part, quotient, scaled, within};
-use core::hash::{Hash, Hasher};
 
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
 const STICK: i32 = 4 << 16;
+
+/// Slower than this, raw mm/s, a piston that is pressed against an end stop stays there (20 mm/s).
+const REBOUND: i32 = 20 << 16;
 
 /// A piston that stands so near to an end stop leans on it, raw mm (1 mm).
 const STOP_ZONE: i32 = 1 << 16;
 
 /// Length before an end stop in which a cushion may act, raw mm (6 mm).
 const CUSHION: i32 = 6 << 16;
+
+/// Share of the friction told that the observer counts on, × 2^16 (0.92): what is less than told
+/// would let it overlook speed.
+const RUBS: i32 = 60_293;
 
 /// Least mass that is counted on, kg × 2^16 (0.02 kg): the least that may be told.
 const LIGHTEST: i32 = 1311;
@@ -33,12 +39,10 @@ pub struct Inertia {
     pub linear: i32,
     /// Load per innovation, mN/mm.
     pub load_gain: i32,
-    /// Speed from which the whole Coulomb friction acts, raw mm/s: not much less than
-    /// what it takes off in a tick, or the estimate of a light piston that stands
-    /// would jump from side to side for ever.
-    pub slides: i32,
-    /// Coulomb friction below it, mN per raw mm/s × 2^18.
-    pub grip: i32,
+    /// Speed that Coulomb friction takes off in a period, raw mm/s.
+    pub rubbed: i32,
+    /// Speed that it takes off in the dead time, raw mm/s.
+    pub rubbed_ahead: i32,
     /// Sum of all these.
     check: u32,
 }
@@ -56,10 +60,7 @@ impl Inertia {
         // 1/kg = mm/s² per mN: 2^(24+16) / raw kg.
         let per_force = quotient(1 << 40, unsigned, 0);
         let share = if mass > model.nimble_mass {
-            cube_root(
-                quotient(u64::from(model.nimble_mass.cast_unsigned()), unsigned, 16)
-                    .cast_unsigned(),
-            )
+            cube_root(part(model.nimble_mass, per_force, 10).cast_unsigned())
         } else {
             1 << 16
         };
@@ -68,24 +69,19 @@ impl Inertia {
         let slope = part(model.slope, share, 16).max(1 << 8);
         // 2^32 / (2 slope²) with slope × 2^8, below 2^16: 2^47 / slope².
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
-        let taken = scaled(scaled(model.coulomb, per_force, 24), model.tick, 16);
-        // Six tenths of it: a tick then turns at most two thirds of a speed round.
-        let slides = part(taken, 39_322, 16).max(STICK);
+        let rubs = scaled(part(model.coulomb, RUBS, 16), per_force, 24);
         let made = Self {
             mass,
             per_force,
-            slides,
-            grip: quotient(
-                u64::from(model.coulomb.cast_unsigned()),
-                slides.cast_unsigned(),
-                18,
-            ),
             slope,
             damping: part(model.damping, share, 16),
             // Below 2^18 mm/s², 27 g: the speed law takes it × 2^13.
             brake: part(model.brake, squared, 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
-            load_gain: part(model.observe_load, mass, 16),
+            // Below 2^27: times an innovation it fits.
+            load_gain: part(model.observe_load, mass, 16).min((1 << 27) - 1),
+            rubbed: scaled(rubs, model.period, 16),
+            rubbed_ahead: scaled(rubs, model.horizon, 16),
             check: 0,
         };
         Self {
@@ -105,8 +101,8 @@ impl Inertia {
             brake,
             linear,
             load_gain,
-            slides,
-            grip,
+            rubbed,
+            rubbed_ahead,
             check: _,
         } = *self;
         let sum = 0;
@@ -117,8 +113,8 @@ impl Inertia {
         let sum = mix(sum, brake);
         let sum = mix(sum, linear);
         let sum = mix(sum, load_gain);
-        let sum = mix(sum, slides);
-        mix(sum, grip)
+        let sum = mix(sum, rubbed);
+        mix(sum, rubbed_ahead)
     }
 
     /// Whether all of it is as it was made.
@@ -128,29 +124,29 @@ impl Inertia {
         self.check == self.sum()
     }
 
-    /// Acceleration of a force in mN, mm/s², within ±2^22 (427 g).
+    /// Acceleration of a force in mN, mm/s², within ±2^21 (213 g): what it gains in 8 ms fits
+    /// raw mm/s.
     #[inline]
     #[must_use]
     pub fn acceleration(&self, force: i32) -> i32 {
         // Forces below 2^25 mN (33 kN), 2^40 over the least mass below 2^30: it fits.
-        clip::<23>(part(clip::<26>(force), self.per_force, 24))
+        clip::<22>(part(clip::<26>(force), self.per_force, 24))
     }
 }
 
-/// Cube root of a share × 2^16 of at most one.
+/// Cube root, × 2^16, of a share × 2^30 of at most one.
 ///
 /// Newton's method on a share that is brought into 1/8…1 by shifts of three bits: the
 /// chord is within a ninth of the root there, and a step squares that.
 fn cube_root(share: u32) -> i32 {
-    if share >= 1 << 16 {
+    if share >= 1 << 30 {
         return 1 << 16;
     }
     if share == 0 {
         return 0;
     }
-    // Below 2^16: it fits 32 bits with 16 bits more.
-    let third = share.leading_zeros().wrapping_sub(16) / 3;
-    let near = share.wrapping_shl(third.wrapping_mul(3));
+    let third = share.leading_zeros().wrapping_sub(2) / 3;
+    let near = share.wrapping_shl(third.wrapping_mul(3)).wrapping_shr(14);
     // The chord from 1/8 to 1.
     let mut root = near
         .wrapping_mul(9362)
@@ -164,7 +160,7 @@ fn cube_root(share: u32) -> i32 {
     root.wrapping_shr(third) as i32
 }
 
-/// Estimated motion.
+/// Estimated motion, of the moment of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Motion {
     /// Stroke, raw mm.
@@ -173,44 +169,44 @@ pub struct Motion {
     pub speed: i32,
     /// Force from outside and what the model does not know, mN, positive extends.
     pub load: i32,
-    /// Acceleration, mm/s².
-    pub acceleration: i32,
-    /// Friction as it acts against the motion, mN.
-    pub friction: i32,
+    /// Speed gained in the last period, raw mm/s.
+    pub gained: i32,
     /// Held by its friction.
     pub stuck: bool,
 }
 
-impl Hash for Motion {
+/// What is left of a speed that loses `taken` to friction, which turns nothing round.
+#[inline]
+pub(super) fn rubbed(speed: i32, taken: i32) -> i32 {
+    speed.saturating_sub(within(speed, taken))
+}
+
+impl Motion {
+    /// Adds itself to a sum.
     #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. What an update
-        // works out before anything reads it is not kept from tick to tick.
+    pub(super) fn sum(&self, sum: u32) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             stroke,
             speed,
             load,
-            acceleration: _,
-            friction: _,
-            stuck: _,
-        } = self;
-        state.write_i32(*stroke);
-        state.write_i32(*speed);
-        state.write_i32(*load);
+            gained,
+            stuck,
+        } = *self;
+        // A flipped bit of either flips one of it.
+        let gained = gained ^ i32::from(stuck).wrapping_shl(31);
+        mix(mix(mix(mix(sum, stroke), speed), load), gained)
     }
-}
 
-impl Motion {
     /// Within a millimetre of an end stop.
     #[must_use]
     pub fn at_stop(&self, model: &AxisModel) -> bool {
         self.stroke < STOP_ZONE || self.stroke > model.stroke.saturating_sub(STOP_ZONE)
     }
 
-    /// One tick: predicts with the pressure force of that tick, corrects with
-    /// the measured stroke.
+    /// One period, in which the chambers made `force` in the mean.
     #[inline]
-    pub fn update(&mut self, model: &AxisModel, inertia: &Inertia, force: i32, measured: i32) {
+    pub fn predict(&mut self, model: &AxisModel, inertia: &Inertia, force: i32) {
         let drive = force.saturating_add(self.load);
         // Pressed against an end stop, the stop takes what is left of the force.
         let against_stop = if drive > 0 {
@@ -218,26 +214,30 @@ impl Motion {
         } else {
             self.stroke < STOP_ZONE
         };
-        self.stuck = self.speed.wrapping_abs() < STICK
-            && (against_stop || drive.saturating_abs() < model.breakaway);
-        self.friction = if self.stuck {
-            drive
+        // A rebound from it is over within the period.
+        self.stuck = if against_stop {
+            (self.speed ^ drive) >= 0 || self.speed.wrapping_abs() < REBOUND
         } else {
-            part(within(self.speed, inertia.slides), inertia.grip, 18).saturating_add(part(
-                self.speed,
-                model.viscous,
-                24,
-            ))
+            self.speed.wrapping_abs() < STICK && drive.saturating_abs() < model.breakaway
         };
-        self.acceleration = inertia.acceleration(drive.saturating_sub(self.friction));
-        // mm/s² × s × 2^32 to raw mm/s: / 2^16. A tick is below 2^24: it fits.
-        let gained = part(self.acceleration, model.tick, 16);
-        let mean = self.speed.saturating_add(gained.wrapping_shr(1));
-        self.stroke = self.stroke.saturating_add(part(mean, model.tick, 32));
-        self.speed = self.speed.saturating_add(gained);
-        if self.stuck {
-            self.speed = self.speed.wrapping_sub(self.speed.wrapping_shr(3));
-        }
+        let speed = if self.stuck {
+            // A bit more than half of it.
+            part(self.speed, 38_400, 16)
+        } else {
+            let sliding = drive.saturating_sub(part(self.speed, model.viscous, 24));
+            // mm/s² × s × 2^32 to raw mm/s: / 2^16.
+            let gained = part(inertia.acceleration(sliding), model.period, 16);
+            rubbed(self.speed.saturating_add(gained), inertia.rubbed)
+        };
+        self.gained = speed.saturating_sub(self.speed);
+        let mean = self.speed.saturating_add(self.gained.wrapping_shr(1));
+        self.stroke = self.stroke.saturating_add(part(mean, model.period, 32));
+        self.speed = speed;
+    }
+
+    /// Corrects with the stroke measured at the moment; gives by how much that is more.
+    #[inline]
+    pub fn correct(&mut self, model: &AxisModel, inertia: &Inertia, measured: i32) {
         // Below 2^19; the shares below 2^24: what follows fits.
         let innovation = within(measured.saturating_sub(self.stroke), 8 << 16);
         self.stroke = self
@@ -280,8 +280,9 @@ mod tests {
                     speed: speed << 16,
                     ..Motion::default()
                 };
-                for _ in 0..200 {
-                    motion.update(&model, &inertia, 0, place);
+                for _ in 0..50 {
+                    motion.predict(&model, &inertia, 0);
+                    motion.correct(&model, &inertia, place);
                 }
                 assert!(
                     motion.stuck && motion.speed.abs() < STICK / 4,
@@ -304,8 +305,8 @@ mod tests {
             |own| &mut own.brake,
             |own| &mut own.linear,
             |own| &mut own.load_gain,
-            |own| &mut own.slides,
-            |own| &mut own.grip,
+            |own| &mut own.rubbed,
+            |own| &mut own.rubbed_ahead,
         ];
         for word in words {
             for bit in 0..32 {
@@ -333,7 +334,6 @@ mod tests {
                 (inertia.brake, f64::from(model.brake) * share * share),
                 (inertia.linear, 2_f64.powi(47) / (slope * slope)),
             ] {
-                // The ratio of the masses is in steps of 2^-16.
                 let difference = (f64::from(value) - exact).abs();
                 assert!(
                     difference <= 2.0 + 2e-3 * exact,
@@ -370,9 +370,16 @@ mod tests {
     #[test]
     fn cube_roots() {
         assert_eq!(cube_root(0), 0);
-        assert_eq!(cube_root(1 << 16), 1 << 16);
-        for share in [1_u32, 100, 8192, 30_000, 65_000] {
-            let exact = (f64::from(share) / 65_536.0).cbrt() * 65_536.0;
+        assert_eq!(cube_root(1 << 30), 1 << 16);
+        for share in [
+            1_u32,
+            20_000,
+            100 << 14,
+            8192 << 14,
+            30_000 << 14,
+            65_000 << 14,
+        ] {
+            let exact = (f64::from(share) / f64::from(1 << 30)).cbrt() * 65_536.0;
             assert!((f64::from(cube_root(share)) - exact).abs() < 2.0, "{share}");
         }
     }

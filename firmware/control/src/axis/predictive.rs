@@ -9,7 +9,7 @@
 //! opening of each valve: the pressure it lacks / the rate at which it changes
 //! ```
 //!
-//! * **Dead time.** A pulse begun now acts a tick, t_on and the wave's way later.
+//! * **Dead time.** A pulse begun now acts t_on and the wave's way later.
 //!   Everything is decided for that moment: the motion is extrapolated, and air
 //!   that pulses under way will still bring is counted in.
 //! * **Braking** follows a parabola in e, so that one law serves 1 and 400 mm; the
@@ -29,109 +29,188 @@
 //!   announced move, and in one from an end stop, the other chamber makes up for what
 //!   it still has too much, and gives way as it falls: the force is there as soon as
 //!   either chamber can make it.
+//!
+//! Valves that take milliseconds need no new decision in every one: the law is worked out once
+//! in a period of four ticks, a quarter of it in each ([`Stroke`]), and plans the pulses of the
+//! next period to the microsecond. What a stroke leaves to the next is sealed by it, and looked
+//! at before the next uses it ([`Predictive::kept_is_sound`]).
 
 mod force;
+mod handover;
+mod plan;
 mod pressures;
 mod rest;
+mod seals;
 
-use super::air::Air;
+use super::air::{Chamber, Clock, Piston};
 use super::gas::Pressures;
 use super::learn::Learner;
 use super::model::AxisModel;
 use super::motion::{Inertia, Motion};
-use super::within;
 use crate::joint::JointInput;
 use crate::pwm::OnTimes;
-use core::hash::{Hash, Hasher};
-use force::{Ahead, Push, Wish};
-use pressures::{made_up, targets};
-use rest::{Approach, Rest};
+use force::{Ahead, Course, Push, Wish};
+use rest::Rest;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 /// Slower than this, raw mm/s, the piston stands (3 mm/s).
 const STILL: i32 = 3 << 16;
 
-/// What the law gives.
+/// No move is awaited.
+const NOTHING: i32 = i32::MIN;
+
+/// The drive chamber makes up for what the counter chamber still has too much.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+enum MakesUp {
+    /// It does not.
+    No,
+    /// In a move that extends.
+    Extends,
+    /// In one that retracts.
+    Retracts,
+}
+
+/// What the law gives in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drive {
     /// On-times of the next tick, µs.
     pub on: OnTimes,
+    /// Estimated speed.
+    pub velocity: VelocityMmS,
+    /// Force asked for as a share of what the supply can give, in steps of 2^-14.
+    pub duty: Duty,
     /// At rest at the reference.
     pub settled: bool,
     /// The force asked for is beyond what the supply can give.
     pub limited: bool,
-    /// Force asked for, mN.
-    pub force: i32,
 }
+
+/// The quarters of the law, by the tick of its period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+enum Stroke {
+    /// Chamber A: what it sees of the pulses, its pressure at the moment and ahead; the mass is
+    /// learnt.
+    #[default]
+    A,
+    /// Chamber B.
+    B,
+    /// Motion, and the force that is wanted.
+    Motion,
+    /// Rest, target pressures, pulses of the next period.
+    Pulses,
+}
+
+/// Who decides about the coils.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+enum Driver {
+    /// Somebody else.
+    #[default]
+    Others,
+    /// The law, from the middle of a period on: what its chambers can do is known with the next.
+    Begins,
+    /// The law.
+    Law,
+}
+
+/// How many they are.
+const STROKES: u8 = super::model::STROKES as u8;
 
 /// State of the law. It keeps no coefficients: every call is given those of the
 /// axis, which must be the same from call to call.
 #[derive(Clone, Debug)]
 pub struct Predictive {
-    inertia: Inertia,
-    air: Air,
-    motion: Motion,
-    learner: Learner,
-    push: Push,
-    rest: Rest,
-    /// Where the piston stood when the next move was announced.
-    awaits: Option<i32>,
-    /// The drive chamber makes up for what the counter chamber still has too much,
-    /// in a move that extends (true) or retracts.
-    makes_up: Option<bool>,
-    primed: bool,
-}
+    a: Chamber,
+    b: Chamber,
 
-impl Hash for Predictive {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Flags share a
-        // word, each in its own bits.
-        let Self {
-            // Sealed apart: see `kept_is_sound`.
-            inertia: _,
-            air,
-            motion,
-            learner,
-            push,
-            rest,
-            awaits,
-            makes_up,
-            primed,
-        } = self;
-        (air, motion, learner, push, rest).hash(state);
-        let flags = u32::from(*primed)
-            | u32::from(awaits.is_some()).wrapping_shl(1)
-            | u32::from(makes_up.is_some()).wrapping_shl(2)
-            | u32::from(*makes_up == Some(true)).wrapping_shl(3);
-        state.write_u32(flags);
-        state.write_i32(awaits.unwrap_or_default());
-    }
+    /// Where the chambers are followed to.
+    course: Course,
+    course_check: u32,
+
+    motion: Motion,
+    /// Pressure force at the moment, mN.
+    force: i32,
+    /// The force that is wanted at the end of the dead time, mN.
+    wanted: i32,
+    motion_check: u32,
+
+    inertia: Inertia,
+    push: Push,
+    push_check: u32,
+
+    learner: Learner,
+
+    rest: Rest,
+    /// Where the piston stood when the next move was announced; [`NOTHING`] without one.
+    awaits: i32,
+    /// The drive chamber makes up for what the counter chamber still has too much.
+    makes_up: MakesUp,
+    /// The target is a new one.
+    fresh: bool,
+    /// The valves stay shut.
+    quiet: bool,
+    rest_check: u32,
+
+    // What every tick uses, in the `Hash`.
+    /// The stroke to come.
+    stroke: Stroke,
+    primed: bool,
+    driver: Driver,
+    /// Begin of the next period, µs; wraps.
+    next: u32,
+    /// Stroke of the last tick, raw mm.
+    measured: i32,
+    /// On-times of the present period from its begin, µs; in its last tick, of the next one.
+    plan: OnTimes,
+
+    // For the record.
+    /// Force that was asked for, as far as it is possible, mN; the duty follows two ticks later.
+    asked: i32,
+    duty: Duty,
+    limited: bool,
 }
 
 impl Predictive {
     /// At rest, both chambers at the atmosphere.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
-        Self {
-            inertia: Inertia::new(model, model.mass),
-            air: Air::new(model.ambient),
+        let pressures = Pressures {
+            a: model.ambient,
+            b: model.ambient,
+        };
+        let mut law = Self {
+            a: Chamber::new(pressures.a),
+            b: Chamber::new(pressures.b),
+            course: Course::default(),
+            course_check: 0,
             motion: Motion::default(),
-            learner: Learner::new(),
+            force: model.pressure_force(pressures),
+            wanted: 0,
+            motion_check: 0,
+            inertia: Inertia::new(model, model.mass),
             push: Push::default(),
+            push_check: 0,
+            learner: Learner::new(),
             rest: Rest::default(),
-            awaits: None,
-            makes_up: None,
+            awaits: NOTHING,
+            makes_up: MakesUp::No,
+            fresh: false,
+            quiet: true,
+            rest_check: 0,
+            stroke: Stroke::default(),
             primed: false,
-        }
-    }
-
-    /// Whether what follows from the mass, which the `Hash` leaves out, is as it was
-    /// worked out.
-    #[inline]
-    #[must_use]
-    pub fn kept_is_sound(&self) -> bool {
-        self.inertia.is_sound()
+            driver: Driver::Others,
+            next: 0,
+            measured: 0,
+            plan: [0; 4],
+            asked: 0,
+            duty: Duty::ZERO,
+            limited: false,
+        };
+        law.seal();
+        law
     }
 
     /// Estimated motion and load.
@@ -143,7 +222,10 @@ impl Predictive {
     /// Estimated pressures.
     #[must_use]
     pub const fn pressures(&self) -> Pressures {
-        self.air.pressures()
+        Pressures {
+            a: self.a.pressure,
+            b: self.b.pressure,
+        }
     }
 
     /// Mass in use, kg × 2^16: as told, or learnt.
@@ -158,160 +240,181 @@ impl Predictive {
         self.rest.is_settled()
     }
 
-    /// Follows valves, chambers and piston through a tick in which `sent` were the
-    /// on-times last given out, whoever chose them. To be called once per
-    /// tick, before [`Predictive::drive`] if that is called at all.
+    /// A tick of the law's own; on-times for the next tick. `sent` are those last given out.
     #[inline]
-    pub fn follow(
-        &mut self,
-        model: &AxisModel,
-        measured: PositionMm,
-        sent: &OnTimes,
-    ) -> VelocityMmS {
+    pub fn drive(&mut self, model: &AxisModel, input: &JointInput, sent: &OnTimes) -> Drive {
         if !self.primed {
-            self.primed = true;
-            self.motion.stroke = measured.raw();
-            self.rest.release(measured.raw());
+            self.prime(input.measured);
         }
-        let (stroke, speed) = (self.motion.stroke, self.motion.speed);
-        self.air.follow(model, stroke, speed, sent);
-        let force = model.pressure_force(self.air.pressures());
-        self.motion
-            .update(model, &self.inertia, force, measured.raw());
-        self.learner.sample(model, self.motion.speed, force);
-        VelocityMmS::from_raw(self.motion.speed)
-    }
-
-    /// The force asked for as a share of what the supply can give, in steps of 2^-14.
-    #[inline]
-    #[must_use]
-    pub fn duty(model: &AxisModel, drive: &Drive) -> Duty {
-        let most = if drive.force > 0 {
-            model.force_out
-        } else {
-            model.force_in
+        if self.driver == Driver::Others {
+            self.take_over(model, sent);
+        }
+        let on = match self.stroke {
+            Stroke::A => {
+                self.driver = Driver::Law;
+                self.follow(model, true);
+                self.due(model, 1)
+            }
+            Stroke::B => {
+                self.follow(model, false);
+                self.duty = model.duty(self.asked);
+                self.due(model, 2)
+            }
+            Stroke::Motion => {
+                self.want(model, input);
+                self.due(model, 3)
+            }
+            Stroke::Pulses => {
+                if self.driver == Driver::Law {
+                    self.choose(model, input);
+                }
+                self.due(model, 0)
+            }
         };
-        let most = most.max(1 << 8);
-        // Below 2^31: forces are below 2^25 mN.
-        let share = within(drive.force, most)
-            .wrapping_shl(6)
-            .checked_div(most.wrapping_shr(8))
-            .unwrap_or(0);
-        Duty::from_raw(within(share, 1 << 14).wrapping_shl(16))
+        self.next_stroke(input.measured);
+        Drive {
+            on,
+            velocity: VelocityMmS::from_raw(self.motion.speed),
+            duty: self.duty,
+            settled: self.rest.is_settled(),
+            limited: self.limited,
+        }
     }
 
-    /// Forgets the rest state: the joint does not track.
+    /// The present period.
     #[inline]
-    pub fn release(&mut self) {
-        self.rest.release(self.motion.stroke);
-        self.push = Push::default();
+    const fn clock(&self, model: &AxisModel) -> Clock {
+        let now = self.next.wrapping_sub(model.times.period as u32);
+        Clock {
+            now,
+            next: self.next,
+            moment: now.wrapping_add(model.moment as u32),
+        }
     }
 
-    /// On-times for the next tick.
+    /// To the next stroke.
     #[inline]
-    pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
+    const fn next_stroke(&mut self, measured: PositionMm) {
+        self.measured = measured.raw();
+        self.stroke = match (self.stroke as u8).wrapping_add(1) % STROKES {
+            0 => Stroke::A,
+            1 => Stroke::B,
+            2 => Stroke::Motion,
+            _ => Stroke::Pulses,
+        };
+    }
+
+    /// One of the chambers, A at the begin of a period.
+    #[inline(never)]
+    fn follow(&mut self, model: &AxisModel, first: bool) {
+        if first {
+            self.next = self.next.wrapping_add(model.times.period as u32);
+        }
+        let clock = self.clock(model);
+        let Course {
+            middle,
+            speed,
+            end,
+            ahead,
+            now,
+            force,
+        } = self.course;
+        let [fill_a, vent_a, fill_b, vent_b] = self.plan;
+        let (chamber, piston, plan) = if first {
+            let piston = Piston {
+                flow: model.flow_a,
+                lengths: [model.length_a(middle), model.length_a(end)],
+                speeds: [speed.wrapping_neg(), ahead.wrapping_neg()],
+                all_flows: 0,
+            };
+            (&mut self.a, piston, [fill_a, vent_a])
+        } else {
+            let piston = Piston {
+                flow: model.flow_b,
+                lengths: [model.length_b(middle), model.length_b(end)],
+                speeds: [speed, ahead],
+                all_flows: 1,
+            };
+            (&mut self.b, piston, [fill_b, vent_b])
+        };
+        chamber.follow(
+            model,
+            &clock,
+            &piston,
+            (self.driver != Driver::Others).then_some(plan),
+        );
+        if first {
+            // Of the period before.
+            self.learner.sample(model, now, force);
+        }
+    }
+
+    /// The motion up to the moment, and where it will go.
+    #[inline]
+    fn moves(&mut self, model: &AxisModel, measured: PositionMm) {
+        let before = self.force;
+        self.force = model.pressure_force(self.pressures());
+        let force = before.saturating_add(self.force) >> 1;
+        self.motion.predict(model, &self.inertia, force);
+        let mean = self.measured.saturating_add(measured.raw()) >> 1;
+        self.motion.correct(model, &self.inertia, mean);
+        self.course = Course::of(model, &self.motion, force);
+        self.course_check = self.course.sum();
+    }
+
+    /// Motion, and the force that is wanted.
+    #[inline]
+    fn want(&mut self, model: &AxisModel, input: &JointInput) {
+        self.moves(model, input.measured);
         let reference = input.reference.raw();
-        let reference_speed = input.reference_velocity.raw();
-        if self.rest.aim(model, reference) {
+        // Also one that came between this stroke and the last of the period before.
+        let other = self.fresh || self.rest.is_other(model, reference);
+        if other {
             self.push = Push::default();
         }
-        let quiet = self.rest.quiet(
-            model,
-            &Approach {
-                reference,
-                reference_speed,
-                measured: input.measured.raw(),
-                motion: &self.motion,
-                force: model.pressure_force(self.air.pressures()),
-                mass: self.inertia.mass,
-            },
-        );
-        let stands = quiet || self.motion.speed.wrapping_abs() < STILL;
-        let mut to = reference;
-        let mut awaited = None;
-        if let Some(announced) = input.announced {
-            let next = announced.reference.raw();
-            if stands {
-                awaited = self.preload(model, next);
-            }
-            if awaited.is_some() {
-                to = next;
-            }
+        if !other && self.learner.has_news() {
+            // Twice after a move: what was wanted a period ago will do.
+            self.learn(model);
         } else {
-            self.awaits = None;
-        }
-        if awaited.is_some() || (stands && self.motion.at_stop(model)) {
-            self.makes_up = Some(to > self.motion.stroke);
-        }
-        if self.motion.speed.wrapping_abs() < STILL
-            && let Some(mass) = self.learner.take()
-        {
-            self.inertia = Inertia::new(model, mass);
-        }
-        if awaited.is_none() && quiet {
-            return Drive {
-                on: self.air.shut(model),
-                settled: self.rest.is_settled(),
-                limited: false,
-                force: 0,
+            let expected = Pressures {
+                a: self.a.expected,
+                b: self.b.expected,
             };
-        }
-        let mut ahead = Ahead::new(model, &self.motion);
-        let expected = self.air.ahead(model, ahead.stroke, ahead.mean);
-        ahead.correct(model, &self.inertia, &self.motion, expected);
-        let force = awaited.unwrap_or_else(|| {
+            let ahead = Ahead::new(model, &self.inertia, &self.motion, self.force, expected);
             let wish = Wish {
                 reference,
-                reference_speed,
+                reference_speed: input.reference_velocity.raw(),
                 motion: &self.motion,
                 ahead,
                 inertia: &self.inertia,
             };
-            let rest = &self.rest;
-            wish.force(model, &mut self.push, |grip| rest.faded(grip))
-        });
-        let possible = force
-            .max(model.force_in.wrapping_neg())
-            .min(model.force_out);
-        let target = self.target(model, possible, expected);
-        Drive {
-            on: self.air.pulses(model, expected, target),
-            settled: false,
-            limited: possible != force,
-            force,
+            if !self.quiet {
+                wish.push(model, &mut self.push);
+            }
+            self.wanted = wish.force(model, self.push, &self.rest);
         }
+        self.push_check = self.push.sum();
+        self.motion_check = self.sum_of_motion();
     }
 
-    /// The force with which an announced move to `next` is awaited; `None` if
-    /// the piston has begun to move, or the move is none.
-    fn preload(&mut self, model: &AxisModel, next: i32) -> Option<i32> {
-        let stroke = self.motion.stroke;
-        let place = *self.awaits.get_or_insert(stroke);
-        let distance = next.saturating_sub(place);
-        let gone = stroke.saturating_sub(place).saturating_abs();
-        let band = model.band;
-        if distance.saturating_abs() <= band || gone > band.saturating_mul(2) {
-            return None;
-        }
-        let edge = model.coulomb.wrapping_shr(1);
-        let edge = if distance > 0 {
-            edge
-        } else {
-            edge.wrapping_neg()
-        };
-        Some(edge.saturating_sub(self.motion.load))
-    }
-
-    /// Chamber pressures for a force that the supply can give, where `expected` will be.
+    /// Takes what a move has told of the mass, a step of it in a period.
     #[inline]
-    fn target(&mut self, model: &AxisModel, force: i32, expected: Pressures) -> Pressures {
-        let target = targets(model, force);
-        let Some(extends) = self.makes_up else {
-            return target;
-        };
-        made_up(model, force, target, expected, extends).unwrap_or_else(|| {
-            self.makes_up = None;
-            target
-        })
+    fn learn(&mut self, model: &AxisModel) {
+        if self.learner.has_news()
+            && let Some(mass) = self.learner.news(model)
+        {
+            self.inertia = Inertia::new(model, mass);
+        }
+    }
+
+    /// On-times of the next tick by the plan, of which so many ticks are gone by then.
+    #[inline]
+    fn due(&self, model: &AxisModel, ticks: u16) -> OnTimes {
+        let tick = model.times.tick as u16;
+        let gone = tick.wrapping_mul(ticks);
+        self.plan.map(|on| on.saturating_sub(gone).min(tick))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,10 +4,13 @@
 //! falls; a pulse shorter than t_on never opens one, a gap shorter than t_off
 //! never shuts it. What the chamber sees comes later by the wave's way through
 //! the line. The same rules are followed here, in whole microseconds, on the
-//! on-times that were really sent.
+//! on-times that are sent: for a whole period of the law, or tick by tick where
+//! somebody else decides.
 
-use core::hash::{Hash, Hasher};
+use super::mix;
 
+/// A change of a coil is decided no longer ahead than this, µs: a period of 2 ms ticks.
+const LONGEST_PLAN: i32 = 8000;
 /// Changes that can be under way at once.
 const EDGES: usize = 4;
 /// Bits of a track's state: changes under way, the coil is on, the valve is open.
@@ -20,6 +23,8 @@ const OPEN: u32 = 1 << 9;
 pub struct ValveTimes {
     /// Control tick.
     pub tick: i32,
+    /// Ticks of one computation of the law, all its strokes.
+    pub period: i32,
     /// Coil on to open, 0…50 000.
     pub on: i32,
     /// Coil off to shut, 0…50 000.
@@ -63,29 +68,6 @@ impl Default for ValveTrack {
     }
 }
 
-impl Hash for ValveTrack {
-    #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Fields share a
-        // word such that a flipped bit of any flips one bit of it.
-        let Self {
-            state: own,
-            edges: [first, second, third, fourth],
-            changed,
-        } = self;
-        state.write_u32(changed ^ own);
-        let pending = own & PENDING;
-        if pending > 0 {
-            state.write_u32(*first);
-            state.write_u32(*second);
-            if pending > 2 {
-                state.write_u32(*third);
-                state.write_u32(*fourth);
-            }
-        }
-    }
-}
-
 impl ValveTrack {
     /// Shut for a long time, on a clock that begins at 0.
     #[must_use]
@@ -97,7 +79,30 @@ impl ValveTrack {
         }
     }
 
-    /// Whether the coil is on at the end of the ticks taken so far.
+    /// Adds itself to a sum. Fields share a word such that a flipped bit of any flips one bit
+    /// of it.
+    #[inline]
+    pub(super) fn sum(&self, sum: u32) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            state,
+            edges: [first, second, third, fourth],
+            changed,
+        } = *self;
+        let mut sum = mix(sum, (changed ^ state).cast_signed());
+        let pending = state & PENDING;
+        if pending > 0 {
+            sum = mix(sum, first.cast_signed());
+            sum = mix(sum, second.cast_signed());
+            if pending > 2 {
+                sum = mix(sum, third.cast_signed());
+                sum = mix(sum, fourth.cast_signed());
+            }
+        }
+        sum
+    }
+
+    /// Whether the coil is on at the end of what has been decided.
     #[must_use]
     pub const fn coil(&self) -> bool {
         self.state & COIL != 0
@@ -139,42 +144,98 @@ impl ValveTrack {
         }
     }
 
-    /// Takes the on-time of the tick that begins `now`, 0…tick µs from its edge; gives for
-    /// how long the chamber sees the valve open in that tick, µs.
+    /// Takes the on-time of the `span` µs that begin `now`: `on` µs from there.
     #[inline]
-    pub fn advance(&mut self, now: u32, on: i32, times: &ValveTimes) -> i32 {
+    pub fn energise(&mut self, now: u32, on: i32, span: i32, times: &ValveTimes) {
         if on > 0 && !self.coil() {
             self.change(now, times);
         }
-        if on < times.tick && self.coil() {
+        if on < span && self.coil() {
             self.change(now.wrapping_add(on as u32), times);
         }
-        if self.pending() > 0 {
-            let [first, ..] = self.edges;
-            if first.wrapping_sub(now) as i32 <= times.tick {
-                return self.pass(now, times.tick);
-            }
-        }
-        if self.open() { times.tick } else { 0 }
     }
 
-    /// Takes the changes within `span` µs from `now`; gives the time open.
+    /// As [`ValveTrack::energise`], or with `cut` as [`ValveTrack::cut`] of a coil that is off.
+    #[inline(never)]
+    pub(super) fn decide(&mut self, now: u32, on: i32, span: i32, cut: bool, times: &ValveTimes) {
+        if cut && !self.coil() {
+            self.cut(now.wrapping_add(on as u32), times);
+        } else {
+            self.energise(now, on, span, times);
+        }
+    }
+
+    /// A coil whose fall was planned for a moment after `at` falls there, because somebody
+    /// else decides from then on.
+    #[inline]
+    pub fn cut(&mut self, at: u32, times: &ValveTimes) {
+        let late = self.changed.wrapping_sub(at) as i32;
+        if self.coil() || late <= 0 || late > LONGEST_PLAN {
+            return;
+        }
+        let falls = times.off.wrapping_add(times.line) as u32;
+        let rises = times.on.wrapping_add(times.line) as u32;
+        let planned = self.changed.wrapping_add(falls);
+        self.changed = at;
+        let pending = self.pending();
+        let [first, second, third, fourth] = self.edges;
+        let (last, before) = match pending {
+            1 => (first, None),
+            2 => (second, Some(first)),
+            3 => (third, Some(second)),
+            _ => (fourth, Some(third)),
+        };
+        if pending == 0 || last != planned {
+            // It does not open the valve.
+            return;
+        }
+        let risen = before.map(|before| before.wrapping_sub(rises));
+        if risen.is_some_and(|risen| (at.wrapping_sub(risen) as i32) < times.on) {
+            // Nor does one so short.
+            self.state = self.state.wrapping_sub(2);
+        } else if let Some(last) = self.edges.get_mut(pending.wrapping_sub(1) as usize) {
+            *last = at.wrapping_add(falls);
+        }
+    }
+
+    /// For how long the chamber sees the valve open within `span` µs from the moment `from`,
+    /// up to which all changes have passed.
+    #[inline]
+    pub fn passes(&mut self, from: u32, span: i32) -> i32 {
+        if self.pending() > 0 {
+            let [first, ..] = self.edges;
+            if first.wrapping_sub(from) as i32 <= span {
+                return self.pass(from, span);
+            }
+        }
+        if self.open() { span } else { 0 }
+    }
+
+    /// Takes the changes within `span` µs from `now`, at least one; gives the time open.
+    ///
+    /// Without a loop: the time open is that to the end of the span, if the valve is open then,
+    /// less the moments of opening, plus those of closing.
     #[inline(never)]
     fn pass(&mut self, now: u32, span: i32) -> i32 {
-        // The time open is that to the end of the span, if the valve is open then, less the
-        // moments of opening, plus those of closing.
-        let mut opened = 0_i32;
-        while self.pending() > 0 {
-            let [first, second, third, fourth] = self.edges;
-            let moment = first.wrapping_sub(now) as i32;
-            if moment > span {
-                break;
-            }
-            opened = moment.wrapping_sub(opened);
-            // One change less, and the other way.
-            self.state = self.state.wrapping_sub(1) ^ OPEN;
+        let [first, second, third, fourth] = self.edges;
+        let [one, two, three, four] = self.edges.map(|edge| edge.wrapping_sub(now) as i32);
+        let pending = self.pending();
+        let opened = if pending < 2 || two > span {
             self.edges = [second, third, fourth, first];
-        }
+            self.state = self.state.wrapping_sub(1) ^ OPEN;
+            one
+        } else if pending < 3 || three > span {
+            self.edges = [third, fourth, first, second];
+            self.state = self.state.wrapping_sub(2);
+            two.wrapping_sub(one)
+        } else if pending < 4 || four > span {
+            self.edges = [fourth, first, second, third];
+            self.state = self.state.wrapping_sub(3) ^ OPEN;
+            three.wrapping_sub(two).wrapping_add(one)
+        } else {
+            self.state = self.state.wrapping_sub(4);
+            four.wrapping_sub(three).wrapping_add(two).wrapping_sub(one)
+        };
         if self.open() {
             span.wrapping_sub(opened)
         } else {
@@ -182,82 +243,138 @@ impl ValveTrack {
         }
     }
 
-    /// What is left at `now` of the shortest pulse under way, µs.
+    /// What is left at `next` of the shortest pulse under way, µs.
     #[inline]
-    fn left(&self, now: u32, times: &ValveTimes) -> i32 {
-        let since = now.wrapping_sub(self.changed);
+    fn left(&self, next: u32, times: &ValveTimes) -> i32 {
+        let since = next.wrapping_sub(self.changed);
         (times.shortest_pulse as u32).saturating_sub(since) as i32
     }
 
-    /// For how long the chamber will still see the valve open after `now`, the end of the
-    /// ticks taken so far, if its coil falls as soon as the shortest pulse allows, µs.
+    /// For how long the chamber will still see the valve open after the moment `from`, up to
+    /// which all changes have passed, if its coil falls as soon after `next`, up to which it
+    /// is decided, as the shortest pulse allows, µs.
     ///
     /// The time open is the sum of the times of closing less the sum of those of
     /// opening: changes alternate, and the last closes.
     #[inline]
     #[must_use]
-    pub fn committed(&self, now: u32, times: &ValveTimes) -> i32 {
-        if self.state & (COIL | PENDING) == 0 {
-            return 0;
-        }
-        self.under_way(now, times)
-    }
-
-    #[inline(never)]
-    fn under_way(&self, now: u32, times: &ValveTimes) -> i32 {
-        let [first, second, third, fourth] = self.edges;
-        // Without a loop: how many changes there are decides all that is to be done. The
-        // moments of an even number of changes need no present to be told from.
-        let sum = match self.pending() {
-            0 => 0,
-            1 => first.wrapping_sub(now),
-            2 => second.wrapping_sub(first),
-            3 => third
-                .wrapping_sub(second)
-                .wrapping_add(first)
-                .wrapping_sub(now),
-            _ => fourth
-                .wrapping_sub(third)
-                .wrapping_add(second)
-                .wrapping_sub(first),
-        } as i32;
+    pub fn committed(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
+        let [first, second, ..] = self.edges;
+        let pending = self.pending();
         if !self.coil() {
-            return sum;
+            return match pending {
+                0 => 0,
+                1 => first.wrapping_sub(from) as i32,
+                2 => second.wrapping_sub(first) as i32,
+                _ => self.under_way(from),
+            };
         }
-        if self.pending() as usize >= EDGES {
+        // The moments of an even number of changes need no present to be told from.
+        let sum = match pending {
+            0 => 0,
+            1 => first.wrapping_sub(from) as i32,
+            _ => self.under_way(from),
+        };
+        if pending as usize >= EDGES {
             return 0;
         }
         // The fall is the last change, and closes.
-        let fall = self.left(now, times);
-        fall.wrapping_add(times.off)
+        let decided = next.wrapping_sub(from) as i32;
+        decided
+            .wrapping_add(self.left(next, times))
+            .wrapping_add(times.off)
             .wrapping_add(times.line)
             .wrapping_sub(sum)
     }
 
-    /// On-time of the tick that begins `now`, at the end of those taken so far, for `need`
-    /// µs of opening beyond what is [`ValveTrack::committed`]; `rival` says that the
-    /// chamber's other valve is on.
+    /// The last moment under way less the one before it, and so on.
+    #[cold]
+    #[inline(never)]
+    fn under_way(&self, from: u32) -> i32 {
+        let [first, second, third, fourth] = self.edges;
+        match self.pending() {
+            2 => second.wrapping_sub(first) as i32,
+            3 => third
+                .wrapping_sub(second)
+                .wrapping_add(first)
+                .wrapping_sub(from) as i32,
+            _ => fourth
+                .wrapping_sub(third)
+                .wrapping_add(second)
+                .wrapping_sub(first) as i32,
+        }
+    }
+
+    /// What it can do in the period that begins `next`, up to which the coil is decided.
     #[inline]
-    #[must_use]
-    pub fn on_time(&self, now: u32, need: i32, rival: bool, times: &ValveTimes) -> i32 {
+    pub(super) fn ready(&self, next: u32, times: &ValveTimes) -> Ready {
+        if self.coil() {
+            return Ready(self.left(next, times));
+        }
+        let since = next.wrapping_sub(self.changed);
+        if since < times.shortest_gap as u32 {
+            Ready::SHUTS
+        } else {
+            Ready::SHUT
+        }
+    }
+}
+
+/// What a valve can do in the next period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Ready(
+    /// What is left of the shortest pulse under way, µs; negative if the coil is off.
+    i32,
+);
+
+impl Default for Ready {
+    fn default() -> Self {
+        Self::SHUT
+    }
+}
+
+impl Ready {
+    /// Shut for long enough to begin a pulse.
+    const SHUT: Self = Self(-1);
+    /// It would not shut in between.
+    const SHUTS: Self = Self(-2);
+
+    /// As a word to be sealed.
+    #[inline]
+    pub(super) const fn word(self) -> i32 {
+        self.0
+    }
+
+    /// Whether the coil is on at the begin of the period.
+    #[inline]
+    pub(super) const fn coil(self) -> bool {
+        self.0 >= 0
+    }
+
+    /// On-time of the period for no opening beyond what is [`ValveTrack::committed`].
+    #[inline]
+    pub(super) fn rest(self, times: &ValveTimes) -> i32 {
+        self.0.max(0).min(times.period)
+    }
+
+    /// On-time of the period for `need` µs of opening beyond what is
+    /// [`ValveTrack::committed`]; `rival` says that the chamber's other valve is on.
+    #[inline]
+    pub(super) fn on_time(self, need: i32, rival: bool, times: &ValveTimes) -> i32 {
         let pulse = if self.coil() {
             // A few microseconds are not worth a tick.
             let need = if need < 20 { 0 } else { need };
-            self.left(now, times).saturating_add(need)
-        } else if need > 0 && !rival {
+            self.0.saturating_add(need)
+        } else {
             let shortest = times.shortest_opening();
-            let since = now.wrapping_sub(self.changed);
-            if since < times.shortest_gap as u32 || need <= shortest.wrapping_mul(5) >> 3 {
+            if rival || self == Self::SHUTS || need <= shortest >> 1 {
                 return 0;
             }
             need.max(shortest)
                 .saturating_add(times.on)
                 .saturating_sub(times.off)
-                .max(times.shortest_pulse)
-        } else {
-            0
         };
-        pulse.min(times.tick)
+        pulse.min(times.period)
     }
 }
 
@@ -268,6 +385,7 @@ mod tests {
 
     const TIMES: ValveTimes = ValveTimes {
         tick: 1000,
+        period: 4000,
         on: 3500,
         off: 2000,
         line: 900,
@@ -275,13 +393,19 @@ mod tests {
         shortest_gap: 2350,
     };
 
+    /// A tick with an on-time; gives for how long the valve was open in it.
+    fn tick(track: &mut ValveTrack, now: u32, on: i32) -> i32 {
+        track.energise(now, on, 1000, &TIMES);
+        track.passes(now, 1000)
+    }
+
     fn pulse(length: i32) -> [i32; 20] {
         let mut track = ValveTrack::new();
         let mut left = length;
-        core::array::from_fn(|tick| {
+        core::array::from_fn(|k| {
             let on = left.clamp(0, 1000);
             left -= on;
-            track.advance(1000 * tick as u32, on, &TIMES)
+            tick(&mut track, 1000 * k as u32, on)
         })
     }
 
@@ -303,7 +427,7 @@ mod tests {
             1000, 1000, 0, 0, 0, 0, 1000, 1000, 1000, 1000, 0, 0, 0, 0, 0, 0,
         ];
         for (on, now) in on.into_iter().zip((0..).step_by(1000)) {
-            track.advance(now, on, &TIMES);
+            tick(&mut track, now, on);
         }
         assert!(!track.open() && track.pending() == 0);
     }
@@ -318,10 +442,47 @@ mod tests {
         // The clock may wrap meanwhile.
         let start = 4000_u32.wrapping_neg();
         track.changed = start.wrapping_sub(1 << 30);
-        for (on, tick) in on.into_iter().zip(0_u32..) {
-            opened += track.advance(start.wrapping_add(1000 * tick), on, &TIMES);
+        for (on, k) in on.into_iter().zip(0_u32..) {
+            opened += tick(&mut track, start.wrapping_add(1000 * k), on);
         }
         assert_eq!(opened, 11_000 - 4400);
+    }
+
+    /// What is seen open from `now` on if nothing is asked for any more.
+    fn rest_of(track: &mut ValveTrack, mut now: u32) -> i32 {
+        let mut seen = 0;
+        for _ in 0..20 {
+            let on = track.ready(now, &TIMES).on_time(0, false, &TIMES);
+            track.energise(now, on, 4000, &TIMES);
+            seen += track.passes(now, 4000);
+            now += 4000;
+        }
+        seen
+    }
+
+    #[test]
+    fn a_planned_fall_that_is_cut_is_as_one_that_was_sent() {
+        // From an idle valve, and from one that opened long ago.
+        for before in [0, 10] {
+            for cut in 0..4 {
+                let mut planned = ValveTrack::new();
+                let mut sent = ValveTrack::new();
+                let mut now = 0;
+                for _ in 0..before {
+                    tick(&mut planned, now, 1000);
+                    tick(&mut sent, now, 1000);
+                    now += 1000;
+                }
+                planned.energise(now, 3950, 4000, &TIMES);
+                planned.cut(now + 1000 * cut, &TIMES);
+                for k in 0..4 {
+                    sent.energise(now + 1000 * k, if k < cut { 1000 } else { 0 }, 1000, &TIMES);
+                }
+                let open = |track: &mut ValveTrack| track.passes(now, 30_000);
+                assert_eq!(open(&mut planned), open(&mut sent), "{before} {cut}");
+                assert!(!planned.coil() && planned.pending() == 0);
+            }
+        }
     }
 
     proptest! {
@@ -334,15 +495,38 @@ mod tests {
             let mut track = ValveTrack::new();
             let mut now = 0;
             for on in ticks {
-                track.advance(now, on, &TIMES);
+                tick(&mut track, now, on);
                 now += 1000;
             }
-            let committed = track.committed(now, &TIMES);
+            let committed = track.committed(now, now, &TIMES);
+            let seen = rest_of(&mut track, now);
+            prop_assert_eq!(seen, committed);
+            prop_assert!(!track.coil() && !track.open());
+        }
+
+        /// The same for a law that decides a period ahead and looks from before its begin.
+        #[test]
+        fn commitment_of_periods_is_kept(
+            periods in proptest::collection::vec(0_i32..=6000, 1..40), before in 0_u32..=3000,
+        ) {
+            let mut track = ValveTrack::new();
+            let mut next = 1 << 20;
+            let mut from = next - before;
+            for need in periods {
+                let on = track.ready(next, &TIMES).on_time(need, false, &TIMES);
+                track.energise(next, on, 4000, &TIMES);
+                track.passes(from, 4000);
+                next += 4000;
+                from += 4000;
+            }
+            let committed = track.committed(from, next, &TIMES);
             let mut seen = 0;
-            for _ in 0..40 {
-                let on = track.on_time(now, 0, false, &TIMES);
-                seen += track.advance(now, on, &TIMES);
-                now += 1000;
+            for _ in 0..20 {
+                let on = track.ready(next, &TIMES).on_time(0, false, &TIMES);
+                track.energise(next, on, 4000, &TIMES);
+                seen += track.passes(from, 4000);
+                next += 4000;
+                from += 4000;
             }
             prop_assert_eq!(seen, committed);
             prop_assert!(!track.coil() && !track.open());

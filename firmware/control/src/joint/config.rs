@@ -324,8 +324,9 @@ impl JointConfig {
         self.axis.as_ref()
     }
 
-    /// Part `0..PARTS` for sealing memory: of about equal size, together the whole
-    /// configuration. Rule bases, which are constants, count by their address.
+    /// Part `0..PARTS` for sealing memory: of about equal size, together all of the
+    /// configuration that the law in use reads in a tick. Rule bases, which are constants, count
+    /// by their address.
     #[inline]
     pub fn hash_part<H: Hasher>(&self, part: usize, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here.
@@ -344,25 +345,26 @@ impl JointConfig {
             bumpless_ticks,
             axis,
         } = self;
-        if let (Some(axis), 0..=3) = (axis, part) {
-            axis.hash_quarter(part, state);
-        }
-        match part {
-            0 => (settle_ticks, release_ticks, bumpless_ticks, axis.is_some()).hash(state),
-            1 => {
+        match (axis, part) {
+            (Some(axis), 0..=3) => axis.hash_quarter(part, state),
+            (Some(_), _) => {}
+            // What the predictive law has no use for.
+            (None, 0) => (settle_ticks, release_ticks, bumpless_ticks).hash(state),
+            (None, 1) => {
                 core::ptr::hash(*rules_pd, state);
                 core::ptr::hash(*rules_id, state);
+                (error_to_input, velocity_to_input).hash(state);
             }
-            2 => gains.hash_forces(state),
-            3 => {
+            (None, 2) => gains.hash_forces(state),
+            (None, 3) => {
                 gains.hash_rest(state);
                 window.hash(state);
             }
-            _ => {
-                (&gains.axis, tick).hash(state);
-                (error_to_input, velocity_to_input).hash(state);
-                (integral_to_input, integral_limit).hash(state);
-            }
+            (None, _) => (integral_to_input, integral_limit).hash(state),
+        }
+        if part == 4 {
+            (gains.stroke_min, gains.stroke_max, gains.law).hash(state);
+            (tick, axis.is_some()).hash(state);
         }
     }
 }
@@ -424,19 +426,20 @@ impl JointGains {
             release_dwell,
             bumpless_time,
             velocity_window,
-            stroke_min,
-            stroke_max,
-            law,
+            // With the part of all laws.
+            stroke_min: _,
+            stroke_max: _,
+            law: _,
             integral: _,
             derivative: _,
             sliding_time,
+            // Read when coefficients are made of it.
             axis: _,
             pwm_period,
         } = self;
         (settle_band, settle_velocity, settle_dwell).hash(state);
         (release_band, release_dwell, bumpless_time).hash(state);
-        (velocity_window, stroke_min, stroke_max).hash(state);
-        (law, sliding_time, pwm_period).hash(state);
+        (velocity_window, sliding_time, pwm_period).hash(state);
     }
 }
 

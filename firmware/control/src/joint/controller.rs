@@ -166,9 +166,7 @@ impl JointController {
     /// next [`JointController::step`] starts afresh with a valid velocity.
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
-            let velocity = law.follow(model, measured, &self.sent);
-            law.release();
-            return velocity;
+            return law.observe(model, measured, &self.sent);
         }
         self.settle = Settle::new();
         self.integral = 0;
@@ -189,21 +187,21 @@ impl JointController {
         limits.reference = reference != input.reference;
         let error = reference.saturating_sub(input.measured);
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
-            let velocity = law.follow(model, input.measured, &self.sent);
             let drive = law.drive(
                 model,
                 &JointInput {
                     reference,
                     ..*input
                 },
+                &self.sent,
             );
             limits.duty = drive.limited;
             return JointOutput {
-                duty: Predictive::duty(model, &drive),
+                duty: drive.duty,
                 openings: ValveOpenings::SHUT,
                 direct: Some(drive.on),
                 error,
-                velocity,
+                velocity: drive.velocity,
                 limits,
                 settled: drive.settled,
             };
@@ -393,19 +391,19 @@ impl Hash for State<'_> {
             sent,
             predictive,
         } = self.0;
-        // In the order of memory: one look at it for all three.
-        let flags = *correction as u32
-            | u32::from(*tracked).wrapping_shl(8)
-            | u32::from(*changed).wrapping_shl(16)
-            | u32::from(predictive.is_some()).wrapping_shl(24);
-        state.write_u32(flags);
         if let Some(law) = predictive {
             // The other laws begin afresh after it, and do not read what was sent.
             let [a, b, c, d] = *sent;
             state.write_u32(u32::from(a) | u32::from(b).wrapping_shl(16));
             state.write_u32(u32::from(c) | u32::from(d).wrapping_shl(16));
+            state.write_u32(*correction as u32);
             return law.hash(state);
         }
+        // In the order of memory: one look at it for all three.
+        let flags = *correction as u32
+            | u32::from(*tracked).wrapping_shl(8)
+            | u32::from(*changed).wrapping_shl(16);
+        state.write_u32(flags);
         velocity.hash(state);
         settle.hash(state);
         state.write_i64(*integral);

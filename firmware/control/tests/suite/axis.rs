@@ -28,8 +28,18 @@ fn at(measured_mm: f64, reference_mm: f64) -> JointInput {
 
 #[test]
 fn a_step_fills_towards_its_target_and_vents_against_it() {
+    // Of a mass that takes force enough for both chambers.
+    let gains = JointGains {
+        law: Law::Predictive,
+        axis: AxisData {
+            mass: PositionMm::from_int(3),
+            ..AxisData::default()
+        },
+        ..JointGains::default()
+    };
+    let config = JointConfig::new(&gains, TICK).expect("valid");
     for (reference, driving, counter) in [(120.0, 0, 2), (60.0, 2, 0)] {
-        let mut joint = controller();
+        let mut joint = JointController::new(config);
         let mut on = [0_u32; 4];
         // From power-up both chambers fill; here they are half full already.
         for tick in 0..400 {
@@ -37,7 +47,8 @@ fn a_step_fills_towards_its_target_and_vents_against_it() {
             let fill = if tick < 150 { 1000 } else { 0 };
             joint.sent([fill, 0, fill, 0]);
         }
-        // Twice the dead time and more: later it would have to move.
+        // Twice the dead time and more: later it would have to move. The first pulses are planned
+        // in the fourth tick.
         for _ in 0..20 {
             let output = joint.step(&at(90.0, reference));
             let sent = output.direct.expect("times its own pulses");
@@ -182,7 +193,8 @@ fn the_probe_finds_the_opening_delay() {
     assert_eq!(probe(3_500, false), None, "a piston that never moves");
 }
 
-/// Of a dead time below 1.1 ms the slope goes no further, and the deceleration with it.
+/// Of a dead time below 1.4 ms, of which shorter ticks are capable, the slope goes no further,
+/// and the deceleration with it.
 #[test]
 fn the_slope_of_the_fastest_valves_is_limited_and_the_brake_with_it() {
     let of = |valve_on: u32| {
@@ -191,12 +203,12 @@ fn the_slope_of_the_fastest_valves_is_limited_and_the_brake_with_it() {
             line_delay: Micros(0),
             ..AxisData::default()
         };
-        AxisModel::new(&data, TICK).expect("in range")
+        AxisModel::new(&data, Micros(100)).expect("in range")
     };
-    let (limited, fastest) = (of(90), of(0));
+    let (limited, fastest) = (of(1000), of(0));
     assert_eq!((limited.slope, fastest.slope), (65_535, 65_535));
     assert_eq!(limited.brake, fastest.brake);
-    let slower = of(200);
+    let slower = of(1200);
     assert!(slower.slope < 65_535 && slower.brake < limited.brake);
 }
 
@@ -215,17 +227,20 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let area_b = area_a - area_rod;
     let flow = data.conductance.to_num::<f64>() * 10.0 * 1.185 * 287.05 * 293.15;
     let (flow_a, flow_b) = (flow / area_a, flow / area_b);
-    let horizon = (f64::from(TICK.get()) + on + line) * 1e-6;
+    // From the moment, one and a half ticks after the begin of a period, to the next one's valves.
+    let period = 4.0 * f64::from(TICK.get()) * 1e-6;
+    let horizon = (2.5 * f64::from(TICK.get()) + on + line) * 1e-6;
     let ambient = 101_325.0;
     let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
     let force_rod = 1e-3 * ambient * area_rod;
     let top = flow_b.min(1.5 * flow_a);
-    let slope = f64::min(0.28 / horizon, 65_535.0 / 256.0);
-    let brake = 0.65 * slope * top;
+    let slope = f64::min(0.36 / horizon, 65_535.0 / 256.0);
+    let brake = 0.6 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
-    let nimble = 0.9 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
+    let nimble = 0.60 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
     let two = |bits: i32| 2_f64.powi(bits);
+    let theta: f64 = 28_400.0 / 65_536.0;
     vec![
         ("flow_a", flow_a * two(16)),
         ("flow_b", flow_b * two(16)),
@@ -252,14 +267,24 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ),
         ("horizon", horizon * two(32)),
         ("slope", slope * two(8)),
-        ("damping", 0.66 / horizon * two(8)),
+        ("damping", 0.95 / horizon * two(8)),
         ("brake", brake),
         ("top_speed", top * two(16)),
         ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),
-        ("observe_stroke", 0.45 * two(16)),
-        ("observe_speed", 67.5 * two(16)),
-        ("observe_load", 3375.0),
-        ("stick_step", 5.0 * number(data.breakaway) * two(8)),
+        ("observe_stroke", (1.0 - theta.powi(3)) * two(16)),
+        (
+            "observe_speed",
+            1.5 * (1.0 - theta).powi(2) * (1.0 + theta) / period * two(16),
+        ),
+        (
+            "observe_load",
+            0.59 * (1.0 - theta).powi(3) / (period * period),
+        ),
+        ("stick_step", 5e3 * number(data.breakaway) * period * two(8)),
+        ("period", period * two(32)),
+        ("horizon_reference", (2e3 + on + line) * 1e-6 * two(32)),
+        ("stretch", two(19) / 0.7),
+        ("choked", 0.3 * two(19) / 0.7),
     ]
 }
 
@@ -292,6 +317,10 @@ fn coefficient(model: &AxisModel, name: &str) -> i32 {
         "observe_speed" => model.observe_speed,
         "observe_load" => model.observe_load,
         "stick_step" => model.stick_step,
+        "period" => model.period,
+        "horizon_reference" => model.horizon_reference,
+        "stretch" => model.curve.stretch,
+        "choked" => model.curve.choked,
         other => panic!("{other}"),
     }
 }

@@ -134,7 +134,7 @@ impl AirModel {
             b: Chamber::new(axis, axis.lead_b, axis.flow_b, axis.force_b),
             stroke: axis.stroke,
             ambient: clipped(divide_signed(share, i64::from(axis.supply))),
-            fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 7),
+            fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 11),
             rod: axis.force_rod,
             known: u16::try_from(known).unwrap_or(u16::MAX),
             slow: slow.div_ceil(WHOLE).saturating_mul(ONE),
@@ -181,22 +181,19 @@ impl AirModel {
         (Micros(opening), (chamber.force >> 10).wrapping_mul(parts))
     }
 
-    /// Pressure of a chamber of `length` (1/256 mm) after its valves were open for `fill`
-    /// and `vent` µs, in which its length grew by `growth` (raw mm).
-    #[inline]
-    fn after(&self, p: i32, chamber: &Chamber, length: i32, on: [u32; 2], growth: i32) -> i32 {
+    /// What a valve that is open for `on` µs lets into a chamber: the way of the piston that it
+    /// is worth, raw mm, times the pressure that drives it, which falls off below `drop` to none.
+    #[inline(always)]
+    fn through(&self, chamber: &Chamber, on: u32, drop: i32, [least, most]: [i32; 2]) -> i64 {
         // A round at most, and flows of at most 2^19: below 2^31.
-        let flow = |on: u32| ((on as i32).wrapping_mul(chamber.flow) >> 8).min(STEP);
-        let [fill, vent] = on;
-        let (fill, vent) = (flow(fill), flow(vent));
-        let chord = |drop: i32| drop.wrapping_mul(self.fall) >> 8;
-        let filling = chord(SUPPLY.wrapping_sub(p)).min(SUPPLY);
-        let venting = chord(p.wrapping_sub(self.ambient)).min(p);
-        // Pressures below 2^19, lengths of a round up to 2^18: sums below 2^39.
-        let sum = i64::from(filling)
-            .wrapping_mul(i64::from(fill))
-            .wrapping_sub(i64::from(venting).wrapping_mul(i64::from(vent)))
-            .wrapping_sub(i64::from(p).wrapping_mul(i64::from(growth)));
+        let way = ((on as i32).wrapping_mul(chamber.flow) >> 8).min(STEP);
+        let chord = drop.wrapping_mul(self.fall) >> 8;
+        i64::from(chord.max(least).min(most)).wrapping_mul(i64::from(way))
+    }
+
+    /// Pressure of a chamber of `length` (1/256 mm) at `p` that gains `sum`, pressure × raw mm.
+    #[inline(always)]
+    fn after(&self, p: i32, length: i32, sum: i64) -> i32 {
         // To pressure × mm × 2^8, below 2^31; at least a millimetre long.
         let change = ((sum >> 8) as i32)
             .checked_div(length.max(256))
@@ -265,29 +262,38 @@ impl Content {
         if open == 0 && moved.wrapping_abs() < 1 << 13 {
             return;
         }
-        let (fill, sure_fill, fills) = taken(open, model.slow);
-        let (vent, sure_vent, vents) = taken(open.wrapping_shr(16), model.slow);
-        // Of a valve of which nothing is ever certain the rounds begin anew after 15.
-        self.open = (fills & 0xFFFF) | vents.wrapping_shl(16);
-        // Below 2^16.
-        self.vented = self
-            .vented
-            .saturating_add((sure_vent >> VENTED_SHIFT) as u16);
-        let on = if certain {
-            [sure_fill, sure_vent]
-        } else {
-            [fill, vent]
-        };
-        self.length = length;
+        let p = self.p;
         // No piston goes that far: another calibration, or the first reading.
-        let moved = if moved.wrapping_abs() > STEP {
+        let shrinks = if moved.wrapping_abs() > STEP {
             0
         } else {
-            moved
+            moved.wrapping_mul(EXPONENT.wrapping_neg()) >> 8
         };
-        let growth = moved.wrapping_mul(EXPONENT) >> 8;
+        // Pressures below 2^19, lengths of a round up to 2^18: sums below 2^39.
+        let mut sum = i64::from(p).wrapping_mul(i64::from(shrinks));
+        // Of a valve of which nothing is ever certain the rounds begin anew after 15.
+        let mut next = 0;
+        if open & 0xFFFF != 0 {
+            let (time, sure, rounds) = taken(open, model.slow);
+            let on = if certain { sure } else { time };
+            let drop = SUPPLY.wrapping_sub(p);
+            sum = sum.wrapping_add(model.through(chamber, on, drop, [i32::MIN, SUPPLY]));
+            next = rounds & 0xFFFF;
+        }
+        if open > 0xFFFF {
+            let (time, sure, rounds) = taken(open.wrapping_shr(16), model.slow);
+            let on = if certain { sure } else { time };
+            let drop = model.ambient.wrapping_sub(p);
+            let most = [p.wrapping_neg(), i32::MAX];
+            sum = sum.wrapping_add(model.through(chamber, on, drop, most));
+            next |= rounds.wrapping_shl(16);
+            // Below 2^16.
+            self.vented = self.vented.saturating_add((sure >> VENTED_SHIFT) as u16);
+        }
+        self.open = next;
+        self.length = length;
         let length = (length >> 8).wrapping_add(chamber.lead);
-        self.p = model.after(self.p, chamber, length, on, growth);
+        self.p = model.after(p, length, sum);
     }
 }
 

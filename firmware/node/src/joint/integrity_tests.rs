@@ -1,5 +1,6 @@
 //! A flipped bit in what a joint board keeps between two ticks means Hold: at the
-//! next tick for what a tick changes, within [`PARTS`] ticks for the rest.
+//! next tick for what a tick changes, within a period of four for what the predictive law keeps
+//! (which has tests of its own), within [`PARTS`] ticks for the rest.
 
 use super::expectation::{MotionModel, MotionWatch};
 use super::node::{JointNode, PARTS};

@@ -83,9 +83,11 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !identity.address.is_joint() {
             return Err(ConfigError::Address);
         }
-        let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
+        let Some(settings) = &JointSettings::new(&parameters) else {
+            return Err(ConfigError::Parameters);
+        };
         Ok(Self::with(
-            identity, parameters, &settings, valves, sensor, switches,
+            identity, parameters, settings, valves, sensor, switches,
         ))
     }
 
@@ -150,8 +152,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let stored = stored.filter(|stored| JointSettings::new(stored).is_some());
         let sound = stored.is_some();
         let parameters = stored.unwrap_or_default();
-        let settings = JointSettings::new(&parameters).ok_or(ConfigError::Parameters)?;
-        let mut node = Self::with(identity, parameters, &settings, valves, sensor, switches);
+        let Some(settings) = &JointSettings::new(&parameters) else {
+            return Err(ConfigError::Parameters);
+        };
+        let mut node = Self::with(identity, parameters, settings, valves, sensor, switches);
         if !sound {
             node.axis_fault(Fault::ParameterCorrupt, Micros::ZERO);
         }
@@ -159,7 +163,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     /// Takes bytes of the bus, in any chunking; the last of them ended at
-    /// `t_end`. Never panics, for any bytes.
+    /// `t_end`. Never panics, for any bytes. Not inlined: the main loop would save the
+    /// registers that it needs, for every tick.
+    #[inline(never)]
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         receive(self, bytes, t_end);
     }
@@ -307,9 +313,11 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.controller.config().hash_part(part, sum);
             // With each part of the configuration another part of the rest.
             match part {
-                0 => self.settings.hash_own(sum),
-                1 => self.settings.motion.hash(sum),
-                2 => (&self.core.times, self.pwm.timing()).hash(sum),
+                0 => self.core.times.hash(sum),
+                1 => self.settings.motion.hash_air(sum),
+                2 => self.settings.motion.hash_forces(sum),
+                3 => self.pwm.timing().hash(sum),
+                4 => self.settings.hash_own(sum),
                 _ => {}
             }
         })

@@ -158,6 +158,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     }
 
     /// Sets one parameter, or changes nothing.
+    #[inline(never)]
     fn set_parameter(&mut self, id: u16, raw: i32, at: Micros) -> Result<(), NackReason> {
         // With other units or limits the watches start anew; what they have found stands.
         if let Some(fault) = self.found() {
@@ -165,18 +166,20 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
         let disarmed = self.core.mode().is_disarmed();
         let trial = self.parameters.with(id, raw, disarmed)?;
-        let settings = JointSettings::new(&trial).ok_or(NackReason::OutOfRange)?;
+        // By reference: each move of the settings would be hundreds of bytes of code.
+        let Some(settings) = &JointSettings::new(&trial) else {
+            return Err(NackReason::OutOfRange);
+        };
         self.change(|node| {
-            if settings.tick.sensor != node.settings.sensor {
+            let sensor_differs = settings.tick.sensor != node.settings.sensor;
+            if sensor_differs {
                 // Another calibration moves the stroke without a motion: neither
                 // a rate fault nor a velocity. The new one has to prove itself
                 // before the board may arm.
                 node.monitor = SensorMonitor::new();
                 node.controller.reset();
             }
-            if settings.tick.sensor != node.settings.sensor
-                || settings.tick.motion != node.settings.motion
-            {
+            if sensor_differs || settings.tick.motion != node.settings.motion {
                 // Other units, other places: nothing that was learnt holds.
                 node.state.motion = MotionWatch::new(&settings.tick.motion, node.state.measured);
             }

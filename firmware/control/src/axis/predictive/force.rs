@@ -1,78 +1,145 @@
 //! The force that is wanted at the end of the dead time.
 
 use super::STILL;
-use super::rest::REFERENCE_RESTS;
+use super::rest::{REFERENCE_RESTS, Rest};
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
-use crate::axis::motion::{Inertia, Motion};
-use crate::axis::{clip, part, scaled, square_root, within};
+use crate::axis::motion::{Inertia, Motion, rubbed};
+use crate::axis::{clip, mix, part, scaled, square_root, within};
 
 /// Fast enough for the sign of friction to be that of the motion (10 mm/s).
 const SLIDES: i32 = 10 << 16;
+
+/// Where the piston goes until the end of the dead time of the next period, for the chambers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Course {
+    /// Stroke in the middle of the period to the next moment, raw mm.
+    pub(super) middle: i32,
+    /// Speed there, raw mm/s.
+    pub(super) speed: i32,
+    /// Stroke at the end of the dead time after it, raw mm.
+    pub(super) end: i32,
+    /// Speed in that, raw mm/s; 0 if that would end beyond an end stop.
+    pub(super) ahead: i32,
+    /// Speed now, raw mm/s …
+    pub(super) now: i32,
+    /// … and the pressure force in the period up to now, mN: for the learner.
+    pub(super) force: i32,
+}
+
+impl Course {
+    /// Standing at `stroke`, raw mm.
+    pub(super) const fn at(stroke: i32) -> Self {
+        Self {
+            middle: stroke,
+            speed: 0,
+            end: stroke,
+            ahead: 0,
+            now: 0,
+            force: 0,
+        }
+    }
+
+    /// Adds itself up.
+    #[inline]
+    pub(super) const fn sum(&self) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            middle,
+            speed,
+            end,
+            ahead,
+            now,
+            force,
+        } = *self;
+        let sum = mix(mix(mix(mix(0, middle), speed), end), ahead);
+        mix(mix(sum, now), force)
+    }
+
+    /// Where the present speed takes the piston: not beyond an end stop, where air would be
+    /// squeezed that is not there. The acceleration is not counted on beyond the period: the air
+    /// that is squeezed pushes back, the more the shorter a chamber is.
+    #[inline]
+    pub(super) fn of(model: &AxisModel, motion: &Motion, force: i32) -> Self {
+        let speed = motion.speed.saturating_add(motion.gained >> 1);
+        let half = part(speed, model.period >> 1, 32);
+        let middle = motion.stroke.saturating_add(half);
+        let way = half.saturating_add(part(motion.speed, model.horizon, 32));
+        let free = middle.saturating_add(way);
+        let end = free.max(0).min(model.stroke);
+        Self {
+            middle,
+            speed,
+            end,
+            ahead: if end == free { motion.speed } else { 0 },
+            now: motion.speed,
+            force,
+        }
+    }
+}
 
 /// Motion at the end of the dead time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead {
     /// Raw mm.
     pub(super) stroke: i32,
-    /// Mean speed until then, raw mm/s; 0 if that would end beyond an end stop.
-    pub(super) mean: i32,
-    /// Speed then, raw mm/s.
+    /// Speed, raw mm/s.
     pub(super) speed: i32,
 }
 
 impl Ahead {
-    /// Where the present acceleration takes the piston: not beyond an end stop, where air
-    /// would be squeezed that is not there.
+    /// With the pressure force `force` now and `expected` pressures then; not beyond an end
+    /// stop.
     #[inline]
-    pub(super) fn new(model: &AxisModel, motion: &Motion) -> Self {
-        let gained = scaled(motion.acceleration, model.horizon, 16);
-        let mean = motion.speed.saturating_add(gained.wrapping_shr(1));
-        let free = motion.stroke.saturating_add(part(mean, model.horizon, 32));
-        let stroke = free.max(0).min(model.stroke);
-        Self {
-            stroke,
-            mean: if stroke == free { mean } else { 0 },
-            speed: motion.speed.saturating_add(gained),
-        }
-    }
-
-    /// Corrects the speed for the pressures that will be there.
-    #[inline]
-    pub(super) fn correct(
-        &mut self,
+    pub(super) fn new(
         model: &AxisModel,
         inertia: &Inertia,
         motion: &Motion,
-        pressures: Pressures,
-    ) {
-        let drive = model.pressure_force(pressures).saturating_add(motion.load);
-        self.speed = if motion.stuck && drive.saturating_abs() < model.breakaway {
+        force: i32,
+        expected: Pressures,
+    ) -> Self {
+        let then = model.pressure_force(expected);
+        let drive = then.saturating_add(motion.load);
+        let speed = if motion.stuck && drive.saturating_abs() < model.breakaway {
             0
         } else {
-            // Mean of the accelerations now and then.
-            let then = inertia.acceleration(drive.saturating_sub(motion.friction));
-            let mean = motion.acceleration.saturating_add(then).wrapping_shr(1);
-            motion.speed.saturating_add(scaled(mean, model.horizon, 16))
+            // Mean of the forces now and then.
+            let mean = force.saturating_add(then) >> 1;
+            let viscous = part(motion.speed, model.viscous, 24);
+            let sliding = mean.saturating_add(motion.load).saturating_sub(viscous);
+            let gained = scaled(inertia.acceleration(sliding), model.horizon, 16);
+            rubbed(motion.speed.saturating_add(gained), inertia.rubbed_ahead)
         };
+        let mean = motion.speed.saturating_add(speed) >> 1;
+        let free = motion.stroke.saturating_add(part(mean, model.horizon, 32));
+        Self {
+            stroke: free.max(0).min(model.stroke),
+            speed,
+        }
     }
 }
 
 /// Extra force on a piston that sticks: it grows until the piston slips.
-#[derive(Clone, Copy, Debug, Default, Hash)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Push {
     /// mN × 2^8.
     force: i32,
 }
 
 impl Push {
-    /// One tick at `speed` raw mm/s with `missing` raw mm to a reference of
+    /// Its sum.
+    #[inline]
+    pub(super) const fn sum(self) -> u32 {
+        mix(0, self.force)
+    }
+
+    /// One period at `speed` raw mm/s with `missing` raw mm to a reference of
     /// `reference_speed`. What moves slower than it slides only gives way by the spring
     /// of its friction: that takes nothing back.
     #[inline]
     fn update(&mut self, model: &AxisModel, speed: i32, missing: i32, reference_speed: i32) {
         if speed > SLIDES {
-            self.force = self.force.saturating_sub(self.force.wrapping_shr(3));
+            self.force = self.force.saturating_sub(part(self.force, 27_000, 16));
         } else if speed < STILL && reference_speed.wrapping_abs() <= REFERENCE_RESTS {
             let step = if missing > 0 {
                 model.stick_step
@@ -100,14 +167,21 @@ pub(super) struct Wish<'a> {
 }
 
 impl Wish<'_> {
-    /// F*, mN. `grip` gives the friction to feed forward of that which is told.
+    /// One period in which the law acts on the piston.
     #[inline]
-    pub(super) fn force(
-        &self,
-        model: &AxisModel,
-        push: &mut Push,
-        grip: impl Fn(i32) -> i32,
-    ) -> i32 {
+    pub(super) fn push(&self, model: &AxisModel, push: &mut Push) {
+        let missing = self.reference.saturating_sub(self.motion.stroke);
+        let speed = if self.motion.stuck {
+            0
+        } else {
+            self.motion.speed.wrapping_abs()
+        };
+        push.update(model, speed, missing, self.reference_speed);
+    }
+
+    /// F*, mN.
+    #[inline]
+    pub(super) fn force(&self, model: &AxisModel, push: Push, rest: &Rest) -> i32 {
         let Self {
             reference,
             reference_speed,
@@ -117,7 +191,7 @@ impl Wish<'_> {
         } = *self;
         let load = motion.load;
         let error = reference
-            .saturating_add(part(reference_speed, model.horizon, 32))
+            .saturating_add(part(reference_speed, model.horizon_reference, 32))
             .saturating_sub(ahead.stroke);
         // The force that can brake, beside the load: seven tenths of it are used.
         let left = if error > 0 {
@@ -136,9 +210,7 @@ impl Wish<'_> {
         let acceleration = within(pull.saturating_add(damp), limit);
 
         let speed_now = motion.speed.wrapping_abs();
-        let missing = reference.saturating_sub(motion.stroke);
-        push.update(model, speed_now, missing, reference_speed);
-        let grip = grip(if speed_now < STILL {
+        let grip = rest.faded(if speed_now < STILL {
             model.breakaway
         } else {
             model.coulomb
@@ -199,25 +271,23 @@ mod tests {
     #[test]
     fn nothing_is_squeezed_beyond_an_end_stop() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
-        let ahead = |stroke_mm: i32, speed_mm_s: i32| {
+        let course = |stroke_mm: i32, speed_mm_s: i32| {
             let motion = Motion {
                 stroke: stroke_mm << 16,
                 speed: speed_mm_s << 16,
                 ..Motion::default()
             };
-            Ahead::new(&model, &motion)
+            Course::of(&model, &motion, 0)
         };
         assert_eq!(model.stroke, 180 << 16);
         for (stroke, speed, end) in [(1, -400, 0), (179, 400, 180)] {
-            let ahead = ahead(stroke, speed);
-            assert_eq!((ahead.stroke, ahead.mean), (end << 16, 0));
+            let course = course(stroke, speed);
+            assert_eq!((course.end, course.ahead), (end << 16, 0));
         }
-        let free = ahead(90, 400);
-        let way = f64::from(free.stroke) / 65_536.0 - 90.0;
-        assert!(
-            (way - 400e-6 * f64::from(model.horizon_us)).abs() < 1e-2,
-            "{way}"
-        );
-        assert_eq!(free.mean, 400 << 16);
+        let free = course(90, 400);
+        let way = f64::from(free.end) / 65_536.0 - 90.0;
+        let time_us = model.times.period + model.horizon_us;
+        assert!((way - 400e-6 * f64::from(time_us)).abs() < 1e-2, "{way}");
+        assert_eq!(free.ahead, 400 << 16);
     }
 }

@@ -3,30 +3,38 @@
 use super::STILL;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::Motion;
-use crate::axis::{part, scaled, square_root};
-use core::hash::{Hash, Hasher};
+use crate::axis::{mix, part, scaled, square_root};
 
-/// Slower than this a piston in the band is caught by shutting the valves (6 mm/s).
-const CATCH: i32 = 6 << 16;
+/// Slower than this a piston in the band is caught by shutting the valves, raw mm/s (4 mm/s).
+const CATCH: i32 = 4 << 16;
 /// A reference slower than this is a step (1 mm/s).
 pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
-/// Ticks in the band before rest.
-const REST_TICKS: u16 = 30;
-/// Ticks near the target without coming to rest after which the band widens …
-const PATIENCE: u16 = 500;
-/// … by one band in so many ticks, up to three bands in all …
+/// Periods in the band before rest.
+const REST_PERIODS: u16 = 6;
+/// Periods near the target without coming to rest after which the law acts and waits …
+const PATIENCE: u16 = 100;
+/// … and, so many periods later, the band widens …
+const WIDENS: i32 = 120;
+/// … by one band in so many periods, up to three bands in all …
 const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
-const PATIENCE_SHIFT: u32 = 9;
+const PATIENCE_SHIFT: u32 = 7;
 /// … but never wider than this, raw mm (0.4 mm).
 const WIDEST: i32 = 26_214;
 /// A piston further from its target than this does not rest there, raw mm (0.45 mm).
 const LEFT: i32 = 29_491;
-/// Ticks outside before the end of rest at the same target, …
-const RELEASE_TICKS: u16 = 20;
+/// A piston that rests may be so much further from its target than one that comes to rest, in
+/// sixteenths of the band.
+const RELEASE: i32 = 16;
+/// Periods near the target (24 bands) after which the piston counts as near.
+const NEAR: u16 = 4;
+/// Periods outside before the end of rest at the same target, …
+const RELEASE_PERIODS: u16 = 5;
 /// … and with a new one.
-const START_TICKS: u16 = 4;
-/// Ticks of a pause that one counts for in which the piston stands beside the band.
+const START_PERIODS: u16 = 1;
+/// Periods of a pause that one counts for in which the piston stands beside the band.
 const PAUSE_SPENT: u16 = 8;
+/// Share of the friction told that is counted on to stop a piston, × 2^16 (0.85).
+const STOPS: i32 = 55_705;
 /// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
 const GENTLE: i32 = 40 << 16;
 /// Nor does one that is further from its target than this, raw mm (2 mm), and outside its band.
@@ -39,20 +47,27 @@ pub(super) struct Rest {
     held: u16,
     released: u16,
     near: u16,
-    /// What is left of the pause under way, ticks.
+    /// What is left of the pause under way, periods.
     pause: u16,
-    /// In the band at the last tick.
+    /// In the band in the last period.
     inside: bool,
     /// The target has changed since the piston came to rest.
     aimed: bool,
     settled: bool,
 }
 
-impl Hash for Rest {
+impl Rest {
+    /// Adds itself to a sum. Fields that are narrower than a word share one, such that a
+    /// flipped bit of any flips one bit of it.
     #[inline]
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Fields that are
-        // narrower than a word share one, such that a flipped bit of any flips one bit of it.
+    pub(super) fn sum(&self, sum: u32) -> u32 {
+        let [first, second, third] = self.words();
+        mix(mix(mix(sum, first), second), third)
+    }
+
+    #[inline]
+    fn words(&self) -> [i32; 3] {
+        // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             target,
             held,
@@ -62,23 +77,28 @@ impl Hash for Rest {
             inside,
             aimed,
             settled,
-        } = self;
-        state.write_i32(*target);
-        state.write_u32(u32::from(*held) | u32::from(*released).wrapping_shl(16));
-        state.write_u32(
-            u32::from(*near)
-                ^ u32::from(*pause).wrapping_shl(16)
-                ^ u32::from(*settled).wrapping_shl(16)
-                ^ u32::from(*inside).wrapping_shl(17)
-                ^ u32::from(*aimed).wrapping_shl(18),
-        );
+        } = *self;
+        let small = u32::from(near)
+            ^ u32::from(pause).wrapping_shl(16)
+            ^ u32::from(settled).wrapping_shl(16)
+            ^ u32::from(inside).wrapping_shl(17)
+            ^ u32::from(aimed).wrapping_shl(18);
+        [
+            target,
+            i32::from(held) | i32::from(released).wrapping_shl(16),
+            small.cast_signed(),
+        ]
     }
-}
 
-impl Rest {
     /// At rest.
     pub(super) const fn is_settled(&self) -> bool {
         self.settled
+    }
+
+    /// Whether the piston has been near its target for some time.
+    #[inline]
+    pub(super) const fn is_near(&self) -> bool {
+        self.near > NEAR
     }
 
     /// Forgets the rest state with the piston at `stroke`.
@@ -90,10 +110,16 @@ impl Rest {
         self.target = stroke;
     }
 
+    /// Whether the reference is another target.
+    #[inline]
+    pub(super) const fn is_other(&self, model: &AxisModel, reference: i32) -> bool {
+        reference.saturating_sub(self.target).saturating_abs() > model.band
+    }
+
     /// Takes over the reference; whether it is a new target.
     #[inline]
     pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
-        let new = reference.saturating_sub(self.target).saturating_abs() > model.band;
+        let new = self.is_other(model, reference);
         if new {
             self.target = reference;
             self.near = 0;
@@ -103,64 +129,89 @@ impl Rest {
         new
     }
 
-    /// One tick; whether the valves are to stay shut.
+    /// One period; whether the valves are to stay shut.
     #[inline]
     pub(super) fn quiet(&mut self, model: &AxisModel, now: &Approach) -> bool {
+        // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
         let narrow = model.band;
+        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        if self.settled && self.stays(narrow, now, steps) {
+            return true;
+        }
         let error = now
             .reference
             .saturating_sub(now.motion.stroke)
             .saturating_abs();
-        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        let near = steps && !self.settled && error < narrow.saturating_mul(24);
-        if near {
-            self.near = self.near.saturating_add(1).min(PATIENCE.saturating_mul(4));
-        } else if !self.settled {
+        if !steps {
             self.near = self.near.saturating_sub(1);
+            self.held = 0;
+            self.pause = 0;
+            self.inside = false;
+            return false;
         }
-        // Patience: what has not come to rest for long may do so in a wider band.
-        let beyond = self.beyond().min(2 * PATIENCE_STEP);
-        // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
-        let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
-        let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
-        let catch = CATCH.wrapping_add(extra(CATCH));
-
-        let inside = error < band;
-        let waits = self.waits(model, now, steps, error, inside);
-        let slow = inside && now.motion.speed.wrapping_abs() < catch;
-        let quiet = steps && (slow || now.stops_within(model, band));
-        self.held = if quiet {
-            self.held.saturating_add(1)
+        self.near = if error < narrow.wrapping_mul(24) {
+            self.near.wrapping_add(1).min(PATIENCE * 4)
         } else {
-            0
+            self.near.saturating_sub(1)
         };
-        if self.held > REST_TICKS && !self.settled {
+        // Patience: what has not come to rest for long may do so in a wider band.
+        let beyond = self.beyond();
+        let (band, catch) = if beyond > WIDENS {
+            let beyond = beyond.wrapping_sub(WIDENS).min(2 * PATIENCE_STEP);
+            // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
+            let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
+            let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
+            (band, CATCH.wrapping_add(extra(CATCH)))
+        } else {
+            (narrow, CATCH)
+        };
+        let speed = now.motion.speed.wrapping_abs();
+        let inside = error < band;
+        let waits = self.waits(model, now, speed, error, inside);
+        let slow = inside && speed < catch;
+        if !(slow || now.stops_within(model, band)) {
+            self.held = 0;
+            return waits;
+        }
+        self.held = self.held.wrapping_add(1);
+        if self.held > REST_PERIODS {
             self.settled = true;
             self.aimed = false;
-        }
-        let release = narrow
-            .saturating_mul(2)
-            .saturating_add(band)
-            .min(LEFT.max(band.saturating_add(narrow >> 1)));
-        let away = now.reference.saturating_sub(now.measured).saturating_abs();
-        let outside = away > release;
-        if self.settled && (outside || !steps) {
-            self.released = self.released.saturating_add(1);
-            let ticks = if self.aimed {
-                START_TICKS
-            } else {
-                RELEASE_TICKS
-            };
-            if self.released >= ticks || !steps {
-                self.settled = false;
-                self.held = 0;
-                self.released = 0;
-                self.near = self.near.max(PATIENCE);
-            }
-        } else {
             self.released = 0;
         }
-        self.settled || quiet || waits
+        true
+    }
+
+    /// One period of a piston that rests; whether it stays so.
+    #[inline]
+    fn stays(&mut self, narrow: i32, now: &Approach, steps: bool) -> bool {
+        let beyond = self.beyond().wrapping_sub(WIDENS);
+        let beyond = beyond.clamp(0, 2 * PATIENCE_STEP);
+        let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
+        let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
+        let release = narrow
+            .wrapping_mul(RELEASE)
+            .wrapping_shr(4)
+            .wrapping_add(band)
+            .min(LEFT.max(band.wrapping_add(narrow >> 1)));
+        let away = now.reference.saturating_sub(now.measured).saturating_abs();
+        if steps && away <= release {
+            self.released = 0;
+            return true;
+        }
+        self.released = self.released.wrapping_add(1);
+        let periods = if self.aimed {
+            START_PERIODS
+        } else {
+            RELEASE_PERIODS
+        };
+        if steps && self.released < periods {
+            return true;
+        }
+        self.settled = false;
+        self.held = 0;
+        self.near = self.near.max(PATIENCE);
+        false
     }
 
     /// Act and wait. Where acting alone has not brought the piston to rest for long,
@@ -173,14 +224,13 @@ impl Rest {
         &mut self,
         model: &AxisModel,
         now: &Approach,
-        steps: bool,
+        speed: i32,
         error: i32,
         inside: bool,
     ) -> bool {
-        let speed = now.motion.speed.wrapping_abs();
         let entered = inside && !self.inside;
         self.inside = inside;
-        if !steps || speed > GENTLE || (error > FLED && !inside) {
+        if speed > GENTLE || (error > FLED && !inside) {
             self.pause = 0;
         } else if self.pause > 0 {
             let spent = if inside || speed >= STILL {
@@ -195,7 +245,7 @@ impl Rest {
         self.pause > 0
     }
 
-    /// Ticks near the target beyond what patience allows.
+    /// Periods near the target beyond what patience allows.
     fn beyond(&self) -> i32 {
         i32::from(self.near.saturating_sub(PATIENCE))
     }
@@ -211,13 +261,12 @@ impl Rest {
     }
 }
 
-/// Ticks of a swing of a mass (kg × 2^16) on the air of both chambers, 100…1000. The tick
-/// that asks for it keeps the valves shut, unless a move is announced.
+/// Periods of a swing of a mass (kg × 2^16) on the air of both chambers, 25…250.
 #[inline]
 fn swing(model: &AxisModel, mass: i32) -> u16 {
     let square_8 = scaled(mass, model.swing, 16);
-    let ticks = square_root(square_8.unsigned_abs()).wrapping_shr(4);
-    ticks.clamp(100, 1000) as u16
+    let periods = square_root(square_8.unsigned_abs()).wrapping_shr(4);
+    periods.clamp(25, 250) as u16
 }
 
 /// How the piston comes to its target.
@@ -244,12 +293,12 @@ impl Approach<'_> {
     fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
         let speed = self.motion.speed.wrapping_shr(8);
         let error = self.reference.saturating_sub(self.motion.stroke);
-        if error.saturating_abs() > band.saturating_mul(12) {
+        if error.saturating_abs() > band.wrapping_mul(12) {
             return false;
         }
         let net = self.force.saturating_add(self.motion.load);
         let along = if speed < 0 { net.saturating_neg() } else { net };
-        let stopping = model.coulomb.saturating_sub(along);
+        let stopping = part(model.coulomb, STOPS, 16).saturating_sub(along);
         if stopping < model.coulomb >> 2 {
             return false;
         }
@@ -273,28 +322,9 @@ mod tests {
     use crate::axis::AxisData;
     use wheeleg_units::{Micros, PositionMm};
 
-    /// The words that are sealed.
-    #[derive(Default, PartialEq, Eq, Debug)]
-    struct Words([u32; 4], usize);
-
-    impl Hasher for Words {
-        fn finish(&self) -> u64 {
-            0
-        }
-
-        fn write(&mut self, bytes: &[u8]) {
-            self.0[self.1] = u32::from_ne_bytes(bytes.try_into().expect("whole words"));
-            self.1 += 1;
-        }
-    }
-
     #[test]
     fn every_flipped_bit_of_the_rest_state_flips_one_that_is_sealed() {
-        let sealed = |rest: &Rest| {
-            let mut words = Words::default();
-            rest.hash(&mut words);
-            words.0
-        };
+        let sealed = Rest::words;
         let some = Rest {
             target: 0x12_3456,
             held: 77,
@@ -358,10 +388,13 @@ mod tests {
                 let model = AxisModel::new(&data, Micros(tick_us)).expect("in range");
                 for mass_kg in [0.5, 1.5, 10.0, 60.0] {
                     let period_s = core::f64::consts::TAU * f64::sqrt(mass_kg / stiffness);
-                    let exact = (period_s * 1e6 / f64::from(tick_us)).clamp(100.0, 1000.0);
-                    let ticks = f64::from(swing(&model, (mass_kg * 65_536.0) as i32));
-                    let off = (ticks - exact).abs();
-                    assert!(off < 1.0 + 0.1 * exact, "{bore} {mass_kg}: {ticks} {exact}");
+                    let exact = (period_s * 1e6 / f64::from(4 * tick_us)).clamp(25.0, 250.0);
+                    let periods = f64::from(swing(&model, (mass_kg * 65_536.0) as i32));
+                    let off = (periods - exact).abs();
+                    assert!(
+                        off < 1.0 + 0.1 * exact,
+                        "{bore} {mass_kg}: {periods} {exact}"
+                    );
                 }
             }
         }
