@@ -31,7 +31,7 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Failed(error) => write!(f, "{error:#}"),
-            Self::Missing { tool, install } => write!(f, "missing {tool}; install with: {install}"),
+            Self::Missing { tool, install } => f.write_str(&missing(tool, install)),
         }
     }
 }
@@ -105,8 +105,12 @@ impl Report {
     }
 }
 
+fn missing(tool: &str, install: &str) -> String {
+    format!("missing {tool}; install with: {install}")
+}
+
 fn not_run(step: &str, tool: &str, install: &str) -> String {
-    format!("NOT RUN: {step}: missing {tool}; install with: {install}")
+    format!("NOT RUN: {step}: {}", missing(tool, install))
 }
 
 impl fmt::Display for Report {

@@ -113,28 +113,64 @@ impl Chamber {
         self.means_check == self.sum_of_means()
     }
 
-    /// Coils that are on for these times of the `span` µs that begin `now`, fill and vent, µs,
-    /// where others decide than the plan; `cut` says that what was planned for later does not
-    /// happen. What was damaged before keeps its broken seal.
+    /// Coils fall that are on, after these times from `now` on, fill and vent, µs, and nothing that
+    /// was planned for later happens. `plan` is what the present period began with, and when,
+    /// if it is not yet known here. What was damaged before keeps its broken seal.
+    #[cold]
     #[inline(never)]
-    pub(super) fn energise(
+    pub(super) fn end(
         &mut self,
         now: u32,
         on: [u16; 2],
-        span: i32,
-        cut: bool,
+        plan: Option<(u32, [u16; 2])>,
         times: &ValveTimes,
     ) {
-        if on == [0; 2] && !cut && !self.fill.coil() && !self.vent.coil() {
-            return;
-        }
         let sound = self.pulses_are_sound();
-        let [fill, vent] = on;
-        self.fill.decide(now, i32::from(fill), span, cut, times);
-        self.vent.decide(now, i32::from(vent), span, cut, times);
+        let [fill, vent] = on.map(i32::from);
+        if let Some((begun, plan)) = plan {
+            let [fill, vent] = plan.map(i32::from);
+            self.fill.energise(begun, fill, times.period, times);
+            self.vent.energise(begun, vent, times.period, times);
+        }
+        self.fill.end(now.wrapping_add(fill as u32), times);
+        self.vent.end(now.wrapping_add(vent as u32), times);
         if sound {
             self.pulses_check = self.sum_of_pulses();
         }
+    }
+
+    /// Pressure at the moment, where somebody else than the law has had the valves open for these
+    /// times, fill and vent, µs. They come on top of what is left of the law's own pulses. Nothing
+    /// is foreseen.
+    #[inline(never)]
+    pub(super) fn observe(
+        &mut self,
+        model: &AxisModel,
+        clock: &Clock,
+        piston: &Piston,
+        open: [u16; 2],
+    ) {
+        let Clock { next, moment, .. } = *clock;
+        let from = moment.wrapping_sub(model.times.period as u32);
+        let [fill_on, vent_on] = open.map(i32::from);
+        if fill_on | vent_on != 0 {
+            // The law waits until they have shut.
+            self.fill.shuts(next);
+            self.vent.shuts(next);
+        }
+        let fill = self.fill.passes(from, model.times.period).wrapping_add(fill_on);
+        let vent = self.vent.passes(from, model.times.period).wrapping_add(vent_on);
+        self.pulses_check = self.sum_of_pulses();
+
+        let [length, _] = piston.lengths;
+        let [speed, _] = piston.speeds;
+        let p = self.pressure;
+        let flows = ChamberFlows::of(model, piston.flow, p, fill > 0, vent > 0);
+        let stiffness = model.stiffness(length);
+        let change = flows.change([fill, vent], power(p, speed), model.times.period, stiffness);
+        self.pressure = bounded(model, p.saturating_add(change), fill, vent);
+        self.expected = self.pressure;
+        self.pressures_check = self.sum_of_pressures();
     }
 
     /// Pressures at the moment and at the end of the dead time, and what the next pulses are
@@ -146,16 +182,15 @@ impl Chamber {
         model: &AxisModel,
         clock: &Clock,
         piston: &Piston,
-        plan: Option<[u16; 2]>,
+        plan: [u16; 2],
     ) {
         let times = &model.times;
         let Clock { now, next, moment } = *clock;
         let from = moment.wrapping_sub(times.period as u32);
         let Self { fill, vent, .. } = self;
-        if let Some([fill_on, vent_on]) = plan {
-            fill.energise(now, i32::from(fill_on), times.period, times);
-            vent.energise(now, i32::from(vent_on), times.period, times);
-        }
+        let [fill_on, vent_on] = plan.map(i32::from);
+        fill.energise(now, fill_on, times.period, times);
+        vent.energise(now, vent_on, times.period, times);
         let open = [
             fill.passes(from, times.period),
             vent.passes(from, times.period),
@@ -187,24 +222,18 @@ impl Chamber {
             vent | more_vent | all_flows != 0,
         );
         let change = flows.change(open, power(p, speed), times.period, stiffness);
-        // No valve fills beyond the supply or vents below the atmosphere, however long a step is
-        // for a small chamber. A vacuum of more than half of it needs a motion of its own.
-        let within = |p: i32, fill: i32, vent: i32| {
-            let most = if fill > 0 { model.supply } else { MOST };
-            let least = if vent > 0 {
-                model.ambient
-            } else {
-                model.ambient.wrapping_shr(1)
-            };
-            p.max(least).min(most)
-        };
-        let p = within(p.saturating_add(change), fill, vent);
+        let p = bounded(model, p.saturating_add(change), fill, vent);
         let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
         self.flows = flows;
         self.stiffness = ahead;
         self.means_check = self.sum_of_means();
         self.pressure = p;
-        self.expected = within(p.saturating_add(change), fill | more_fill, vent | more_vent);
+        self.expected = bounded(
+            model,
+            p.saturating_add(change),
+            fill | more_fill,
+            vent | more_vent,
+        );
         self.pressures_check = self.sum_of_pressures();
     }
 
@@ -251,6 +280,20 @@ impl Chamber {
         let times = &model.times;
         self.ready.map(|ready| microseconds(ready.rest(times)))
     }
+}
+
+/// A pressure that valves open for `fill` and `vent` µs can lead to. None fills beyond the supply or
+/// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
+/// half of that needs a motion of its own.
+#[inline]
+fn bounded(model: &AxisModel, p: i32, fill: i32, vent: i32) -> i32 {
+    let most = if fill > 0 { model.supply } else { MOST };
+    let least = if vent > 0 {
+        model.ambient
+    } else {
+        model.ambient.wrapping_shr(1)
+    };
+    p.max(least).min(most)
 }
 
 /// An on-time, 0…period (at most 8000).

@@ -102,19 +102,6 @@ enum Stroke {
     Pulses,
 }
 
-/// Who decides about the coils.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-enum Driver {
-    /// Somebody else.
-    #[default]
-    Others,
-    /// The law, from the middle of a period on: what its chambers can do is known with the next.
-    Begins,
-    /// The law.
-    Law,
-}
-
 /// How many they are.
 const STROKES: u8 = super::model::STROKES as u8;
 
@@ -157,12 +144,14 @@ pub struct Predictive {
     /// The stroke to come.
     stroke: Stroke,
     primed: bool,
-    driver: Driver,
+    /// The law decides about the coils, not somebody else.
+    drives: bool,
     /// Begin of the next period, µs; wraps.
     next: u32,
     /// Stroke of the last tick, raw mm.
     measured: i32,
-    /// On-times of the present period from its begin, µs; in its last tick, of the next one.
+    /// On-times of the present period from its begin, µs; in its last tick, of the next one. Where
+    /// somebody else decides: for how long the valves were open since their chambers were followed.
     plan: OnTimes,
 
     // For the record.
@@ -201,7 +190,7 @@ impl Predictive {
             rest_check: 0,
             stroke: Stroke::default(),
             primed: false,
-            driver: Driver::Others,
+            drives: false,
             next: 0,
             measured: 0,
             plan: [0; 4],
@@ -240,18 +229,22 @@ impl Predictive {
         self.rest.is_settled()
     }
 
-    /// A tick of the law's own; on-times for the next tick. `sent` are those last given out.
+    /// A tick of the law's own; on-times for the next tick. `sent` are those last given out, or
+    /// what [`Predictive::observe`] says of them.
+    ///
+    /// It begins to decide with a period, once all is counted that somebody else has sent.
     #[inline]
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput, sent: &OnTimes) -> Drive {
-        if !self.primed {
-            self.prime(input.measured);
-        }
-        if self.driver == Driver::Others {
-            self.take_over(model, sent);
+        if !self.drives {
+            let nothing = [0; 4];
+            if self.stroke != Stroke::A || self.plan != nothing || *sent != nothing {
+                self.observe(model, input.measured, sent);
+                return self.gives(nothing);
+            }
+            self.begin(input.measured);
         }
         let on = match self.stroke {
             Stroke::A => {
-                self.driver = Driver::Law;
                 self.follow(model, true);
                 self.due(model, 1)
             }
@@ -265,13 +258,17 @@ impl Predictive {
                 self.due(model, 3)
             }
             Stroke::Pulses => {
-                if self.driver == Driver::Law {
-                    self.choose(model, input);
-                }
+                self.choose(model, input);
                 self.due(model, 0)
             }
         };
         self.next_stroke(input.measured);
+        self.gives(on)
+    }
+
+    /// With these on-times.
+    #[inline(always)]
+    const fn gives(&self, on: OnTimes) -> Drive {
         Drive {
             on,
             velocity: VelocityMmS::from_raw(self.motion.speed),
@@ -337,12 +334,17 @@ impl Predictive {
             };
             (&mut self.b, piston, [fill_b, vent_b])
         };
-        chamber.follow(
-            model,
-            &clock,
-            &piston,
-            (self.driver != Driver::Others).then_some(plan),
-        );
+        if self.drives {
+            chamber.follow(model, &clock, &piston, plan);
+        } else {
+            chamber.observe(model, &clock, &piston, plan);
+            // Counted.
+            self.plan = if first {
+                [0, 0, fill_b, vent_b]
+            } else {
+                [fill_a, vent_a, 0, 0]
+            };
+        }
         if first {
             // Of the period before.
             self.learner.sample(model, now, force);

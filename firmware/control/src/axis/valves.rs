@@ -4,8 +4,7 @@
 //! falls; a pulse shorter than t_on never opens one, a gap shorter than t_off
 //! never shuts it. What the chamber sees comes later by the wave's way through
 //! the line. The same rules are followed here, in whole microseconds, on the
-//! on-times that are sent: for a whole period of the law, or tick by tick where
-//! somebody else decides.
+//! on-times that are sent, a whole period of the law at once.
 
 use super::mix;
 
@@ -155,14 +154,20 @@ impl ValveTrack {
         }
     }
 
-    /// As [`ValveTrack::energise`], or with `cut` as [`ValveTrack::cut`] of a coil that is off.
+    /// The coil falls at the moment `at`, or did before.
     #[inline(never)]
-    pub(super) fn decide(&mut self, now: u32, on: i32, span: i32, cut: bool, times: &ValveTimes) {
-        if cut && !self.coil() {
-            self.cut(now.wrapping_add(on as u32), times);
+    pub(super) fn end(&mut self, at: u32, times: &ValveTimes) {
+        if self.coil() {
+            self.change(at, times);
         } else {
-            self.energise(now, on, span, times);
+            self.cut(at, times);
         }
+    }
+
+    /// Its coil, which somebody else has driven, is off from the moment `at` on.
+    #[inline]
+    pub(super) const fn shuts(&mut self, at: u32) {
+        self.changed = at;
     }
 
     /// A coil whose fall was planned for a moment after `at` falls there, because somebody

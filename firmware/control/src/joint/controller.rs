@@ -112,9 +112,9 @@ impl JointController {
         self.predictive.as_ref()
     }
 
-    /// Takes note of the on-times that were sent for the next tick, by whatever
-    /// decided them: once per tick, after [`JointController::step`] or
-    /// [`JointController::observe`]. The predictive law follows the air by them.
+    /// Takes note of what was sent for the next tick, once per tick: the on-times after
+    /// [`JointController::step`]; after [`JointController::observe`], for how much of it each valve
+    /// counts as open without its switching delays, µs. The predictive law follows the air by it.
     pub const fn sent(&mut self, on: OnTimes) {
         self.sent = on;
     }

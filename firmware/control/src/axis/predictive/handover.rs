@@ -1,7 +1,7 @@
 //! Who decides about the valves: the law, or somebody else.
 
 use super::force::{Course, Push};
-use super::{Driver, NOTHING, Predictive, Stroke};
+use super::{NOTHING, Predictive, Stroke};
 use crate::axis::learn::Learner;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::Inertia;
@@ -9,10 +9,11 @@ use crate::pwm::OnTimes;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 impl Predictive {
-    /// A tick in which somebody else drives: `sent` are the on-times last given out. Follows
-    /// valves, chambers and piston, and forgets that the piston rests. Damage that the caller was
-    /// told of before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke that it
-    /// concerns: nothing of it is used here.
+    /// A tick in which somebody else drives: `sent` says for how much of it each valve counts as
+    /// open without its switching delays, µs; in the first one, the on-times that the law gave out
+    /// last. Follows chambers and piston, and forgets that the piston rests. Damage that the
+    /// caller was told of before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke
+    /// that it concerns: nothing of it is used here.
     pub fn observe(
         &mut self,
         model: &AxisModel,
@@ -22,10 +23,16 @@ impl Predictive {
         if !self.primed {
             self.prime(measured);
         }
-        if self.driver != Driver::Others {
+        if self.drives {
             self.yield_to_others(model, sent);
-        } else {
-            self.energise(model, sent, model.times.tick, false);
+            // That is enough for a tick: the period is one longer. What has opened or shut in
+            // it is seen a tick later; a valve that is open throughout counts for one less.
+            self.next = self.next.wrapping_add(model.times.tick as u32);
+            self.measured = measured.raw();
+            return VelocityMmS::from_raw(self.motion.speed);
+        }
+        for (open, more) in self.plan.iter_mut().zip(sent) {
+            *open = open.saturating_add(*more);
         }
         match self.stroke {
             Stroke::A => self.follow(model, true),
@@ -81,8 +88,18 @@ impl Predictive {
         }
     }
 
+    /// The law decides from this period on.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn begin(&mut self, measured: PositionMm) {
+        if !self.primed {
+            self.prime(measured);
+        }
+        self.drives = true;
+    }
+
     /// Begin of the tick.
-    pub(super) const fn edge(&self, model: &AxisModel) -> u32 {
+    const fn edge(&self, model: &AxisModel) -> u32 {
         let turn = self.stroke as i32;
         if turn == 0 {
             return self.next;
@@ -94,50 +111,24 @@ impl Predictive {
         self.next.wrapping_sub(left as u32)
     }
 
-    /// Coils that somebody else decides, for `span` µs from this tick on.
+    /// Somebody else drives from now on: what is planned for after this tick, in which `sent` acts,
+    /// does not happen.
+    #[cold]
     #[inline(never)]
-    pub(super) fn energise(&mut self, model: &AxisModel, sent: &OnTimes, span: i32, cut: bool) {
+    fn yield_to_others(&mut self, model: &AxisModel, sent: &OnTimes) {
+        let times = &model.times;
         let now = self.edge(model);
         let [fill_a, vent_a, fill_b, vent_b] = *sent;
-        let times = &model.times;
-        self.a.energise(now, [fill_a, vent_a], span, cut, times);
-        self.b.energise(now, [fill_b, vent_b], span, cut, times);
-    }
-
-    /// The law drives from now on: what others have sent still acts in this tick, and nothing
-    /// after it.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn take_over(&mut self, model: &AxisModel, sent: &OnTimes) {
-        // So a coil that is on until the end of the tick falls there.
-        self.energise(model, sent, model.times.tick.wrapping_add(1), false);
-        self.driver = if self.stroke == Stroke::A {
-            Driver::Law
-        } else {
-            Driver::Begins
+        let [_, _, fill, vent] = self.plan;
+        // The period has begun for a chamber with its stroke.
+        let (begun_a, begun_b) = match self.stroke {
+            Stroke::A => (Some((now, [fill_a, vent_a])), Some((now, [fill_b, vent_b]))),
+            Stroke::B => (None, Some((self.clock(model).now, [fill, vent]))),
+            Stroke::Motion | Stroke::Pulses => (None, None),
         };
-    }
-
-    /// Somebody else drives from now on: what is planned for after this tick does not happen.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn yield_to_others(&mut self, model: &AxisModel, sent: &OnTimes) {
-        let times = &model.times;
-        if self.stroke == Stroke::B {
-            let [_, _, fill, vent] = self.plan;
-            let begun = self.clock(model).now;
-            self.b
-                .energise(begun, [fill, vent], times.period, false, times);
-        }
-        // Before the first stroke of its period the plan has not begun.
-        let begun = self.stroke != Stroke::A;
-        self.energise(
-            model,
-            sent,
-            times.tick.wrapping_add(i32::from(begun)),
-            begun,
-        );
-        self.driver = Driver::Others;
+        self.a.end(now, [fill_a, vent_a], begun_a, times);
+        self.b.end(now, [fill_b, vent_b], begun_b, times);
+        self.drives = false;
         self.plan = [0; 4];
         self.asked = 0;
         self.duty = Duty::ZERO;

@@ -18,16 +18,16 @@ impl Predictive {
         let mut to = reference;
         let mut awaited = None;
         match input.announced {
+            // It is awaited where the last move ended, not in the midst of that.
             Some(Announced {
                 reference: next, ..
-            }) if stands => {
+            }) if self.rest.holds() => {
                 awaited = self.preload(model, next.raw());
                 if awaited.is_some() {
                     to = next.raw();
                 }
             }
-            Some(_) => {}
-            None => self.awaits = NOTHING,
+            _ => self.awaits = NOTHING,
         }
         if awaited.is_none() {
             self.quiet = self.rest.quiet(

@@ -95,6 +95,12 @@ impl Rest {
         self.settled
     }
 
+    /// Whether it rests at the present target.
+    #[inline]
+    pub(super) const fn holds(&self) -> bool {
+        self.settled && !self.aimed
+    }
+
     /// Whether the piston has been near its target for some time.
     #[inline]
     pub(super) const fn is_near(&self) -> bool {
@@ -197,6 +203,7 @@ impl Rest {
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
         if steps && away <= release {
             self.released = 0;
+            self.aimed = false;
             return true;
         }
         self.released = self.released.wrapping_add(1);

@@ -31,7 +31,7 @@ impl Hash for Predictive {
             rest_check: _,
             stroke,
             primed,
-            driver,
+            drives,
             next,
             measured,
             plan: [fill_a, vent_a, fill_b, vent_b],
@@ -42,7 +42,7 @@ impl Hash for Predictive {
         } = self;
         let flags = u32::from(*stroke as u8)
             | u32::from(*primed).wrapping_shl(8)
-            | u32::from(*driver as u8).wrapping_shl(16)
+            | u32::from(*drives).wrapping_shl(16)
             // There is such a law.
             | 1 << 24;
         state.write_u32(flags);
