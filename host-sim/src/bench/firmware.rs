@@ -99,7 +99,6 @@ impl Board for Firmware {
             None if output.settled => self.pwm.shut(),
             None => self.pwm.tick(&output.openings),
         };
-        self.controller.sent(on_us);
         Action {
             on_us,
             settled: output.settled,

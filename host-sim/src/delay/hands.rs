@@ -43,8 +43,6 @@ impl Board for Hands {
             }
         }
         if let Some(on) = self.forced {
-            // The law follows the air by what was really sent.
-            self.firmware.controller.sent(on);
             action.on_us = on;
         }
         action

@@ -229,19 +229,13 @@ impl Predictive {
         self.rest.is_settled()
     }
 
-    /// A tick of the law's own; on-times for the next tick. `sent` are those last given out, or
-    /// what [`Predictive::observe`] says of them.
+    /// A tick of the law's own; on-times for the next tick, which are sent.
     ///
     /// It begins to decide with a period, once all is counted that somebody else has sent.
     #[inline]
-    pub fn drive(&mut self, model: &AxisModel, input: &JointInput, sent: &OnTimes) -> Drive {
-        if !self.drives {
-            let nothing = [0; 4];
-            if self.stroke != Stroke::A || self.plan != nothing || *sent != nothing {
-                self.observe(model, input.measured, sent);
-                return self.gives(nothing);
-            }
-            self.begin(input.measured);
+    pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
+        if !self.drives && !self.begins(model, input.measured) {
+            return self.gives([0; 4]);
         }
         let on = match self.stroke {
             Stroke::A => {

@@ -6,7 +6,7 @@ use super::settle::Settle;
 use super::types::{Correction, JointInput, JointLimits, JointOutput, Law};
 use crate::axis::predictive::Predictive;
 use crate::pwm::OnTimes;
-use crate::valve::{VALVE_COUNT, ValveOpenings, allocate};
+use crate::valve::{ValveOpenings, allocate};
 use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{
@@ -39,8 +39,6 @@ pub struct JointController {
     /// What is still added to the law after a change, × 2^30, and its decay.
     fade: i32,
     fade_step: i32,
-    /// On-times that were last sent, whoever chose them.
-    sent: OnTimes,
     /// The predictive law, when it is chosen.
     predictive: Option<Predictive>,
 }
@@ -60,7 +58,6 @@ impl JointController {
             changed: false,
             fade: 0,
             fade_step: 0,
-            sent: [0; VALVE_COUNT],
             predictive: config.axis().map(Predictive::new),
             config,
         }
@@ -112,11 +109,14 @@ impl JointController {
         self.predictive.as_ref()
     }
 
-    /// Takes note of what was sent for the next tick, once per tick: the on-times after
-    /// [`JointController::step`]; after [`JointController::observe`], for how much of it each valve
-    /// counts as open without its switching delays, µs. The predictive law follows the air by it.
-    pub const fn sent(&mut self, on: OnTimes) {
-        self.sent = on;
+    /// Takes note of what was sent for the next tick where no law drives, once after each
+    /// [`JointController::observe`]: for how much of it each valve counts as open without its
+    /// switching delays, µs. The predictive law follows the air by it.
+    #[inline]
+    pub fn sent(&mut self, open: &OnTimes) {
+        if let Some(law) = &mut self.predictive {
+            law.sent(open);
+        }
     }
 
     /// Selects the correction, without a bump. The integral starts from zero.
@@ -144,10 +144,8 @@ impl JointController {
         if made_of(&config) != made_of(&self.config) {
             // The state of the law that is left was not watched while another was in
             // use.
-            let sent = self.sent;
             self.config = config;
             self.reset();
-            self.sent = sent;
         }
         self.config = config;
         self.changed = true;
@@ -166,7 +164,7 @@ impl JointController {
     /// next [`JointController::step`] starts afresh with a valid velocity.
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
-            return law.observe(model, measured, &self.sent);
+            return law.observe(model, measured);
         }
         self.settle = Settle::new();
         self.integral = 0;
@@ -193,7 +191,6 @@ impl JointController {
                     reference,
                     ..*input
                 },
-                &self.sent,
             );
             limits.duty = drive.limited;
             return JointOutput {
@@ -388,14 +385,10 @@ impl Hash for State<'_> {
             changed,
             fade,
             fade_step,
-            sent,
             predictive,
         } = self.0;
         if let Some(law) = predictive {
-            // The other laws begin afresh after it, and do not read what was sent.
-            let [a, b, c, d] = *sent;
-            state.write_u32(u32::from(a) | u32::from(b).wrapping_shl(16));
-            state.write_u32(u32::from(c) | u32::from(d).wrapping_shl(16));
+            // The other laws begin afresh after it.
             state.write_u32(*correction as u32);
             return law.hash(state);
         }

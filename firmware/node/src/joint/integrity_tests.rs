@@ -255,7 +255,7 @@ fn the_predictive_law_is_watched_as_well() {
     assert_eq!(ticks_to_hold(node(), 20, |_| {}), None);
     // Pressures, motion and valves followed through a tick that never was.
     let found = ticks_to_hold(node(), 1, |node| {
-        node.controller.sent([1000, 0, 0, 0]);
+        node.controller.sent(&[1000, 0, 0, 0]);
         node.controller.observe(PositionMm::from_int(50));
     });
     assert_eq!(found, Some(1));

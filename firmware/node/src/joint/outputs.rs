@@ -58,7 +58,6 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         state
             .motion
             .follow(&on_times, state.measured, &self.settings.motion);
-        self.controller.sent(on_times);
         let mut limits = limit_bits(&output.limits, output.settled);
         if slew_limited {
             limits.insert(Limit::SlewLimited);
@@ -152,7 +151,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     fn rested(&mut self, now: Micros, on_times: OnTimes, open: &OnTimes) {
         self.state.following = Ticks::ZERO;
         let velocity = self.controller.observe(self.state.measured);
-        self.controller.sent(*open);
+        self.controller.sent(open);
         let state = &mut self.state;
         state
             .motion

@@ -9,30 +9,21 @@ use crate::pwm::OnTimes;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 impl Predictive {
-    /// A tick in which somebody else drives: `sent` says for how much of it each valve counts as
-    /// open without its switching delays, µs; in the first one, the on-times that the law gave out
-    /// last. Follows chambers and piston, and forgets that the piston rests. Damage that the
-    /// caller was told of before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke
-    /// that it concerns: nothing of it is used here.
-    pub fn observe(
-        &mut self,
-        model: &AxisModel,
-        measured: PositionMm,
-        sent: &OnTimes,
-    ) -> VelocityMmS {
+    /// A tick after which somebody else drives, who tells [`Predictive::sent`] how. Follows
+    /// chambers and piston, and forgets that the piston rests. Damage that the caller was told of
+    /// before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke that it concerns:
+    /// nothing of it is used here.
+    pub fn observe(&mut self, model: &AxisModel, measured: PositionMm) -> VelocityMmS {
         if !self.primed {
             self.prime(measured);
         }
         if self.drives {
-            self.yield_to_others(model, sent);
+            self.yield_to_others(model);
             // That is enough for a tick: the period is one longer. What has opened or shut in
             // it is seen a tick later; a valve that is open throughout counts for one less.
             self.next = self.next.wrapping_add(model.times.tick as u32);
             self.measured = measured.raw();
             return VelocityMmS::from_raw(self.motion.speed);
-        }
-        for (open, more) in self.plan.iter_mut().zip(sent) {
-            *open = open.saturating_add(*more);
         }
         match self.stroke {
             Stroke::A => self.follow(model, true),
@@ -62,6 +53,18 @@ impl Predictive {
         VelocityMmS::from_raw(self.motion.speed)
     }
 
+    /// What somebody else has sent for the next tick: for how much of it each valve counts as open
+    /// without its switching delays, µs.
+    #[inline]
+    pub fn sent(&mut self, open: &OnTimes) {
+        if self.drives {
+            return;
+        }
+        for (open, more) in self.plan.iter_mut().zip(open) {
+            *open = open.saturating_add(*more);
+        }
+    }
+
     /// The first stroke that is measured is where the piston stands.
     #[cold]
     #[inline(never)]
@@ -88,14 +91,19 @@ impl Predictive {
         }
     }
 
-    /// The law decides from this period on.
+    /// Whether the law decides from this period on. If not, it has only looked on.
     #[cold]
     #[inline(never)]
-    pub(super) fn begin(&mut self, measured: PositionMm) {
+    pub(super) fn begins(&mut self, model: &AxisModel, measured: PositionMm) -> bool {
+        if self.stroke != Stroke::A || self.plan != [0; 4] {
+            self.observe(model, measured);
+            return false;
+        }
         if !self.primed {
             self.prime(measured);
         }
         self.drives = true;
+        true
     }
 
     /// Begin of the tick.
@@ -111,14 +119,14 @@ impl Predictive {
         self.next.wrapping_sub(left as u32)
     }
 
-    /// Somebody else drives from now on: what is planned for after this tick, in which `sent` acts,
-    /// does not happen.
+    /// Somebody else drives from now on: what is planned for after the tick that begins does not
+    /// happen.
     #[cold]
     #[inline(never)]
-    fn yield_to_others(&mut self, model: &AxisModel, sent: &OnTimes) {
+    fn yield_to_others(&mut self, model: &AxisModel) {
         let times = &model.times;
         let now = self.edge(model);
-        let [fill_a, vent_a, fill_b, vent_b] = *sent;
+        let [fill_a, vent_a, fill_b, vent_b] = self.due(model, self.stroke as u16);
         let [_, _, fill, vent] = self.plan;
         // The period has begun for a chamber with its stroke.
         let (begun_a, begun_b) = match self.stroke {
