@@ -134,8 +134,6 @@ pub struct Predictive {
     awaits: i32,
     /// The drive chamber makes up for what the counter chamber still has too much.
     makes_up: MakesUp,
-    /// The target is a new one.
-    fresh: bool,
     /// The valves stay shut.
     quiet: bool,
     rest_check: u32,
@@ -185,7 +183,6 @@ impl Predictive {
             rest: Rest::default(),
             awaits: NOTHING,
             makes_up: MakesUp::No,
-            fresh: false,
             quiet: true,
             rest_check: 0,
             stroke: Stroke::default(),
@@ -364,7 +361,7 @@ impl Predictive {
         self.moves(model, input.measured);
         let reference = input.reference.raw();
         // Also one that came between this stroke and the last of the period before.
-        let other = self.fresh || self.rest.is_other(model, reference);
+        let other = self.rest.is_fresh() || self.rest.is_other(model, reference);
         if other {
             self.push = Push::default();
         }

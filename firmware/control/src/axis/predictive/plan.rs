@@ -13,7 +13,7 @@ impl Predictive {
     #[inline]
     pub(super) fn choose(&mut self, model: &AxisModel, input: &JointInput) {
         let reference = input.reference.raw();
-        self.fresh = self.rest.aim(model, reference);
+        self.rest.aim(model, reference);
         let stands = self.rest.is_settled() || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
         let mut awaited = None;

@@ -40,8 +40,10 @@ const GENTLE: i32 = 40 << 16;
 /// Nor does one that is further from its target than this, raw mm (2 mm), and outside its band.
 const FLED: i32 = 2 << 16;
 
-/// Rest at a target, and how long it has been tried.
+/// Rest at a target, and how long it has been tried. In an order in which it is whole words,
+/// which are sealed as they are.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
 pub(super) struct Rest {
     target: i32,
     held: u16,
@@ -54,6 +56,8 @@ pub(super) struct Rest {
     /// The target has changed since the piston came to rest.
     aimed: bool,
     settled: bool,
+    /// The target is a new one of this period.
+    fresh: bool,
 }
 
 impl Rest {
@@ -61,12 +65,12 @@ impl Rest {
     /// flipped bit of any flips one bit of it.
     #[inline]
     pub(super) fn sum(&self, sum: u32) -> u32 {
-        let [first, second, third] = self.words();
-        mix(mix(mix(sum, first), second), third)
+        let [first, second, third, fourth] = self.words();
+        mix(mix(mix(mix(sum, first), second), third), fourth)
     }
 
     #[inline]
-    fn words(&self) -> [i32; 3] {
+    fn words(&self) -> [i32; 4] {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             target,
@@ -77,17 +81,14 @@ impl Rest {
             inside,
             aimed,
             settled,
+            fresh,
         } = *self;
-        let small = u32::from(near)
-            ^ u32::from(pause).wrapping_shl(16)
-            ^ u32::from(settled).wrapping_shl(16)
-            ^ u32::from(inside).wrapping_shl(17)
-            ^ u32::from(aimed).wrapping_shl(18);
-        [
-            target,
-            i32::from(held) | i32::from(released).wrapping_shl(16),
-            small.cast_signed(),
-        ]
+        let two = |low: u16, high: u16| i32::from(low) | i32::from(high).wrapping_shl(16);
+        let flags = i32::from(inside)
+            | i32::from(aimed).wrapping_shl(8)
+            | i32::from(settled).wrapping_shl(16)
+            | i32::from(fresh).wrapping_shl(24);
+        [target, two(held, released), two(near, pause), flags]
     }
 
     /// At rest.
@@ -122,17 +123,22 @@ impl Rest {
         reference.saturating_sub(self.target).saturating_abs() > model.band
     }
 
-    /// Takes over the reference; whether it is a new target.
+    /// Whether the target was a new one in the last period.
     #[inline]
-    pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
-        let new = self.is_other(model, reference);
-        if new {
+    pub(super) const fn is_fresh(&self) -> bool {
+        self.fresh
+    }
+
+    /// Takes over the reference.
+    #[inline]
+    pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) {
+        self.fresh = self.is_other(model, reference);
+        if self.fresh {
             self.target = reference;
             self.near = 0;
             self.pause = 0;
             self.aimed = true;
         }
-        new
     }
 
     /// One period; whether the valves are to stay shut.
@@ -341,6 +347,7 @@ mod tests {
             inside: true,
             aimed: false,
             settled: true,
+            fresh: false,
         };
         let flips_one = |flip: &dyn Fn(&mut Rest)| {
             let mut flipped = some;
@@ -361,6 +368,7 @@ mod tests {
         flips_one(&|rest| rest.inside ^= true);
         flips_one(&|rest| rest.aimed ^= true);
         flips_one(&|rest| rest.settled ^= true);
+        flips_one(&|rest| rest.fresh ^= true);
     }
 
     /// Against the period of mass and air springs in SI units, on cylinders of this project.

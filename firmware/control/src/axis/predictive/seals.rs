@@ -26,7 +26,6 @@ impl Hash for Predictive {
             rest: _,
             awaits: _,
             makes_up: _,
-            fresh: _,
             quiet: _,
             rest_check: _,
             stroke,
@@ -74,11 +73,10 @@ impl Predictive {
         let Self {
             awaits,
             makes_up,
-            fresh,
             quiet,
             ..
         } = *self;
-        let flags = i32::from(fresh) | i32::from(quiet) << 8 | (makes_up as i32) << 16;
+        let flags = i32::from(quiet) | (makes_up as i32) << 8;
         mix(mix(self.rest.sum(0), awaits), flags)
     }
 
