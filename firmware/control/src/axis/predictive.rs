@@ -93,7 +93,7 @@ enum Stroke {
     /// Chamber A: what it sees of the pulses, its pressure at the moment and ahead; the mass is
     /// learnt.
     #[default]
-    A,
+    A = 1,
     /// Chamber B.
     B,
     /// Motion, and the force that is wanted.
@@ -102,8 +102,51 @@ enum Stroke {
     Pulses,
 }
 
-/// How many they are.
-const STROKES: u8 = super::model::STROKES as u8;
+impl Stroke {
+    /// Ticks of the period before it.
+    #[inline]
+    const fn turn(self) -> u16 {
+        (self as u16).wrapping_sub(1)
+    }
+
+    #[inline]
+    const fn next(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::Motion,
+            Self::Motion => Self::Pulses,
+            Self::Pulses => Self::A,
+        }
+    }
+}
+
+/// Small ones that every tick uses, in an order in which they are a whole word, which is sealed
+/// as it is. It is never zero.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(4))]
+struct Turn {
+    /// The stroke to come.
+    stroke: Stroke,
+    primed: bool,
+    /// The law decides about the coils, not somebody else.
+    drives: bool,
+    /// For the record: the force asked for was beyond what is possible.
+    limited: bool,
+}
+
+impl Turn {
+    #[inline]
+    const fn word(self) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            stroke,
+            primed,
+            drives,
+            limited,
+        } = self;
+        u32::from_le_bytes([stroke as u8, primed as u8, drives as u8, limited as u8])
+    }
+}
 
 /// State of the law. It keeps no coefficients: every call is given those of the
 /// axis, which must be the same from call to call.
@@ -139,11 +182,7 @@ pub struct Predictive {
     rest_check: u32,
 
     // What every tick uses, in the `Hash`.
-    /// The stroke to come.
-    stroke: Stroke,
-    primed: bool,
-    /// The law decides about the coils, not somebody else.
-    drives: bool,
+    turn: Turn,
     /// Begin of the next period, µs; wraps.
     next: u32,
     /// Stroke of the last tick, raw mm.
@@ -156,7 +195,6 @@ pub struct Predictive {
     /// Force that was asked for, as far as it is possible, mN; the duty follows two ticks later.
     asked: i32,
     duty: Duty,
-    limited: bool,
 }
 
 impl Predictive {
@@ -185,15 +223,12 @@ impl Predictive {
             makes_up: MakesUp::No,
             quiet: true,
             rest_check: 0,
-            stroke: Stroke::default(),
-            primed: false,
-            drives: false,
+            turn: Turn::default(),
             next: 0,
             measured: 0,
             plan: [0; 4],
             asked: 0,
             duty: Duty::ZERO,
-            limited: false,
         };
         law.seal();
         law
@@ -231,10 +266,10 @@ impl Predictive {
     /// It begins to decide with a period, once all is counted that somebody else has sent.
     #[inline]
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
-        if !self.drives && !self.begins(model, input.measured) {
+        if !self.turn.drives && !self.begins(model, input.measured) {
             return self.gives([0; 4]);
         }
-        let on = match self.stroke {
+        let on = match self.turn.stroke {
             Stroke::A => {
                 self.follow(model, true);
                 self.due(model, 1)
@@ -265,7 +300,7 @@ impl Predictive {
             velocity: VelocityMmS::from_raw(self.motion.speed),
             duty: self.duty,
             settled: self.rest.is_settled(),
-            limited: self.limited,
+            limited: self.turn.limited,
         }
     }
 
@@ -284,12 +319,7 @@ impl Predictive {
     #[inline]
     const fn next_stroke(&mut self, measured: PositionMm) {
         self.measured = measured.raw();
-        self.stroke = match (self.stroke as u8).wrapping_add(1) % STROKES {
-            0 => Stroke::A,
-            1 => Stroke::B,
-            2 => Stroke::Motion,
-            _ => Stroke::Pulses,
-        };
+        self.turn.stroke = self.turn.stroke.next();
     }
 
     /// One of the chambers, A at the begin of a period.
@@ -325,7 +355,7 @@ impl Predictive {
             };
             (&mut self.b, piston, [fill_b, vent_b])
         };
-        if self.drives {
+        if self.turn.drives {
             chamber.follow(model, &clock, &piston, plan);
         } else {
             chamber.observe(model, &clock, &piston, plan);

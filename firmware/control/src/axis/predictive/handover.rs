@@ -14,10 +14,10 @@ impl Predictive {
     /// before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke that it concerns:
     /// nothing of it is used here.
     pub fn observe(&mut self, model: &AxisModel, measured: PositionMm) -> VelocityMmS {
-        if !self.primed {
+        if !self.turn.primed {
             self.prime(measured);
         }
-        if self.drives {
+        if self.turn.drives {
             self.yield_to_others(model);
             // That is enough for a tick: the period is one longer. What has opened or shut in
             // it is seen a tick later; a valve that is open throughout counts for one less.
@@ -25,7 +25,7 @@ impl Predictive {
             self.measured = measured.raw();
             return VelocityMmS::from_raw(self.motion.speed);
         }
-        match self.stroke {
+        match self.turn.stroke {
             Stroke::A => self.follow(model, true),
             Stroke::B => {
                 self.follow(model, false);
@@ -57,7 +57,7 @@ impl Predictive {
     /// without its switching delays, µs.
     #[inline]
     pub fn sent(&mut self, open: &OnTimes) {
-        if self.drives {
+        if self.turn.drives {
             return;
         }
         for (open, more) in self.plan.iter_mut().zip(open) {
@@ -69,7 +69,7 @@ impl Predictive {
     #[cold]
     #[inline(never)]
     pub(super) fn prime(&mut self, measured: PositionMm) {
-        self.primed = true;
+        self.turn.primed = true;
         let stroke = measured.raw();
         self.measured = stroke;
         self.motion.stroke = stroke;
@@ -95,20 +95,20 @@ impl Predictive {
     #[cold]
     #[inline(never)]
     pub(super) fn begins(&mut self, model: &AxisModel, measured: PositionMm) -> bool {
-        if self.stroke != Stroke::A || self.plan != [0; 4] {
+        if self.turn.stroke != Stroke::A || self.plan != [0; 4] {
             self.observe(model, measured);
             return false;
         }
-        if !self.primed {
+        if !self.turn.primed {
             self.prime(measured);
         }
-        self.drives = true;
+        self.turn.drives = true;
         true
     }
 
     /// Begin of the tick.
     const fn edge(&self, model: &AxisModel) -> u32 {
-        let turn = self.stroke as i32;
+        let turn = self.turn.stroke.turn() as i32;
         if turn == 0 {
             return self.next;
         }
@@ -126,21 +126,21 @@ impl Predictive {
     fn yield_to_others(&mut self, model: &AxisModel) {
         let times = &model.times;
         let now = self.edge(model);
-        let [fill_a, vent_a, fill_b, vent_b] = self.due(model, self.stroke as u16);
+        let [fill_a, vent_a, fill_b, vent_b] = self.due(model, self.turn.stroke.turn());
         let [_, _, fill, vent] = self.plan;
         // The period has begun for a chamber with its stroke.
-        let (begun_a, begun_b) = match self.stroke {
+        let (begun_a, begun_b) = match self.turn.stroke {
             Stroke::A => (Some((now, [fill_a, vent_a])), Some((now, [fill_b, vent_b]))),
             Stroke::B => (None, Some((self.clock(model).now, [fill, vent]))),
             Stroke::Motion | Stroke::Pulses => (None, None),
         };
         self.a.end(now, [fill_a, vent_a], begun_a, times);
         self.b.end(now, [fill_b, vent_b], begun_b, times);
-        self.drives = false;
+        self.turn.drives = false;
         self.plan = [0; 4];
         self.asked = 0;
         self.duty = Duty::ZERO;
-        self.limited = false;
+        self.turn.limited = false;
         self.release();
     }
 }

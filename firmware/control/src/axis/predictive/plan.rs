@@ -53,7 +53,7 @@ impl Predictive {
             None if self.quiet => {
                 let ([fill_a, vent_a], [fill_b, vent_b]) = (self.a.shut(model), self.b.shut(model));
                 self.plan = [fill_a, vent_a, fill_b, vent_b];
-                self.limited = false;
+                self.turn.limited = false;
                 self.asked = 0;
                 self.rest_check = self.sum_of_rest();
                 return;
@@ -82,7 +82,7 @@ impl Predictive {
                 self.plan = [0, 0, fill_b, vent_b];
             }
         }
-        self.limited = possible != force;
+        self.turn.limited = possible != force;
         self.asked = possible;
         self.rest_check = self.sum_of_rest();
     }

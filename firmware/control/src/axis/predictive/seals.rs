@@ -7,8 +7,7 @@ use core::hash::{Hash, Hasher};
 impl Hash for Predictive {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Flags share a
-        // word, each in its own bits.
+        // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             // Sealed apart: see `kept_is_sound`.
             a: _,
@@ -28,23 +27,15 @@ impl Hash for Predictive {
             makes_up: _,
             quiet: _,
             rest_check: _,
-            stroke,
-            primed,
-            drives,
+            turn,
             next,
             measured,
             plan: [fill_a, vent_a, fill_b, vent_b],
             // They shape no output.
             asked: _,
             duty: _,
-            limited: _,
         } = self;
-        let flags = u32::from(*stroke as u8)
-            | u32::from(*primed).wrapping_shl(8)
-            | u32::from(*drives).wrapping_shl(16)
-            // There is such a law.
-            | 1 << 24;
-        state.write_u32(flags);
+        state.write_u32(turn.word());
         state.write_u32(*next);
         state.write_i32(*measured);
         state.write_u32(u32::from(*fill_a) | u32::from(*vent_a).wrapping_shl(16));
@@ -87,8 +78,8 @@ impl Predictive {
     #[must_use]
     pub fn kept_is_sound(&self) -> bool {
         let Self { a, b, .. } = self;
-        if matches!(self.stroke, Stroke::A | Stroke::B) {
-            let first = self.stroke == Stroke::A;
+        if matches!(self.turn.stroke, Stroke::A | Stroke::B) {
+            let first = self.turn.stroke == Stroke::A;
             let chamber = if first { a } else { b };
             return chamber.pulses_are_sound()
                 && chamber.pressures_are_sound()
@@ -100,7 +91,7 @@ impl Predictive {
             && self.motion_check == self.sum_of_motion()
             && self.rest_check == self.sum_of_rest();
         sound
-            && if self.stroke == Stroke::Motion {
+            && if self.turn.stroke == Stroke::Motion {
                 self.push_check == self.push.sum()
                     && self.inertia.is_sound()
                     && (!self.learner.has_news() || self.learner.is_sound())

@@ -224,7 +224,7 @@ fn what_somebody_else_sends_is_counted_once() {
         *end = law.pressures().a;
         for tick in 0..8 {
             law.drive(&model, &input(90, 90));
-            assert!(law.drives || tick < 4, "{observed} {tick}");
+            assert!(law.turn.drives || tick < 4, "{observed} {tick}");
         }
         assert!((law.pressures().a - *end).abs() < 1 << 16);
     }
