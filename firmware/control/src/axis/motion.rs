@@ -204,6 +204,14 @@ impl Motion {
         self.stroke < STOP_ZONE || self.stroke > model.stroke.saturating_sub(STOP_ZONE)
     }
 
+    /// Within a millimetre of an end stop, and so is `target` (raw mm), or beyond it.
+    #[inline]
+    #[must_use]
+    pub fn leans(&self, model: &AxisModel, target: i32) -> bool {
+        let far = model.stroke.saturating_sub(STOP_ZONE);
+        self.stroke.max(target) < STOP_ZONE || self.stroke.min(target) > far
+    }
+
     /// One period, in which the chambers made `force` in the mean.
     #[inline]
     pub fn predict(&mut self, model: &AxisModel, inertia: &Inertia, force: i32) {

@@ -17,11 +17,13 @@ impl Predictive {
         let stands = self.rest.is_settled() || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
         let mut awaited = None;
+        // Pressed against a stop that is its target, or has its target behind it, it need not rest.
+        let leans = stands && !self.rest.is_settled() && self.motion.leans(model, reference);
         match input.announced {
-            // It is awaited where the last move ended, not in the midst of that.
+            // A move is awaited where the last one ended, not in the midst of that.
             Some(Announced {
                 reference: next, ..
-            }) if self.rest.holds() => {
+            }) if leans || self.rest.holds() => {
                 awaited = self.preload(model, next.raw());
                 if awaited.is_some() {
                     to = next.raw();
@@ -29,7 +31,7 @@ impl Predictive {
             }
             _ => self.awaits = NOTHING,
         }
-        if awaited.is_none() {
+        if awaited.is_none() && !(leans && input.announced.is_some()) {
             self.quiet = self.rest.quiet(
                 model,
                 &Approach {
