@@ -93,17 +93,6 @@ pub(crate) const fn mix(sum: u32, word: i32) -> u32 {
         .wrapping_add(word.cast_unsigned())
 }
 
-/// What a word that is the `place`-th from the end of such a sum adds to it, per one.
-pub(crate) const fn weight(place: u32) -> u32 {
-    let mut weight = 1_u32;
-    let mut at = 0;
-    while at < place {
-        weight = mix(weight, 0);
-        at = at.wrapping_add(1);
-    }
-    weight
-}
-
 /// `value` limited to ±`bound`.
 #[inline]
 pub(crate) fn within(value: i32, bound: i32) -> i32 {

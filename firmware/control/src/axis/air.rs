@@ -168,7 +168,8 @@ impl Chamber {
         let flows = ChamberFlows::of(model, piston.flow, p, fill > 0, vent > 0);
         let stiffness = model.stiffness(length);
         let change = flows.change([fill, vent], power(p, speed), model.times.period, stiffness);
-        self.pressure = bounded(model, p.saturating_add(change), fill, vent);
+        let (least, most) = bounds(model, fill, vent);
+        self.pressure = p.saturating_add(change).max(least).min(most);
         self.expected = self.pressure;
         self.pressures_check = self.sum_of_pressures();
     }
@@ -222,18 +223,14 @@ impl Chamber {
             vent | more_vent | all_flows != 0,
         );
         let change = flows.change(open, power(p, speed), times.period, stiffness);
-        let p = bounded(model, p.saturating_add(change), fill, vent);
+        let (least, most) = bounds(model, fill | more_fill, vent | more_vent);
+        let p = p.saturating_add(change).max(least).min(most);
         let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
         self.flows = flows;
         self.stiffness = ahead;
         self.means_check = self.sum_of_means();
         self.pressure = p;
-        self.expected = bounded(
-            model,
-            p.saturating_add(change),
-            fill | more_fill,
-            vent | more_vent,
-        );
+        self.expected = p.saturating_add(change).max(least).min(most);
         self.pressures_check = self.sum_of_pressures();
     }
 
@@ -282,18 +279,19 @@ impl Chamber {
     }
 }
 
-/// A pressure that valves open for `fill` and `vent` µs can lead to. None fills beyond the supply or
+/// Bounds of a pressure while valves open for `fill` and `vent` µs. None fills beyond the supply or
 /// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
 /// half of that needs a motion of its own.
 #[inline]
-fn bounded(model: &AxisModel, p: i32, fill: i32, vent: i32) -> i32 {
-    let most = if fill > 0 { model.supply } else { MOST };
-    let least = if vent > 0 {
-        model.ambient
-    } else {
-        model.ambient.wrapping_shr(1)
-    };
-    p.max(least).min(most)
+fn bounds(model: &AxisModel, fill: i32, vent: i32) -> (i32, i32) {
+    (
+        if vent > 0 {
+            model.ambient
+        } else {
+            model.ambient.wrapping_shr(1)
+        },
+        if fill > 0 { model.supply } else { MOST },
+    )
 }
 
 /// An on-time, 0…period (at most 8000).

@@ -12,7 +12,7 @@
 //! is due to c; what the fastest has above that line is due to m, in J as in v.
 
 use super::model::AxisModel;
-use super::{mix, part, quotient, scaled, weight};
+use super::{part, quotient, scaled};
 
 /// A move is looked at for so many periods at most.
 const PERIODS_MAX: u16 = 250;
@@ -56,15 +56,24 @@ pub struct Learner {
     check: u32,
 }
 
-/// Weights in the seal.
-const LAST_PERIOD: u32 = FASTEST_PERIOD.wrapping_shl(16);
-const FASTEST_PERIOD: u32 = weight(4);
-const FASTEST_SPEED: u32 = weight(3);
-const FASTEST_IMPULSE: u32 = weight(2);
-const LAST_IMPULSE: u32 = weight(1);
-const FIRST: u32 = weight(5);
-const MASS: u32 = weight(6);
-const ENDED: u32 = FASTEST_PERIOD.wrapping_shl(15);
+/// Weights in the seal: odd, so that every flipped bit is seen, and small, so that a change costs
+/// little.
+const FIRST: u32 = 9;
+const FASTEST_SPEED: u32 = 5;
+const FASTEST_IMPULSE: u32 = 7;
+const LAST_SPEED: u32 = 13;
+const LAST_IMPULSE: u32 = 3;
+const MASS: u32 = 11;
+/// One period of the fastest moment counts one; one of the last, and the end, are beside it in
+/// the word.
+const LAST_PERIOD: u32 = 1 << 16;
+const ENDED: u32 = 1 << 15;
+
+/// `by` more of a word of this weight.
+#[inline]
+const fn more(weight: u32, by: i32) -> u32 {
+    weight.wrapping_mul(by.cast_unsigned())
+}
 
 impl Learner {
     /// Nothing seen.
@@ -85,12 +94,15 @@ impl Learner {
             mass,
             check: _,
         } = *self;
-        let periods = u32::from(fastest.periods)
-            .wrapping_add(u32::from(last.periods).wrapping_shl(16))
-            .wrapping_add(u32::from(ended).wrapping_shl(15));
-        let sum = mix(mix(mix(0, mass), first), periods.cast_signed());
-        let sum = mix(mix(sum, fastest.speed), fastest.impulse);
-        mix(mix(sum, last.impulse), last.speed)
+        u32::from(fastest.periods)
+            .wrapping_add(LAST_PERIOD.wrapping_mul(u32::from(last.periods)))
+            .wrapping_add(ENDED.wrapping_mul(u32::from(ended)))
+            .wrapping_add(more(FIRST, first))
+            .wrapping_add(more(FASTEST_SPEED, fastest.speed))
+            .wrapping_add(more(FASTEST_IMPULSE, fastest.impulse))
+            .wrapping_add(more(LAST_SPEED, last.speed))
+            .wrapping_add(more(LAST_IMPULSE, last.impulse))
+            .wrapping_add(more(MASS, mass))
     }
 
     /// Flips a bit, for tests of those who keep it.
@@ -123,8 +135,7 @@ impl Learner {
             return None;
         }
         let mass = core::mem::take(&mut self.mass);
-        let less = MASS.wrapping_mul(mass.cast_unsigned());
-        self.check = self.check.wrapping_sub(less);
+        self.check = self.check.wrapping_sub(more(MASS, mass));
         Some(mass)
     }
 
@@ -135,7 +146,6 @@ impl Learner {
             return;
         }
         let sliding = speed.wrapping_abs() > SLIDES;
-        let more = |weight: u32, by: i32| weight.wrapping_mul(by.cast_unsigned());
         if self.first == 0 {
             if sliding {
                 // All else is zero.
@@ -162,13 +172,13 @@ impl Learner {
             };
             let later = periods.wrapping_sub(fastest.periods);
             check = check
-                .wrapping_add(more(FASTEST_PERIOD, i32::from(later)))
+                .wrapping_add(u32::from(later))
                 .wrapping_add(more(FASTEST_SPEED, speed.wrapping_sub(fastest.speed)))
                 .wrapping_add(more(FASTEST_IMPULSE, impulse.wrapping_sub(fastest.impulse)));
         }
         if !sliding || (speed ^ self.first) < 0 || periods >= PERIODS_MAX {
             let other = speed.wrapping_sub(self.last.speed);
-            check = check.wrapping_add(ENDED).wrapping_add(more(1, other));
+            check = check.wrapping_add(ENDED).wrapping_add(more(LAST_SPEED, other));
             self.ended = true;
             self.last.speed = speed;
         }

@@ -192,8 +192,7 @@ pub struct Predictive {
     plan: OnTimes,
 
     // For the record.
-    /// Force that was asked for, as far as it is possible, mN; the duty follows two ticks later.
-    asked: i32,
+    /// Share of the force that was asked for, as far as it is possible.
     duty: Duty,
 }
 
@@ -227,7 +226,6 @@ impl Predictive {
             next: 0,
             measured: 0,
             plan: [0; 4],
-            asked: 0,
             duty: Duty::ZERO,
         };
         law.seal();
@@ -276,7 +274,6 @@ impl Predictive {
             }
             Stroke::B => {
                 self.follow(model, false);
-                self.duty = model.duty(self.asked);
                 self.due(model, 2)
             }
             Stroke::Motion => {

@@ -228,10 +228,10 @@ impl Hash for MotionWatch {
             stands,
         } = self;
         air.hash(state);
-        state.write_i32(*from);
+        // A flipped bit of either flips one of the word.
+        state.write_i32(*from ^ i32::from(*stands).wrapping_shl(16));
         state.write_i32(*learnt);
         state.write_u32(u32::from(*slid) | u32::from(*doubt).wrapping_shl(16));
-        state.write_u32(u32::from(*stands));
     }
 }
 

@@ -138,7 +138,6 @@ impl Predictive {
         self.b.end(now, [fill_b, vent_b], begun_b, times);
         self.turn.drives = false;
         self.plan = [0; 4];
-        self.asked = 0;
         self.duty = Duty::ZERO;
         self.turn.limited = false;
         self.release();

@@ -6,6 +6,7 @@ use super::{MakesUp, NOTHING, Predictive, STILL};
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
 use crate::joint::{Announced, JointInput};
+use wheeleg_units::Duty;
 
 impl Predictive {
     /// The pulses of the next period. Those towards a reference that came in this very tick
@@ -56,7 +57,7 @@ impl Predictive {
                 let ([fill_a, vent_a], [fill_b, vent_b]) = (self.a.shut(model), self.b.shut(model));
                 self.plan = [fill_a, vent_a, fill_b, vent_b];
                 self.turn.limited = false;
-                self.asked = 0;
+                self.duty = Duty::ZERO;
                 self.rest_check = self.sum_of_rest();
                 return;
             }
@@ -85,7 +86,7 @@ impl Predictive {
             }
         }
         self.turn.limited = possible != force;
-        self.asked = possible;
+        self.duty = model.duty(possible);
         self.rest_check = self.sum_of_rest();
     }
 

@@ -32,7 +32,6 @@ impl Hash for Predictive {
             measured,
             plan: [fill_a, vent_a, fill_b, vent_b],
             // They shape no output.
-            asked: _,
             duty: _,
         } = self;
         state.write_u32(turn.word());
