@@ -20,7 +20,7 @@ const REJECTED_WEIGHT: u8 = 2;
 const FAULT_LEVEL: u8 = 4;
 
 /// Good readings in a row that pass the self-test after reset.
-pub const SELF_TEST_READINGS: u8 = 10;
+pub const SELF_TEST_READINGS: u16 = 10;
 
 /// Calibration and limits of a position sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,14 +65,16 @@ pub struct Reading {
     pub fault: Option<Rejection>,
 }
 
-/// Checks and converts the readings of one position sensor.
+/// Checks and converts the readings of one position sensor. In an order in which it is two whole
+/// words, which are sealed as they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
 pub struct SensorMonitor {
     /// The last good position; zero without one.
     last: PositionMm,
     rejected: u8,
-    good_in_row: u8,
     has_last: bool,
+    good_in_row: u16,
 }
 
 impl Hash for SensorMonitor {
@@ -87,8 +89,8 @@ impl Hash for SensorMonitor {
             has_last,
         } = self;
         let small = u32::from(*rejected)
-            | u32::from(*good_in_row).wrapping_shl(8)
-            | u32::from(*has_last).wrapping_shl(16);
+            | u32::from(*has_last).wrapping_shl(8)
+            | u32::from(*good_in_row).wrapping_shl(16);
         state.write_u32(small);
         state.write_i32(last.raw());
     }
@@ -300,7 +302,7 @@ mod tests {
                 let mut damaged = [sound; 4];
                 damaged[0].last = PositionMm::from_raw(sound.last.raw() ^ (1 << bit));
                 damaged[1].rejected ^= 1 << (bit % 8);
-                damaged[2].good_in_row ^= 1 << (bit % 8);
+                damaged[2].good_in_row ^= 1 << (bit % 16);
                 damaged[3].has_last = !has_last;
                 for (field, damaged) in damaged.iter().enumerate() {
                     assert_ne!(Seal::of(damaged), Seal::of(&sound), "{field} {bit}");

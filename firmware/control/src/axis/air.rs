@@ -158,8 +158,14 @@ impl Chamber {
             self.fill.shuts(next);
             self.vent.shuts(next);
         }
-        let fill = self.fill.passes(from, model.times.period).wrapping_add(fill_on);
-        let vent = self.vent.passes(from, model.times.period).wrapping_add(vent_on);
+        let fill = self
+            .fill
+            .passes(from, model.times.period)
+            .wrapping_add(fill_on);
+        let vent = self
+            .vent
+            .passes(from, model.times.period)
+            .wrapping_add(vent_on);
         self.pulses_check = self.sum_of_pulses();
 
         let [length, _] = piston.lengths;

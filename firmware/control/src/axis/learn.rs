@@ -178,7 +178,9 @@ impl Learner {
         }
         if !sliding || (speed ^ self.first) < 0 || periods >= PERIODS_MAX {
             let other = speed.wrapping_sub(self.last.speed);
-            check = check.wrapping_add(ENDED).wrapping_add(more(LAST_SPEED, other));
+            check = check
+                .wrapping_add(ENDED)
+                .wrapping_add(more(LAST_SPEED, other));
             self.ended = true;
             self.last.speed = speed;
         }

@@ -26,21 +26,45 @@ const RULE_SHIFT: u32 = 24 + 15 - 30;
 #[derive(Clone, Debug)]
 pub struct JointController {
     config: JointConfig,
-    correction: Correction,
+    marks: Marks,
     velocity: VelocityEstimator,
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
     integral: i64,
-    /// u before the limit, × 2^30 and within ±2, of the last tick, and whether it tracked.
+    /// u before the limit, × 2^30 and within ±2, of the last tick.
     last_law: i32,
-    tracked: bool,
-    /// Set by a change of law: the next tick continues from `last_law`.
-    changed: bool,
     /// What is still added to the law after a change, × 2^30, and its decay.
     fade: i32,
     fade_step: i32,
     /// The predictive law, when it is chosen.
     predictive: Option<Predictive>,
+}
+
+/// Small ones, in an order in which they are a whole word, which is sealed as it is.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(4))]
+struct Marks {
+    correction: Correction,
+    /// The last tick tracked.
+    tracked: bool,
+    /// Set by a change of law: the next tick continues from `last_law`.
+    changed: bool,
+    /// Always zero: it makes the word whole.
+    rest: u8,
+}
+
+impl Marks {
+    #[inline]
+    const fn word(self) -> u32 {
+        // Taken apart, so that a new field cannot be forgotten here.
+        let Self {
+            correction,
+            tracked,
+            changed,
+            rest,
+        } = self;
+        u32::from_le_bytes([correction as u8, tracked as u8, changed as u8, rest])
+    }
 }
 
 impl JointController {
@@ -49,13 +73,11 @@ impl JointController {
     #[must_use]
     pub fn new(config: JointConfig) -> Self {
         Self {
-            correction: Correction::Pd,
+            marks: Marks::default(),
             velocity: VelocityEstimator::new(),
             settle: Settle::new(),
             integral: 0,
             last_law: 0,
-            tracked: false,
-            changed: false,
             fade: 0,
             fade_step: 0,
             predictive: config.axis().map(Predictive::new),
@@ -91,7 +113,7 @@ impl JointController {
     /// The correction in use.
     #[must_use]
     pub const fn correction(&self) -> Correction {
-        self.correction
+        self.marks.correction
     }
 
     /// Whether all valves are held shut because the joint is at rest.
@@ -122,10 +144,10 @@ impl JointController {
     /// Selects the correction, without a bump. The integral starts from zero.
     #[inline]
     pub fn set_correction(&mut self, correction: Correction) {
-        if correction != self.correction {
-            self.correction = correction;
+        if correction != self.marks.correction {
+            self.marks.correction = correction;
             self.integral = 0;
-            self.changed = true;
+            self.marks.changed = true;
         }
     }
 
@@ -148,15 +170,15 @@ impl JointController {
             self.reset();
         }
         self.config = config;
-        self.changed = true;
+        self.marks.changed = true;
     }
 
     /// Forgets everything but configuration and correction: as after
     /// [`JointController::new`].
     pub fn reset(&mut self) {
-        let correction = self.correction;
+        let correction = self.marks.correction;
         *self = Self::new(self.config);
-        self.correction = correction;
+        self.marks.correction = correction;
     }
 
     /// A tick in which the joint does not track (idle, hold, exhaust): follows the
@@ -168,8 +190,8 @@ impl JointController {
         }
         self.settle = Settle::new();
         self.integral = 0;
-        self.tracked = false;
-        self.changed = false;
+        self.marks.tracked = false;
+        self.marks.changed = false;
         self.fade = 0;
         self.velocity.update(&self.config.window, measured)
     }
@@ -210,7 +232,7 @@ impl JointController {
         // What is beyond ±2 is cut to a duty of ±1 in any case.
         let law = self.faded(saturate_i32(law));
         self.last_law = law;
-        self.tracked = true;
+        self.marks.tracked = true;
 
         let quiet = self
             .settle
@@ -222,7 +244,7 @@ impl JointController {
             self.shaped(law, error, input.reference_velocity, &mut limits)
         };
         let integrates = match self.config.gains().law {
-            Law::Fuzzy => self.correction == Correction::Id,
+            Law::Fuzzy => self.marks.correction == Correction::Id,
             Law::Pid => true,
             _ => false,
         };
@@ -272,7 +294,7 @@ impl JointController {
             config.velocity_to_input,
         );
         limits.velocity = rate_limited;
-        let (gain, output) = match self.correction {
+        let (gain, output) = match self.marks.correction {
             Correction::Pd => {
                 let (input, limited) =
                     to_input(error.raw(), gains.error_scale.raw(), config.error_to_input);
@@ -298,9 +320,13 @@ impl JointController {
     /// end of the duty beyond the other, is faded by that much.
     #[inline]
     fn faded(&mut self, law: i32) -> i32 {
-        if self.changed {
-            self.changed = false;
-            let last = if self.tracked { self.last_law } else { law };
+        if self.marks.changed {
+            self.marks.changed = false;
+            let last = if self.marks.tracked {
+                self.last_law
+            } else {
+                law
+            };
             // Symmetric, so that its magnitude is a number, too.
             self.fade = last.saturating_sub(law).max(-i32::MAX);
             // Rounded up: the fade ends within the configured time.
@@ -376,27 +402,20 @@ impl Hash for State<'_> {
         // Taken apart, so that a new field cannot be forgotten here.
         let JointController {
             config: _,
-            correction,
+            marks,
             velocity,
             settle,
             integral,
             last_law,
-            tracked,
-            changed,
             fade,
             fade_step,
             predictive,
         } = self.0;
+        state.write_u32(marks.word());
         if let Some(law) = predictive {
             // The other laws begin afresh after it.
-            state.write_u32(*correction as u32);
             return law.hash(state);
         }
-        // In the order of memory: one look at it for all three.
-        let flags = *correction as u32
-            | u32::from(*tracked).wrapping_shl(8)
-            | u32::from(*changed).wrapping_shl(16);
-        state.write_u32(flags);
         velocity.hash(state);
         settle.hash(state);
         state.write_i64(*integral);

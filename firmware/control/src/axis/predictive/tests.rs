@@ -214,13 +214,20 @@ fn what_somebody_else_sends_is_counted_once() {
             let on = if tick < observed - 390 { 600 } else { 0 };
             law.sent(&[on, 0, 0, 0]);
         }
-        let last = if observed == 400 { 10.0 } else { f64::from(observed - 390) };
+        let last = if observed == 400 {
+            10.0
+        } else {
+            f64::from(observed - 390)
+        };
         // Choked: of C ρ0 R T p_s a share of the volume, n times as much in pressure.
         let length = f64::from(model.length_a(90 << 16)) / 65_536.0;
         let flow = f64::from(model.flow_a) / 65_536.0;
         let rise = 1.2 * f64::from(model.supply) * flow * last * 600e-6 / length;
         let risen = f64::from(law.pressures().a - model.ambient);
-        assert!((risen / rise - 1.0).abs() < 0.03, "{observed}: {risen} {rise}");
+        assert!(
+            (risen / rise - 1.0).abs() < 0.03,
+            "{observed}: {risen} {rise}"
+        );
         *end = law.pressures().a;
         for tick in 0..8 {
             law.drive(&model, &input(90, 90));
