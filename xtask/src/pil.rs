@@ -118,9 +118,10 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let eventful = report.step("runs with faults on eight emulated boards", || {
         eventful(&emulator, &images.folder)
     });
-    report.step("three steps and runs with faults with the predictive law", || {
-        predictive(&emulator, &images.folder)
-    });
+    report.step(
+        "three steps and runs with faults with the predictive law",
+        || predictive(&emulator, &images.folder),
+    );
     report.step("one step with boards here, emulated, and on QEMU", || {
         mixed(&emulator, &images.folder, set_up(firmware::TARGET)?)
     });
