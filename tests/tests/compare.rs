@@ -260,8 +260,12 @@ fn wrong_input_is_refused_by_name() {
     );
     refused(&["--move", "jump"], &["jump", "step-100", "contact-helped"]);
     refused(&["--move"], &["--move"]);
-    refused(&["--seeds", "0"], &["0", "1..=1000"]);
-    refused(&["--threads", "0"], &["1..=1024"]);
+    refused(&["--seeds", "0"], &["'0'", "from 1 to 1000"]);
+    refused(&["--threads", "0"], &["from 1 to 1024"]);
+    for wrong in ["ten", "-1", "10001"] {
+        let argument = format!("--combinations={wrong}");
+        refused(&[&argument], &[wrong, "from 0 to 10000"]);
+    }
     refused(&["--axis", "bench"], &["bench", "bench-vq110u"]);
     refused(&["--axis", "nowhere/a.toml"], &["nowhere/a.toml"]);
     refused(
@@ -287,6 +291,15 @@ fn wrong_input_is_refused_by_name() {
         "bore          = { value = -3.0",
     );
     refused(&["--axis", &bad], &["mine.toml", "cylinder.bore", "-3"]);
+    let bad = axis_file(
+        folder.path(),
+        "rod           = { value = 8.0",
+        "rod           = { value = 25.0",
+    );
+    refused(
+        &["--axis", &bad],
+        &["mine.toml", "`cylinder.rod` = 25 mm", "18 mm"],
+    );
     // A range of the board, not of the file.
     let bad = axis_file(
         folder.path(),

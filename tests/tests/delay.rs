@@ -217,7 +217,7 @@ fn bad_input_is_refused_with_its_range() {
     let taken = file.to_string_lossy().into_owned();
     let out = dir.path().join("out").to_string_lossy().into_owned();
     for (arguments, words) in [
-        (vec!["--seeds", "0"], "1..=1000"),
+        (vec!["--seeds", "0"], "from 1 to 1000"),
         (vec!["--mass", "0"], "0.1 to 50 kg"),
         (vec!["--load", "nan"], "-100 to 100 N"),
         (vec!["--robot", "wheeleg-2004"], "wheeleg-2003"),

@@ -15,6 +15,7 @@ use wheeleg_plant::sensors::AdcNoise;
 
 use super::{Bench, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
+use crate::config::brief;
 
 /// An experiment could not be made.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -37,7 +38,10 @@ pub enum BenchError {
     Design(ConfigError),
     /// A value that the board's parameter table does not hold.
     #[error(
-        "the design needs `{name}` = {value} {unit}; a joint board allows {min} to {max} {unit}"
+        "the design needs `{name}` = {} {unit}; a joint board allows {} to {} {unit}",
+        brief(*.value),
+        brief(*.min),
+        brief(*.max)
     )]
     #[diagnostic(
         code(wheeleg::bench::parameter),

@@ -6,11 +6,14 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::print;
+use super::{print, whole};
 use crate::SimError;
 use crate::bench::{Grain, Kind};
 use crate::compare::{self, CaseId, Comparison, Move, Options};
 use crate::config::axis::AXES;
+
+/// So many false alarms are named; all of them are in the report.
+const ALARMS_TOLD: usize = 5;
 
 /// Arguments of `wheeleg compare`.
 #[derive(Debug, Args)]
@@ -27,19 +30,19 @@ pub(super) struct CompareArgs {
     #[arg(long = "move", value_name = "MOVE", value_parser = motion)]
     moves: Vec<Move>,
     /// Number of seeds for the cases as on the sheet.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1, 1000))]
     seeds: u64,
     /// The first seed.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=u64::MAX - 1000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0, u64::MAX - 1000))]
     seed: u64,
     /// Random combinations of factors per axis [default: 200; 20 with --quick].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    #[arg(long, value_name = "N", value_parser = whole(0, 10_000))]
     combinations: Option<u64>,
     /// One seed, fewer factors and combinations, a coarser bound.
     #[arg(long)]
     quick: bool,
     /// Threads [default: as many as the machine has].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = whole(1, 1024))]
     threads: Option<u16>,
     /// Folder for report, figures and tables. Results of an earlier run in it move to
     /// its folder `previous`.
@@ -152,11 +155,19 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, SimError> {
             let _ = writeln!(out, "  {advice}");
         }
     }
-    let alarms = comparison.false_alarms().count();
+    let alarms = comparison.false_alarms();
+    let mut told = String::new();
+    for row in alarms.clone().take(ALARMS_TOLD) {
+        let _ = writeln!(told, "  {}: {}", row.case.id, row.figures.faults);
+    }
+    let alarms = alarms.count();
+    if alarms > ALARMS_TOLD {
+        let _ = writeln!(told, "  and {} more, in the report", alarms - ALARMS_TOLD);
+    }
     let infeasible = comparison.infeasible().len();
     let _ = writeln!(
         out,
-        "cases       {}, false alarms {alarms}, infeasible corners {infeasible}\nreport      {}",
+        "cases       {}, false alarms {alarms}, infeasible corners {infeasible}\n{told}report      {}",
         comparison.rows.len(),
         finished.report.display()
     );

@@ -16,9 +16,11 @@ mod run;
 mod tune;
 mod usage;
 
+use std::fmt::Display;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use clap::{Parser, Subcommand};
 
@@ -46,6 +48,17 @@ struct Cli {
 
 const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
 1 a required target is not met (--strict only), or a checked quantity beyond tolerance; 2 error; 130 stopped with Ctrl-C.";
+
+/// Parses a whole number from `low` to `high`, and says so of any other.
+fn whole<N>(low: N, high: N) -> impl Fn(&str) -> Result<N, String> + Clone + Send + Sync
+where
+    N: FromStr + PartialOrd + Display + Copy + Send + Sync,
+{
+    move |text| {
+        let number = text.parse().ok().filter(|n| (low..=high).contains(n));
+        number.ok_or_else(|| format!("allowed are whole numbers from {low} to {high}"))
+    }
+}
 
 #[derive(Debug, Subcommand)]
 enum Command {

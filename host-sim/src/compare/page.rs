@@ -101,7 +101,7 @@ impl Comparison {
 
     /// Feasible cases in which the supervision latched a fault: no fault was put in,
     /// so each is a false alarm.
-    pub fn false_alarms(&self) -> impl Iterator<Item = &Row> {
+    pub fn false_alarms(&self) -> impl Iterator<Item = &Row> + Clone {
         self.rows.iter().filter(|r| !r.figures.faults.is_empty())
     }
 

@@ -20,7 +20,7 @@ pub use node::NodeParams;
 pub(crate) use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
-pub(crate) use quantity::pretty;
+pub(crate) use quantity::{brief, pretty};
 pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };

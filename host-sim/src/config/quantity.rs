@@ -135,6 +135,11 @@ pub(crate) fn suffix(unit: &str) -> String {
     }
 }
 
+/// A number to four digits, for messages about what was worked out.
+pub(crate) fn brief(value: f64) -> String {
+    pretty(format!("{value:.3e}").parse().unwrap_or(value))
+}
+
 /// A number for people: up to `digits` significant digits, no float noise.
 #[must_use]
 pub(crate) fn pretty(value: f64) -> String {

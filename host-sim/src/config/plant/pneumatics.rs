@@ -56,6 +56,7 @@ impl Pneumatics {
         let vent_valve = r.section::<ValveSection>("vent_valve");
         let line = r.section::<LineSection>("line");
         let cylinder = r.section::<CylinderSection>("cylinder");
+        check_rod(r, cylinder.as_ref());
         let friction = r.section::<FrictionSection>("friction");
         let end_stop = r.section::<EndStopSection>("end_stop");
         Some(Self {
@@ -123,37 +124,56 @@ fn check_contacts(
     const NEVER: &str = "a contact that never closes: the robot would take its supply for lost";
     if let Some(s) = supply {
         let most = ("supply.switch_on", s.switch_on);
-        at_most(r, ["supply", "switch_off"], s.switch_off, most, OPENS);
+        at_most(
+            r,
+            ["supply", "switch_off"],
+            (s.switch_off, "Pa"),
+            most,
+            OPENS,
+        );
     }
     let Some(Some(switch)) = source_switch else {
         return;
     };
     let most = ("source_switch.on", switch.on);
-    at_most(r, ["source_switch", "off"], switch.off, most, OPENS);
+    at_most(r, ["source_switch", "off"], (switch.off, "Pa"), most, OPENS);
     if let Some(s) = supply {
         let most = ("supply.source_pressure", s.source_pressure);
-        at_most(r, ["source_switch", "on"], switch.on, most, NEVER);
+        at_most(r, ["source_switch", "on"], (switch.on, "Pa"), most, NEVER);
     }
 }
 
-/// Holds a pressure (Pa) of a section against that of another field.
+/// The largest rod, over the bore: the annulus of chamber B.
+const ROD_MOST: f64 = 0.9;
+
+/// A rod leaves a chamber beside it.
+fn check_rod(r: &mut Reader, cylinder: Option<&CylinderSection>) {
+    const WHY: &str = "the air of chamber B acts on what the rod leaves of the piston";
+    if let Some(c) = cylinder {
+        let most = ("0.9 × cylinder.bore", ROD_MOST * c.bore * 1e3);
+        at_most(r, ["cylinder", "rod"], (c.rod * 1e3, "mm"), most, WHY);
+    }
+}
+
+/// Holds a value of a section against that of another field, in a unit.
 fn at_most(
     r: &mut Reader,
     [section, key]: [&str; 2],
-    pressure_pa: f64,
-    (limit, most_pa): (&str, f64),
+    (value, unit): (f64, &str),
+    (limit, most): (&str, f64),
     why: &str,
 ) {
-    if pressure_pa <= most_pa {
+    // To the rounding of conversions.
+    if value <= most * (1.0 + 1e-9) {
         return;
     }
     let field = r.table(section).and_then(|table| table.get(key));
     r.problem(
         field.and_then(|(key, item)| item.span().or(Some(key))),
         format!(
-            "`{section}.{key}` = {} Pa is out of range: allowed up to {} Pa, which is `{limit}`",
-            pretty(pressure_pa),
-            pretty(most_pa)
+            "`{section}.{key}` = {} {unit} is out of range: allowed up to {} {unit}, which is `{limit}`",
+            pretty(value),
+            pretty(most)
         ),
         "out of range",
         Some(why.to_owned()),
