@@ -118,7 +118,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let eventful = report.step("runs with faults on eight emulated boards", || {
         eventful(&emulator, &images.folder)
     });
-    report.step(
+    let predictive = report.step(
         "three steps and runs with faults with the predictive law",
         || predictive(&emulator, &images.folder),
     );
@@ -127,6 +127,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     });
     if let (Some(machine), Some(mut figures)) = (machine, figures) {
         figures["pil"]["eventful"] = json!(eventful);
+        figures["pil"]["predictive"] = json!(predictive);
         report.step("figures for machines", || Ok(machine.print(&figures)?));
     }
 }

@@ -1,8 +1,8 @@
 //! A pneumatic axis as its controller knows it: data, gas, motion, valves.
 //!
 //! There is no pressure sensor. What is in the chambers follows from what the
-//! valves have let in and out: every on-time that is sent is also followed
-//! through the switching delays ([`valves`]), the flow of ISO 6358 through each
+//! valves have let in and out: every on-time that the law sends is also followed
+//! through the switching delays ([`valves`]), what others send counts at once; the flow of ISO 6358 through each
 //! opening and the piston's motion give the two pressures ([`air`], [`gas`]), and the
 //! measured stroke corrects speed and load ([`motion`]). Errors of the pressures
 //! die out by themselves, because a filling chamber ends at the supply and a

@@ -60,6 +60,12 @@ fn ensure_told(messages: &str, what: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// A tick that nobody counted is none that holds.
+fn ensure_measured(worst: u64, image: &str) -> anyhow::Result<()> {
+    ensure!(worst > 0, "no tick of an image `{image}` was counted");
+    Ok(())
+}
+
 /// Plays the runs with faults, with the files of `scenarios`; their figures. No bit may differ from
 /// the host.
 fn struck(
@@ -85,7 +91,12 @@ fn struck(
         for code in codes {
             ensure_told(&told, code).with_context(|| format!("{scenario} {faults:?}"))?;
         }
-        runs.push(run["pil"].take());
+        let pil = run["pil"].take();
+        for image in ["joint", "wheel"] {
+            let worst = most(&pil, "tick_instructions_worst", image);
+            ensure_measured(worst, image).with_context(|| format!("{scenario} {faults:?}"))?;
+        }
+        runs.push(pil);
     }
     let mut figures = json!({});
     put_most(&mut figures, &runs.iter().collect::<Vec<_>>());
@@ -118,13 +129,19 @@ fn changed(folder: &Path, from: &str, to: &str, old: &str, new: &str) -> anyhow:
 fn with_predictive_law(scenario: &str) -> anyhow::Result<PathBuf> {
     let folder = target_dir().join("pil-run").join("predictive");
     let law = r#"law = { value = 5, unit = "1", source = "ASSUMED: this run's" }"#;
-    changed(
+    let robot = changed(
         &folder,
         "robots/wheeleg-2003.toml",
         "robot.toml",
         "[node.joint]\n",
         &format!("[node.joint]\n{law}\n"),
     )?;
+    let text = fs::read_to_string(&robot).with_context(|| robot.display().to_string())?;
+    let laws = text.lines().filter(|line| line.starts_with("law "));
+    ensure!(
+        laws.count() == 1,
+        "the law of all joints is this run's alone"
+    );
     changed(
         &folder,
         &format!("scenarios/{scenario}.toml"),
@@ -135,8 +152,8 @@ fn with_predictive_law(scenario: &str) -> anyhow::Result<PathBuf> {
 }
 
 /// The paper's test, and the runs with faults, with the predictive law: no bit may differ from the
-/// host, and the worst tick has a budget of its own.
-pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult {
+/// host, and tick and stack have their budgets.
+pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult<Value> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let summary = run_nodes(
         &with_predictive_law("three-step")?,
@@ -152,17 +169,19 @@ pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult {
         "    joint tick with the predictive law: {} instructions in the median, {worst} at worst",
         most(pil, "tick_instructions_median", "joint")
     );
-    let figures = struck(
+    let mut figures = struck(
         emulator,
         images,
         "pil-run/predictive/out",
         with_predictive_law,
     )?;
     println!("    with faults {figures}");
+    let struck = figures["joint"]["tick_instructions_worst"].as_u64();
     sizes::check_predictive(worst)?;
-    // A tick that was not measured is none that holds.
-    let struck = &figures["joint"]["tick_instructions_worst"];
-    sizes::check_predictive(struck.as_u64().unwrap_or(0))
+    sizes::check_predictive(struck.unwrap_or(0))?;
+    sizes::check_run(images, &mut figures)?;
+    figures["joint"]["tick_instructions_worst_three_steps"] = json!(worst);
+    Ok(figures)
 }
 
 /// Which nodes of a mixed run are outside, and where.

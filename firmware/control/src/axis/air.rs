@@ -77,6 +77,26 @@ impl Chamber {
         chamber
     }
 
+    /// Flips a bit of one of the words that only this file sees, for tests of those who keep it.
+    #[cfg(test)]
+    pub(super) const fn damage(&mut self, word: u32, bit: u32) {
+        let flip = 1 << bit;
+        match word {
+            0 => self.flows.fill ^= flip,
+            1 => self.flows.vent ^= flip,
+            2 => self.stiffness ^= flip,
+            3 => self.means_check ^= flip.cast_unsigned(),
+            4 => self.pressures_check ^= flip.cast_unsigned(),
+            _ => self.pulses_check ^= flip.cast_unsigned(),
+        }
+    }
+
+    /// Tracks of fill and vent, for tests of what is sent.
+    #[cfg(test)]
+    pub(super) const fn tracks(&self) -> [ValveTrack; 2] {
+        [self.fill, self.vent]
+    }
+
     #[inline]
     fn sum_of_pulses(&self) -> u32 {
         self.vent.sum(self.fill.sum(0))
@@ -229,6 +249,8 @@ impl Chamber {
             vent | more_vent | all_flows != 0,
         );
         let change = flows.change(open, power(p, speed), times.period, stiffness);
+        // Those of the second step for both, which cost the tick too much apart: while a valve is
+        // about to open, the piston does not squeeze beyond what it will let.
         let (least, most) = bounds(model, fill | more_fill, vent | more_vent);
         let p = p.saturating_add(change).max(least).min(most);
         let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
@@ -285,7 +307,7 @@ impl Chamber {
     }
 }
 
-/// Bounds of a pressure while valves open for `fill` and `vent` µs. None fills beyond the supply or
+/// Bounds of a pressure while valves are open, or are to be, for `fill` and `vent` µs. None fills beyond the supply or
 /// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
 /// half of that needs a motion of its own.
 #[inline]

@@ -56,16 +56,16 @@ pub struct Learner {
     check: u32,
 }
 
-/// Weights in the seal: odd, so that every flipped bit is seen, and small, so that a change costs
-/// little.
+/// Weights in the seal, one for each word: odd, so that every flipped bit is seen, and small, so that
+/// a change costs little.
 const FIRST: u32 = 9;
 const FASTEST_SPEED: u32 = 5;
 const FASTEST_IMPULSE: u32 = 7;
 const LAST_SPEED: u32 = 13;
 const LAST_IMPULSE: u32 = 3;
 const MASS: u32 = 11;
-/// One period of the fastest moment counts one; one of the last, and the end, are beside it in
-/// the word.
+/// Places in the word of what is smaller than one: there the periods of the fastest moment are the
+/// lowest bits, and the end is above all they count.
 const LAST_PERIOD: u32 = 1 << 16;
 const ENDED: u32 = 1 << 15;
 

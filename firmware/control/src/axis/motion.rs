@@ -48,6 +48,27 @@ pub struct Inertia {
 }
 
 impl Inertia {
+    /// None yet: there is no such mass.
+    pub const TO_BE_MADE: Self = Self {
+        mass: 0,
+        per_force: 0,
+        slope: 0,
+        damping: 0,
+        brake: 0,
+        linear: 0,
+        load_gain: 0,
+        rubbed: 0,
+        rubbed_ahead: 0,
+        check: 0,
+    };
+
+    /// Whether it is [`Inertia::TO_BE_MADE`].
+    #[inline]
+    #[must_use]
+    pub const fn is_to_be_made(&self) -> bool {
+        self.mass == 0
+    }
+
     /// For a mass in kg × 2^16; gains fall with the cube root of what the mass
     /// exceeds the axis's nimble mass by.
     // Seldom: small rather than fast.
@@ -204,12 +225,15 @@ impl Motion {
         self.stroke < STOP_ZONE || self.stroke > model.stroke.saturating_sub(STOP_ZONE)
     }
 
-    /// Within a millimetre of an end stop, and so is `target` (raw mm), or beyond it.
+    /// Within a millimetre of an end stop, with a `target` (raw mm) more than one behind it; or, for a
+    /// piston that `lingers` there, less than one before it.
     #[inline]
     #[must_use]
-    pub fn leans(&self, model: &AxisModel, target: i32) -> bool {
+    pub fn leans(&self, model: &AxisModel, target: i32, lingers: bool) -> bool {
+        let zone = if lingers { STOP_ZONE } else { -STOP_ZONE };
         let far = model.stroke.saturating_sub(STOP_ZONE);
-        self.stroke.max(target) < STOP_ZONE || self.stroke.min(target) > far
+        (self.stroke < STOP_ZONE && target < zone)
+            || (self.stroke > far && target > model.stroke.saturating_sub(zone))
     }
 
     /// One period, in which the chambers made `force` in the mean.

@@ -22,7 +22,8 @@
 //!   long may do so in a wider band, up to three times and 0.4 mm; and each time it
 //!   enters that band the law waits with the valves shut, to see where it comes to
 //!   rest, before it acts again: no limit cycle lasts.
-//! * **Announced moves.** With a move announced, the force is brought to the edge
+//! * **Announced moves.** With a move announced, and the piston at rest at the present target or
+//!   against a stop, the force is brought to the edge
 //!   of slipping in its direction: the counter chamber vents and the drive
 //!   chamber fills ahead of time, and the piston stands.
 //! * **Pressure swap.** A chamber vents no faster than its valve lets it. In an
@@ -188,7 +189,7 @@ pub struct Predictive {
     /// Stroke of the last tick, raw mm.
     measured: i32,
     /// On-times of the present period from its begin, µs; in its last tick, of the next one. Where
-    /// somebody else decides: for how long the valves were open since their chambers were followed.
+    /// somebody else decides: for how long the valves were sent open since their chambers were followed.
     plan: OnTimes,
 
     // For the record.
@@ -200,6 +201,11 @@ impl Predictive {
     /// At rest, both chambers at the atmosphere.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
+        Self::with(model, Inertia::new(model, model.mass))
+    }
+
+    #[inline]
+    fn with(model: &AxisModel, inertia: Inertia) -> Self {
         let pressures = Pressures {
             a: model.ambient,
             b: model.ambient,
@@ -213,7 +219,7 @@ impl Predictive {
             force: model.pressure_force(pressures),
             wanted: 0,
             motion_check: 0,
-            inertia: Inertia::new(model, model.mass),
+            inertia,
             push: Push::default(),
             push_check: 0,
             learner: Learner::new(),
@@ -222,7 +228,10 @@ impl Predictive {
             makes_up: MakesUp::No,
             quiet: true,
             rest_check: 0,
-            turn: Turn::default(),
+            turn: Turn {
+                stroke: Stroke::Pulses,
+                ..Turn::default()
+            },
             next: 0,
             measured: 0,
             plan: [0; 4],

@@ -131,6 +131,24 @@ impl JointController {
         self.predictive.as_ref()
     }
 
+    /// What the last look ([`JointController::history_is_sound`]) found damaged is made anew: the
+    /// predictive law begins as after power-up with the next tick.
+    #[inline]
+    pub fn forget(&mut self) {
+        if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
+            law.forget(model);
+        }
+    }
+
+    /// Takes note that nothing is sent of what the last [`JointController::step`] gave, after which
+    /// it is not called before others have driven.
+    #[inline]
+    pub fn stopped(&mut self) {
+        if let Some(law) = &mut self.predictive {
+            law.stopped();
+        }
+    }
+
     /// Takes note of what was sent for the next tick where no law drives, once after each
     /// [`JointController::observe`]: for how much of it each valve counts as open without its
     /// switching delays, µs. The predictive law follows the air by it.

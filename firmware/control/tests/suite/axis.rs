@@ -48,8 +48,8 @@ fn a_step_fills_towards_its_target_and_vents_against_it() {
             joint.sent(&[fill, 0, fill, 0]);
         }
         // Twice the dead time and more: later it would have to move. The first pulses are planned
-        // in the fourth tick.
-        for _ in 0..20 {
+        // within seven ticks.
+        for _ in 0..22 {
             let output = joint.step(&at(90.0, reference));
             let sent = output.direct.expect("times its own pulses");
             assert!(output.openings.is_shut() && sent.iter().all(|on| *on <= 1000));

@@ -187,6 +187,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.core.supervisor.begin_tick(now, &self.core.times);
         if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
+            self.controller.forget();
         }
         // A pin that cannot be read keeps its last debounced level.
         if let Ok(raw) = switches {

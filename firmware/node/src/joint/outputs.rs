@@ -44,6 +44,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let overdue = self.state.motion.judge(&driven, &self.settings.motion);
         // At rest, and in the very tick in which a fault is found, no pulse goes on.
         let on_times = if overdue || self.is_behind() {
+            self.controller.stopped();
             self.pwm.shut()
         } else if let Some(on) = output.direct {
             self.pwm.direct(on)
@@ -114,6 +115,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else {
             self.pwm.shut()
         };
+        // What exhausts counts for as long as its coils are on: a little more than it lets out.
         self.rested(now, on_times, &on_times);
         self.snapshot.limits = LimitBits::NONE;
         on_times

@@ -2,7 +2,6 @@
 
 use super::force::{Course, Push};
 use super::{NOTHING, Predictive, Stroke};
-use crate::axis::learn::Learner;
 use crate::axis::model::AxisModel;
 use crate::axis::motion::Inertia;
 use crate::pwm::OnTimes;
@@ -10,12 +9,11 @@ use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 impl Predictive {
     /// A tick after which somebody else drives, who tells [`Predictive::sent`] how. Follows
-    /// chambers and piston, and forgets that the piston rests. Damage that the caller was told of
-    /// before this tick ([`Predictive::kept_is_sound`]) is mended by the stroke that it concerns:
-    /// nothing of it is used here.
+    /// chambers and piston, and forgets that the piston rests.
     pub fn observe(&mut self, model: &AxisModel, measured: PositionMm) -> VelocityMmS {
         if !self.turn.primed {
             self.prime(measured);
+            return VelocityMmS::ZERO;
         }
         if self.turn.drives {
             self.yield_to_others(model);
@@ -27,17 +25,9 @@ impl Predictive {
         }
         match self.turn.stroke {
             Stroke::A => self.follow(model, true),
-            Stroke::B => {
-                self.follow(model, false);
-                if !self.learner.is_sound() {
-                    self.learner = Learner::new();
-                }
-            }
+            Stroke::B => self.follow(model, false),
             Stroke::Motion => {
                 self.learn(model);
-                if !self.inertia.is_sound() {
-                    self.inertia = Inertia::new(model, model.mass);
-                }
                 self.moves(model, measured);
                 self.wanted = 0;
                 self.push = Push::default();
@@ -45,8 +35,10 @@ impl Predictive {
                 self.motion_check = self.sum_of_motion();
             }
             Stroke::Pulses => {
+                if self.inertia.is_to_be_made() {
+                    self.inertia = Inertia::new(model, model.mass);
+                }
                 self.release();
-                self.rest_check = self.sum_of_rest();
             }
         }
         self.next_stroke(measured);
@@ -54,7 +46,7 @@ impl Predictive {
     }
 
     /// What somebody else has sent for the next tick: for how much of it each valve counts as open
-    /// without its switching delays, µs.
+    /// without its switching delays, µs. It counts at once: the delays are not waited for.
     #[inline]
     pub fn sent(&mut self, open: &OnTimes) {
         if self.turn.drives {
@@ -63,6 +55,21 @@ impl Predictive {
         for (open, more) in self.plan.iter_mut().zip(open) {
             *open = open.saturating_add(*more);
         }
+    }
+
+    /// What is kept is damaged ([`Predictive::kept_is_sound`]): all of it begins anew, as after
+    /// power-up. What follows from the mass takes long to be made; that waits for a stroke that has
+    /// the time, the first one after the next stroke that is measured.
+    #[cold]
+    #[inline(never)]
+    pub fn forget(&mut self, model: &AxisModel) {
+        *self = Self::with(model, Inertia::TO_BE_MADE);
+    }
+
+    /// Nothing of the plan has been sent in the tick to come, nor will be.
+    #[inline]
+    pub fn stopped(&mut self) {
+        self.plan = [0; 4];
     }
 
     /// The first stroke that is measured is where the piston stands.
@@ -95,12 +102,9 @@ impl Predictive {
     #[cold]
     #[inline(never)]
     pub(super) fn begins(&mut self, model: &AxisModel, measured: PositionMm) -> bool {
-        if self.turn.stroke != Stroke::A || self.plan != [0; 4] {
+        if !self.turn.primed || self.turn.stroke != Stroke::A || self.plan != [0; 4] {
             self.observe(model, measured);
             return false;
-        }
-        if !self.turn.primed {
-            self.prime(measured);
         }
         self.turn.drives = true;
         true
@@ -140,6 +144,5 @@ impl Predictive {
         self.plan = [0; 4];
         self.duty = Duty::ZERO;
         self.turn.limited = false;
-        self.release();
     }
 }

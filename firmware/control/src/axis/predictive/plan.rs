@@ -1,7 +1,7 @@
 //! The last stroke: rest or target pressures, and the pulses of the next period.
 
 use super::pressures::{made_up, targets};
-use super::rest::Approach;
+use super::rest::{Approach, REFERENCE_RESTS};
 use super::{MakesUp, NOTHING, Predictive, STILL};
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
@@ -18,13 +18,18 @@ impl Predictive {
         let stands = self.rest.is_settled() || self.motion.speed.wrapping_abs() < STILL;
         let mut to = reference;
         let mut awaited = None;
-        // Pressed against a stop that is its target, or has its target behind it, it need not rest.
-        let leans = stands && !self.rest.is_settled() && self.motion.leans(model, reference);
+        // Against a stop with the target behind it, or where patience is over, it need not rest.
+        let leans = || {
+            stands
+                && !self.rest.is_settled()
+                && input.reference_velocity.raw().wrapping_abs() <= REFERENCE_RESTS
+                && self.motion.leans(model, reference, self.rest.lingers())
+        };
         match input.announced {
             // A move is awaited where the last one ended, not in the midst of that.
             Some(Announced {
                 reference: next, ..
-            }) if leans || self.rest.holds() => {
+            }) if self.rest.holds() || leans() => {
                 awaited = self.preload(model, next.raw());
                 if awaited.is_some() {
                     to = next.raw();
@@ -32,7 +37,7 @@ impl Predictive {
             }
             _ => self.awaits = NOTHING,
         }
-        if awaited.is_none() && !(leans && input.announced.is_some()) {
+        if awaited.is_none() {
             self.quiet = self.rest.quiet(
                 model,
                 &Approach {

@@ -56,7 +56,7 @@ pub(super) struct Rest {
     /// The target has changed since the piston came to rest.
     aimed: bool,
     settled: bool,
-    /// The target is a new one of this period.
+    /// The target was a new one when the last stroke looked at it.
     fresh: bool,
 }
 
@@ -96,6 +96,12 @@ impl Rest {
         self.settled
     }
 
+    /// Whether it has been near its target without coming to rest for longer than patience allows.
+    #[inline]
+    pub(super) fn lingers(&self) -> bool {
+        self.near > PATIENCE
+    }
+
     /// Whether it rests at the present target.
     #[inline]
     pub(super) const fn holds(&self) -> bool {
@@ -123,7 +129,7 @@ impl Rest {
         reference.saturating_sub(self.target).saturating_abs() > model.band
     }
 
-    /// Whether the target was a new one in the last period.
+    /// Whether the target was a new one when the last stroke looked at it.
     #[inline]
     pub(super) const fn is_fresh(&self) -> bool {
         self.fresh

@@ -31,7 +31,7 @@ impl Hash for Predictive {
             next,
             measured,
             plan: [fill_a, vent_a, fill_b, vent_b],
-            // They shape no output.
+            // It shapes no output.
             duty: _,
         } = self;
         state.write_u32(turn.word());
