@@ -30,19 +30,19 @@ pub(super) struct CompareArgs {
     #[arg(long = "move", value_name = "MOVE", value_parser = motion)]
     moves: Vec<Move>,
     /// Number of seeds for the cases as on the sheet.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1, 1000))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
     seeds: u64,
     /// The first seed.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0, u64::MAX - 1000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0_u64, u64::MAX - 1000))]
     seed: u64,
     /// Random combinations of factors per axis [default: 200; 20 with --quick].
-    #[arg(long, value_name = "N", value_parser = whole(0, 10_000))]
+    #[arg(long, value_name = "N", value_parser = whole(0_u64, 10_000))]
     combinations: Option<u64>,
     /// One seed, fewer factors and combinations, a coarser bound.
     #[arg(long)]
     quick: bool,
     /// Threads [default: as many as the machine has].
-    #[arg(long, value_name = "N", value_parser = whole(1, 1024))]
+    #[arg(long, value_name = "N", value_parser = whole(1_u16, 1024))]
     threads: Option<u16>,
     /// Folder for report, figures and tables. Results of an earlier run in it move to
     /// its folder `previous`.

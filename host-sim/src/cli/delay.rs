@@ -27,7 +27,7 @@ pub(super) struct DelayArgs {
     #[arg(long)]
     json: bool,
     /// Starts per kind of move and law, 1 to 1000.
-    #[arg(long, default_value_t = Options::default().seeds, value_parser = whole(1, 1000))]
+    #[arg(long, default_value_t = Options::default().seeds, value_parser = whole(1_u32, 1000))]
     seeds: u32,
     /// Mass that moves with the rod, kg, 0.1 to 50 (assumed: rod and carriage, lying).
     #[arg(long, value_name = "KG", default_value_t = Options::default().mass_kg, value_parser = mass)]
