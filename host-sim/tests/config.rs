@@ -141,12 +141,19 @@ fn out_of_range() {
 
 #[test]
 fn limits_themselves_are_allowed() {
-    for value in ["4.0", "200.0"] {
-        let text = ROBOT.replace(
-            "bore          = { value = 20.0",
-            &format!("bore          = {{ value = {value}"),
-        );
-        assert!(RobotConfig::parse("my.toml", &text).is_ok(), "{value}");
+    // With the thickest rod that the bore allows.
+    for (bore, rod) in [("4.0", "3.6"), ("200.0", "180.0")] {
+        let text = ROBOT
+            .replace(
+                "bore          = { value = 20.0",
+                &format!("bore          = {{ value = {bore}"),
+            )
+            .replace(
+                "rod           = { value = 8.0",
+                &format!("rod           = {{ value = {rod}"),
+            );
+        let parsed = RobotConfig::parse("my.toml", &text);
+        assert!(parsed.is_ok(), "{bore}: {parsed:?}");
     }
 }
 

@@ -228,10 +228,7 @@ impl Predictive {
             makes_up: MakesUp::No,
             quiet: true,
             rest_check: 0,
-            turn: Turn {
-                stroke: Stroke::Pulses,
-                ..Turn::default()
-            },
+            turn: Turn::default(),
             next: 0,
             measured: 0,
             plan: [0; 4],

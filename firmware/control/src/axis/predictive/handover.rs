@@ -13,7 +13,9 @@ impl Predictive {
     pub fn observe(&mut self, model: &AxisModel, measured: PositionMm) -> VelocityMmS {
         if !self.turn.primed {
             self.prime(measured);
-            return VelocityMmS::ZERO;
+            if self.inertia.is_to_be_made() {
+                return VelocityMmS::ZERO;
+            }
         }
         if self.turn.drives {
             self.yield_to_others(model);
@@ -64,6 +66,7 @@ impl Predictive {
     #[inline(never)]
     pub fn forget(&mut self, model: &AxisModel) {
         *self = Self::with(model, Inertia::TO_BE_MADE);
+        self.turn.stroke = Stroke::Pulses;
     }
 
     /// Nothing of the plan has been sent in the tick to come, nor will be.

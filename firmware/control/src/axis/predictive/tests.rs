@@ -280,7 +280,7 @@ fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
     let mut opened = 0;
     // From the begin of periods in which the law is busy.
     for period in 20..60 {
-        let begun = moving(&model, 4 * period + 2);
+        let begun = moving(&model, 4 * period);
         assert_eq!(begun.turn.stroke, Stroke::A);
         let start = begun.next.wrapping_sub(times.period as u32) + model.moment as u32;
         for sent_ticks in 0..4 {
