@@ -3,7 +3,7 @@
 
 use std::sync::OnceLock;
 
-use crate::sil::{at, command_to, gait, range, robot, run, settled_touches, window};
+use crate::sil::{at, command_to, gait, range, robot, robot_with, run, settled_touches, window};
 use wheeleg_plant::sensors::AdcNoise;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_sim::analysis::{Analysis, analyse};
@@ -323,14 +323,7 @@ fn the_stepping_foot_lifts_and_touches_three_times_and_the_other_never() {
 #[test]
 fn with_the_predictive_law_the_foot_lifts_and_touches_three_times_too() {
     for leg in [LegChoice::Left, LegChoice::Right] {
-        let mut robot = robot();
-        for joint in &mut robot.node.joints {
-            let law = JointParam::Law.id();
-            joint.retain(|(id, _)| *id != law);
-            joint.push((law, 5));
-            joint.sort_unstable();
-        }
-        let steps = Steps::with(leg, robot);
+        let steps = Steps::with(leg, robot_with(JointParam::Law, 5));
         let touches = settled_touches(&steps.recording.feet[steps.foot]);
         let expected = [false, true, false, true, false, true];
         assert_eq!(touches.iter().map(|t| t.1).collect::<Vec<_>>(), expected);

@@ -201,7 +201,7 @@ fn two_hundred_combinations() {
 
 #[test]
 fn off_the_bench_axis_few_combinations_miss() {
-    // Of 1,200, 600 and 1,200 on the axes 21, 3 and 46 were measured: reversals that had not died
+    // Of 1,200, 600 and 1,200 on the axes 21, 3 and 48 were measured: reversals that had not died
     // out, a rest beside the bar, a false alarm near the target.
     for (name, count) in [
         ("small-12x50", 60),

@@ -112,9 +112,9 @@ fn the_default_law_starts_no_later_than_the_papers_from_a_stop() {
         Start::StopRest,
     ] {
         let (paper, ours) = (median_s(Law::Paper, start), median_s(Law::Default, start));
-        // It decides once in four ticks.
+        // It decides once in four ticks: 2.04 ms later were measured at rest on a stop.
         assert!(
-            ours <= paper + 4e-3 && ours > 0.02,
+            ours <= paper + 2.5e-3 && ours > 0.02,
             "{start:?}: {ours} {paper}"
         );
     }

@@ -1,12 +1,12 @@
 //! Precharge on simulated cylinders: what it makes of the first motion after a stop, and how far
 //! the piston moves while the chambers are filled. The board is the whole application.
 
-use crate::sil::{command, range, robot, run, stand, window};
+use crate::sil::{command, range, robot, robot_with, run, stand, window};
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{Arm, ClearFault, Limit, LinkLossAction, SCHEMA_HASH};
 use wheeleg_sim::bench::{Bench, Kind, Motion, Node, Trace, design};
-use wheeleg_sim::config::{AxisConfig, EventAction, RobotConfig};
+use wheeleg_sim::config::{AxisConfig, EventAction};
 
 /// Raw value of a bar.
 const BAR: f64 = 65_536.0;
@@ -219,18 +219,6 @@ fn without_supply_it_ends_and_the_fault_that_follows_names_the_supply() {
     }
 }
 
-/// The robot with a precharge on all six joints.
-fn robot_with(bar: f64) -> RobotConfig {
-    let mut robot = robot();
-    let id = JointParam::Precharge.id();
-    for joint in &mut robot.node.joints {
-        joint.retain(|(other, _)| *other != id);
-        joint.push((id, (bar * BAR) as i32));
-        joint.sort_unstable();
-    }
-    robot
-}
-
 #[test]
 fn a_robot_that_stands_on_its_legs_neither_rises_nor_sinks() {
     let (stop, clear, arm) = (0.8, 1.8, 4.3);
@@ -239,7 +227,11 @@ fn a_robot_that_stands_on_its_legs_neither_rises_nor_sinks() {
         (clear, EventAction::ClearFault),
         (arm, command("Arm")),
     ];
-    let recording = run(&stand(arm + 2.0, &events), &robot_with(1.0), 1);
+    let recording = run(
+        &stand(arm + 2.0, &events),
+        &robot_with(JointParam::Precharge, BAR as i32),
+        1,
+    );
     let said: Vec<_> = recording.events.iter().map(|e| e.v.text.as_str()).collect();
     for (joint, rows) in recording.joints.iter().enumerate() {
         let told = format!("joint {} logs", joint + 1);

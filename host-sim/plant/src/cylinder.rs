@@ -21,6 +21,9 @@ use crate::valve::{NEVER_NS, ValveParams, ValveState};
 /// Longest line delay the valve model can hold \[s\].
 const MAX_LINE_DELAY_S: f64 = 7e-3;
 
+/// The thickest rod, over the bore: it leaves an annulus for the air of chamber B.
+pub const ROD_MOST: f64 = 0.9;
+
 /// One cylinder, its line and its valves. SI units; ranges as checked by
 /// [`CylinderParams::validate`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -73,7 +76,7 @@ impl CylinderParams {
     /// [`PlantError::Parameter`] names the first field outside its range.
     pub fn validate(&self) -> Result<(), PlantError> {
         check("cylinder.bore_m", self.bore_m, 0.004, 0.2)?;
-        check("cylinder.rod_m", self.rod_m, 0.0, self.bore_m * 0.9)?;
+        check("cylinder.rod_m", self.rod_m, 0.0, self.bore_m * ROD_MOST)?;
         check("cylinder.stroke_m", self.stroke_m, 0.001, 2.0)?;
         check(
             "cylinder.dead_volume_a_m3",

@@ -5,6 +5,7 @@
 
 use std::ops::ControlFlow;
 
+use wheeleg_protocol::param::JointParam;
 use wheeleg_sim::config::{
     EventAction, LegChoice, Motion, ParameterChoice, RobotConfig, Scenario, ScenarioEvent,
     TargetSet, builtin,
@@ -15,6 +16,18 @@ use wheeleg_sim::telemetry::{FootSample, JointSample, Recorder, Recording, Row};
 /// The one robot.
 pub(crate) fn robot() -> RobotConfig {
     builtin::robot("wheeleg-2003").expect("built in")
+}
+
+/// The robot with a parameter of all six joints set.
+pub(crate) fn robot_with(parameter: JointParam, raw: i32) -> RobotConfig {
+    let mut robot = robot();
+    let id = parameter.id();
+    for joint in &mut robot.node.joints {
+        joint.retain(|(other, _)| *other != id);
+        joint.push((id, raw));
+        joint.sort_unstable();
+    }
+    robot
 }
 
 /// A built-in scenario.

@@ -2,7 +2,7 @@
 //! valves, and the sensor that reads its stroke.
 
 use wheeleg_plant::chamber::GasModel;
-use wheeleg_plant::cylinder::CylinderParams;
+use wheeleg_plant::cylinder::{CylinderParams, ROD_MOST};
 use wheeleg_plant::endstop::EndStopParams;
 use wheeleg_plant::flow::{GasParams, Iso6358};
 use wheeleg_plant::friction::FrictionParams;
@@ -143,14 +143,12 @@ fn check_contacts(
     }
 }
 
-/// The largest rod, over the bore: the annulus of chamber B.
-const ROD_MOST: f64 = 0.9;
-
 /// A rod leaves a chamber beside it.
 fn check_rod(r: &mut Reader, cylinder: Option<&CylinderSection>) {
     const WHY: &str = "the air of chamber B acts on what the rod leaves of the piston";
     if let Some(c) = cylinder {
-        let most = ("0.9 × cylinder.bore", ROD_MOST * c.bore * 1e3);
+        let name = format!("{ROD_MOST} × cylinder.bore");
+        let most = (&*name, ROD_MOST * c.bore * 1e3);
         at_most(r, ["cylinder", "rod"], (c.rod * 1e3, "mm"), most, WHY);
     }
 }
