@@ -310,21 +310,26 @@ impl Recorder {
     }
 
     fn log_periodic<S: Sample>(&mut self, channel: usize, t_ns: u64, sample: &S) {
+        self.hash.update(self.channels[channel].def.topic, t_ns, sample);
         let state = &mut self.channels[channel];
         if t_ns < state.next_ns {
             return;
         }
         // Stay on the grid of the period, whatever the first time was.
         state.next_ns = (t_ns / state.period_ns + 1) * state.period_ns;
-        self.log(channel, t_ns, sample);
+        self.write(channel, t_ns, sample);
     }
 
     fn log<S: Sample>(&mut self, channel: usize, t_ns: u64, sample: &S) {
+        self.hash.update(self.channels[channel].def.topic, t_ns, sample);
+        self.write(channel, t_ns, sample);
+    }
+
+    fn write<S: Sample>(&mut self, channel: usize, t_ns: u64, sample: &S) {
         let state = &mut self.channels[channel];
         debug_assert_eq!(state.def.schema, S::SCHEMA);
         self.payload.clear();
         sample.encode_json(&mut self.payload);
-        self.hash.update(state.def.topic, t_ns, &self.payload);
         self.data.messages += 1;
         state.sequence += 1;
         if self.disk_full {

@@ -99,6 +99,10 @@ pub trait Sample: Clone {
     /// Appends the sample as one JSON object.
     fn encode_json(&self, out: &mut Vec<u8>);
 
+    /// Appends the values of all fields in order: numbers and integers little-endian in their own
+    /// width, a boolean as one byte, a text as its length (u32) and its UTF-8 bytes.
+    fn bytes(&self, out: &mut Vec<u8>);
+
     /// Calls `cell` with the text of each field in order.
     fn cells(&self, cell: &mut dyn FnMut(&[u8]));
 }

@@ -7,12 +7,17 @@ use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample};
 trait Value {
     const TYPE: FieldType;
     fn json(&self, out: &mut Vec<u8>, decimals: u8);
+    /// Appends the value little-endian, in its own width; a text with its length (u32) before it.
+    fn bytes(&self, out: &mut Vec<u8>);
 }
 
 impl Value for f64 {
     const TYPE: FieldType = FieldType::Number;
     fn json(&self, out: &mut Vec<u8>, decimals: u8) {
         push_fixed(out, *self, decimals);
+    }
+    fn bytes(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&self.to_le_bytes());
     }
 }
 
@@ -21,12 +26,19 @@ impl Value for bool {
     fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
         out.extend_from_slice(if *self { b"true" } else { b"false" });
     }
+    fn bytes(&self, out: &mut Vec<u8>) {
+        out.push(u8::from(*self));
+    }
 }
 
 impl Value for String {
     const TYPE: FieldType = FieldType::Text;
     fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
         push_json_string(out, self);
+    }
+    fn bytes(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&(self.len() as u32).to_le_bytes());
+        out.extend_from_slice(self.as_bytes());
     }
 }
 
@@ -36,6 +48,9 @@ macro_rules! integer_values {
             const TYPE: FieldType = FieldType::Integer;
             fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
                 $push(out, <$wide>::from(*self));
+            }
+            fn bytes(&self, out: &mut Vec<u8>) {
+                out.extend_from_slice(&self.to_le_bytes());
             }
         }
     )*};
@@ -80,6 +95,10 @@ macro_rules! samples {
                 )*
                 let _ = separator;
                 out.push(b'}');
+            }
+
+            fn bytes(&self, out: &mut Vec<u8>) {
+                $( self.$field.bytes(out); )*
             }
 
             fn cells(&self, cell: &mut dyn FnMut(&[u8])) {
