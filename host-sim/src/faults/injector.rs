@@ -6,10 +6,10 @@
 //! the simulation asks at every passage. All chance comes from one random
 //! stream of the run's seed, which sound runs never draw from.
 
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
 use wheeleg_plant::ground::GroundPatch;
+use wheeleg_plant::noise::Normal;
 use wheeleg_plant::robot::{Plant, PlantState};
 use wheeleg_plant::sensors::{SensorFault, signal_rng};
 use wheeleg_plant::valve::ValveFault;
@@ -196,7 +196,7 @@ impl Injector {
         if noise_mm == 0.0 {
             return code;
         }
-        let unit: f64 = StandardNormal.sample(&mut self.rng);
+        let unit = Normal::default().sample(&mut self.rng);
         let jump = noise_mm * 1e-3 / full_scale_m * 65536.0 * unit;
         (f64::from(code) + jump).clamp(0.0, 65520.0) as u16
     }

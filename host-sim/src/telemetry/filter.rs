@@ -22,7 +22,7 @@ impl LowPass2 {
     /// The corner must lie below half the sample rate.
     #[must_use]
     pub fn new(cutoff_hz: f64, period_s: f64) -> Self {
-        let k = (PI * cutoff_hz * period_s).tan();
+        let k = libm::tan(PI * cutoff_hz * period_s);
         let norm = 1.0 / (1.0 + SQRT_2 * k + k * k);
         Self {
             b0: k * k * norm,

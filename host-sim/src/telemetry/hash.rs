@@ -77,11 +77,17 @@ mod tests {
     #[test]
     fn sees_channel_time_order_and_every_bit_of_every_field() {
         let base = hash(&[("/a", 1, foot(1.0, 3)), ("/b", 2, foot(2.0, 0))]);
-        assert_eq!(base, hash(&[("/a", 1, foot(1.0, 3)), ("/b", 2, foot(2.0, 0))]));
+        assert_eq!(
+            base,
+            hash(&[("/a", 1, foot(1.0, 3)), ("/b", 2, foot(2.0, 0))])
+        );
         for other in [
             hash(&[("/c", 1, foot(1.0, 3)), ("/b", 2, foot(2.0, 0))]),
             hash(&[("/a", 3, foot(1.0, 3)), ("/b", 2, foot(2.0, 0))]),
-            hash(&[("/a", 1, foot(1.0_f64.next_up(), 3)), ("/b", 2, foot(2.0, 0))]),
+            hash(&[
+                ("/a", 1, foot(1.0_f64.next_up(), 3)),
+                ("/b", 2, foot(2.0, 0)),
+            ]),
             hash(&[("/a", 1, foot(1.0, 2)), ("/b", 2, foot(2.0, 0))]),
             hash(&[("/b", 2, foot(2.0, 0)), ("/a", 1, foot(1.0, 3))]),
             hash(&[("/a", 1, foot(1.0, 3))]),

@@ -310,7 +310,8 @@ impl Recorder {
     }
 
     fn log_periodic<S: Sample>(&mut self, channel: usize, t_ns: u64, sample: &S) {
-        self.hash.update(self.channels[channel].def.topic, t_ns, sample);
+        self.hash
+            .update(self.channels[channel].def.topic, t_ns, sample);
         let state = &mut self.channels[channel];
         if t_ns < state.next_ns {
             return;
@@ -321,15 +322,14 @@ impl Recorder {
     }
 
     fn log<S: Sample>(&mut self, channel: usize, t_ns: u64, sample: &S) {
-        self.hash.update(self.channels[channel].def.topic, t_ns, sample);
+        self.hash
+            .update(self.channels[channel].def.topic, t_ns, sample);
         self.write(channel, t_ns, sample);
     }
 
     fn write<S: Sample>(&mut self, channel: usize, t_ns: u64, sample: &S) {
         let state = &mut self.channels[channel];
         debug_assert_eq!(state.def.schema, S::SCHEMA);
-        self.payload.clear();
-        sample.encode_json(&mut self.payload);
         self.data.messages += 1;
         state.sequence += 1;
         if self.disk_full {
@@ -337,6 +337,8 @@ impl Recorder {
             return;
         }
         let Some(log) = &mut self.log else { return };
+        self.payload.clear();
+        sample.encode_json(&mut self.payload);
         let header = MessageHeader {
             channel_id: state.mcap_id,
             sequence: state.sequence,
