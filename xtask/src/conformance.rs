@@ -20,10 +20,10 @@ pub(crate) fn steps(report: &mut Report) {
             "judge",
         ]))?;
         let judge = target_dir().join("debug").join("examples").join("judge");
-        let folder = root().join("protocol").join("conformance");
+        let folder = root().join("tests").join("conformance");
         run(command(python)
             .current_dir(&folder)
-            .args(["-B", "agree.py", "../SPEC.md"])
+            .args(["-B", "agree.py", "../../protocol/SPEC.md"])
             .arg(judge)
             .arg(FRAMES))?;
         Ok(())

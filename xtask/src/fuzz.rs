@@ -1,4 +1,4 @@
-//! Fuzzing with libFuzzer. The programs of `protocol/fuzz` are built here with
+//! Fuzzing with libFuzzer. The programs of `tests/fuzz` are built here with
 //! coverage instrumentation by plain cargo, so that neither `cargo fuzz` nor a
 //! nightly compiler is needed; a C++ compiler is (libFuzzer itself is C++).
 
@@ -15,7 +15,7 @@ use crate::report::{Report, StepError, StepResult};
 use crate::{deep, tools};
 
 /// The fuzzers' folder, from the root.
-const FOLDER: &str = "protocol/fuzz";
+const FOLDER: &str = "tests/fuzz";
 
 /// What libFuzzer needs of the compiler: edge counters and compared values.
 /// These are codegen options of stable rustc.
@@ -248,7 +248,7 @@ fn fuzzer(bins: &Path, target: &Target) -> Command {
     fuzzer
 }
 
-/// Inputs under `protocol/fuzz` of one kind.
+/// Inputs under `tests/fuzz` of one kind.
 fn stored(kind: &str, target: &Target) -> PathBuf {
     root().join(FOLDER).join(kind).join(target.0)
 }
@@ -479,7 +479,7 @@ fn copy_tree() -> Result<PathBuf> {
     let listed = output(command("git").args(["ls-files", "-co", "--exclude-standard"]))?;
     for name in listed
         .lines()
-        .filter(|name| !name.starts_with("protocol/fuzz/corpus"))
+        .filter(|name| !name.starts_with("tests/fuzz/corpus"))
     {
         let (from, to) = (root().join(name), tree.join(name));
         let Ok(content) = fs::read(&from) else {

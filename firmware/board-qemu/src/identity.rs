@@ -11,7 +11,7 @@ const SOURCES: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources"));
 pub const fn record(kind: Kind) -> Record {
     Record::new(&Identity {
         kind,
-        link: wheeleg_pil_link::LINK_VERSION,
+        link: wheeleg_remote_link::LINK_VERSION,
         interface: wheeleg_protocol::SCHEMA_HASH,
         sources: SOURCES,
     })

@@ -26,7 +26,7 @@ const COMMON: [&str; 8] = [
     "firmware/identity",
 ];
 /// The board link's wire types; `remote` speaks it.
-const LINK: &str = "host-sim/pil-link";
+const LINK: &str = "protocol/remote-link";
 /// Of a crate: its manifest, its sources, its build script if it has one. Tests and fuzz
 /// targets are in no image.
 const MANIFEST: &str = "Cargo.toml";

@@ -5,8 +5,8 @@ use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::{JointParameters, WheelParameters};
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{ConfigError, JOINT_TICK, NodeIdentity, Transmission};
-use wheeleg_pil_link::{Inputs, Outputs, Switches as WireSwitches};
 use wheeleg_protocol::{NackReason, ResetCause};
+use wheeleg_remote_link::{Inputs, Outputs, Switches as WireSwitches};
 use wheeleg_units::Micros;
 
 use crate::pins::{

@@ -1,15 +1,15 @@
 //! Frames as a board reads and writes them.
 //!
-//! The format is that of `wheeleg-pil-link`, `COBS(index, postcard(message),
+//! The format is that of `wheeleg-remote-link`, `COBS(index, postcard(message),
 //! CRC-32C) 0x00`. The simulator's side uses libraries for COBS and checksum.
 //! They hold index checks that can panic, and a second checksum table; an image
 //! may have neither. So the board's side undoes COBS as the bytes come and takes
 //! the bus protocol's checksum; tests hold the two sides together.
 
 use serde::{Serialize, de::DeserializeOwned};
-use wheeleg_pil_link::FrameError;
-use wheeleg_pil_link::frame::MAX_FRAME;
 use wheeleg_protocol::frame::checksum;
+use wheeleg_remote_link::FrameError;
+use wheeleg_remote_link::frame::MAX_FRAME;
 
 /// Longest stretch without a zero in one COBS block.
 const BLOCK: u8 = 0xFF;
@@ -163,7 +163,7 @@ fn read<T: DeserializeOwned>(frame: &[u8]) -> Option<(u8, T)> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use wheeleg_pil_link::{self as link, Inputs, Nonvolatile, Ran, Reply, Request, Run, Sent};
+    use wheeleg_remote_link::{self as link, Inputs, Nonvolatile, Ran, Reply, Request, Run, Sent};
 
     fn request(received: &[u8], until_ns: u64, edge: bool) -> Request {
         Request::Run(Run {

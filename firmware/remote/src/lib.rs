@@ -9,7 +9,7 @@
 //! through a pair of pipes, and hardware-in-the-loop images, where they go over a
 //! serial port.
 //!
-//! The messages are those of `wheeleg-pil-link`, one reply to every request.
+//! The messages are those of `wheeleg-remote-link`, one reply to every request.
 //! Simulated time is an argument of the request: a board waits for as long as
 //! its partner likes, and the partner decides how fast time runs. A board whose
 //! partner falls silent stands still, and it has no output that could move

@@ -1,7 +1,7 @@
 //! The loop of an image: frames in, session, frames out.
 
-use wheeleg_pil_link::frame::MAX_FRAME;
-use wheeleg_pil_link::{FrameError, Reply, Request, text};
+use wheeleg_remote_link::frame::MAX_FRAME;
+use wheeleg_remote_link::{FrameError, Reply, Request, text};
 
 use crate::board::Board;
 use crate::frame::{Deframer, encode};

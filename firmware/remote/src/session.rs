@@ -5,11 +5,11 @@ use core::marker::PhantomData;
 use heapless::{String, Vec};
 use wheeleg_node::hardware::{ParameterStore, StoreError};
 use wheeleg_node::{ConfigError, NodeIdentity};
-use wheeleg_pil_link::{
+use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_remote_link::{
     Figures, Hello, Image, Inputs, LINK_VERSION, Nonvolatile, Outputs, Power, Ran, Reply, Request,
     Run, Sent, Straps, Trip, text,
 };
-use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_units::Micros;
 
 use crate::board::Board;

@@ -12,7 +12,7 @@ use std::path::Path;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use wheeleg_pil_link::image::{Kind, identify};
+use wheeleg_remote_link::image::{Kind, identify};
 
 use crate::image::Image;
 use crate::machine::blocks::Blocks;

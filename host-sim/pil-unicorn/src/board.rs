@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use wheeleg_pil_link::{
+use wheeleg_remote_link::{
     Figures, Halt, Hello, Hook, LINK_VERSION, Nonvolatile, Power, Ran, Reply, Request, Straps,
     Trip, text,
 };
@@ -113,7 +113,7 @@ impl Board {
         };
         Hello {
             version: LINK_VERSION,
-            image: wheeleg_pil_link::Image {
+            image: wheeleg_remote_link::Image {
                 name: short(&self.image.name),
                 digest: self.image.digest,
                 clock_hz: 170_000_000,

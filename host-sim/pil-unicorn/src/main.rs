@@ -4,7 +4,7 @@
 //!     wheeleg-pil-unicorn [--awake] IMAGE.elf…
 //!
 //! hosts one board per image, numbered from 0, and answers the requests of the
-//! simulator (crate `wheeleg-pil-link`) that come on standard input on standard
+//! simulator (crate `wheeleg-remote-link`) that come on standard input on standard
 //! output, in order. Nothing here reads a clock or a random number: equal
 //! requests get equal replies. `--awake` is for a process with a processor core of
 //! its own: it does not sleep between requests that follow each other closely.
@@ -32,10 +32,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::rc::Rc;
 
-use wheeleg_pil_link::frame::MAX_FRAME;
+use wheeleg_remote_link::frame::MAX_FRAME;
 #[cfg(unix)]
-use wheeleg_pil_link::wait::Watch;
-use wheeleg_pil_link::{Deframer, Reply, Request, encode, text};
+use wheeleg_remote_link::wait::Watch;
+use wheeleg_remote_link::{Deframer, Reply, Request, encode, text};
 
 use crate::board::Board;
 use crate::image::Image;

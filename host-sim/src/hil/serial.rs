@@ -4,7 +4,7 @@ use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
 
 use serialport::{ClearBuffer, SerialPort};
-use wheeleg_pil_link::Hello;
+use wheeleg_remote_link::Hello;
 
 use crate::SimError;
 use crate::pil::{Partner, Stream};

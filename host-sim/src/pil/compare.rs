@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use wheeleg_pil_link::{Inputs, Outputs};
+use wheeleg_remote_link::{Inputs, Outputs};
 
 use super::channel::{Channel, Count, Counts};
 use super::choice::NODE_NAMES;
@@ -138,7 +138,8 @@ impl Comparison {
             let pair = (u64::from(here.adc), u64::from(there.adc));
             self.pins(at_ns, address, Channel::Converter, 16, pair);
             if address.is_multiple_of(3) {
-                let foot = |i: &Inputs| u64::from(i.switches.0 & wheeleg_pil_link::Switches::FOOT);
+                let foot =
+                    |i: &Inputs| u64::from(i.switches.0 & wheeleg_remote_link::Switches::FOOT);
                 let pair = (foot(here), foot(there));
                 self.pins(at_ns, address, Channel::Feet, 4, pair);
             }

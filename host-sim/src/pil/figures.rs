@@ -1,7 +1,7 @@
 //! Figures of the boards outside, for summary and report.
 
 use serde::Serialize;
-use wheeleg_pil_link::{Figures, Hello};
+use wheeleg_remote_link::{Figures, Hello};
 
 use super::channel::{ChannelFigures, Count};
 use super::choice::NODE_NAMES;

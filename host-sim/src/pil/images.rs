@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use wheeleg_pil_link::image::{Digest, Identity, Kind, identify};
 use wheeleg_protocol::SCHEMA_HASH;
+use wheeleg_remote_link::image::{Digest, Identity, Kind, identify};
 
 use super::choice::{NodeKind, Nodes};
 use super::unicorn::{self, IMAGES_VARIABLE};

@@ -1,6 +1,6 @@
 //! Boards outside of this process, whatever they run on.
 
-use wheeleg_pil_link::{Reply, Request};
+use wheeleg_remote_link::{Reply, Request};
 
 use super::partner::{Partner, Stream};
 use crate::SimError;
@@ -56,8 +56,8 @@ impl<S: Stream> Line for Partner<S> {
 mod tests {
     use super::*;
     use crate::pil::Stream;
-    use wheeleg_pil_link::frame::MAX_FRAME;
-    use wheeleg_pil_link::{Deframer, encode};
+    use wheeleg_remote_link::frame::MAX_FRAME;
+    use wheeleg_remote_link::{Deframer, encode};
 
     /// A board that loses what comes while it owes an answer.
     #[derive(Default)]

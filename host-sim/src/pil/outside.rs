@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-use wheeleg_pil_link::{
+use wheeleg_remote_link::{
     Hello, Hook, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run,
     Straps, Trip,
 };

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use wheeleg_pil_link::frame::MAX_FRAME;
-use wheeleg_pil_link::{Deframer, FrameError, Hello, LINK_VERSION, Reply, Request, encode};
+use wheeleg_remote_link::frame::MAX_FRAME;
+use wheeleg_remote_link::{Deframer, FrameError, Hello, LINK_VERSION, Reply, Request, encode};
 
 use crate::SimError;
 
@@ -215,7 +215,7 @@ pub(super) fn unexpected(name: &str, reply: &Reply) -> SimError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wheeleg_pil_link::Image;
+    use wheeleg_remote_link::Image;
 
     /// Says what it was told to, whatever it hears.
     struct Canned(VecDeque<Vec<u8>>);

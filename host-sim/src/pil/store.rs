@@ -4,7 +4,7 @@
 //! magic, count, sequence; the records; CRC-32C of all that and its complement.
 
 use crc::{CRC_32_ISCSI, Crc};
-use wheeleg_pil_link::{MAX_NONVOLATILE, Nonvolatile};
+use wheeleg_remote_link::{MAX_NONVOLATILE, Nonvolatile};
 
 const MAGIC: u16 = 0x5757;
 

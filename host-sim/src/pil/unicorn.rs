@@ -5,10 +5,10 @@ use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use wheeleg_pil_link::frame::MAX_FRAME;
+use wheeleg_remote_link::frame::MAX_FRAME;
 #[cfg(unix)]
-use wheeleg_pil_link::wait::Watch;
-use wheeleg_pil_link::{Deframer, Reply, Request, encode};
+use wheeleg_remote_link::wait::Watch;
+use wheeleg_remote_link::{Deframer, Reply, Request, encode};
 
 use super::line::Line;
 use crate::SimError;

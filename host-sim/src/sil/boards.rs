@@ -160,8 +160,8 @@ impl JointBoard {
 
     /// The outputs that become active at this tick edge, as boards outside of
     /// this process report them.
-    pub(super) fn active_outputs(&self) -> wheeleg_pil_link::Outputs {
-        wheeleg_pil_link::Outputs {
+    pub(super) fn active_outputs(&self) -> wheeleg_remote_link::Outputs {
+        wheeleg_remote_link::Outputs {
             valve_on_us: self.active_on_us(),
             ..Default::default()
         }
@@ -317,8 +317,8 @@ impl WheelBoard {
 
     /// The outputs that become active at this sample edge, as boards outside
     /// of this process report them.
-    pub(super) fn active_outputs(&self) -> wheeleg_pil_link::Outputs {
-        wheeleg_pil_link::Outputs {
+    pub(super) fn active_outputs(&self) -> wheeleg_remote_link::Outputs {
+        wheeleg_remote_link::Outputs {
             bridge_percent: self.pulse.preloaded() as u8,
             bridge_backward: self.sign.level(),
             dump: self.dump.level(),

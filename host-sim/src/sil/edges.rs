@@ -1,8 +1,8 @@
 //! Tick edges of boards outside of this process: their inputs, and the comparison
 //! of their outputs with those of the native application beside them.
 
-use wheeleg_pil_link as link;
 use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_remote_link as link;
 
 use super::world::World;
 use crate::SimError;

@@ -5,8 +5,8 @@ use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Request, Ticket};
 use wheeleg_master::master::LOCAL_DEADLINE_US;
 use wheeleg_master::{Master, MasterConfig};
-use wheeleg_pil_link as link;
 use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_remote_link as link;
 use wheeleg_units::Micros;
 
 use super::boards::{JointBoard, WheelBoard, identity};
@@ -20,7 +20,7 @@ use crate::SimError;
 pub(crate) const WATCHDOG_NS: u64 = 50_000_000;
 /// From power-up to the first tick edge, ns: a joint board's, and a wheel board's.
 /// Memory, clock, converter and parameters as the shipped images set them up, measured on
-/// emulated boards (tests/tests/pil.rs). A crystal that is slow to swing makes it longer.
+/// emulated boards (tests/system/pil.rs). A crystal that is slow to swing makes it longer.
 pub const BOARD_START_UP_NS: [u64; 2] = [3_198_000, 2_248_000];
 /// What a master adds to the first number of its requests at every start, so that
 /// no board takes them for repetitions; any odd number would do.

@@ -1,7 +1,7 @@
 //! Faults that stop boards or programs: what they do at the instant at which they strike.
 
-use wheeleg_pil_link as link;
 use wheeleg_protocol::ResetCause;
+use wheeleg_remote_link as link;
 
 use super::power::{Client, Down, WATCHDOG_NS};
 use super::world::{JOINT_TICK_NS, World};

@@ -9,9 +9,9 @@
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
-use wheeleg_pil_link as link;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_remote_link as link;
 
 use super::Boards;
 use super::audit::{Audit, LineAudit};

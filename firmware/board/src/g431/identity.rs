@@ -12,7 +12,7 @@ const SOURCES: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources"));
 #[must_use]
 pub const fn record(kind: Kind) -> Record {
     #[cfg(feature = "hil")]
-    let link = wheeleg_pil_link::LINK_VERSION;
+    let link = wheeleg_remote_link::LINK_VERSION;
     #[cfg(not(feature = "hil"))]
     let link = 0;
     Record::new(&Identity {

@@ -148,7 +148,7 @@ impl AxisModel {
     /// its top. The factors, here and where the law rests, have no unit or are times of a
     /// period. They were searched on the bench axis (bore 20 × 180 mm, VQ110U-class valves),
     /// three other and some 200 random cylinders, all with loads, masses, friction and valve
-    /// times off their data: of sets that meet the bars of `tests/tests/control_bars.rs` one
+    /// times off their data: of sets that meet the bars of `tests/system/control_bars.rs` one
     /// that misses few of the others.
     ///
     /// In integers, like the tick: every coefficient is within 0.1 % of the exact

@@ -20,7 +20,7 @@
 //! counts as valves nearly twice as slow as told let through for certain. A longer mean lags behind
 //! an account that goes wrong on the way, by as much as a valve that does not open for the
 //! short pulses at the end of a motion. Robots drawn off their data are walked by
-//! `tests/tests/off_data.rs`; what came of it stands in `host-sim/FAULTS.md`.
+//! `tests/system/off_data.rs`; what came of it stands in `host-sim/FAULTS.md`.
 //!
 //! The margin is the room for a load that changes while the axis stands: a parameter,
 //! because only who knows the machine knows its loads; half of the largest force where

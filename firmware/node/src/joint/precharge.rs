@@ -35,7 +35,7 @@ use wheeleg_units::{Micros, PositionMm, Ticks};
 /// project takes to 1 bar).
 const LONGEST: u32 = 2000;
 const _: () = assert!(JOINT_TICK.get() == 1000);
-/// Motion that ends it, raw mm (1.5 mm): the piston then stays below 2 mm (`tests/tests/precharge.rs`).
+/// Motion that ends it, raw mm (1.5 mm): the piston then stays below 2 mm (`tests/system/precharge.rs`).
 const WAY: i32 = 3 << 15;
 
 /// A tick of it.

@@ -1,5 +1,5 @@
 //! Precharge of a joint board on mocks: what the outputs do between arming and the first
-//! motion, and what ends it. What it makes of a cylinder is in `tests/tests/precharge.rs`.
+//! motion, and what ends it. What it makes of a cylinder is in `tests/system/precharge.rs`.
 
 use crate::common::joint::{JointRig, code_at, setpoint};
 use crate::common::{ARM, refusal};

@@ -1,6 +1,6 @@
 //! A board's course through time: edges, received bytes, supply, resets.
 
-use wheeleg_pil_link::{Inputs, Power, Ran, Run, Trip};
+use wheeleg_remote_link::{Inputs, Power, Ran, Run, Trip};
 
 use super::Board;
 use crate::machine::{Stop, Until};

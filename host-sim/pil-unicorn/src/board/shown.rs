@@ -1,7 +1,7 @@
 //! What a board shows: outputs, inputs as its program read them, transmissions,
 //! measurements.
 
-use wheeleg_pil_link::{Figures, Inputs, MAX_TRANSMISSIONS, Outputs, Ran, Sent, Switches};
+use wheeleg_remote_link::{Figures, Inputs, MAX_TRANSMISSIONS, Outputs, Ran, Sent, Switches};
 
 use super::Board;
 use crate::machine::Machine;

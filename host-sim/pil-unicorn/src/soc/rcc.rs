@@ -23,7 +23,7 @@ const PLLRDY: u32 = 1 << 25;
 pub(crate) const PIN_RESET: u32 = 1 << 26;
 /// Brown-out or power-on.
 pub(crate) const BROWN_OUT_RESET: u32 = 1 << 27;
-pub(crate) use wheeleg_pil_link::{SOFTWARE_RESET, WATCHDOG_RESET};
+pub(crate) use wheeleg_remote_link::{SOFTWARE_RESET, WATCHDOG_RESET};
 const RMVF: u32 = 1 << 23;
 
 /// Clock tree.

@@ -202,7 +202,7 @@ pub const ROWS: &[Row] = &[
         .noted("the watchdog period is 50 ms (firmware/board/BOARD.md), not the 20 ms of the matrix: a flash save stalls the board for about 20 ms"),
     row("stack-overflow", &[at("processor-fault:joint2", FOR_GOOD)], Phase::Push,
         stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["joint 2 says why:", "A processor fault"])
-        .noted("the stack lies below all variables, so that one that overflows is a processor fault (in emulation the image's own handler runs: tests/tests/pil_faults.rs); the images' worst stack is bounded by `cargo xtask sizes`"),
+        .noted("the stack lies below all variables, so that one that overflows is a processor fault (in emulation the image's own handler runs: tests/system/pil_faults.rs); the images' worst stack is bounded by `cargo xtask sizes`"),
     row("panic", &[at("processor-fault:wheel8", FOR_GOOD)], Phase::Push,
         stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &["wheel 8 says why:", "A processor fault"])
         .noted("the handler of panics does what that of faults does; the link check proves that no panic is reachable"),

@@ -7,12 +7,12 @@ use crate::bench::pil::{Board, edge};
 use crate::bench::{delivery, numbered, power_up};
 use crate::sil;
 use crate::sil::{command, command_about, run_with, stand};
-use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request};
 use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{
     Address, Decoder, FaultRecord, FaultReport, Message, NackReason, ParamGet, ParamSave, ParamSet,
     ResetCause,
 };
+use wheeleg_remote_link::{Hook, Power, Ran, Reply, Request};
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_sim::pil::{NodeKind, Nodes};
 

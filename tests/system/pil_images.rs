@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use tempfile::TempDir;
-use wheeleg_pil_link::image::{Identity, Kind, identify};
 use wheeleg_protocol::SCHEMA_HASH;
+use wheeleg_remote_link::image::{Identity, Kind, identify};
 use wheeleg_sim::pil::unicorn;
 
 /// Begin of the record in a file (firmware/identity).

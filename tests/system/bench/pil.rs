@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use wheeleg_pil_link::{Inputs, Power, Ran, Reply, Request, Run};
+use wheeleg_remote_link::{Inputs, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::pil::Line as _;
 use wheeleg_sim::pil::unicorn::{Place, Unicorn};
 

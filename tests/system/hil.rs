@@ -12,9 +12,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use serialport::{SerialPort as _, TTYPort};
-use wheeleg_pil_link::frame::MAX_FRAME;
-use wheeleg_pil_link::{Hello, Image, LINK_VERSION, Reply, Request, encode};
 use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, Stream, WheelPins, serve};
+use wheeleg_remote_link::frame::MAX_FRAME;
+use wheeleg_remote_link::{Hello, Image, LINK_VERSION, Reply, Request, encode};
 use wheeleg_sim::SimError;
 use wheeleg_sim::hil::{HilOptions, SerialLine, connect};
 use wheeleg_sim::pil::Partner;

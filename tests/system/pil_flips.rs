@@ -9,11 +9,11 @@ use std::ops::Range;
 use crate::bench::pil::{Board, edge};
 use crate::bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
 use wheeleg_node::{joint, wheel};
-use wheeleg_pil_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, text};
 use wheeleg_protocol::{
     Address, Arm, ClearFault, Decoder, Fault, FaultReport, LinkReport, Message, SCHEMA_HASH,
     SyncSlots, TransmitPosition, WheelSetpoint,
 };
+use wheeleg_remote_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, text};
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_tests::{STEP, mix};
 use wheeleg_units::WheelCount;

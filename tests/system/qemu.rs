@@ -10,7 +10,6 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use heapless::Vec as Short;
-use wheeleg_pil_link::{Figures, Inputs, Nonvolatile, Power, Ran, Reply, Request, Run, Switches};
 use wheeleg_plant::testing::wheeleg_2003_valve;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
@@ -18,6 +17,9 @@ use wheeleg_protocol::{
     SCHEMA_HASH, Sync, SyncFlags, SyncSlots, WheelSetpoint,
 };
 use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, WheelPins};
+use wheeleg_remote_link::{
+    Figures, Inputs, Nonvolatile, Power, Ran, Reply, Request, Run, Switches,
+};
 use wheeleg_sim::SimError;
 use wheeleg_sim::config::{LegChoice, Scenario};
 use wheeleg_sim::hil::{HilOptions, connect};

@@ -8,7 +8,7 @@ use wheeleg_fuzz_targets::TARGETS;
 
 fn fuzz_folder() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().expect("protocol/fuzz").to_path_buf()
+    here.parent().expect("tests/fuzz").to_path_buf()
 }
 
 fn inputs(kind: &str, target: &str) -> Vec<(PathBuf, Vec<u8>)> {

@@ -12,7 +12,7 @@ use std::process::Command;
 use crate::bench::pil::Board;
 use crate::bench::power_up;
 use crate::sil::{at, energised, gait, range, robot, run_with, window};
-use wheeleg_pil_link::{Hook, Power, Ran, Reply, Request, Run};
+use wheeleg_remote_link::{Hook, Power, Ran, Reply, Request, Run};
 use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
 use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_sim::telemetry::{JointSample, Recording, Row, WheelSample};

@@ -5,10 +5,10 @@
 use std::fmt::Debug;
 
 use arbitrary::Unstructured;
-use wheeleg_pil_link::frame::MAX_FRAME;
-use wheeleg_pil_link::{Deframer as HostReader, Reply, Request, encode};
 use wheeleg_remote::frame::Deframer as BoardReader;
 use wheeleg_remote::store::StoreReader;
+use wheeleg_remote_link::frame::MAX_FRAME;
+use wheeleg_remote_link::{Deframer as HostReader, Reply, Request, encode};
 
 use crate::reference::{cobs, crc32c};
 

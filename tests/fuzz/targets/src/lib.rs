@@ -9,7 +9,7 @@
 //! | P4 | any chunking of the bytes gives the same frames |
 //! | P5 | corrupted frames are rejected |
 //! | P6 | no message sequence energises an output of a disarmed board; a stop is latched; the safe state comes within its deadline |
-//! | P7 | two implementations agree (`protocol/conformance`) |
+//! | P7 | two implementations agree (`tests/conformance`) |
 //! | P8 | handlers behind a valid CRC hold P1 too |
 //! | P9 | a saved parameter set is read whole, or an older one, or none; never a mix |
 //!

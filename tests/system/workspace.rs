@@ -29,8 +29,8 @@ const ARROWS: [(&str, &[&str]); 19] = [
         "wheeleg-remote",
         &[
             "wheeleg-node",
-            "wheeleg-pil-link",
             "wheeleg-protocol",
+            "wheeleg-remote-link",
             "wheeleg-units",
         ],
     ),
@@ -39,9 +39,9 @@ const ARROWS: [(&str, &[&str]); 19] = [
         &[
             "wheeleg-identity",
             "wheeleg-node",
-            "wheeleg-pil-link",
             "wheeleg-protocol",
             "wheeleg-remote",
+            "wheeleg-remote-link",
             "wheeleg-units",
         ],
     ),
@@ -49,16 +49,16 @@ const ARROWS: [(&str, &[&str]); 19] = [
         "wheeleg-board-qemu",
         &[
             "wheeleg-identity",
-            "wheeleg-pil-link",
             "wheeleg-protocol",
             "wheeleg-remote",
+            "wheeleg-remote-link",
             "wheeleg-units",
         ],
     ),
     ("wheeleg-plant", &["wheeleg-kinematics"]),
-    ("wheeleg-pil-link", &["wheeleg-identity"]),
+    ("wheeleg-remote-link", &["wheeleg-identity"]),
     // GPL-2.0-only: nothing may depend on it (no line here names it).
-    ("wheeleg-pil-unicorn", &["wheeleg-pil-link"]),
+    ("wheeleg-pil-unicorn", &["wheeleg-remote-link"]),
     ("wheeleg-sim", &LIBRARIES),
     ("wheeleg-tests", &TESTED),
     (
@@ -67,9 +67,9 @@ const ARROWS: [(&str, &[&str]); 19] = [
             "wheeleg-board",
             "wheeleg-master",
             "wheeleg-node",
-            "wheeleg-pil-link",
             "wheeleg-protocol",
             "wheeleg-remote",
+            "wheeleg-remote-link",
             "wheeleg-sim",
             "wheeleg-units",
         ],
@@ -93,9 +93,9 @@ const LIBRARIES: [&str; 9] = [
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
-    "wheeleg-pil-link",
     "wheeleg-plant",
     "wheeleg-protocol",
+    "wheeleg-remote-link",
     "wheeleg-units",
 ];
 
@@ -105,10 +105,10 @@ const TESTED: [&str; 11] = [
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
-    "wheeleg-pil-link",
     "wheeleg-plant",
     "wheeleg-protocol",
     "wheeleg-remote",
+    "wheeleg-remote-link",
     "wheeleg-sim",
     "wheeleg-units",
 ];
@@ -486,9 +486,9 @@ fn images_that_are_wrong_on_purpose_are_built_by_their_own_step_alone() {
             || [
                 builder,
                 "firmware/board/Cargo.toml",
-                "tests/tests/pil_driver.rs",
-                "tests/tests/pil_mutants.rs",
-                "tests/tests/workspace.rs",
+                "tests/system/pil_driver.rs",
+                "tests/system/pil_mutants.rs",
+                "tests/system/workspace.rs",
             ]
             .contains(&name.as_str());
         if !name.ends_with(".md") && !theirs {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::bench::pil::Board;
 use crate::bench::power_up;
-use wheeleg_pil_link::{Power, Request, Run};
+use wheeleg_remote_link::{Power, Request, Run};
 
 #[test]
 fn memory_is_copied_and_cleared_to_the_byte_at_every_alignment() {

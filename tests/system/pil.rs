@@ -4,10 +4,10 @@
 
 use crate::bench::pil::{Board, edge};
 use crate::bench::{delivery, numbered};
-use wheeleg_pil_link::{
+use wheeleg_protocol::{Address, FaultReport};
+use wheeleg_remote_link::{
     Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, SOFTWARE_RESET, Straps, WATCHDOG_RESET,
 };
-use wheeleg_protocol::{Address, FaultReport};
 use wheeleg_sim::pil::unicorn::image;
 use wheeleg_sim::sil::BOARD_START_UP_NS;
 

@@ -11,7 +11,6 @@
 pub(crate) mod pil;
 
 use heapless::Vec as Short;
-use wheeleg_pil_link::{Figures, Inputs, Ran, Reply, Request, Run, Straps};
 use wheeleg_plant::axis::Axis;
 use wheeleg_plant::testing::wheeleg_2003_axis;
 use wheeleg_protocol::{
@@ -19,6 +18,7 @@ use wheeleg_protocol::{
     SyncFlags, SyncSlots,
 };
 use wheeleg_remote::{JointPins, RemoteJoint, Session, Stopwatch};
+use wheeleg_remote_link::{Figures, Inputs, Ran, Reply, Request, Run, Straps};
 use wheeleg_units::{Micros, PositionMm, WireVelocity};
 
 /// The board of the bench.

@@ -14,8 +14,8 @@ use std::process::{Child, Command, Stdio};
 
 use bench::{NoTime, closed_loop_as_the_host};
 use sil::{gait, robot, run_with};
-use wheeleg_pil_link::{Inputs, Outputs, Ran, Reply, Request, Run};
 use wheeleg_remote::{RemoteWheel, Session, WheelPins};
+use wheeleg_remote_link::{Inputs, Outputs, Ran, Reply, Request, Run};
 use wheeleg_sim::config::LegChoice;
 use wheeleg_sim::hil::{HilOptions, connect};
 use wheeleg_sim::pil::unicorn::{self, image};
