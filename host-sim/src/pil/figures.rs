@@ -27,6 +27,9 @@ pub struct BoardFigures {
     /// where nobody counts them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tick_instructions_median: Option<u32>,
+    /// The same, mean, rounded up.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tick_instructions_mean: Option<u32>,
     /// The same, worst.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tick_instructions_worst: Option<u32>,
@@ -60,6 +63,8 @@ impl BoardFigures {
     ) -> Self {
         // A board that cannot take a measurement sends zero.
         let known = |figure: u32| (figure > 0).then_some(figure);
+        let sum: u64 = ticks.iter().map(|tick| u64::from(*tick)).sum();
+        let mean = sum.div_ceil(ticks.len().max(1) as u64);
         let mut sorted = ticks.to_vec();
         sorted.sort_unstable();
         Self {
@@ -76,6 +81,8 @@ impl BoardFigures {
             differing_bits: compared.differing,
             ticks: ticks.len() as u64,
             tick_instructions_median: sorted.get(sorted.len() / 2).copied().and_then(known),
+            // Not above the largest tick.
+            tick_instructions_mean: known(mean as u32),
             tick_instructions_worst: sorted.last().copied().and_then(known),
             longest_awake_instructions: known(figures.longest_awake),
             stack_used_bytes: known(figures.stack_used),

@@ -203,6 +203,7 @@ mod tests {
                     differing_bits: differing,
                     ticks: 10_000,
                     tick_instructions_median: Some(1_111),
+                    tick_instructions_mean: Some(1_120),
                     tick_instructions_worst: Some(1_444),
                     longest_awake_instructions: Some(2_000),
                     stack_used_bytes: Some(3_456),
