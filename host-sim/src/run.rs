@@ -1,7 +1,7 @@
 //! One run from names to files.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -14,11 +14,6 @@ use crate::report::{self, RunInfo, Summary};
 use crate::sil::{self, Boards, DownTimes};
 use crate::telemetry::Recorder;
 use crate::{SimError, analysis, output};
-
-/// Scenario of a bare `wheeleg`.
-pub const DEFAULT_SCENARIO: &str = "three-step";
-/// Robot of a bare `wheeleg params`.
-pub const DEFAULT_ROBOT: &str = "wheeleg-2003";
 
 /// What to run.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +94,7 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, SimEr
     let folder = options
         .out
         .clone()
-        .unwrap_or_else(|| crate::cli::default_out(&scenario.name, seed));
+        .unwrap_or_else(|| default_out(&scenario.name, seed));
     // A board that does not answer must not cost the results of the run before.
     let boards = match kept {
         Some(kept) => Boards::native_with(kept.clone()),
@@ -171,6 +166,11 @@ fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotConfig,
     }
 }
 
+/// Folder of a run's results where none is given.
+fn default_out(scenario: &str, seed: u64) -> PathBuf {
+    Path::new("runs").join(format!("{scenario}-seed{seed}"))
+}
+
 fn progress_bar(scenario: &Scenario) -> ProgressBar {
     // Draws on stderr, and only if that is a terminal.
     let bar = ProgressBar::new((scenario.duration_s * 1e3) as u64);
@@ -195,7 +195,7 @@ mod tests {
         let mut nodes = Nodes::default();
         nodes.0[0] = NodeKind::Hil(temporary.path().join("no-port"));
         let options = Options {
-            scenario: DEFAULT_SCENARIO.to_owned(),
+            scenario: builtin::DEFAULT_SCENARIO.to_owned(),
             robot: None,
             seed: None,
             nodes,

@@ -9,8 +9,9 @@ use super::print;
 use crate::SimError;
 use crate::config::builtin;
 use crate::faults::FaultSpec;
-use crate::pil::{NODE_NAMES, NodeChoice, NodeKind, Nodes};
-use crate::run::DEFAULT_SCENARIO;
+use wheeleg_protocol::NODE_NAMES;
+use crate::pil::{NodeChoice, NodeKind, Nodes};
+use crate::config::builtin::DEFAULT_SCENARIO;
 use crate::sil::{self, hex};
 
 /// Arguments of `wheeleg commission`.

@@ -11,7 +11,7 @@ use crate::SimError;
 use crate::config::builtin;
 use crate::delay::trial::{Law, Start};
 use crate::delay::{self, Options, Study};
-use crate::run::DEFAULT_ROBOT;
+use crate::config::builtin::DEFAULT_ROBOT;
 
 /// Arguments of `wheeleg delay`.
 #[derive(Debug, Args)]

@@ -32,7 +32,7 @@ enum Format {
 #[derive(Debug, Args)]
 struct UrdfArgs {
     /// Built-in robot or path of a TOML file.
-    #[arg(default_value = run::DEFAULT_ROBOT)]
+    #[arg(default_value = builtin::DEFAULT_ROBOT)]
     robot: String,
     /// File to write [default: standard output]. A file of that name moves to
     /// `FILE.previous`.

@@ -25,7 +25,7 @@ use std::str::FromStr;
 use clap::{Parser, Subcommand};
 
 use crate::SimError;
-use crate::run::DEFAULT_SCENARIO;
+use crate::config::builtin::DEFAULT_SCENARIO;
 
 /// Exit code when `--strict` is given and a required target is not met.
 const TARGETS_MISSED: u8 = 1;

@@ -14,7 +14,7 @@ use crate::run;
 #[derive(Debug, Args)]
 pub(super) struct ParamsArgs {
     /// Built-in robot or path of a TOML file.
-    #[arg(default_value = run::DEFAULT_ROBOT)]
+    #[arg(default_value = builtin::DEFAULT_ROBOT)]
     robot: String,
     /// Print JSON.
     #[arg(long)]

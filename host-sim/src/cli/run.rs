@@ -19,7 +19,7 @@ use crate::{output, telemetry};
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
     /// Built-in scenario or path of a TOML file.
-    #[arg(default_value = run::DEFAULT_SCENARIO)]
+    #[arg(default_value = builtin::DEFAULT_SCENARIO)]
     scenario: String,
     #[command(flatten)]
     options: RunOptions,

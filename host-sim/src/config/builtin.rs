@@ -12,6 +12,11 @@ macro_rules! embedded {
     };
 }
 
+/// Scenario of a bare `wheeleg`.
+pub const DEFAULT_SCENARIO: &str = "three-step";
+/// Robot of a bare `wheeleg params`.
+pub const DEFAULT_ROBOT: &str = "wheeleg-2003";
+
 /// Robots: name, file name for messages, text.
 pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg-2003");
 

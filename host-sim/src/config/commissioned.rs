@@ -3,7 +3,7 @@
 use wheeleg_master::config::UniqueId;
 
 use super::reader::Reader;
-use crate::pil::NODE_NAMES;
+use wheeleg_protocol::NODE_NAMES;
 
 /// Digits of a unique id.
 const DIGITS: usize = 24;

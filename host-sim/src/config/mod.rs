@@ -3,6 +3,7 @@
 
 pub mod axis;
 pub mod builtin;
+mod command;
 mod commissioned;
 mod error;
 mod node;
@@ -13,6 +14,7 @@ mod reader;
 mod robot;
 mod scenario;
 mod suggest;
+pub mod timing;
 
 pub use axis::AxisConfig;
 pub use error::{ConfigError, Problem};
@@ -25,7 +27,7 @@ pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
 pub use scenario::{
-    EventAction, GroundPatch, LegChoice, Motion, ParameterChoice, Scenario, ScenarioEvent,
+    EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent,
     TargetSet,
 };
 pub use suggest::closest;

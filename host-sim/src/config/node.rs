@@ -1,13 +1,13 @@
 //! Board parameters set by a robot file, by the names of the protocol's tables.
 
 use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
-use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_node::acceptance::accepts;
+use wheeleg_protocol::Address;
 
 use super::params::ParameterInfo;
 use super::quantity::{pretty, suffix};
 use super::reader::{Entry, Reader, range};
-use super::scenario::ParameterChoice;
-use crate::sil::{JointBoard, WheelBoard, identity, parameter_row};
+use super::command::ParameterChoice;
 
 /// Parameters that the master sends to the boards before arming, as raw
 /// numbers of the wire format.
@@ -76,7 +76,7 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
     for (place, (id, raw)) in stored.iter().enumerate() {
         let mut without = stored.clone();
         without.remove(place);
-        let info = parameter_row(address.raw(), *id);
+        let info = params_at(address.raw()).iter().find(|row| row.id == *id);
         let Some(info) = info.filter(|_| accepts(address, &without)) else {
             continue;
         };
@@ -111,15 +111,6 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
                 sections.join("], [node.")
             )),
         );
-    }
-}
-
-fn accepts(address: Address, stored: &[(u16, i32)]) -> bool {
-    let (who, cause) = (identity(address), ResetCause::PowerUp);
-    if address.is_joint() {
-        JointBoard::new(who, Some(stored), cause).is_ok()
-    } else {
-        WheelBoard::new(who, Some(stored), cause).is_ok()
     }
 }
 

@@ -1,7 +1,8 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
-use miette::Diagnostic as _;
+use wheeleg_master::command::Command;
 
+use super::command::{Arguments, command};
 use super::error::ConfigError;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
@@ -50,57 +51,7 @@ pub enum EventAction {
     /// The operator clears latched faults.
     ClearFault,
     /// A user command is given to the dispatcher.
-    Command {
-        /// Name of the command, as in the master's table of commands.
-        name: String,
-        /// Joint 1 to 6, for commands that take one.
-        joint: Option<u8>,
-        /// Stroke in m, for commands that take one.
-        stroke_m: Option<f64>,
-        /// Wheel travel in m, for commands that take one.
-        travel_m: Option<f64>,
-        /// Board 1 to 8, for commands that take one.
-        board: Option<u8>,
-        /// A board's parameter and its raw value, for commands that take them.
-        parameter: Option<ParameterChoice>,
-    },
-}
-
-impl EventAction {
-    /// A user command without arguments.
-    #[must_use]
-    pub fn command(name: &str) -> Self {
-        Self::Command {
-            name: name.to_owned(),
-            joint: None,
-            stroke_m: None,
-            travel_m: None,
-            board: None,
-            parameter: None,
-        }
-    }
-
-    /// A user command about board 1 to 8, and perhaps a parameter of it.
-    #[must_use]
-    pub fn about(name: &str, board: u8, parameter: Option<ParameterChoice>) -> Self {
-        Self::Command {
-            name: name.to_owned(),
-            joint: None,
-            stroke_m: None,
-            travel_m: None,
-            board: Some(board),
-            parameter,
-        }
-    }
-}
-
-/// A parameter of a board, and a value for it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ParameterChoice {
-    /// Its number.
-    pub id: u16,
-    /// Raw value in its format; `None` where none was given.
-    pub raw: Option<i32>,
+    Command(Command),
 }
 
 /// A timed event.
@@ -458,13 +409,31 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         let board = r.whole(entry, "board", 1..=8);
         let board = board.map(|number| number as u8);
         let parameter = super::node::choice(r, entry, board);
-        EventAction::Command {
-            board,
-            parameter,
-            name: name?.to_owned(),
+        let given = Arguments {
             joint: joint.map(|j| j as u8),
             stroke_m,
             travel_m,
+            board,
+            parameter,
+        };
+        let name = name?;
+        match command(name, &given) {
+            Ok(command) => EventAction::Command(command),
+            Err(missing) => {
+                // Of a field that is there and wrong, the reader has said what is wrong.
+                if r.problem_count() == before {
+                    r.problem(
+                        Some(entry.span.clone()),
+                        format!(
+                            "`{}`: the command {name} of the scenario needs `{missing}`",
+                            entry.path
+                        ),
+                        "in this event",
+                        Some(format!("add `{missing}` to the event")),
+                    );
+                }
+                return None;
+            }
         }
     } else {
         r.reject_misplaced(entry, &["at", "action"], &TOP);
@@ -474,19 +443,6 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
             _ => EventAction::ClearFault,
         }
     };
-    // Of a field that is there and wrong, it is told what is wrong.
-    if r.problem_count() == before
-        && let Err(reason) = crate::sil::can_be_given(&action)
-    {
-        let place = Some(entry.span.clone());
-        let help = reason.help().map(|help| help.to_string());
-        r.problem(
-            place,
-            format!("`{}`: {reason}", entry.path),
-            "in this event",
-            help,
-        );
-    }
     Some(ScenarioEvent {
         at_s: at_s?,
         action,

@@ -1,7 +1,7 @@
 //! The catalogue of faults that a run can be given.
 
 use crate::config::pretty;
-use crate::sil::{JOINT_TICK_NS, SERVICE_NS, WATCHDOG_NS};
+use crate::config::timing::{JOINT_TICK_NS, SERVICE_NS, WATCHDOG_NS};
 
 /// Where a fault strikes, and so what its target is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -260,6 +260,23 @@ impl FaultKind {
         self.info().name
     }
 }
+
+const ETHERNET: &str = "there is no Ethernet user interface yet";
+const UPDATE: &str = "there is no firmware update over the bus yet";
+const SOFT: &str = "there is no soft terrain yet";
+
+/// Faults that cannot be injected yet, and why. They are refused by name.
+pub const NOT_IMPLEMENTED: &[(&str, &str)] = &[
+    ("foot-sinks", SOFT),
+    ("brown-out/update", UPDATE),
+    ("ui-link-lost", ETHERNET),
+    ("ui-half-open", ETHERNET),
+    ("ui-slow", ETHERNET),
+    ("ui-reconnects", ETHERNET),
+    ("ui-second-client", ETHERNET),
+    ("ui-bad-mac", ETHERNET),
+    ("ui-replay", ETHERNET),
+];
 
 #[cfg(test)]
 mod tests {

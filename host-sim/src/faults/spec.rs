@@ -7,8 +7,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::kind::{FaultKind, KINDS, Place, ValueSpec};
-use super::matrix;
+use super::kind::{FaultKind, KINDS, NOT_IMPLEMENTED, Place, ValueSpec};
 
 /// What a fault strikes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -236,9 +235,9 @@ impl FromStr for FaultSpec {
 /// Why no fault has this name.
 fn no_such(text: &str, name: &str) -> SpecError {
     let text = text.to_owned();
-    let missing = matrix::not_implemented().find(|(row, _)| *row == name);
+    let missing = NOT_IMPLEMENTED.iter().find(|(row, _)| *row == name);
     match missing {
-        Some((name, reason)) => SpecError::NotImplemented { text, name, reason },
+        Some(&(name, reason)) => SpecError::NotImplemented { text, name, reason },
         None => SpecError::Name {
             text,
             name: name.to_owned(),

@@ -21,7 +21,7 @@ use wheeleg_kinematics::{LegGeometry, LegParameters};
 
 use crate::config::builtin;
 use crate::report::subfolder;
-use crate::run::DEFAULT_ROBOT;
+use crate::config::builtin::DEFAULT_ROBOT;
 use crate::{SimError, output};
 
 /// Instants of a curve, less one.

@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use wheeleg_protocol::NODE_NAMES;
+
 use crate::SimError;
 
 /// Where the application of one node runs.
@@ -48,11 +50,6 @@ impl fmt::Display for NodeKind {
         }
     }
 }
-
-/// Names of the nodes, addresses 1 to 8, and what the command line calls them.
-pub const NODE_NAMES: [&str; 8] = [
-    "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8",
-];
 
 /// One node's own choice: `joint3=pil`.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use std::fmt;
 use wheeleg_remote_link::{Inputs, Outputs};
 
 use super::channel::{Channel, Count, Counts};
-use super::choice::NODE_NAMES;
+use wheeleg_protocol::NODE_NAMES;
 
 /// The first thing that differed.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use serde::Serialize;
 use wheeleg_remote_link::{Figures, Hello};
 
 use super::channel::{ChannelFigures, Count};
-use super::choice::NODE_NAMES;
+use wheeleg_protocol::NODE_NAMES;
 
 /// Figures of one board.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

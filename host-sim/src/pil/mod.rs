@@ -14,7 +14,6 @@ mod store;
 pub mod unicorn;
 
 pub use channel::{Channel, ChannelFigures, Count, Counts};
-pub(crate) use choice::NODE_NAMES;
 pub use choice::{NodeChoice, NodeKind, Nodes};
 pub use compare::{Comparison, Difference};
 pub use figures::{BoardFigures, PilSummary};

@@ -14,7 +14,8 @@ use wheeleg_remote_link::{
     Straps, Trip,
 };
 
-use super::choice::{NODE_NAMES, NodeKind, Nodes};
+use super::choice::{NodeKind, Nodes};
+use wheeleg_protocol::NODE_NAMES;
 use super::compare::Comparison;
 use super::cores::Cores;
 use super::figures::{BoardFigures, PilSummary};

@@ -2,7 +2,9 @@
 
 use minijinja::{Value, context};
 
-use crate::pil::{BoardFigures, NODE_NAMES, PilSummary};
+use wheeleg_protocol::NODE_NAMES;
+
+use crate::pil::{BoardFigures, PilSummary};
 
 /// A count with a thin space between groups of three digits; a dash for what was
 /// not measured.

@@ -6,7 +6,7 @@ use super::Summary;
 use super::figures::Source;
 use super::plot::Figure;
 use crate::SimError;
-use crate::pil::NODE_NAMES;
+use wheeleg_protocol::NODE_NAMES;
 use crate::sil::START_UP;
 use crate::telemetry::{EventSample, LinkSample, Row};
 

@@ -37,10 +37,7 @@ pub use self::audit::LineAudit;
 pub(crate) use self::boards::{JointBoard, WheelBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::power::BOARD_START_UP_NS;
-pub(crate) use self::power::WATCHDOG_NS;
-pub(crate) use self::strangers::SERVICE_NS;
 pub(crate) use self::words::{hex, parameter_row};
-pub(crate) use self::world::JOINT_TICK_NS;
 
 use self::observe::Observer;
 use self::operator::Operator;
@@ -416,37 +413,6 @@ fn act(
             operator.submit(world, Command::EmergencyStop, t_ns, recorder)
         }
         EventAction::ClearFault => operator.submit(world, Command::ClearFault, t_ns, recorder),
-        EventAction::Command { .. } => match command(action)? {
-            Some(command) => operator.submit(world, command, t_ns, recorder),
-            None => Ok(()),
-        },
+        EventAction::Command(command) => operator.submit(world, *command, t_ns, recorder),
     }
-}
-
-/// The user command of an event, if it is one.
-fn command(action: &EventAction) -> Result<Option<Command>, SimError> {
-    let EventAction::Command {
-        name,
-        joint,
-        stroke_m,
-        travel_m,
-        board,
-        parameter,
-    } = action
-    else {
-        return Ok(None);
-    };
-    let command = match operator::parameter_command(name, *board, *parameter)? {
-        Some(command) => command,
-        None => operator::command(name, *joint, *stroke_m, *travel_m)?,
-    };
-    Ok(Some(command))
-}
-
-/// Whether an event of a scenario has what its command needs.
-///
-/// # Errors
-/// [`SimError::Simulation`] naming the argument that is missing.
-pub(crate) fn can_be_given(action: &EventAction) -> Result<(), SimError> {
-    command(action).map(|_| ())
 }

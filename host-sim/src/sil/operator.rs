@@ -1,7 +1,7 @@
 //! The person at the console: gets the robot ready, starts the motion, and
 //! carries out the scenario's events, all through the master's dispatcher.
 
-use wheeleg_master::command::{Command, CorrectionKind};
+use wheeleg_master::command::Command;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::Reject;
 use wheeleg_master::event::Event;
@@ -13,7 +13,7 @@ use super::START_UP;
 use super::words::{describe, reject};
 use super::world::World;
 use crate::SimError;
-use crate::config::{LegChoice, Motion, ParameterChoice, Scenario, ScenarioEvent, StartUpParams};
+use crate::config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
 use crate::telemetry::{EventKind, LinkSample, Recorder};
 
 /// What to do about a robot that does not get ready, where no board is to blame.
@@ -37,105 +37,6 @@ pub(super) struct Operator<'a> {
     notes: Vec<(u64, EventKind, String)>,
     next_event: usize,
     flood_refused: bool,
-}
-
-/// A command of a scenario file.
-///
-/// # Errors
-/// [`SimError::Simulation`] naming the argument that is missing.
-pub(super) fn command(
-    name: &str,
-    joint: Option<u8>,
-    stroke_m: Option<f64>,
-    travel_m: Option<f64>,
-) -> Result<Command, SimError> {
-    let missing = |argument: &str| {
-        SimError::simulation(
-            format!("the command {name} of the scenario needs `{argument}`"),
-            format!("add `{argument}` to the event"),
-        )
-    };
-    let the_joint = || joint.ok_or_else(|| missing("joint"));
-    let mm = |m: f64| PositionMm::from_f64(m * 1e3);
-    Ok(match name {
-        "JointReference" => Command::JointReference {
-            joint: the_joint()?,
-            stroke_mm: mm(stroke_m.ok_or_else(|| missing("stroke"))?),
-        },
-        "TransmitPosition" => Command::TransmitPosition {
-            joint: the_joint()?,
-        },
-        "OpenAllValves" => Command::OpenAllValves {
-            joint: the_joint()?,
-        },
-        "EmergencyBrake" => Command::EmergencyBrake {
-            joint: the_joint()?,
-        },
-        // The argument is part of the name: an event has no field for it.
-        "SelectCorrectionPd" => Command::SelectCorrection {
-            joint: the_joint()?,
-            correction: CorrectionKind::Pd,
-        },
-        "SelectCorrectionId" => Command::SelectCorrection {
-            joint: the_joint()?,
-            correction: CorrectionKind::Id,
-        },
-        "WheelReference" => Command::WheelReference {
-            travel_mm: mm(travel_m.ok_or_else(|| missing("travel"))?),
-        },
-        "Commission" => Command::Commission,
-        "Arm" => Command::Arm,
-        "Disarm" => Command::Disarm,
-        "ClearFault" => Command::ClearFault,
-        "EmergencyStop" => Command::EmergencyStop,
-        "Stand" => Command::Stand,
-        "Hold" => Command::Hold,
-        "StartGait" => Command::StartGait,
-        "StopGait" => Command::StopGait,
-        other => {
-            return Err(SimError::simulation(
-                format!("the scenario gives the command {other}, which the console does not know"),
-                "the names are those of the master's table of commands",
-            ));
-        }
-    })
-}
-
-/// A command about a board's parameters, if it is one.
-///
-/// # Errors
-/// [`SimError::Simulation`] naming the argument that is missing.
-pub(super) fn parameter_command(
-    name: &str,
-    board: Option<u8>,
-    parameter: Option<ParameterChoice>,
-) -> Result<Option<Command>, SimError> {
-    let missing = |argument: &str| {
-        SimError::simulation(
-            format!("the command {name} of the scenario needs `{argument}`"),
-            format!("add `{argument}` to the event"),
-        )
-    };
-    let node = || board.ok_or_else(|| missing("board"));
-    let id = || parameter.map(|p| p.id).ok_or_else(|| missing("parameter"));
-    let raw = || {
-        parameter
-            .and_then(|p| p.raw)
-            .ok_or_else(|| missing("value"))
-    };
-    Ok(Some(match name {
-        "ReadParameter" => Command::ReadParameter {
-            node: node()?,
-            id: id()?,
-        },
-        "WriteParameter" => Command::WriteParameter {
-            node: node()?,
-            id: id()?,
-            raw: raw()?,
-        },
-        "SaveParameters" => Command::SaveParameters { node: node()? },
-        _ => return Ok(None),
-    }))
 }
 
 /// Side of a leg as the master names it.

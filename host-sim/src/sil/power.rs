@@ -12,12 +12,10 @@ use wheeleg_units::Micros;
 use super::boards::{JointBoard, WheelBoard, identity};
 use super::downtime::{DownTimes, Due};
 use super::traffic::{NS_PER_US, micros};
-use super::world::{JOINT_TICK_NS, World};
+use super::world::World;
+use crate::config::timing::JOINT_TICK_NS;
 use crate::SimError;
 
-/// A stopped program is reset after this, ns: the independent watchdog of the
-/// boards (firmware/board/BOARD.md).
-pub(crate) const WATCHDOG_NS: u64 = 50_000_000;
 /// From power-up to the first tick edge, ns: a joint board's, and a wheel board's.
 /// Memory, clock, converter and parameters as the shipped images set them up, measured on
 /// emulated boards (tests/system/pil.rs). A crystal that is slow to swing makes it longer.

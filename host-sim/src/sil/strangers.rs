@@ -15,6 +15,7 @@ use super::bus::{Bus, Delivery, Driver};
 use super::traffic::{NS_PER_US, micros};
 use crate::SimError;
 use crate::config::NodeParams;
+use crate::config::timing::SERVICE_NS;
 
 /// A second board drives the line as this plus the address.
 const TWIN: Driver = 0x40;
@@ -162,8 +163,8 @@ const STEPS: [Write; 7] = [
     Write::Read,
 ];
 
-/// How long the service tool takes at most, if every request is answered in time, ns.
-pub(crate) const SERVICE_NS: u64 = STEPS.len() as u64 * PATIENCE_US * NS_PER_US;
+// The fault's earliest end is checked where it is read.
+const _: () = assert!(SERVICE_NS == STEPS.len() as u64 * PATIENCE_US * NS_PER_US);
 
 /// A tool that speaks on the master's behalf, between its requests.
 struct Service {

@@ -3,8 +3,9 @@
 use wheeleg_protocol::ResetCause;
 use wheeleg_remote_link as link;
 
-use super::power::{Client, Down, WATCHDOG_NS};
-use super::world::{JOINT_TICK_NS, World};
+use super::power::{Client, Down};
+use super::world::World;
+use crate::config::timing::{JOINT_TICK_NS, WATCHDOG_NS};
 use crate::SimError;
 use crate::faults::{FaultKind, FaultSpec, Victim};
 

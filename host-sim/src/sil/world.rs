@@ -24,12 +24,11 @@ use super::power::{Client, Down};
 use super::strangers::Strangers;
 use super::traffic::NS_PER_US;
 use crate::SimError;
+use crate::config::timing::JOINT_TICK_NS;
 use crate::config::{NodeParams, RobotConfig};
 use crate::faults::{FaultKind, FaultSpec, Injector, Victim};
 use crate::pil::Outside;
 
-/// Joint tick, ns.
-pub(crate) const JOINT_TICK_NS: u64 = 1_000_000;
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,8 +3,9 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
+use wheeleg_master::command::Command;
 use wheeleg_node::mode::ModeRules as _;
-use wheeleg_protocol::param::params_at;
+use wheeleg_protocol::param::{ParamInfo, params_at};
 
 use super::judge::{Outcome, judge};
 use super::measure::{Measured, measure};
@@ -12,12 +13,12 @@ use super::row::{Ask, Expect, Phase, Row, Variant};
 use super::rows::ROWS;
 use crate::SimError;
 use crate::config::{
-    EventAction, LegChoice, Motion, ParameterChoice, RobotConfig, Scenario, ScenarioEvent,
+    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent,
     TargetSet, builtin, raw_of,
 };
 use crate::faults::{FaultSpec, check};
 use crate::pil::Nodes;
-use crate::run::DEFAULT_SCENARIO;
+use crate::config::builtin::DEFAULT_SCENARIO;
 use crate::sil::{self, LineAudit, WatchedJoint};
 use crate::telemetry::{Recorder, Recording};
 
@@ -140,14 +141,14 @@ impl Robots {
                 .push(event(at_s + ESTOP_S, EventAction::EStop));
         }
         for (after_s, ask) in row.asks {
-            scenario.events.push(event(at_s + after_s, asked(ask)));
+            scenario.events.push(event(at_s + after_s, EventAction::Command(asked(ask))));
         }
         let arm_s = duration_s - ARM_S;
         let stops = matches!(row.expect, Expect::Stop(_) | Expect::Degrades);
         if stops {
             scenario
                 .events
-                .push(event(arm_s, EventAction::command("Arm")));
+                .push(event(arm_s, EventAction::Command(Command::Arm)));
         }
         check(&scenario, robot, &Nodes::default())?;
         let arming_asked = stops && faults.iter().all(|fault| fault.over_s() < arm_s);
@@ -163,21 +164,27 @@ impl Robots {
 }
 
 /// What a user asks of a board's parameters.
-fn asked(ask: &Ask) -> EventAction {
-    let (name, node, of) = match *ask {
-        Ask::Disarm => return EventAction::command("Disarm"),
-        Ask::Save(node) => ("SaveParameters", node, None),
-        Ask::Read(node, of) => ("ReadParameter", node, Some((of, None))),
-        Ask::Write(node, of, value) => ("WriteParameter", node, Some((of, Some(value)))),
+///
+/// # Panics
+/// If a row names a parameter that its board does not have.
+fn asked(ask: &Ask) -> Command {
+    let row = |node: u8, of: &str| -> &ParamInfo {
+        let row = params_at(node).iter().find(|info| info.name == of);
+        row.expect("a parameter of the board")
     };
-    let chosen = of.and_then(|(of, value)| {
-        let info = params_at(node).iter().find(|info| info.name == of)?;
-        Some(ParameterChoice {
-            id: info.id,
-            raw: value.map(|value| raw_of(info, value)),
-        })
-    });
-    EventAction::about(name, node, chosen)
+    match *ask {
+        Ask::Disarm => Command::Disarm,
+        Ask::Save(node) => Command::SaveParameters { node },
+        Ask::Read(node, of) => Command::ReadParameter {
+            node,
+            id: row(node, of).id,
+        },
+        Ask::Write(node, of, value) => Command::WriteParameter {
+            node,
+            id: row(node, of).id,
+            raw: raw_of(row(node, of), value),
+        },
+    }
 }
 
 fn stands(phase: Phase) -> bool {

@@ -73,7 +73,7 @@ impl Source<'_> {
         self.scenario
             .events
             .iter()
-            .filter(|e| !matches!(e.action, EventAction::Command { .. }))
+            .filter(|e| !matches!(e.action, EventAction::Command(_)))
             .map(|e| self.t(e.at_s))
             .collect()
     }
