@@ -14,12 +14,16 @@ pub fn accepts(address: Address, stored: &[(u16, i32)]) -> bool {
     if address.is_joint() {
         let all = stored
             .iter()
-            .try_fold(JointParameters::default(), |p, (id, raw)| p.with(*id, *raw, true));
+            .try_fold(JointParameters::default(), |p, (id, raw)| {
+                p.with(*id, *raw, true)
+            });
         all.is_ok_and(|p| JointSettings::new(&p).is_some())
     } else {
         let all = stored
             .iter()
-            .try_fold(WheelParameters::default(), |p, (id, raw)| p.with(*id, *raw, true));
+            .try_fold(WheelParameters::default(), |p, (id, raw)| {
+                p.with(*id, *raw, true)
+            });
         let mode = WheelControlMode::Position;
         all.is_ok_and(|p| WheelSettings::new(&p, mode).is_some())
     }
