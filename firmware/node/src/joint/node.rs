@@ -188,6 +188,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
             self.controller.forget();
+            // Nobody knows which stroke was damaged: with the next good reading all that holds
+            // a history of them begins anew.
+            self.monitor.restart();
         }
         // A pin that cannot be read keeps its last debounced level.
         if let Ok(raw) = switches {
