@@ -190,6 +190,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             node.core.times = settings.times;
             node.settings = settings.tick;
             node.parameters = trial;
+            node.core.parameters_changed();
         });
         Ok(())
     }

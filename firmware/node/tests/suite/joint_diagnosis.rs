@@ -11,7 +11,7 @@ use wheeleg_protocol::LinkLossAction::Hold;
 use wheeleg_protocol::link::{SlotTiming, TURNAROUND_US};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
-    Address, Discover, Fault, FaultReport, Limit, LinkReport, LogEvent, LogRead, Message,
+    Address, Disarm, Discover, Fault, FaultReport, Limit, LinkReport, LogEvent, LogRead, Message,
     NackReason, NodeMode, ParamSave, ParamSet, ResetCause, SlotReply, Sync, SyncFlags, SyncSlots,
 };
 use wheeleg_units::Micros;
@@ -403,4 +403,22 @@ fn a_fault_record_tells_the_limits_in_force() {
     assert!(!record(&mut rig).limits.contains(Limit::SettledShut));
     rig.run_cycles(50, Some(setpoint(100.2, Hold)));
     assert!(record(&mut rig).limits.contains(Limit::SettledShut));
+}
+
+/// Asked for, armed before it was done, disarmed: asked again it is done, not told to have failed.
+#[test]
+fn a_save_that_arming_has_prevented_is_forgotten() {
+    let mut memory = Memory::default();
+    let mut rig = JointRig::new();
+    rig.run_cycles(3, None);
+    assert_eq!(refusal(&rig.request(&SAVE)), Some(NackReason::Busy));
+    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    rig.node.save(&mut memory, Micros(rig.now));
+    rig.run_cycles(1, None);
+    assert!(matches!(
+        rig.request(&Message::Disarm(Disarm {})),
+        Message::Ack(_)
+    ));
+    assert!(matches!(save(&mut rig, &mut memory), Message::Ack(_)));
+    assert_eq!(memory.saves, 1);
 }
