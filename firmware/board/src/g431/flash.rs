@@ -100,7 +100,8 @@ impl Flash for ParameterPages {
         let address = Self::address(page, word)?;
         // SAFETY: an aligned address inside the flash. A word that a power cut
         // left half-written has a double error, which the NMI handler turns into
-        // a note that `take_ecc_error` gives.
+        // a note that `take_ecc_error` gives, unless the flag of an earlier error
+        // still stands: then the checksum of the set decides.
         let value = unsafe { core::ptr::read_volatile(address as *const u64) };
         (!take_ecc_error()).then_some(value)
     }
