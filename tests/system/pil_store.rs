@@ -22,8 +22,8 @@ const ADDRESS: u8 = 2;
 const MS: u64 = 1_000_000;
 /// Start-up with its self-test of ten readings, ms.
 const START_MS: u64 = 40;
-/// A blank store is erased twice, 22 ms each, ms.
-const SAVE_MS: u64 = 60;
+/// A page is erased in 22 ms, and then written, ms.
+const SAVE_MS: u64 = 35;
 const PARAMETER: JointParam = JointParam::FollowingError;
 
 /// An emulated joint board and its partner on the bus.

@@ -48,7 +48,9 @@ impl Flash for &mut Pages {
     }
 
     fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError> {
-        if self.took_ns > self.fails_ns || self.words[page][word] != BLANK {
+        // Zeros can be written over anything (RM0440 §3.3.7).
+        let writable = value == 0 || self.words[page][word] == BLANK;
+        if self.took_ns > self.fails_ns || !writable {
             return Err(FlashError);
         }
         let whole = self.completes(PROGRAM_NS);
