@@ -1,5 +1,5 @@
 //! Long checks that do not fit the test suite. Each run appends a dated line
-//! per check to `DEEP.md`, so that what was last looked at, and when, is in the
+//! per check to `docs/records/deep.md`, so that what was last looked at, and when, is in the
 //! repository.
 
 use std::fs::OpenOptions;
@@ -11,6 +11,9 @@ use clap::Args;
 use crate::process::{ask, cargo, command, figures, output, root};
 use crate::report::{Report, StepResult};
 use crate::{fuzz, mutants, pil, rust};
+
+/// Where results are kept.
+const RECORD: &str = "docs/records/deep.md";
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -121,17 +124,17 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     }
 }
 
-/// Appends a line to `DEEP.md`: date, commit, check, result.
+/// Appends a line to the record: date, commit, check, result.
 pub(crate) fn note(name: &str, text: &str) -> Result<()> {
     let date = ask(command("date").args(["-u", "+%F"])).unwrap_or_else(|| "undated".to_owned());
     let commit = ask(command("git").args(["rev-parse", "--short", "HEAD"]));
     let commit = commit.unwrap_or_else(|| "-".to_owned());
     let first = text.lines().next().unwrap_or_default().replace('|', "/");
-    let path = root().join("DEEP.md");
+    let path = root().join(RECORD);
     let mut file = OpenOptions::new()
         .append(true)
         .open(&path)
-        .context("DEEP.md")?;
+        .context(RECORD)?;
     writeln!(file, "| {date} | {commit} | {name} | {first} |")?;
     Ok(())
 }

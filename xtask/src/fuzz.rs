@@ -105,7 +105,7 @@ pub(crate) struct Options {
     /// Afterwards, reduces the corpus to the fewest inputs with the same coverage and stores it.
     #[arg(long)]
     store: bool,
-    /// Afterwards, appends a dated line per target to `DEEP.md`.
+    /// Afterwards, appends a dated line per target to `docs/records/deep.md`.
     #[arg(long)]
     note: bool,
 }

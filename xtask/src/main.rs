@@ -78,7 +78,7 @@ enum Command {
     Plant,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
-    /// The long checks; results are appended to DEEP.md.
+    /// The long checks; results are appended to docs/records/deep.md.
     Deep(deep::Options),
     /// Open the MCAP log of a run with the Python reader and check every channel.
     McapCheck {
