@@ -119,7 +119,7 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
     for miss in &missed {
         println!("{miss}");
     }
-    // One line: it goes into DEEP.md.
+    // One line: it goes into the record of long checks.
     let told = |[runs, misses, alarms]: [u64; 3]| {
         format!("{misses} of {runs} combinations missed, {alarms} by a fault")
     };

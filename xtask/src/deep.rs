@@ -1,16 +1,12 @@
-//! Long checks that do not fit the test suite. Each run appends a dated line
-//! per check to `DEEP.md`, so that what was last looked at, and when, is in the
-//! repository.
+//! Long checks that do not fit the test suite. Each run appends a line per check to the
+//! record.
 
-use std::fs::OpenOptions;
-use std::io::Write;
-
-use anyhow::{Context, Result};
+use anyhow::Context;
 use clap::Args;
 
-use crate::process::{ask, cargo, command, figures, output, root};
+use crate::process::{cargo, figures, output};
 use crate::report::{Report, StepResult};
-use crate::{fuzz, mutants, pil, rust};
+use crate::{fuzz, mutants, pil, record, rust};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -110,30 +106,13 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     for Check(name, what, _, run) in CHECKS.iter().filter(|check| wanted(check.0)) {
         report.step(format!("deep: {what}"), || {
             let result = run();
-            let text = match &result {
-                Ok(text) => text.clone(),
-                Err(error) => format!("FAILED: {error}"),
-            };
-            println!("    {text}");
-            note(name, &text)?;
+            if let Ok(text) = &result {
+                println!("    {text}");
+            }
+            record::note(name, &result)?;
             result.map(drop)
         });
     }
-}
-
-/// Appends a line to `DEEP.md`: date, commit, check, result.
-pub(crate) fn note(name: &str, text: &str) -> Result<()> {
-    let date = ask(command("date").args(["-u", "+%F"])).unwrap_or_else(|| "undated".to_owned());
-    let commit = ask(command("git").args(["rev-parse", "--short", "HEAD"]));
-    let commit = commit.unwrap_or_else(|| "-".to_owned());
-    let first = text.lines().next().unwrap_or_default().replace('|', "/");
-    let path = root().join("DEEP.md");
-    let mut file = OpenOptions::new()
-        .append(true)
-        .open(&path)
-        .context("DEEP.md")?;
-    writeln!(file, "| {date} | {commit} | {name} | {first} |")?;
-    Ok(())
 }
 
 /// The line of a test program's output that has `marker`, with one of its tests run by

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
 
-use crate::no_std::{Way, cargo_for, set_up};
+use crate::no_std::{Way, cargo_for, way};
 use crate::process::{command, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::sizes::elf::Elf;
@@ -127,7 +127,7 @@ pub(crate) fn steps(report: &mut Report) {
 
 /// Builds all images and says how.
 pub(crate) fn build() -> StepResult<Vec<Image>> {
-    build_into(set_up(TARGET)?, &target_dir().join("firmware"))
+    build_into(way(TARGET)?, &target_dir().join("firmware"))
 }
 
 /// Builds all images in one of the ways and lays them down in `folder`.
@@ -194,7 +194,7 @@ pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
 /// Links each image with a panic handler that does not exist. A third program,
 /// with a panic planted in it, must *not* link: else the check shows nothing.
 pub(crate) fn link_check() -> StepResult {
-    let way = set_up(TARGET)?;
+    let way = way(TARGET)?;
     for name in ["link_check_joint", "link_check_wheel"] {
         run(&mut cargo(way, "build", "outputs", name)?)?;
     }
@@ -228,7 +228,7 @@ fn must_not_build(command: &mut Command, words: &str) -> anyhow::Result<()> {
 /// and none holds the address of a register that does. The shipped images hold them, or
 /// the search would show nothing.
 fn exclusion_check() -> StepResult {
-    let way = set_up(TARGET)?;
+    let way = way(TARGET)?;
     println!("    both of the features must be refused");
     for (bench, shipped) in BENCH {
         for image in [bench, shipped] {
@@ -267,7 +267,7 @@ pub(crate) fn literal_check() -> StepResult {
             .no_literal_parsing()
             .context(image.name)?;
     }
-    let way = set_up(TARGET)?;
+    let way = way(TARGET)?;
     const PLANTED: &str = "planted_literal";
     run(&mut cargo(way, "build", "planted", PLANTED)?)?;
     let planted = Elf::read(&product(way, PLANTED))?;
@@ -279,7 +279,7 @@ pub(crate) fn literal_check() -> StepResult {
 
 /// The board support is not built on the host, so its lints are checked here.
 fn lint() -> StepResult {
-    let way = set_up(TARGET)?;
+    let way = way(TARGET)?;
     if way == Way::DebianBuildStd {
         return Err(StepError::missing(
             format!("the Rust target {TARGET} for clippy"),

@@ -19,9 +19,12 @@ mod pil;
 mod plant;
 mod process;
 mod qemu;
+mod record;
 mod report;
 mod rigid_body;
+mod runs;
 mod rust;
+mod setup;
 mod sizes;
 mod tools;
 mod vectors;
@@ -46,10 +49,10 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Set up all tools, then run the whole test suite.
+    /// Say what the suite needs and this machine lacks, and install it.
+    Setup,
+    /// Set up, then run the whole test suite.
     Test,
-    /// What continuous integration runs: the same as `test`.
-    Ci,
     /// Format, lints and bare-metal checks; no tests.
     Check,
     /// Build all board images into `target/firmware`, and check that none can panic.
@@ -78,7 +81,7 @@ enum Command {
     Plant,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
-    /// The long checks; results are appended to DEEP.md.
+    /// The long checks; results are appended to docs/records/deep.md.
     Deep(deep::Options),
     /// Open the MCAP log of a run with the Python reader and check every channel.
     McapCheck {
@@ -91,9 +94,9 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut report = Report::new();
     match cli.command {
-        Command::Test | Command::Ci => test(&mut report),
+        Command::Setup => setup::steps(&mut report),
+        Command::Test => test(&mut report),
         Command::Check => {
-            tools_for_lints(&mut report);
             lints(&mut report);
             no_std::steps(&mut report);
         }
@@ -126,8 +129,7 @@ fn main() -> ExitCode {
 /// The whole suite. Every step is run, whatever the ones before it did, so
 /// that one run shows everything that is wrong.
 fn test(report: &mut Report) {
-    tools_for_lints(report);
-    report.step("set-up: Python environment", || tools::python().map(drop));
+    setup::steps(report);
     lints(report);
     report.step("cargo test --workspace", rust::test);
     no_std::steps(report);
@@ -142,11 +144,6 @@ fn test(report: &mut Report) {
     mcap::steps(report, run.as_deref());
     rigid_body::steps(report);
     plant::steps(report);
-}
-
-fn tools_for_lints(report: &mut Report) {
-    report.step("set-up: rustfmt", || tools::cargo_component("fmt"));
-    report.step("set-up: clippy", || tools::cargo_component("clippy"));
 }
 
 fn lints(report: &mut Report) {

@@ -10,10 +10,6 @@ use crate::process::{command, output, target_dir};
 use crate::report::Report;
 use crate::rust;
 
-/// Target for the speed of the run, simulated seconds per wall second. Printed
-/// beside the measured value and not enforced: a busy machine is no defect.
-const REALTIME_FACTOR_TARGET: f64 = 20.0;
-
 /// Required targets that the simulated robot is known to miss, and why. They
 /// stay FAIL in every report; here they only do not stop the suite. One that is
 /// met again must leave this list, or the suite fails.
@@ -30,7 +26,7 @@ pub(crate) fn steps(report: &mut Report) -> Option<PathBuf> {
     let first = report.step("main job: wheeleg run three-step", || {
         let summary = simulate("main-job-a")?;
         check_targets(&summary.json)?;
-        check_speed(&summary.json)?;
+        println!("      {} times real time", summary.json["realtime_factor"]);
         Ok(summary)
     });
     report.step("same seed in another folder: same hash", || {
@@ -115,15 +111,6 @@ fn check_targets(json: &Value) -> Result<()> {
     Ok(())
 }
 
-fn check_speed(json: &Value) -> Result<()> {
-    let factor = json["realtime_factor"]
-        .as_f64()
-        .context("no `realtime_factor`")?;
-    println!("      {factor:.1} times real time (target: at least {REALTIME_FACTOR_TARGET})");
-    ensure!(factor > 0.0, "`realtime_factor` is not positive");
-    Ok(())
-}
-
 fn same_hash(first: &Value, second: &Value) -> Result<()> {
     let a = first["hash"].as_str().context("no `hash`")?;
     let b = second["hash"].as_str().context("no `hash`")?;
@@ -143,7 +130,7 @@ mod tests {
             .iter()
             .map(|id| json!({"id": id, "value": 1.0, "unit": "mm", "min": 0.0, "max": 2.0, "required": true, "pass": pass || *id != "A27"}))
             .collect();
-        json!({"hash": "ab", "realtime_factor": 20.0, "targets": targets})
+        json!({"hash": "ab", "targets": targets})
     }
 
     #[test]
@@ -165,10 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn speed_must_be_there_and_hashes_equal() {
-        assert!(check_speed(&summary(true)).is_ok());
-        assert!(check_speed(&json!({"realtime_factor": 0.0})).is_err());
-        assert!(check_speed(&json!({})).is_err());
+    fn hashes_must_be_there_and_equal() {
         assert!(same_hash(&summary(true), &summary(true)).is_ok());
         assert!(same_hash(&summary(true), &json!({"hash": "ac"})).is_err());
         assert!(same_hash(&json!({"hash": ""}), &json!({"hash": ""})).is_err());

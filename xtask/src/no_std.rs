@@ -15,7 +15,6 @@ use std::process::Command;
 
 use crate::process::{ask, cargo, command, run, succeeds, target_dir};
 use crate::report::{Report, StepError, StepResult};
-use crate::tools::{apt_install, have, may_apt};
 
 /// The `no_std` crates.
 const CRATES: [&str; 8] = [
@@ -31,10 +30,10 @@ const CRATES: [&str; 8] = [
 
 /// Cortex-M4 is the part on the boards; Cortex-M0+ is the poorest core that
 /// the crates are kept fit for (no atomic swap, no hardware division).
-const TARGETS: [&str; 2] = ["thumbv7em-none-eabi", "thumbv6m-none-eabi"];
+pub(crate) const TARGETS: [&str; 2] = ["thumbv7em-none-eabi", "thumbv6m-none-eabi"];
 
 /// Debian's compiler and what `-Zbuild-std` needs with it.
-const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+pub(crate) const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 
@@ -67,7 +66,7 @@ pub(crate) fn steps(report: &mut Report) {
 }
 
 fn check(target: &str) -> StepResult {
-    let way = set_up(target)?;
+    let way = way(target)?;
     println!("    way: {} for {target}", way.describe());
     let mut wrong = Vec::new();
     for package in CRATES {
@@ -91,32 +90,17 @@ fn check(target: &str) -> StepResult {
     }
 }
 
-/// Finds a way to compile for the target, installing what may be installed.
-pub(crate) fn set_up(target: &str) -> StepResult<Way> {
-    if env::var_os(FORCE_BUILD_STD).is_none() {
-        if has_core(target) {
-            return Ok(Way::Rustup);
-        }
-        if have("rustup") {
-            let _ = run(command("rustup").args(["target", "add", target]));
-            if has_core(target) {
-                return Ok(Way::Rustup);
-            }
-        }
+/// The way to compile for the target.
+pub(crate) fn way(target: &str) -> StepResult<Way> {
+    if env::var_os(FORCE_BUILD_STD).is_none() && has_core(target) {
+        return Ok(Way::Rustup);
     }
-    second_way().map_err(|missing| {
-        if have("rustup") {
-            let install = format!("rustup target add {target}");
-            StepError::missing(format!("the Rust target {target}"), install)
-        } else {
-            missing
-        }
-    })
+    second_way().map_err(|_| StepError::not_set_up(format!("the Rust target {target}")))
 }
 
-/// The second way, found or installed.
+/// The second way, if Debian's compiler is there.
 pub(crate) fn second_way() -> StepResult<Way> {
-    if has_debian() || (may_apt() && apt_install(&DEBIAN_PACKAGES) && has_debian()) {
+    if has_debian() {
         return Ok(Way::DebianBuildStd);
     }
     Err(StepError::missing(

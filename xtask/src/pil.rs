@@ -11,29 +11,26 @@ use serde_json::{Value, json};
 
 use crate::firmware;
 use crate::machine::Machine;
-use crate::no_std::{self, Way, set_up};
+use crate::no_std::{self, Way, way};
 use crate::process::{self, cargo, run, target_dir};
 use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
+use crate::runs::{ensure_equal, most, put_most, three_steps};
 use crate::rust;
 use crate::sizes;
-use crate::tools::{apt_install, have, may_apt};
+use crate::tools::have;
 
 mod further;
 mod load;
 mod profile;
-mod runs;
 mod speed;
 
-pub(crate) use runs::{ensure_equal, three_steps};
-
 use further::{eventful, mixed, predictive};
-use runs::{most, put_most};
 use speed::{SPEED_LEAST, Speed, is_met, speed_verdict, watched};
 
 const PACKAGE: &str = "wheeleg-pil-unicorn";
 /// What building the Unicorn engine takes, as Debian packages.
-const PACKAGES: [&str; 3] = ["cmake", "pkg-config", "libclang-dev"];
+pub(crate) const PACKAGES: [&str; 3] = ["cmake", "pkg-config", "libclang-dev"];
 
 /// Arguments of `cargo xtask pil`.
 #[derive(Args, Debug, Default)]
@@ -68,10 +65,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     let Some(machine) = Machine::of(report, options.json) else {
         return;
     };
-    if report
-        .step("set-up: build tools of the emulator", tools)
-        .is_none()
-    {
+    if report.step("build tools of the emulator", tools).is_none() {
         return;
     }
     let Some(emulator) = report.step("emulated STM32G431", emulator) else {
@@ -79,7 +73,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     };
     let only_images = options.build || options.profile;
     let images = report.step("images for the emulated boards", || {
-        Images::build(set_up(firmware::TARGET)?, "firmware", !only_images)
+        Images::build(way(firmware::TARGET)?, "firmware", !only_images)
     });
     let Some(images) = images else {
         return;
@@ -123,7 +117,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         || predictive(&emulator, &images.folder),
     );
     report.step("one step with boards here, emulated, and on QEMU", || {
-        mixed(&emulator, &images.folder, set_up(firmware::TARGET)?)
+        mixed(&emulator, &images.folder, way(firmware::TARGET)?)
     });
     if let (Some(machine), Some(mut figures)) = (machine, figures) {
         figures["pil"]["eventful"] = json!(eventful);
@@ -146,15 +140,18 @@ fn libclang() -> bool {
             .any(below)
 }
 
-/// Finds the build tools or installs them.
+/// True if the build tools are there.
+pub(crate) fn have_tools() -> bool {
+    have("cmake") && have("pkg-config") && libclang()
+}
+
+/// Finds the build tools.
 fn tools() -> StepResult {
-    let there = || have("cmake") && have("pkg-config") && libclang();
-    if there() || (may_apt() && apt_install(&PACKAGES) && there()) {
+    if have_tools() {
         return Ok(());
     }
-    Err(StepError::missing(
+    Err(StepError::not_set_up(
         "cmake, pkg-config or libclang, which the Unicorn engine is built with",
-        format!("apt-get install -y {}", PACKAGES.join(" ")),
     ))
 }
 
@@ -225,7 +222,7 @@ fn test_programs(emulator: &Path, images: &Images, names: &[&str]) -> Command {
 /// The emulator and the images that are flashed, built where they are not.
 fn boards() -> StepResult<(PathBuf, Images)> {
     tools()?;
-    let images = Images::build(set_up(firmware::TARGET)?, "firmware", false)?;
+    let images = Images::build(way(firmware::TARGET)?, "firmware", false)?;
     Ok((emulator()?, images))
 }
 

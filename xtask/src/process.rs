@@ -103,7 +103,7 @@ pub(crate) fn ask(command: &mut Command) -> Option<String> {
 }
 
 /// A command as it is told: the program by its name, since where it stands is a matter of the
-/// machine, and DEEP.md keeps what failed.
+/// machine, and `docs/records/deep.md` keeps what failed.
 fn line(command: &Command) -> String {
     let program = Path::new(command.get_program());
     let name = program.file_name().unwrap_or(program.as_os_str());

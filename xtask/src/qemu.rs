@@ -9,14 +9,14 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::firmware;
-use crate::no_std::{Way, cargo_for, set_up};
-use crate::pil;
+use crate::no_std::{Way, cargo_for, way};
 use crate::process::{ask, cargo, command, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
+use crate::runs;
 use crate::rust;
-use crate::tools::{apt_install, have, may_apt};
+use crate::tools::have;
 
-const EMULATOR: &str = "qemu-system-arm";
+pub(crate) const EMULATOR: &str = "qemu-system-arm";
 const TARGET: &str = "thumbv7em-none-eabi";
 const PACKAGE: &str = "wheeleg-board-qemu";
 const IMAGES: [&str; 3] = ["qemu-joint", "qemu-wheel", "qemu-hil-joint"];
@@ -38,10 +38,10 @@ pub(crate) struct Options {
 
 /// `cargo xtask qemu`.
 pub(crate) fn steps(report: &mut Report, options: &Options) {
-    if report.step("set-up: QEMU", emulator).is_none() {
+    if report.step("QEMU", emulator).is_none() {
         return;
     }
-    let Some(images) = report.step("QEMU images", || images(set_up(TARGET)?)) else {
+    let Some(images) = report.step("QEMU images", || images(way(TARGET)?)) else {
         return;
     };
     report.step("lints of the QEMU board support", lint);
@@ -57,17 +57,14 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     }
 }
 
-/// Finds the emulator or installs it.
+/// Finds the emulator.
 pub(crate) fn emulator() -> StepResult {
-    if have(EMULATOR) || (may_apt() && apt_install(&[EMULATOR]) && have(EMULATOR)) {
-        let version = ask(command(EMULATOR).arg("--version")).unwrap_or_default();
-        println!("    {}", version.lines().next().unwrap_or_default());
-        return Ok(());
+    if !have(EMULATOR) {
+        return Err(StepError::not_set_up(EMULATOR));
     }
-    Err(StepError::missing(
-        EMULATOR,
-        format!("apt-get install -y {EMULATOR}"),
-    ))
+    let version = ask(command(EMULATOR).arg("--version")).unwrap_or_default();
+    println!("    {}", version.lines().next().unwrap_or_default());
+    Ok(())
 }
 
 /// Builds the images in one of the ways; gives the folder in which they lie. They link
@@ -103,7 +100,7 @@ pub(crate) fn images(way: Way) -> StepResult<PathBuf> {
 /// Images and tests that need them are not among the host's targets, so their
 /// lints are checked here.
 fn lint() -> StepResult {
-    if set_up(TARGET)? == Way::DebianBuildStd {
+    if way(TARGET)? == Way::DebianBuildStd {
         return Err(StepError::missing(
             format!("the Rust target {TARGET} for clippy"),
             format!("rustup target add {TARGET}"),
@@ -139,7 +136,7 @@ fn compare(images: &Path) -> StepResult {
 /// The paper's test with the whole robot on QEMU: no bit may differ from the host.
 fn three_steps(images: &Path) -> StepResult {
     let environment = [("WHEELEG_IMAGES", images)];
-    let summary = pil::three_steps("qemu", "qemu-run", &environment, &["--compare-sil"])?;
+    let summary = runs::three_steps("qemu", "qemu-run", &environment, &["--compare-sil"])?;
     let pil = &summary["pil"];
     println!(
         "    {} bits compared, {} differ, {:.1} times real time",
@@ -147,7 +144,7 @@ fn three_steps(images: &Path) -> StepResult {
         pil["differing_bits"],
         summary["realtime_factor"].as_f64().unwrap_or(0.0)
     );
-    Ok(pil::ensure_equal(pil)?)
+    Ok(runs::ensure_equal(pil)?)
 }
 
 /// Runs the loops of the tests with the counting plugin. Gives, for each

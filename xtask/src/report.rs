@@ -18,6 +18,11 @@ pub(crate) enum StepError {
 }
 
 impl StepError {
+    /// A tool that `cargo xtask setup` installs.
+    pub(crate) fn not_set_up(tool: impl Into<String>) -> Self {
+        Self::missing(tool, "cargo xtask setup")
+    }
+
     /// A missing tool, with the command that installs it.
     pub(crate) fn missing(tool: impl Into<String>, install: impl Into<String>) -> Self {
         Self::Missing {

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
-use super::runs::{ensure_equal, most, put_most, run_nodes};
 use crate::no_std::Way;
 use crate::process::{root, target_dir};
 use crate::qemu;
 use crate::report::StepResult;
+use crate::runs::{ensure_equal, most, put_most, run_nodes};
 use crate::sizes;
 
 /// Runs in which boards latch faults, with what strikes them: the master falls silent, a

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::load;
-use super::runs::{build_wheeleg, three_steps};
+use crate::runs::{build_wheeleg, three_steps};
 
 /// Least speed of eight boards with the plant, times real time, on 2 cores.
 pub(super) const SPEED_LEAST: f64 = 2.0;

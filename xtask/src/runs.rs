@@ -36,13 +36,13 @@ pub(crate) fn three_steps(
 }
 
 /// Builds the program.
-pub(super) fn build_wheeleg() -> anyhow::Result<()> {
+pub(crate) fn build_wheeleg() -> anyhow::Result<()> {
     rust::build(&["--bin", "wheeleg"])
 }
 
 /// Builds the program and runs a scenario with it; gives its summary. `nodes` says which
 /// node runs where.
-pub(super) fn run_nodes(
+pub(crate) fn run_nodes(
     scenario: &Path,
     nodes: &[&str],
     folder: &str,
@@ -87,7 +87,7 @@ pub(crate) fn ensure_equal(pil: &Value) -> anyhow::Result<()> {
 }
 
 /// Puts the largest figures of each image in these runs.
-pub(super) fn put_most(figures: &mut Value, runs: &[&Value]) {
+pub(crate) fn put_most(figures: &mut Value, runs: &[&Value]) {
     for image in ["joint", "wheel"] {
         for key in MEASURED {
             let each = runs.iter().map(|pil| most(pil, key, image));
@@ -97,7 +97,7 @@ pub(super) fn put_most(figures: &mut Value, runs: &[&Value]) {
 }
 
 /// Largest figure of the boards with this image.
-pub(super) fn most(pil: &Value, key: &str, image: &str) -> u64 {
+pub(crate) fn most(pil: &Value, key: &str, image: &str) -> u64 {
     let boards = pil["boards"].as_array().into_iter().flatten();
     let boards = boards.filter(|board| board["image"] == image);
     let figures = boards.filter_map(|board| board[key].as_u64());
