@@ -74,8 +74,12 @@ const fn is_refused(faults: FaultBits) -> bool {
 }
 
 fn rejected(address: Address, error: ConfigError) -> SimError {
+    let why = match error {
+        ConfigError::Address => "its address straps name a board of another kind",
+        ConfigError::Parameters => "its parameters contradict each other",
+    };
     SimError::simulation(
-        format!("the board of {address} refuses its configuration: {error:?}"),
+        format!("the board of {address} refuses its configuration: {why}"),
         "see the sections [node.…] of the robot file",
     )
 }

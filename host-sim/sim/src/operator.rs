@@ -28,6 +28,18 @@ enum Stage {
     Settling { until_ns: u64 },
 }
 
+impl Stage {
+    /// Name, for messages.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Enumerating => "finding the boards",
+            Self::Arming => "arming",
+            Self::Homing => "moving to the start pose",
+            Self::Settling { .. } => "settling in the start pose",
+        }
+    }
+}
+
 /// The operator of one run.
 pub(super) struct Operator<'a> {
     scenario: &'a Scenario,
@@ -127,9 +139,9 @@ impl<'a> Operator<'a> {
             .collect();
         SimError::simulation(
             format!(
-                "the robot did not get ready in {:.2} s of simulated time (stage {:?}); last events: {}",
+                "the robot did not get ready in {:.2} s of simulated time (stage: {}); last events: {}",
                 now_ns as f64 * 1e-9,
-                self.stage,
+                self.stage.name(),
                 story.join("; ")
             ),
             help,
@@ -203,7 +215,7 @@ impl<'a> Operator<'a> {
         t_ns: u64,
         recorder: &mut Recorder,
     ) -> Result<(), SimError> {
-        let name = format!("{:?}", command.code());
+        let name = command.code().name();
         if !world.master_alive() {
             recorder.event(
                 t_ns,
@@ -277,7 +289,11 @@ fn is_advice(event: &Event) -> bool {
 
 pub(super) fn refused(command: &Command, why: &Reject) -> SimError {
     SimError::simulation(
-        format!("the master refuses {:?}: {}", command.code(), reject(why)),
+        format!(
+            "the master refuses {}: {}",
+            command.code().name(),
+            reject(why)
+        ),
         "the events of the log tell what the robot was doing",
     )
 }

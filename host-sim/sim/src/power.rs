@@ -340,7 +340,7 @@ impl World {
             ..self.config
         };
         self.master = Master::new(self.config).map_err(|e| {
-            SimError::simulation(format!("the master does not start again: {e:?}"), "")
+            SimError::simulation(format!("the master does not start again: {e}"), "")
         })?;
         self.master_alive = true;
         Ok(())

@@ -15,9 +15,9 @@ use wheeleg_remote_host::interface::{Side, first_difference};
 /// An event of the master in words.
 pub(crate) fn describe(event: &Event) -> String {
     let text = match *event {
-        Event::Done(ticket) => format!("{:?} done", ticket.code),
+        Event::Done(ticket) => format!("{} done", ticket.code.name()),
         Event::Refused { ticket, reason } => {
-            format!("{:?} refused: {}", ticket.code, refusal(&reason))
+            format!("{} refused: {}", ticket.code.name(), refusal(&reason))
         }
         Event::NodeReady(node) => format!("{} identified, interface matches", board(node)),
         Event::SchemaMismatch {

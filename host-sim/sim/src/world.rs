@@ -173,7 +173,7 @@ impl World {
             wheel_sample_us: wheels[0].period_us(),
             ..master
         };
-        let mut brain = Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?;
+        let mut brain = Master::new(master).map_err(|e| refused("master", &e.to_string()))?;
         Ok(Self {
             outputs,
             plant,

@@ -38,6 +38,7 @@ mod motion;
 mod node;
 pub mod optimal;
 pub mod plant_check;
+mod refusal;
 mod run;
 pub mod suite;
 

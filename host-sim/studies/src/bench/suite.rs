@@ -14,7 +14,7 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
 use super::{Bench, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
-use super::{design, design_with, identify};
+use super::{design, design_with, identify, refusal};
 use wheeleg_config::brief;
 
 /// An experiment could not be made.
@@ -28,7 +28,7 @@ pub enum BenchError {
     )]
     Plant(#[from] PlantError),
     /// The design is not one the board accepts.
-    #[error("the board refuses the design for this axis: {0:?}")]
+    #[error("the board refuses the design for this axis: {}", refusal::words(.0))]
     #[diagnostic(
         code(wheeleg::bench::design),
         help(

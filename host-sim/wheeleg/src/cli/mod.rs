@@ -2,6 +2,7 @@
 
 mod channels;
 mod check;
+mod commands;
 mod commission;
 mod compare;
 mod delay;
@@ -71,6 +72,8 @@ enum Command {
     Faults(faults::FaultsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
+    /// Print the commands that a scenario can give: arguments, units, ranges.
+    Commands(commands::CommandsArgs),
     /// Write the robot for other programs.
     Export(export::ExportArgs),
     /// Print the unique ids of a robot's boards, as a section for its file.
@@ -103,6 +106,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::List(args)) => list::command(&args),
         Some(Command::Params(args)) => params::command(&args),
         Some(Command::Channels(args)) => channels::command(&args),
+        Some(Command::Commands(args)) => commands::command(&args),
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Commission(args)) => commission::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
