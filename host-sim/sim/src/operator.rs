@@ -29,8 +29,9 @@ enum Stage {
 }
 
 /// The operator of one run.
-pub(super) struct Operator<'a> {
-    scenario: &'a Scenario,
+pub(super) struct Operator {
+    motion: Motion,
+    events: Vec<ScenarioEvent>,
     rest_ns: u64,
     limit_ns: u64,
     stage: Stage,
@@ -47,12 +48,13 @@ pub(super) fn side(leg: LegChoice) -> Side {
     }
 }
 
-impl<'a> Operator<'a> {
+impl Operator {
     /// An operator at a robot that is just being switched on.
-    pub(super) fn new(scenario: &'a Scenario, start_up: &StartUpParams) -> Self {
+    pub(super) fn new(scenario: &Scenario, start_up: &StartUpParams) -> Self {
         let ns = |s: f64| (s * 1e9).round() as u64;
         Self {
-            scenario,
+            motion: scenario.motion,
+            events: scenario.events.clone(),
             rest_ns: ns(start_up.rest_s),
             limit_ns: ns(start_up.limit_s),
             stage: Stage::Enumerating,
@@ -153,7 +155,7 @@ impl<'a> Operator<'a> {
     /// # Errors
     /// [`SimError::Simulation`] if the dispatcher refuses it.
     pub(super) fn begin(&self, world: &mut World) -> Result<(), SimError> {
-        let command = match self.scenario.motion {
+        let command = match self.motion {
             Motion::Stand => return Ok(()),
             Motion::SquareWave { .. } => Command::StartGait,
             Motion::Sinusoid {
@@ -182,7 +184,7 @@ impl<'a> Operator<'a> {
     /// The events of the scenario that are due at `t_ns`, each once.
     pub(super) fn due(&mut self, t_ns: u64) -> Vec<ScenarioEvent> {
         let t_s = t_ns as f64 * 1e-9;
-        let rest = &self.scenario.events[self.next_event..];
+        let rest = &self.events[self.next_event..];
         let due: Vec<ScenarioEvent> = rest
             .iter()
             .take_while(|e| e.at_s <= t_s + 1e-9)

@@ -223,6 +223,14 @@ impl World {
         })
     }
 
+    /// When the next event is, ns.
+    pub(super) fn next_ns(&self) -> u64 {
+        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
+        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        let due_ns = self.bus.next_delivery_ns();
+        due_ns.map_or(tick_ns, |due_ns| due_ns.min(tick_ns))
+    }
+
     /// Takes the next event.
     ///
     /// # Errors

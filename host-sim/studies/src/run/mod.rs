@@ -123,7 +123,6 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
         &scenario,
         &robot,
         seed,
-        &options.nodes,
         &mut recorder,
         sil::Onlookers::new(&mut |t_s| {
             bar.set_position((t_s * 1e3) as u64);
