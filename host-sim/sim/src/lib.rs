@@ -7,6 +7,7 @@
 //! instant at which the robot stands at rest in that pose.
 
 mod audit;
+mod board;
 mod boards;
 mod bus;
 mod downtime;

@@ -7,6 +7,7 @@ use wheeleg_node::mode::Mode;
 use wheeleg_plant::robot::Outputs;
 use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality};
 
+use super::boards::WheelBoard;
 use super::world::World;
 use wheeleg_telemetry::{
     BodySample, BusSample, EventKind, FootSample, JointSample, MasterSample, Recorder,
@@ -55,7 +56,7 @@ impl Observer {
         self.joints(world, out, t_ns, recorder);
         self.wheels(world, out, t_ns, recorder);
         for foot in 0..2 {
-            let vertical = world.joints()[3 * foot + 2].snapshot();
+            let vertical = world.joints().nth(3 * foot + 2);
             recorder.foot(
                 t_ns,
                 foot,
@@ -63,7 +64,7 @@ impl Observer {
                     normal_force_n: out.foot_force_n[foot][2],
                     friction_force_n: out.foot_force_n[foot][0],
                     clearance_mm: out.foot_clearance_m[foot] * 1e3,
-                    switches: switch_bits(vertical.switches),
+                    switches: vertical.map_or(0, |board| switch_bits(board.snapshot().switches)),
                 },
             );
             self.notice_contact(foot, out.foot_switches[foot], t_ns, recorder);
@@ -78,14 +79,15 @@ impl Observer {
             },
         );
         let gas = &world.plant().params().gas;
+        let left_wheel = world.wheels().next();
         recorder.supply(
             t_ns,
             SupplySample {
                 pressure_bar: out.supply_pressure_pa / PA_PER_BAR,
                 air_used_dm3: out.air_used_kg / gas.reference_density_kg_m3 * 1e3,
-                dump_commanded: world.wheels()[0].dumps(),
+                dump_commanded: left_wheel.is_some_and(WheelBoard::dumps),
                 dump_open: out.dumping,
-                pressure_switch: world.wheels()[0].snapshot().supply_present,
+                pressure_switch: left_wheel.is_some_and(|board| board.snapshot().supply_present),
             },
         );
         if recorder.wants_state(t_ns) {
@@ -98,7 +100,7 @@ impl Observer {
 
     fn joints(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
         let inputs = world.tick_inputs();
-        for (i, board) in world.joints().iter().enumerate() {
+        for (i, board) in world.joints().enumerate() {
             let node = board.snapshot();
             let c = &out.cylinders[i];
             let [fill_a_us, vent_a_us, fill_b_us, vent_b_us] = inputs.on_us[i];
@@ -138,7 +140,7 @@ impl Observer {
     fn wheels(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
         let params = world.plant().params();
         let radius_mm = params.body.wheel_radius_m * 1e3;
-        for (i, board) in world.wheels().iter().enumerate() {
+        for (i, board) in world.wheels().enumerate() {
             let node = board.snapshot();
             let motor = &params.motors[i];
             let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;

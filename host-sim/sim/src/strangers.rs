@@ -10,7 +10,8 @@ use wheeleg_protocol::{
     ParamSet, ParamValue, ResetCause,
 };
 
-use super::boards::{JointBoard, WheelBoard, twin_identity};
+use super::board::{Application, BoardInputs};
+use super::boards::twin_identity;
 use super::bus::{Bus, Delivery, Driver};
 use super::traffic::{NS_PER_US, micros};
 use crate::SimError;
@@ -42,8 +43,7 @@ const NO_PARAMETER: u16 = 0x7FFF;
 #[derive(Default)]
 pub(super) struct Strangers {
     /// Boards with the address of another one.
-    joints: Vec<(u8, JointBoard)>,
-    wheels: Vec<(u8, WheelBoard)>,
+    boards: Vec<(Address, Application)>,
     service: Option<Service>,
     notes: Vec<String>,
 }
@@ -55,24 +55,18 @@ impl Strangers {
     /// # Errors
     /// [`SimError::Simulation`] if the board refuses its parameters.
     pub(super) fn plug_in(&mut self, address: u8, stored: &NodeParams) -> Result<(), SimError> {
-        let i = usize::from(address) - 1;
-        let Some(who) = Address::new(address).map(twin_identity) else {
+        let Some(address) = Address::new(address) else {
             return Ok(());
         };
-        if i < 6 {
-            let board = JointBoard::new(who, Some(&stored.joints[i]), ResetCause::PowerUp)?;
-            self.joints.push((address, board));
-        } else {
-            let board = WheelBoard::new(who, Some(&stored.wheels[i - 6]), ResetCause::PowerUp)?;
-            self.wheels.push((address, board));
-        }
+        let (who, stored) = (twin_identity(address), stored.of(address));
+        let board = Application::new(who, Some(stored), ResetCause::PowerUp)?;
+        self.boards.push((address, board));
         Ok(())
     }
 
     /// It is unplugged.
     pub(super) fn unplug(&mut self, address: u8) {
-        self.joints.retain(|(own, _)| *own != address);
-        self.wheels.retain(|(own, _)| *own != address);
+        self.boards.retain(|(own, _)| own.raw() != address);
     }
 
     /// The service tool begins to write parameters of the board at `address`.
@@ -82,27 +76,30 @@ impl Strangers {
 
     /// One tick of the joints among the second boards.
     pub(super) fn joint_tick(&mut self, now_ns: u64) {
-        for (_, board) in &mut self.joints {
-            board.tick(micros(now_ns), BENCH_CODE, [false; 4]);
-        }
+        self.tick(now_ns, Address::is_joint);
     }
 
     /// One sample of the wheels among the second boards that stand for `address`.
     pub(super) fn wheel_sample(&mut self, address: u8, now_ns: u64) {
-        for (_, board) in self.wheels.iter_mut().filter(|(own, _)| *own == address) {
-            board.tick(micros(now_ns), 0, true);
+        self.tick(now_ns, |own| own.raw() == address);
+    }
+
+    /// One tick of the second boards that `due` names, on the bench side of their sensors.
+    fn tick(&mut self, now_ns: u64, due: impl Fn(Address) -> bool) {
+        let inputs = BoardInputs {
+            code: BENCH_CODE,
+            supply: true,
+            ..BoardInputs::default()
+        };
+        for (_, board) in self.boards.iter_mut().filter(|(own, _)| due(*own)) {
+            board.tick(micros(now_ns), &inputs);
         }
     }
 
     /// Hears a delivery.
     pub(super) fn hear(&mut self, bus: &Bus, delivery: &Delivery) {
-        for (address, board) in &mut self.joints {
-            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
-                board.on_bus_bytes(&bytes, micros(end_ns));
-            }
-        }
-        for (address, board) in &mut self.wheels {
-            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
+        for (address, board) in &mut self.boards {
+            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | address.raw(), delivery) {
                 board.on_bus_bytes(&bytes, micros(end_ns));
             }
         }
@@ -115,14 +112,10 @@ impl Strangers {
 
     /// What a second board wants to send.
     pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
-        let joints = self.joints.iter_mut();
-        let mut joints = joints.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
-        if let Some(sent) = joints.next() {
-            return Some(sent);
-        }
-        let wheels = self.wheels.iter_mut();
-        let mut wheels = wheels.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
-        wheels.next()
+        let boards = self.boards.iter_mut();
+        let mut sent =
+            boards.filter_map(|(a, board)| Some((TWIN | a.raw(), board.take_transmission()?)));
+        sent.next()
     }
 
     /// The next request of the service tool, if it has one and `left_ns` until the

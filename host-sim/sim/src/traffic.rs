@@ -81,11 +81,8 @@ impl World {
                     continue;
                 }
                 let t_end = self.clock(address, end_ns);
-                let i = usize::from(address) - 1;
-                match self.joints.get_mut(i) {
-                    Some(board) => board.on_bus_bytes(bytes, t_end),
-                    None => self.wheels[i - 6].on_bus_bytes(bytes, t_end),
-                }
+                let board = self.board_mut(address);
+                board.application.on_bus_bytes(bytes, t_end);
             }
             let master = Address::MASTER.raw();
             if self.master_alive
@@ -134,17 +131,10 @@ impl World {
                 }
             }
         };
-        for (board, address) in self.joints.iter_mut().zip(1..) {
-            while let Some(t) = board.take_transmission() {
+        for (board, address) in self.boards.iter_mut().zip(1..) {
+            while let Some(t) = board.application.take_transmission() {
                 if send(address, t) {
-                    board.driver_cut_off(clock(address));
-                }
-            }
-        }
-        for (board, address) in self.wheels.iter_mut().zip(7..) {
-            while let Some(t) = board.take_transmission() {
-                if send(address, t) {
-                    board.driver_cut_off(clock(address));
+                    board.application.driver_cut_off(clock(address));
                 }
             }
         }
