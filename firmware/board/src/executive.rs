@@ -37,22 +37,41 @@ pub trait Application {
     fn driver_cut_off(&mut self, at: Micros);
 }
 
+/// What both kinds of node have by the same names.
+macro_rules! of_the_node {
+    () => {
+        fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+            self.on_bus_bytes(bytes, t_end);
+        }
+
+        fn tick(&mut self, now: Micros) -> TickReport {
+            self.tick(now)
+        }
+
+        fn tick_done(&mut self, end: Micros) {
+            self.tick_done(end);
+        }
+
+        fn take_transmission(&mut self) -> Option<Transmission> {
+            self.take_transmission()
+        }
+
+        fn save_is_due(&self) -> bool {
+            self.save_is_due()
+        }
+
+        fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+            self.save(store, at);
+        }
+
+        fn driver_cut_off(&mut self, at: Micros) {
+            self.driver_cut_off(at);
+        }
+    };
+}
+
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V, S, W> {
-    fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        self.on_bus_bytes(bytes, t_end);
-    }
-
-    fn tick(&mut self, now: Micros) -> TickReport {
-        self.tick(now)
-    }
-
-    fn tick_done(&mut self, end: Micros) {
-        self.tick_done(end);
-    }
-
-    fn take_transmission(&mut self) -> Option<Transmission> {
-        self.take_transmission()
-    }
+    of_the_node!();
 
     fn period(&self) -> Micros {
         JOINT_TICK
@@ -61,36 +80,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     fn period_is_sound(&self) -> bool {
         true
     }
-
-    fn save_is_due(&self) -> bool {
-        self.save_is_due()
-    }
-
-    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
-        self.save(store, at);
-    }
-
-    fn driver_cut_off(&mut self, at: Micros) {
-        self.driver_cut_off(at);
-    }
 }
 
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for WheelNode<M, E, P, D> {
-    fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        self.on_bus_bytes(bytes, t_end);
-    }
-
-    fn tick(&mut self, now: Micros) -> TickReport {
-        self.tick(now)
-    }
-
-    fn tick_done(&mut self, end: Micros) {
-        self.tick_done(end);
-    }
-
-    fn take_transmission(&mut self) -> Option<Transmission> {
-        self.take_transmission()
-    }
+    of_the_node!();
 
     fn period(&self) -> Micros {
         Micros(self.tick_period_us())
@@ -98,18 +91,6 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
 
     fn period_is_sound(&self) -> bool {
         self.is_intact()
-    }
-
-    fn save_is_due(&self) -> bool {
-        self.save_is_due()
-    }
-
-    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
-        self.save(store, at);
-    }
-
-    fn driver_cut_off(&mut self, at: Micros) {
-        self.driver_cut_off(at);
     }
 }
 

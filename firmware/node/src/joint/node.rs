@@ -36,6 +36,7 @@ pub(super) struct TickState {
     pub(super) following: Ticks,
     pub(super) motion: MotionWatch,
     pub(super) precharge: Precharge,
+    boot_ticks: Ticks,
 }
 
 /// Application of one joint board: sense, control, valves.
@@ -116,6 +117,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 following: Ticks::ZERO,
                 motion: MotionWatch::new(&settings.tick.motion, PositionMm::ZERO),
                 precharge: Precharge::default(),
+                boot_ticks: Ticks::ZERO,
             },
             fixed_seals: PartSeals::new(),
             seal: Seal::default(),
@@ -414,10 +416,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             }
             return;
         }
-        let ticks = self.state.precharge.self_test();
+        self.state.boot_ticks = self.state.boot_ticks.next();
         if self.monitor.is_settled() {
             let _ = self.core.supervisor.apply(Event::SelfTestPassed, now);
-        } else if ticks >= SELF_TEST_TICKS {
+        } else if self.state.boot_ticks >= SELF_TEST_TICKS {
             let fault = fault.unwrap_or(Fault::SensorRange);
             self.core
                 .supervisor
