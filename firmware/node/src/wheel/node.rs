@@ -253,6 +253,11 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.core.axis_fault(Fault::SlotOverrun, at);
     }
 
+    /// A frame that was taken was not sent: its slot had passed.
+    pub fn missed_slot(&mut self) {
+        self.core.port.missed();
+    }
+
     /// Whether the parameters are to be stored: call [`Self::save`] between two ticks.
     pub fn save_is_due(&self) -> bool {
         self.core.save_is_due()
