@@ -190,6 +190,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
             self.controller.forget();
+            self.controller.set_correction(self.settings.correction);
             // Nobody knows which stroke was damaged: with the next good reading all that holds
             // a history of them begins anew.
             self.monitor.restart();

@@ -175,6 +175,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             self.state.actual = self.undamaged_count();
             actual = self.encoder.count(self.state.actual);
             self.axis_fault(Fault::StateCorrupt, now);
+            // What is cleared later must not go on with what was damaged.
+            self.controller = WheelController::new();
+            self.tune();
         }
         // A pin that cannot be read keeps its last debounced level.
         if let Ok(raw) = switches {
