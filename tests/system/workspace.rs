@@ -9,6 +9,8 @@ use std::process::Command;
 use serde_json::Value;
 use wheeleg_identity::sources::{self, Images};
 
+mod circles;
+
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
 const ARROWS: [(&str, &[&str]); 19] = [
