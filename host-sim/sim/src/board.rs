@@ -8,9 +8,9 @@ use wheeleg_remote_link::Outputs;
 use wheeleg_units::Micros;
 
 use super::boards::{JointBoard, WheelBoard, identity};
+use super::clock::NS_PER_US;
+use super::down::Down;
 use super::memory::Memory;
-use super::power::Down;
-use super::traffic::NS_PER_US;
 use crate::SimError;
 use wheeleg_config::timing::JOINT_TICK_NS;
 

@@ -13,7 +13,7 @@ use wheeleg_protocol::{
 use super::board::{Application, BoardInputs};
 use super::boards::twin_identity;
 use super::bus::{Bus, Delivery, Driver};
-use super::traffic::{NS_PER_US, micros};
+use super::clock::{NS_PER_US, micros};
 use crate::SimError;
 use wheeleg_config::NodeParams;
 use wheeleg_config::timing::SERVICE_NS;

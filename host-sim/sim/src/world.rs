@@ -6,6 +6,11 @@
 //! plant is advanced to a tick before its inputs are latched; bus events do
 //! not touch it.
 
+mod edges;
+mod power;
+mod strike;
+mod traffic;
+
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
@@ -18,16 +23,18 @@ use super::audit::{Audit, LineAudit};
 use super::board::{Board, BoardInputs};
 use super::boards::{JointBoard, WheelBoard};
 use super::bus::Bus;
+use super::client::Client;
+use super::clock::NS_PER_US;
 use super::downtime::DownTimes;
-use super::power::Client;
 use super::strangers::Strangers;
-use super::traffic::NS_PER_US;
 use crate::SimError;
 use crate::faults::Injector;
 use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
 use wheeleg_remote_host::Outside;
+
+pub use power::BOARD_START_UP_NS;
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

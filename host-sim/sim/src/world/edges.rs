@@ -4,9 +4,9 @@
 use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_remote_link as link;
 
-use super::board::BoardInputs;
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::board::BoardInputs;
 use wheeleg_remote_host::Outside;
 
 impl World {

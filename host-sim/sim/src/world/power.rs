@@ -1,19 +1,17 @@
 //! Power, resets and restarts: boards without power or with a stopped program,
 //! and a master or a user's program that starts anew.
 
-use wheeleg_master::command::Command;
-use wheeleg_master::dispatcher::{Reject, Request, Ticket};
-use wheeleg_master::master::LOCAL_DEADLINE_US;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_remote_link as link;
 use wheeleg_units::Micros;
 
-use super::board::Application;
-use super::downtime::{DownTimes, Due};
-use super::traffic::micros;
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::board::Application;
+use crate::clock::micros;
+use crate::down::Down;
+use crate::downtime::{DownTimes, Due};
 use wheeleg_config::timing::JOINT_TICK_NS;
 
 /// From power-up to the first tick edge, ns: a joint board's, and a wheel board's.
@@ -23,80 +21,6 @@ pub const BOARD_START_UP_NS: [u64; 2] = [3_198_000, 2_248_000];
 /// What a master adds to the first number of its requests at every start, so that
 /// no board takes them for repetitions; any odd number would do.
 const SEQUENCE_STEP: u16 = 0x2F35;
-
-/// Why a board does not run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Down {
-    /// It runs.
-    No,
-    /// It has no power: all its outputs are off.
-    Off {
-        /// When power comes back, ns.
-        until_ns: u64,
-    },
-    /// Its processor starts: all its outputs are off.
-    Starting {
-        /// When its first tick begins at the earliest, ns; it hears the line a tick before.
-        until_ns: u64,
-        /// What it finds as the cause of its reset.
-        cause: ResetCause,
-    },
-    /// It stores its parameters, which keeps its processor from everything else: its
-    /// outputs stay as they are, off.
-    Storing {
-        /// When that is done, ns.
-        until_ns: u64,
-    },
-    /// Its program has stopped: its outputs stay as they are.
-    Hung {
-        /// When the watchdog bites, ns.
-        until_ns: u64,
-    },
-}
-
-impl Down {
-    /// Whether nothing drives the outputs of the board.
-    pub(super) fn is_off(self) -> bool {
-        matches!(self, Self::Off { .. } | Self::Starting { .. })
-    }
-}
-
-/// The program through which the user gives commands: a client of the master.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Client {
-    next_id: u32,
-}
-
-impl Client {
-    /// Number of the client at the master.
-    const NUMBER: u8 = 1;
-
-    /// A program that has just been started and opens its session.
-    pub(super) fn connect(master: &mut Master) -> Self {
-        master.open_session(Self::NUMBER);
-        Self { next_id: 1 }
-    }
-
-    /// Gives a command.
-    ///
-    /// # Errors
-    /// See [`Reject`].
-    pub(super) fn submit(
-        &mut self,
-        master: &mut Master,
-        command: Command,
-        now_us: u64,
-    ) -> Result<Ticket, Reject> {
-        let request = Request {
-            client: Self::NUMBER,
-            id: self.next_id,
-            deadline_us: now_us.saturating_add(LOCAL_DEADLINE_US),
-            command,
-        };
-        self.next_id += 1;
-        master.submit_request(request, now_us)
-    }
-}
 
 impl World {
     /// Whether the board at `address` works: here unless it is down, outside
@@ -195,7 +119,7 @@ impl World {
     }
 
     /// When boards outside were down, at the end of the run.
-    pub(super) fn take_down_times(&mut self) -> DownTimes {
+    pub(crate) fn take_down_times(&mut self) -> DownTimes {
         std::mem::take(&mut self.down_times)
     }
 

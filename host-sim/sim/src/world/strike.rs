@@ -3,9 +3,10 @@
 use wheeleg_protocol::ResetCause;
 use wheeleg_remote_link as link;
 
-use super::power::{Client, Down};
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::client::Client;
+use crate::down::Down;
 use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
 use wheeleg_config::timing::{JOINT_TICK_NS, WATCHDOG_NS};
 

@@ -3,19 +3,13 @@
 use wheeleg_protocol::Address;
 use wheeleg_units::Micros;
 
-use super::audit::Audit;
-use super::bus::{Bus, Driver};
-use super::strangers;
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::audit::Audit;
+use crate::bus::{Bus, Driver};
+use crate::clock::{NS_PER_US, micros};
 use crate::faults::Injector;
-
-pub(super) const NS_PER_US: u64 = 1_000;
-
-pub(super) fn micros(ns: u64) -> Micros {
-    // The boards' clocks are 32-bit microsecond counters and wrap.
-    Micros((ns / NS_PER_US) as u32)
-}
+use crate::strangers;
 
 /// How far a start lies ahead on the board's own clock, µs, when that shows `now`.
 fn ahead_us(now: Micros, start_at: Micros) -> u32 {
