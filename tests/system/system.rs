@@ -18,6 +18,7 @@ mod figures;
 mod foot_sides;
 mod off_data;
 mod precharge;
+mod reference;
 mod restart;
 mod safe_states;
 mod service;
