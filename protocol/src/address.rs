@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 
 /// Number of nodes: six joints and two wheels.
 pub const NODES: usize = 8;
+/// Names of the nodes in files and commands, addresses 1 to 8.
+pub const NODE_NAMES: [&str; NODES] = [
+    "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8",
+];
 
 /// Bus address: master 0, joints 1–6, wheels 7–8, broadcast 255. No other value exists.
 ///

@@ -57,7 +57,7 @@ pub mod schema;
 pub mod sync;
 pub mod wire;
 
-pub use address::{Address, NODES};
+pub use address::{Address, NODE_NAMES, NODES};
 pub use decoder::{Decoder, LinkQuality};
 pub use fault::{
     FAULTS, Fault, FaultBits, FaultClass, FaultCode, FaultSchema, LIMITS, Limit, LimitBits,

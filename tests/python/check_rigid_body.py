@@ -3,7 +3,7 @@
     check_rigid_body.py URDF STATES [--tolerance T] [--seeded-errors]
 
 URDF is what `wheeleg export urdf` wrote, STATES what the example
-`floating_states` of wheeleg-sim printed. For every state Pinocchio computes
+`floating_states` of wheeleg-studies printed. For every state Pinocchio computes
 mass matrix and bias of the open tree; rotor inertia, which URDF cannot hold, is
 added; and the yaw loops are closed with constraint Jacobians that Pinocchio
 computes at the cut (crank end against yaw carriage). Nothing of our own

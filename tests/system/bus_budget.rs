@@ -1,11 +1,12 @@
 //! The traffic on the simulated line against the budget that the protocol
 //! computes at compile time.
 
-use crate::sil::{command_to, gait, range, robot, run, stand, window};
+use crate::sil::{gait, range, robot, run, stand, window};
+use wheeleg_config::{EventAction, LegChoice};
+use wheeleg_master::command::Command;
 use wheeleg_protocol::link::{BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, GAP_US, TURNAROUND_US};
 use wheeleg_protocol::{Message, MessageType, NODES};
-use wheeleg_sim::config::LegChoice;
-use wheeleg_sim::telemetry::{BusSample, Recording, Row};
+use wheeleg_telemetry::{BusSample, Recording, Row};
 
 /// Per mille of the cycle in which the line is silent between the cyclic frames,
 /// because the budget keeps it free: the turnaround and a gap for each slot.
@@ -96,7 +97,10 @@ fn requests_leave_thirty_per_cent_free() {
     let events: Vec<_> = (0..200_u8)
         .map(|i| {
             let at_s = 0.5 + 0.005 * f64::from(i);
-            (at_s, command_to("TransmitPosition", 1 + i % 6))
+            (
+                at_s,
+                EventAction::Command(Command::TransmitPosition { joint: 1 + i % 6 }),
+            )
         })
         .collect();
     let recording = run(&gait(LegChoice::Left, 2.0, &events), &robot(), 1);

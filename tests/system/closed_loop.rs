@@ -3,12 +3,13 @@
 
 use std::sync::OnceLock;
 
-use crate::sil::{at, command_to, gait, range, robot, robot_with, run, settled_touches, window};
+use crate::sil::{at, gait, range, robot, robot_with, run, settled_touches, window};
+use wheeleg_config::{EventAction, LegChoice, RobotConfig, TargetSet};
+use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_plant::sensors::AdcNoise;
 use wheeleg_protocol::param::JointParam;
-use wheeleg_sim::analysis::{Analysis, analyse};
-use wheeleg_sim::config::{LegChoice, RobotConfig, TargetSet};
-use wheeleg_sim::telemetry::{JointSample, Recording, Row};
+use wheeleg_studies::analysis::{Analysis, analyse};
+use wheeleg_telemetry::{JointSample, Recording, Row};
 
 /// Length of the three steps, s.
 const RUN_S: f64 = 10.0;
@@ -524,13 +525,14 @@ fn changing_the_correction_in_motion_is_bumpless() {
     // In mid-reach, in mid-push, and where the lowering foot slows down.
     for (joint, at_s) in [(2, 0.70), (2, 2.50), (3, 1.60)] {
         let robot = robot();
-        let one = |name: &str| {
-            let events = [(at_s, command_to(name, joint))];
+        let one = |correction: CorrectionKind| {
+            let command = Command::SelectCorrection { joint, correction };
+            let events = [(at_s, EventAction::Command(command))];
             run(&gait(LegChoice::Left, 3.2, &events), &robot, 1)
         };
         let plain = run(&gait(LegChoice::Left, 3.2, &[]), &robot, 1);
-        let same = one("SelectCorrectionPd");
-        let other = one("SelectCorrectionId");
+        let same = one(CorrectionKind::Pd);
+        let other = one(CorrectionKind::Id);
         let index = usize::from(joint) - 1;
         let drive =
             |r: &Recording| -> Vec<f64> { r.joints[index].iter().map(|row| row.v.drive).collect() };

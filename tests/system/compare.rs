@@ -11,10 +11,10 @@ use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
-use wheeleg_sim::bench::suite::{self, Factors, StartUp};
-use wheeleg_sim::bench::{Kind, Metrics};
-use wheeleg_sim::compare::{Comparison, Move, Options, Scene, Variation};
-use wheeleg_sim::config::{AxisConfig, RobotConfig};
+use wheeleg_config::{AxisConfig, RobotConfig};
+use wheeleg_studies::bench::suite::{self, Factors, StartUp};
+use wheeleg_studies::bench::{Kind, Metrics};
+use wheeleg_studies::compare::{Comparison, Move, Options, Scene, Variation};
 
 const AXIS: &str = "bench-vq110u";
 /// Longest time that any one call may take before it counts as hung.

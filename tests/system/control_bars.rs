@@ -3,15 +3,15 @@
 //! and on axes that nobody tuned for. All on the joint board's whole application,
 //! supervision included: a fault in any of these cases is a false alarm and fails it.
 
+use wheeleg_config::AxisConfig;
 use wheeleg_control::axis::AxisData;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::testing::wheeleg_2003_axis;
-use wheeleg_sim::bench::suite::{self, Factors, Rig, StartUp};
-use wheeleg_sim::bench::{
+use wheeleg_studies::bench::suite::{self, Factors, Rig, StartUp};
+use wheeleg_studies::bench::{
     Kind, Metrics, Motion, Trace, axis_data, design, identify, optimal, plant_check,
 };
-use wheeleg_sim::compare::{Figures, Move, RECOVERY_S, Scene, Sizes, Variation};
-use wheeleg_sim::config::AxisConfig;
+use wheeleg_studies::compare::{Figures, Move, RECOVERY_S, Scene, Sizes, Variation};
 use wheeleg_units::{Duty, PositionMm};
 
 fn bench_axis() -> AxisParams {

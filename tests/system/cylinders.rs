@@ -5,11 +5,11 @@
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
+use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_sim::bench::grain::{COARSE, Grain};
-use wheeleg_sim::bench::suite::{Factors, StartUp, steps};
-use wheeleg_sim::bench::{Kind, Metrics};
-use wheeleg_sim::config::AxisConfig;
+use wheeleg_studies::bench::grain::{COARSE, Grain};
+use wheeleg_studies::bench::suite::{Factors, StartUp, steps};
+use wheeleg_studies::bench::{Kind, Metrics};
 
 /// How many cylinders are drawn, and the number of the first: others than those that the law's
 /// factors were searched on (1000 to 1119 of the generator at 8239838) show whether they hold.

@@ -6,10 +6,10 @@ use std::fs;
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
+use wheeleg_config::builtin;
 use wheeleg_plant::testing::wheeleg_2003_axis;
-use wheeleg_sim::config::builtin;
-use wheeleg_sim::delay::trial::{Law, Start};
-use wheeleg_sim::delay::{
+use wheeleg_studies::delay::trial::{Law, Start};
+use wheeleg_studies::delay::{
     EARLY_LIMIT_MM, NOTICED_LIMIT_S, Options, PAPER_BAND_S, PAPER_DELAY_S, Study, axis_of, study,
 };
 

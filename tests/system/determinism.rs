@@ -5,14 +5,18 @@ mod sil;
 use std::thread;
 
 use sil::{gait, robot, run};
+use wheeleg_config::{EventAction, LegChoice, RobotConfig, Scenario};
+use wheeleg_master::command::Command;
 use wheeleg_plant::robot::{Inputs, Plant, PlantParams, PlantState};
-use wheeleg_sim::config::{EventAction, LegChoice, RobotConfig, Scenario};
 
 /// A run with everything in it that could be left to chance: motion, contact,
 /// requests on the bus, a loss of the master, a staged exhaust.
 fn eventful() -> Scenario {
     let events = [
-        (0.4, sil::command_to("TransmitPosition", 5)),
+        (
+            0.4,
+            EventAction::Command(Command::TransmitPosition { joint: 5 }),
+        ),
         (4.0, EventAction::KillMaster),
     ];
     gait(LegChoice::Left, 5.0, &events)

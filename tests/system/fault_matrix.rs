@@ -6,17 +6,18 @@ use crate::sil;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-use crate::sil::{command, gait, robot, run, scenario, story};
+use crate::sil::{gait, robot, run, scenario, story};
 use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
+use wheeleg_config::faults::{FaultKind, KINDS};
+use wheeleg_config::{EventAction, LegChoice, builtin};
+use wheeleg_master::command::Command as UserCommand;
 use wheeleg_protocol::SCHEMA_HASH;
-use wheeleg_sim::config::{EventAction, LegChoice, builtin};
-use wheeleg_sim::faults::matrix::{self, Expect, ROWS, Verdict};
-use wheeleg_sim::faults::{FaultKind, KINDS};
-use wheeleg_sim::interface::{Side, archive, first_difference};
-use wheeleg_sim::telemetry::Recorder;
+use wheeleg_remote_host::interface::{Side, archive, first_difference};
+use wheeleg_studies::matrix::{self, Expect, ROWS, Verdict};
+use wheeleg_telemetry::Recorder;
 
 const DOCUMENT: &str = include_str!("../../host-sim/FAULTS.md");
 
@@ -213,15 +214,20 @@ fn a_robot_that_is_started_again_and_again_acts_on_no_wrong_frame_for_a_minute()
     let rounds = (0..20).flat_map(|round| {
         let from_s = 1.0 + 3.0 * f64::from(round);
         let clear = (from_s, EventAction::ClearFault);
-        let commands = [(0.2, "Arm"), (0.5, "Stand"), (1.5, "StartGait")];
-        let commands = commands.map(|(after_s, name)| (from_s + after_s, command(name)));
+        let commands = [
+            (0.2, UserCommand::Arm),
+            (0.5, UserCommand::Stand),
+            (1.5, UserCommand::StartGait),
+        ];
+        let commands =
+            commands.map(|(after_s, command)| (from_s + after_s, EventAction::Command(command)));
         std::iter::once(clear).chain(commands)
     });
     let mut scenario = gait(LegChoice::Left, 61.0, &rounds.collect::<Vec<_>>());
     scenario.faults = vec!["bit-errors=1e-4@0.5s..60.5s".parse().expect("a fault")];
     let mut recorder = Recorder::in_memory();
     let go_on = &mut |_| ControlFlow::Continue(());
-    let outcome = wheeleg_sim::sil::run(&scenario, &robot(), 1, &mut recorder, go_on);
+    let outcome = wheeleg_sim::run(&scenario, &robot(), 1, &mut recorder, go_on);
     let line = outcome.expect("the run gets to its end").line;
     let recording = recorder.finish().expect("nothing is written to a file");
     let mut story = story(&recording);

@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use wheeleg_sim::config::{Scenario, builtin};
-use wheeleg_sim::sil;
-use wheeleg_sim::telemetry::{Recorder, Recording};
+use wheeleg_config::{Scenario, builtin};
+use wheeleg_sim as sil;
+use wheeleg_telemetry::{Recorder, Recording};
 
 /// Sides with their bit in the log and the master's name for them.
 const SIDES: [(&str, u8, &str); 4] = [
@@ -93,9 +93,8 @@ fn assert_side(recording: &Recording, foot: usize, (side, bit, reported): (&str,
     } else {
         bit ^ 0b1100
     };
-    let after = |row: &&wheeleg_sim::telemetry::Row<_>| {
-        (sensed_ns..sensed_ns + 100_000_000).contains(&row.t_ns)
-    };
+    let after =
+        |row: &&wheeleg_telemetry::Row<_>| (sensed_ns..sensed_ns + 100_000_000).contains(&row.t_ns);
     let rows: Vec<_> = recording.feet[foot].iter().filter(after).collect();
     assert!(
         rows.iter().all(|row| row.v.switches & across == 0),
@@ -124,8 +123,8 @@ fn each_side_of_the_left_foot_is_felt_as_that_side() {
 fn each_side_of_the_right_foot_is_felt_as_that_side() {
     for side in SIDES {
         let mut scenario = scenario(side.0);
-        scenario.motion = wheeleg_sim::config::Motion::SquareWave {
-            leg: wheeleg_sim::config::LegChoice::Right,
+        scenario.motion = wheeleg_config::Motion::SquareWave {
+            leg: wheeleg_config::LegChoice::Right,
         };
         // The right foot comes down where the left one would, less the track of the feet.
         for patch in &mut scenario.ground {

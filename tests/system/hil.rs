@@ -13,11 +13,11 @@ use std::time::Duration;
 
 use serialport::{SerialPort as _, TTYPort};
 use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, Stream, WheelPins, serve};
+use wheeleg_remote_host::Partner;
+use wheeleg_remote_host::RemoteError;
+use wheeleg_remote_host::serial::{HilOptions, SerialLine, connect};
 use wheeleg_remote_link::frame::MAX_FRAME;
 use wheeleg_remote_link::{Hello, Image, LINK_VERSION, Reply, Request, encode};
-use wheeleg_sim::SimError;
-use wheeleg_sim::hil::{HilOptions, SerialLine, connect};
-use wheeleg_sim::pil::Partner;
 
 use bench::{NoTime, assert_same, closed_loop, closed_loop_as_the_host};
 
@@ -120,10 +120,8 @@ fn ask(partner: &mut Partner<SerialLine>, request: &Request) -> Reply {
 }
 
 /// Message and advice of an error.
-fn said(error: &SimError) -> String {
-    let SimError::Simulation { what, help } = error else {
-        panic!("{error:?}");
-    };
+fn said(error: &RemoteError) -> String {
+    let RemoteError { what, help } = error;
     format!("{what} | {help}")
 }
 
@@ -153,7 +151,7 @@ fn a_board_can_be_asked_anew_after_its_partner_has_gone() {
         let mut frame = [0; MAX_FRAME];
         let whole = encode(0, &bench::power_up(1), &mut frame).expect("fits");
         let mut line = partner.into_stream();
-        wheeleg_sim::pil::Stream::send(&mut line, &whole[..whole.len() / 2]).expect("sent");
+        wheeleg_remote_host::Stream::send(&mut line, &whole[..whole.len() / 2]).expect("sent");
     }
     let (mut partner, _) = connect(&bench.options, "joint").expect("a joint board");
     let second = closed_loop(50, |request| ask(&mut partner, request));

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::sil::{robot, scenario};
+use wheeleg_config::{RobotConfig, Scenario, builtin};
 use wheeleg_node::joint::MotionAccount;
 use wheeleg_protocol::Fault;
-use wheeleg_sim::config::{RobotConfig, Scenario, builtin};
-use wheeleg_sim::sil::{WatchedJoint, run_watched};
-use wheeleg_sim::telemetry::Recorder;
+use wheeleg_sim::{WatchedJoint, run_watched};
+use wheeleg_telemetry::Recorder;
 use wheeleg_tests::{STEP, mix};
 
 /// How many robots are drawn, and the number of the first: others than those that a bound was

@@ -5,11 +5,11 @@
 use crate::bench::pil::{Board, edge};
 use crate::bench::{delivery, numbered};
 use wheeleg_protocol::{Address, FaultReport};
+use wheeleg_remote_host::unicorn::image;
 use wheeleg_remote_link::{
     Figures, Hook, Outputs, Power, Ran, Reply, Request, Run, SOFTWARE_RESET, Straps, WATCHDOG_RESET,
 };
-use wheeleg_sim::pil::unicorn::image;
-use wheeleg_sim::sil::BOARD_START_UP_NS;
+use wheeleg_sim::BOARD_START_UP_NS;
 
 /// RCC_CSR: brown-out or power-on.
 const BROWN_OUT: u32 = 1 << 27;

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use crate::bench::pil::{Board, edge};
 use crate::bench::{delivery, numbered, power_up};
 use wheeleg_protocol::{Address, Decoder, Fault, FaultRecord, FaultReport, MAX_ENCODED, Message};
+use wheeleg_remote_host::unicorn::image;
 use wheeleg_remote_link::{Figures, Hook, Power, Ran, Reply, Request};
-use wheeleg_sim::pil::unicorn::image;
 
 /// Folder with one folder of images per mutation (firmware/board/src/g431/mutant.rs).
 const MUTANTS: &str = "WHEELEG_MUTANTS";

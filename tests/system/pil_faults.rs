@@ -12,10 +12,10 @@ use std::process::Command;
 use crate::bench::pil::Board;
 use crate::bench::power_up;
 use crate::sil::{at, energised, gait, range, robot, run_with, window};
+use wheeleg_config::{EventAction, LegChoice, Scenario};
+use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_remote_link::{Hook, Power, Ran, Reply, Request, Run};
-use wheeleg_sim::config::{EventAction, LegChoice, Scenario};
-use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes, PilSummary};
-use wheeleg_sim::telemetry::{JointSample, Recording, Row, WheelSample};
+use wheeleg_telemetry::{JointSample, Recording, Row, WheelSample};
 
 /// Valves commanded shut and wheel ramps begun within this, s.
 const REACTION_S: f64 = 0.060;

@@ -13,8 +13,8 @@ use wheeleg_protocol::{
     Address, Arm, ClearFault, Decoder, Fault, FaultReport, LinkReport, Message, SCHEMA_HASH,
     SyncSlots, TransmitPosition, WheelSetpoint,
 };
+use wheeleg_remote_host::unicorn::image;
 use wheeleg_remote_link::{Hook, Inputs, Outputs, Power, Ran, Reply, Request, Run, text};
-use wheeleg_sim::pil::unicorn::image;
 use wheeleg_tests::{STEP, mix};
 use wheeleg_units::WheelCount;
 

@@ -14,13 +14,13 @@ use std::process::{Child, Command, Stdio};
 
 use bench::{NoTime, closed_loop_as_the_host};
 use sil::{gait, robot, run_with};
+use wheeleg_config::LegChoice;
 use wheeleg_remote::{RemoteWheel, Session, WheelPins};
+use wheeleg_remote_host::serial::{HilOptions, connect};
+use wheeleg_remote_host::unicorn::{self, image};
+use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes};
 use wheeleg_remote_link::{Inputs, Outputs, Ran, Reply, Request, Run};
-use wheeleg_sim::config::LegChoice;
-use wheeleg_sim::hil::{HilOptions, connect};
-use wheeleg_sim::pil::unicorn::{self, image};
-use wheeleg_sim::pil::{NodeChoice, NodeKind, Nodes};
-use wheeleg_sim::telemetry::Recorder;
+use wheeleg_telemetry::Recorder;
 
 /// A bench board that is emulated.
 struct Bench {
@@ -117,10 +117,8 @@ fn the_robot_walks_with_a_joint_and_a_wheel_on_the_bench() {
     // And the robot does what it does without.
     let native = sil::run(&gait(LegChoice::Left, 1.2, &[]), &robot(), 1);
     assert!(recording.joints == native.joints && recording.wheels == native.wheels);
-    let moves = |rows: &[wheeleg_sim::telemetry::Row<_>]| {
-        let (low, high) = sil::range(rows, |s: &wheeleg_sim::telemetry::JointSample| {
-            s.position_mm
-        });
+    let moves = |rows: &[wheeleg_telemetry::Row<_>]| {
+        let (low, high) = sil::range(rows, |s: &wheeleg_telemetry::JointSample| s.position_mm);
         high - low
     };
     assert!(moves(&recording.joints[1]) > 20.0, "worth comparing");
@@ -132,7 +130,7 @@ fn a_cable_pulled_in_mid_run_ends_it_with_an_error_that_names_the_port() {
     let nodes = Nodes::new(&NodeKind::Sil, &[bench.choice("joint1")]).expect("one each");
     let port = bench.port.clone();
     let mut recorder = Recorder::in_memory();
-    let outcome = wheeleg_sim::sil::run_with(
+    let outcome = wheeleg_sim::run_with(
         &gait(LegChoice::Left, 2.0, &[]),
         &robot(),
         1,

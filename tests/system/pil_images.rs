@@ -8,8 +8,8 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 use wheeleg_protocol::SCHEMA_HASH;
+use wheeleg_remote_host::unicorn;
 use wheeleg_remote_link::image::{Identity, Kind, identify};
-use wheeleg_sim::pil::unicorn;
 
 /// Begin of the record in a file (firmware/identity).
 const MARK: &[u8] = b"WLIM";

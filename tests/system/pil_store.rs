@@ -6,22 +6,24 @@
 use crate::bench::pil::{Board, edge};
 use crate::bench::{delivery, numbered, power_up};
 use crate::sil;
-use crate::sil::{command, command_about, run_with, stand};
+use crate::sil::{run_with, stand};
+use wheeleg_config::EventAction;
+use wheeleg_master::command::Command;
 use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{
     Address, Decoder, FaultRecord, FaultReport, Message, NackReason, ParamGet, ParamSave, ParamSet,
     ResetCause,
 };
+use wheeleg_remote_host::unicorn::image;
+use wheeleg_remote_host::{NodeKind, Nodes};
 use wheeleg_remote_link::{Hook, Power, Ran, Reply, Request};
-use wheeleg_sim::pil::unicorn::image;
-use wheeleg_sim::pil::{NodeKind, Nodes};
 
 const ADDRESS: u8 = 2;
 const MS: u64 = 1_000_000;
 /// Start-up with its self-test of ten readings, ms.
 const START_MS: u64 = 40;
-/// A blank store is erased twice, 22 ms each, ms.
-const SAVE_MS: u64 = 60;
+/// A page is erased in 22 ms, and then written, ms.
+const SAVE_MS: u64 = 35;
 const PARAMETER: JointParam = JointParam::FollowingError;
 
 /// An emulated joint board and its partner on the bus.
@@ -176,28 +178,31 @@ fn a_power_cut_in_any_unit_of_a_save_leaves_the_old_value_or_the_new_one_and_a_d
     assert_eq!(found, expected, "the word with the checksum decides");
 }
 
+fn write(node: u8, id: u16, raw: i32) -> EventAction {
+    EventAction::Command(Command::WriteParameter { node, id, raw })
+}
+
+fn read(node: u8, id: u16) -> EventAction {
+    EventAction::Command(Command::ReadParameter { node, id })
+}
+
+fn save(node: u8) -> EventAction {
+    EventAction::Command(Command::SaveParameters { node })
+}
+
 #[test]
 fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
     // The law that takes longest to set up, and one value of a wheel.
     let (law, error) = (JointParam::Law.id(), WheelParam::FollowingError.id());
     let events = [
-        (0.2, command("Disarm")),
-        (
-            0.4,
-            command_about("WriteParameter", 3, Some((law, Some(5)))),
-        ),
-        (
-            0.6,
-            command_about("WriteParameter", 8, Some((error, Some(12_345)))),
-        ),
-        (0.8, command_about("SaveParameters", 3, None)),
-        (1.0, command_about("SaveParameters", 8, None)),
-        (
-            1.2,
-            command_about("WriteParameter", 3, Some((law, Some(1)))),
-        ),
-        (1.4, command_about("ReadParameter", 3, Some((law, None)))),
-        (1.6, command_about("ReadParameter", 8, Some((error, None)))),
+        (0.2, EventAction::Command(Command::Disarm)),
+        (0.4, write(3, law, 5)),
+        (0.6, write(8, error, 12_345)),
+        (0.8, save(3)),
+        (1.0, save(8)),
+        (1.2, write(3, law, 1)),
+        (1.4, read(3, law)),
+        (1.6, read(8, error)),
     ];
     let scenario = stand(1.8, &events);
     let nodes = Nodes::new(&NodeKind::Pil, &[]).expect("one each");
@@ -219,15 +224,13 @@ fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
 #[test]
 fn in_a_whole_run_a_board_without_power_goes_on_with_what_it_had_saved_as_on_the_host() {
     let (own, error) = (PARAMETER.id(), WheelParam::FollowingError.id());
-    let write = |board, id, raw| command_about("WriteParameter", board, Some((id, Some(raw))));
-    let read = |board, id| command_about("ReadParameter", board, Some((id, None)));
     let mm = |mm: f64| (mm * 65_536.0) as i32;
     let events = [
-        (0.2, command("Disarm")),
+        (0.2, EventAction::Command(Command::Disarm)),
         (0.4, write(3, own, mm(55.0))),
         (0.5, write(8, error, 12_345)),
-        (0.6, command_about("SaveParameters", 3, None)),
-        (0.8, command_about("SaveParameters", 8, None)),
+        (0.6, save(3)),
+        (0.8, save(8)),
         // In force, and not saved.
         (1.0, write(3, own, mm(70.0))),
         (1.1, write(8, error, 777)),

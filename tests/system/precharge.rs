@@ -1,12 +1,13 @@
 //! Precharge on simulated cylinders: what it makes of the first motion after a stop, and how far
 //! the piston moves while the chambers are filled. The board is the whole application.
 
-use crate::sil::{command, range, robot, robot_with, run, stand, window};
+use crate::sil::{range, robot, robot_with, run, stand, window};
+use wheeleg_config::{AxisConfig, EventAction};
+use wheeleg_master::command::Command;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{Arm, ClearFault, Limit, LinkLossAction, SCHEMA_HASH};
-use wheeleg_sim::bench::{Bench, Kind, Motion, Node, Trace, design};
-use wheeleg_sim::config::{AxisConfig, EventAction};
+use wheeleg_studies::bench::{Bench, Kind, Motion, Node, Trace, design};
 
 /// Raw value of a bar.
 const BAR: f64 = 65_536.0;
@@ -225,7 +226,7 @@ fn a_robot_that_stands_on_its_legs_neither_rises_nor_sinks() {
     let events = [
         (stop, EventAction::EStop),
         (clear, EventAction::ClearFault),
-        (arm, command("Arm")),
+        (arm, EventAction::Command(Command::Arm)),
     ];
     let recording = run(
         &stand(arm + 2.0, &events),

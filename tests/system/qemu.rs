@@ -10,6 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use heapless::Vec as Short;
+use wheeleg_config::{LegChoice, Scenario};
 use wheeleg_plant::testing::wheeleg_2003_valve;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
@@ -17,14 +18,13 @@ use wheeleg_protocol::{
     SCHEMA_HASH, Sync, SyncFlags, SyncSlots, WheelSetpoint,
 };
 use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, WheelPins};
+use wheeleg_remote_host::RemoteError;
+use wheeleg_remote_host::qemu::{Qemu, QemuOptions};
+use wheeleg_remote_host::serial::{HilOptions, connect};
+use wheeleg_remote_host::{NodeKind, Nodes, Partner};
 use wheeleg_remote_link::{
     Figures, Inputs, Nonvolatile, Power, Ran, Reply, Request, Run, Switches,
 };
-use wheeleg_sim::SimError;
-use wheeleg_sim::config::{LegChoice, Scenario};
-use wheeleg_sim::hil::{HilOptions, connect};
-use wheeleg_sim::pil::qemu::{Qemu, QemuOptions};
-use wheeleg_sim::pil::{NodeKind, Nodes, Partner};
 use wheeleg_units::{PositionMm, WheelCount, WireVelocity};
 
 use bench::{NoTime, assert_same, closed_loop, closed_loop_as_the_host, power_up, script};
@@ -44,10 +44,8 @@ fn board(name: &str) -> Partner<Qemu> {
     partner
 }
 
-fn said(error: &SimError) -> String {
-    let SimError::Simulation { what, help } = error else {
-        panic!("{error:?}");
-    };
+fn said(error: &RemoteError) -> String {
+    let RemoteError { what, help } = error;
     format!("{what} | {help}")
 }
 
@@ -366,7 +364,7 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
 const HOLD: u8 = 4;
 
 /// The gait with a loss of power of `node` at `t` s, and that board on QEMU.
-fn loss_of_power(fault: &str, t: f64, node: &str) -> (wheeleg_sim::telemetry::Recording, u16) {
+fn loss_of_power(fault: &str, t: f64, node: &str) -> (wheeleg_telemetry::Recording, u16) {
     let scenario = Scenario {
         faults: vec![format!("{fault}@{t:.3}s").parse().expect("a fault")],
         ..sil::gait(LegChoice::Left, t + 0.6, &[])

@@ -2,10 +2,11 @@
 //! walks: all come back within a second, disarmed, and nothing moves until the user says
 //! so.
 
-use crate::sil::{at, command, energised, gait, range, robot, run, stand, story, window};
-use wheeleg_sim::config::{EventAction, LegChoice};
-use wheeleg_sim::pil::Nodes;
-use wheeleg_sim::telemetry::{JointSample, Recording, Row};
+use crate::sil::{at, energised, gait, range, robot, run, stand, story, window};
+use wheeleg_config::{EventAction, LegChoice};
+use wheeleg_master::command::Command;
+use wheeleg_remote_host::Nodes;
+use wheeleg_telemetry::{JointSample, Recording, Row};
 
 /// The wheels push, the horizontal cylinder moves.
 const FIRST_S: f64 = 2.5;
@@ -55,7 +56,7 @@ fn restart(order: [Who; 3], gap_s: f64) -> (Recording, f64) {
     let armed_s = last_s + RECOVERED_S;
     let events = [
         (armed_s - 0.1, EventAction::ClearFault),
-        (armed_s, command("Arm")),
+        (armed_s, EventAction::Command(Command::Arm)),
     ];
     let mut scenario = gait(LegChoice::Left, armed_s + 0.5, &events);
     for (i, who) in order.into_iter().enumerate() {
@@ -139,7 +140,7 @@ fn a_master_that_starts_again_after_minutes_is_noticed_as_well() {
 /// The user's program may come back alone: the robot goes on, and listens to it.
 #[test]
 fn a_client_that_comes_back_is_heard_and_nothing_else_happens() {
-    let events = [(3.0, command("Hold"))];
+    let events = [(3.0, EventAction::Command(Command::Hold))];
     let mut scenario = gait(LegChoice::Left, 3.5, &events);
     scenario
         .faults

@@ -2,9 +2,10 @@
 //! gait, E-stop, and coming back from it. Checked on the commanded, sensed and
 //! physical signals.
 
-use crate::sil::{at, command, energised, gait, range, robot, run, story, window};
-use wheeleg_sim::config::{EventAction, LegChoice};
-use wheeleg_sim::telemetry::{JointSample, Recording, Row};
+use crate::sil::{at, energised, gait, range, robot, run, story, window};
+use wheeleg_config::{EventAction, LegChoice};
+use wheeleg_master::command::Command;
+use wheeleg_telemetry::{JointSample, Recording, Row};
 use wheeleg_tests::{STEP, mix};
 
 /// Valves commanded shut and wheel ramps begun within this, s.
@@ -255,7 +256,7 @@ fn losing_the_master_at_a_hundred_instants_is_latched_in_time() {
 }
 
 /// Loses the master for 100 ms from `t` on; 1 if a valve was driven within 20 ms before.
-fn lose_master(robot: &wheeleg_sim::config::RobotConfig, t: f64, part: &str) -> u32 {
+fn lose_master(robot: &wheeleg_config::RobotConfig, t: f64, part: &str) -> u32 {
     let mut scenario = gait(LegChoice::Left, t + 0.25, &[]);
     let text = format!("master-silent@{t:.3}s..{:.3}s", t + 0.1);
     scenario.faults.push(text.parse().expect("a fault"));
@@ -325,9 +326,9 @@ fn coming_back_from_an_e_stop_moves_nothing() {
         let events = [
             (t, EventAction::EStop),
             // Too early: the stop is latched.
-            (t + 0.5, command("Arm")),
+            (t + 0.5, EventAction::Command(Command::Arm)),
             (clear, EventAction::ClearFault),
-            (arm, command("Arm")),
+            (arm, EventAction::Command(Command::Arm)),
         ];
         let recording = run(&gait(LegChoice::Left, arm + 1.5, &events), &robot, 1);
         let told = story(&recording);
@@ -395,7 +396,7 @@ fn without_supply_pressure_the_robot_does_not_arm() {
     let events = [
         (t, EventAction::EStop),
         (t + 1.2, EventAction::ClearFault),
-        (t + 1.3, command("Arm")),
+        (t + 1.3, EventAction::Command(Command::Arm)),
     ];
     let recording = run(&gait(LegChoice::Left, t + 3.0, &events), &robot(), 1);
     assert!(!at(&recording.supply, t + 1.3).pressure_switch);

@@ -21,4 +21,5 @@ mod precharge;
 mod restart;
 mod safe_states;
 mod service;
+mod session;
 mod workspace;

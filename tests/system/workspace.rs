@@ -13,7 +13,7 @@ mod circles;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 19] = [
+const ARROWS: [(&str, &[&str]); 25] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -61,18 +61,45 @@ const ARROWS: [(&str, &[&str]); 19] = [
     ("wheeleg-remote-link", &["wheeleg-identity"]),
     // GPL-2.0-only: nothing may depend on it (no line here names it).
     ("wheeleg-pil-unicorn", &["wheeleg-remote-link"]),
-    ("wheeleg-sim", &LIBRARIES),
+    (
+        "wheeleg-config",
+        &[
+            "wheeleg-kinematics",
+            "wheeleg-master",
+            "wheeleg-node",
+            "wheeleg-plant",
+            "wheeleg-protocol",
+            "wheeleg-units",
+        ],
+    ),
+    ("wheeleg-telemetry", &["wheeleg-protocol"]),
+    (
+        "wheeleg-remote-host",
+        &[
+            "wheeleg-config",
+            "wheeleg-identity",
+            "wheeleg-node",
+            "wheeleg-protocol",
+            "wheeleg-remote-link",
+            "wheeleg-units",
+        ],
+    ),
+    ("wheeleg-sim", &SIM),
+    ("wheeleg-report", &[]),
+    ("wheeleg-studies", &STUDIES),
+    ("wheeleg", &PROGRAM),
     ("wheeleg-tests", &TESTED),
     (
         "wheeleg-fuzz-targets",
         &[
             "wheeleg-board",
+            "wheeleg-config",
             "wheeleg-master",
             "wheeleg-node",
             "wheeleg-protocol",
             "wheeleg-remote",
             "wheeleg-remote-link",
-            "wheeleg-sim",
+            "wheeleg-studies",
             "wheeleg-units",
         ],
     ),
@@ -89,19 +116,50 @@ const ARROWS: [(&str, &[&str]); 19] = [
     ("insn-plugin", &[]),
 ];
 
-const LIBRARIES: [&str; 9] = [
+const SIM: [&str; 11] = [
+    "wheeleg-config",
     "wheeleg-control",
-    "wheeleg-identity",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
     "wheeleg-plant",
     "wheeleg-protocol",
+    "wheeleg-remote-host",
     "wheeleg-remote-link",
+    "wheeleg-telemetry",
     "wheeleg-units",
 ];
 
-const TESTED: [&str; 11] = [
+const STUDIES: [&str; 12] = [
+    "wheeleg-config",
+    "wheeleg-control",
+    "wheeleg-kinematics",
+    "wheeleg-master",
+    "wheeleg-node",
+    "wheeleg-plant",
+    "wheeleg-protocol",
+    "wheeleg-remote-host",
+    "wheeleg-report",
+    "wheeleg-sim",
+    "wheeleg-telemetry",
+    "wheeleg-units",
+];
+
+const PROGRAM: [&str; 10] = [
+    "wheeleg-config",
+    "wheeleg-kinematics",
+    "wheeleg-master",
+    "wheeleg-plant",
+    "wheeleg-protocol",
+    "wheeleg-remote-host",
+    "wheeleg-report",
+    "wheeleg-sim",
+    "wheeleg-studies",
+    "wheeleg-telemetry",
+];
+
+const TESTED: [&str; 15] = [
+    "wheeleg-config",
     "wheeleg-control",
     "wheeleg-identity",
     "wheeleg-kinematics",
@@ -110,8 +168,11 @@ const TESTED: [&str; 11] = [
     "wheeleg-plant",
     "wheeleg-protocol",
     "wheeleg-remote",
+    "wheeleg-remote-host",
     "wheeleg-remote-link",
     "wheeleg-sim",
+    "wheeleg-studies",
+    "wheeleg-telemetry",
     "wheeleg-units",
 ];
 

@@ -9,7 +9,8 @@ use crate::process::{command, output, target_dir};
 use crate::rust;
 
 /// What is measured of each board.
-const MEASURED: [&str; 5] = [
+const MEASURED: [&str; 6] = [
+    "tick_instructions_mean",
     "tick_instructions_median",
     "tick_instructions_worst",
     "longest_awake_instructions",

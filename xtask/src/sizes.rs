@@ -84,8 +84,8 @@ fn stack_fits(image: &Image) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Holds what runs on emulated boards have measured (`tick_instructions_worst` and
-/// `stack_used_bytes` of each image in `figures`) and the images themselves against budget
+/// Holds what runs on emulated boards have measured (`tick_instructions_worst`,
+/// `tick_instructions_mean` and `stack_used_bytes` of each image in `figures`) and the images themselves against budget
 /// and static bound, and puts those beside it.
 pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
     let mut breaches = Vec::new();
@@ -96,6 +96,7 @@ pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
         let number = |key: &str| measured[key].as_u64().unwrap_or(0);
         let run = Run {
             tick_instructions: number("tick_instructions_worst"),
+            tick_instructions_mean: number("tick_instructions_mean"),
             stack_used_bytes: number("stack_used_bytes"),
         };
         let mut found = row.budget.breaches(&row.figures);
@@ -104,11 +105,12 @@ pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
         let bound = row.figures.stack_bound_bytes;
         println!(
             "    {name:<5} stack {} bytes painted over, {bound} at worst by the call graph, {} there; \
-             tick {} instructions at worst, {} allowed",
+             tick {} instructions at worst, {} allowed, {} in the mean",
             run.stack_used_bytes,
             row.figures.stack_room_bytes,
             run.tick_instructions,
-            row.budget.tick_instructions_max
+            row.budget.tick_instructions_max,
+            run.tick_instructions_mean
         );
         if let Some(known) = &row.budget.tick_shortfall {
             println!("      KNOWN SHORTFALL of the tick: {}", known.reason);
@@ -122,12 +124,6 @@ pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
     } else {
         Err(anyhow::anyhow!(breaches.join("; ")).into())
     }
-}
-
-/// Holds the worst tick of joint boards with the predictive law against its budget.
-pub(crate) fn check_predictive(tick: u64) -> StepResult {
-    let breach = Budget::read("joint")?.breach_of_predictive(tick);
-    breach.map_or(Ok(()), |text| Err(anyhow::anyhow!("joint: {text}").into()))
 }
 
 struct Row {

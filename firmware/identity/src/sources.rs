@@ -177,7 +177,7 @@ mod tests {
             let before = of(here.path(), images);
             assert_eq!(before, of(&there, images), "another place");
             for other in [
-                "host-sim/src/lib.rs",
+                "host-sim/sim/src/lib.rs",
                 "firmware/master/src/lib.rs",
                 "firmware/units/tests/all.rs",
                 "firmware/units/src/lib.rs.orig",

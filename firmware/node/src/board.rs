@@ -45,17 +45,17 @@ pub(crate) struct BoardCore {
     duplicates: DuplicateFilter,
     time: TimeSync,
     reset_cause: ResetCause,
-    pub(crate) save: Save,
+    save: Save,
 }
 
 /// Where a save of the parameters is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Save {
+enum Save {
     /// Nobody asked.
     Idle,
     /// To be done between two ticks.
     Asked,
-    /// Done; whether it went well is not told yet.
+    /// Done with the parameters in force; whether it went well is not told yet.
     Done(bool),
 }
 
@@ -140,11 +140,22 @@ impl BoardCore {
         store: &mut impl ParameterStore,
         at: Micros,
     ) {
-        let stored = self.mode().is_disarmed() && store.save(records).is_ok();
-        self.save = Save::Done(stored);
+        let disarmed = self.mode().is_disarmed();
+        let stored = disarmed && store.save(records).is_ok();
+        // What was not tried did not fail either: who asks again has it done.
+        self.save = if disarmed {
+            Save::Done(stored)
+        } else {
+            Save::Idle
+        };
         self.supervisor
             .note(LogEvent::Saved, u8::from(stored), 0, at);
         self.supervisor.restart_timing();
+    }
+
+    /// Other parameters are in force: what was stored, or is to be, is no longer them.
+    pub(crate) fn parameters_changed(&mut self) {
+        self.save = Save::Idle;
     }
 
     /// Answer to a request to save: Busy until it is done, then how it went, once.
@@ -370,10 +381,8 @@ fn common_request<A: Application>(
         _ => {
             let answer = application.request(request, at)?;
             if let Message::ParamSet(set) = request {
-                let core = application.core();
-                // What was stored is no longer what is in force.
-                core.save = Save::Idle;
-                core.supervisor.note(LogEvent::Parameter, 0, set.id, at);
+                let supervisor = &mut application.core().supervisor;
+                supervisor.note(LogEvent::Parameter, 0, set.id, at);
             }
             return Ok(answer);
         }

@@ -63,6 +63,11 @@ impl<const TICKS: u8> Debounce<TICKS> {
         self.state
     }
 
+    /// A tick in which the levels could not be read: no samples are in a row across it.
+    pub fn missed(&mut self) {
+        self.planes = [0; 3];
+    }
+
     /// Debounced levels, one bit per switch.
     pub const fn state(&self) -> u8 {
         self.state
@@ -72,6 +77,17 @@ impl<const TICKS: u8> Debounce<TICKS> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn samples_on_both_sides_of_an_unreadable_one_are_not_in_a_row() {
+        let mut switches = Debounce::<3>::new();
+        switches.sample(1);
+        switches.sample(1);
+        switches.missed();
+        assert_eq!([1, 1, 1].map(|raw| switches.sample(raw)), [0, 0, 1]);
+        switches.missed();
+        assert_eq!(switches.state(), 1);
+    }
 
     #[test]
     fn change_takes_exactly_three_samples_both_ways() {

@@ -26,6 +26,7 @@
     )
 )]
 
+pub mod acceptance;
 mod board;
 pub mod clock;
 pub mod debounce;

@@ -3,9 +3,11 @@
 //! stroke = (code − zero) · full scale / 2^16. An open or shorted
 //! potentiometer pulls the converter input to a rail, outside the valid codes;
 //! a loose wiper makes jumps that no piston can. A rejected reading is replaced
-//! by the last good one. Two rejections in a row are a fault, so a dead sensor is
+//! by the last good one, for as long as the sensor is faulty. Two rejections in a row are a fault, so a dead sensor is
 //! acted upon in its second tick; so is a wiper that loses contact every other
 //! tick, in its third rejection (a leaky count: +2 bad, −1 good, fault at 4).
+//! After a fault the wiper may have come back anywhere: the first good reading is compared
+//! with nothing, and it says that what holds a history of strokes must begin anew.
 //! A sensor that is stuck inside its range is not seen here: following error
 //! sees it.
 
@@ -63,6 +65,9 @@ pub struct Reading {
     pub rejected: Option<Rejection>,
     /// Set when the sensor is faulty now: the reason of the newest rejection.
     pub fault: Option<Rejection>,
+    /// The first good reading, or the first one after a fault: no stroke before it belongs
+    /// to the same motion.
+    pub is_first: bool,
 }
 
 /// Checks and converts the readings of one position sensor. In an order in which it is two whole
@@ -73,6 +78,7 @@ pub struct SensorMonitor {
     /// The last good position; zero without one.
     last: PositionMm,
     rejected: u8,
+    /// The next reading may be compared with the last good one.
     has_last: bool,
     good_in_row: u16,
 }
@@ -115,6 +121,7 @@ impl SensorMonitor {
     ) -> Reading {
         match self.check(reading, config) {
             Ok(position) => {
+                let is_first = !self.has_last;
                 self.last = position;
                 self.has_last = true;
                 self.rejected = self.rejected.saturating_sub(1);
@@ -123,6 +130,7 @@ impl SensorMonitor {
                     position,
                     rejected: None,
                     fault: None,
+                    is_first,
                 }
             }
             Err(rejection) => {
@@ -130,20 +138,28 @@ impl SensorMonitor {
                 let level = self.rejected.saturating_add(REJECTED_WEIGHT);
                 self.rejected = level.min(FAULT_LEVEL);
                 let fault = (level >= FAULT_LEVEL).then_some(rejection);
-                let position = self.last;
                 if fault.is_some() {
-                    // Nothing to compare with any more: the wiper may have
-                    // come back anywhere.
-                    self.last = PositionMm::ZERO;
+                    // Nothing to compare with any more: the wiper may come back
+                    // anywhere. Its last good place is still the best guess.
                     self.has_last = false;
                 }
                 Reading {
-                    position,
+                    position: self.last,
                     rejected: Some(rejection),
                     fault,
+                    is_first: false,
                 }
             }
         }
+    }
+
+    /// Another calibration: the sensor has to prove itself anew. Until it does, the last good
+    /// position stands.
+    pub fn restart(&mut self) {
+        *self = Self {
+            last: self.last,
+            ..Self::new()
+        };
     }
 
     /// Whether enough good readings have been seen in a row.
@@ -252,6 +268,37 @@ mod tests {
             assert_eq!(first.position, PositionMm::from_int(50), "last good one");
             assert_eq!(monitor.sample(bad, &CONFIG).fault, Some(reason));
         }
+    }
+
+    /// A blind sensor says nothing of the stroke: neither that it is zero nor that it moves.
+    #[test]
+    fn the_last_good_position_stands_for_as_long_as_the_sensor_is_faulty() {
+        let mut monitor = SensorMonitor::new();
+        assert!(monitor.sample(code(100), &CONFIG).is_first);
+        assert!(!monitor.sample(code(100), &CONFIG).is_first);
+        for _ in 0..20 {
+            let reading = monitor.sample(Ok(AdcCode::MIN), &CONFIG);
+            assert_eq!(reading.position, PositionMm::from_int(100));
+            assert!(!reading.is_first);
+        }
+        let back = monitor.sample(code(60), &CONFIG);
+        assert_eq!(back.position, PositionMm::from_int(60));
+        assert_eq!((back.rejected, back.is_first), (None, true));
+        assert!(!monitor.sample(code(60), &CONFIG).is_first);
+    }
+
+    #[test]
+    fn another_calibration_has_to_prove_itself_and_keeps_the_place_meanwhile() {
+        let mut monitor = SensorMonitor::new();
+        for _ in 0..SELF_TEST_READINGS {
+            monitor.sample(code(100), &CONFIG);
+        }
+        monitor.restart();
+        assert!(!monitor.is_settled());
+        let rejected = monitor.sample(Ok(AdcCode::MIN), &CONFIG);
+        assert_eq!(rejected.position, PositionMm::from_int(100));
+        let reading = monitor.sample(code(60), &CONFIG);
+        assert_eq!((reading.rejected, reading.is_first), (None, true));
     }
 
     #[test]

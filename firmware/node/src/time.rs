@@ -18,9 +18,13 @@ const WINDOW: Micros = Micros::from_millis(1000);
 /// Largest step of the difference that is a drift, µs.
 const JUMP_US: i32 = 100_000;
 
-/// Drift beyond which a board does not keep to its slot, ppm: over the 3.6 ms of
-/// the slots it is 7 µs, of a gap of 20 µs between two of them, and the neighbour
-/// may run as wrong the other way.
+/// Drift beyond which a board does not keep to its slot, ppm: from the latch of SYNC to the
+/// end of the last slot it is 5 µs, of a gap of 20 µs between two of them, and the
+/// neighbour may run as wrong the other way.
+///
+/// A board on its internal oscillator, good to about 2 %, is beyond it as any other whose clock is
+/// wrong: it would cut off the replies of its neighbours, and sound boards would be blamed.
+/// It answers and says why; it is not to be driven before its crystal is changed.
 pub const DRIFT_LIMIT_PPM: i16 = 2000;
 
 /// Offset and drift.
@@ -78,6 +82,8 @@ impl TimeSync {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_protocol::Address;
+    use wheeleg_protocol::link::GAP_US;
 
     /// Seconds after which a clock that is wrong by `ppm` is a fault, of ten.
     fn fault_after(ppm: i64, late_us: impl Fn(i64) -> i64) -> (Option<i64>, TimeSync) {
@@ -104,10 +110,24 @@ mod tests {
                 "{ppm} {clock:?}"
             );
         }
-        for ppm in [2100, -2100, 40_000, -50_000] {
+        for ppm in [2100, -2100, 10_000, 16_000, -19_000, 40_000, -50_000] {
             let (fault, _) = fault_after(ppm, |_| 0);
             assert!(matches!(fault, Some(1 | 2)), "{ppm} {fault:?}");
         }
+    }
+
+    #[test]
+    fn within_the_limit_no_slot_reaches_the_next_one_and_on_the_internal_oscillator_some_do() {
+        let timing = SlotTiming::DEFAULT;
+        let last = Address::nodes()
+            .last()
+            .and_then(|a| timing.slot_start_us(a));
+        let end_us = last.unwrap() + timing.frame_us(MessageType::SlotReply);
+        let off_us = |ppm: u32| end_us * ppm / 1_000_000;
+        // Two neighbours that run as wrong, one each way.
+        assert!(2 * off_us(DRIFT_LIMIT_PPM.unsigned_abs().into()) < GAP_US);
+        // The oscillator over 0 to 85 °C (DATASHEET), against a sound neighbour.
+        assert!(off_us(10_000) > GAP_US && off_us(19_000) > 2 * GAP_US);
     }
 
     #[test]

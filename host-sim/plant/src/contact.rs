@@ -182,7 +182,7 @@ impl ContactParams {
     #[must_use]
     pub fn mu(&self, speed_m_s: f64) -> f64 {
         let ratio = speed_m_s / self.stribeck_m_s;
-        self.mu_kinetic + (self.mu_static - self.mu_kinetic) * (-ratio * ratio).exp()
+        self.mu_kinetic + (self.mu_static - self.mu_kinetic) * libm::exp(-ratio * ratio)
     }
 
     /// Normal force (N) at a penetration (m) and a speed into the ground (m/s).
@@ -270,7 +270,7 @@ impl Touch {
         }
         let n = surface.normal;
         // First tangent: X laid into the surface. It is never vertical, so never zero.
-        let scale = 1.0 / n[2].hypot(n[0]);
+        let scale = 1.0 / libm::hypot(n[2], n[0]);
         let t1 = [n[2] * scale, 0.0, -n[0] * scale];
         let t2 = [
             n[1] * t1[2] - n[2] * t1[1],
@@ -304,7 +304,7 @@ fn within(v: [f64; 2], limit: f64) -> ([f64; 2], bool) {
 }
 
 fn length(v: [f64; 2]) -> f64 {
-    v[0].hypot(v[1])
+    libm::hypot(v[0], v[1])
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

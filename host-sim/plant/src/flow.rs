@@ -188,7 +188,7 @@ impl Restrictor {
         let b = path.critical_ratio;
         let inv = 1.0 / (1.0 - b);
         let y = (path.linear_ratio - b) * inv;
-        let psi_beta = (1.0 - y * y).powf(path.subsonic_exponent);
+        let psi_beta = libm::pow(1.0 - y * y, path.subsonic_exponent);
         Self {
             scale: path.conductance_m3_s_pa
                 * gas.reference_density_kg_m3
@@ -214,7 +214,7 @@ impl Restrictor {
             if self.square_root {
                 inside.sqrt()
             } else {
-                inside.powf(self.subsonic_exponent)
+                libm::pow(inside, self.subsonic_exponent)
             }
         } else {
             self.linear_slope * (1.0 - ratio)

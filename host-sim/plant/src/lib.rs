@@ -7,8 +7,8 @@
 //! simulator's board models.
 //!
 //! Determinism: no wall clock, no threads, no iteration over unordered maps, one random
-//! stream per signal. The same binary, parameters, seed and inputs give the
-//! same bytes. A state saved as JSON comes back bit for bit only with a parser that
+//! stream per signal, and `exp`, `sin` and their kin from the crate `libm`, because the C library's
+//! differ between systems. The same parameters, seed and inputs give the same bytes. A state saved as JSON comes back bit for bit only with a parser that
 //! rounds correctly (`serde_json` feature `float_roundtrip`).
 
 pub mod assembly;
@@ -25,6 +25,7 @@ pub mod friction;
 pub mod ground;
 pub mod hash;
 pub mod motor;
+pub mod noise;
 pub mod reference;
 pub mod robot;
 pub mod sensors;

@@ -1,12 +1,12 @@
 //! Sensors: linear potentiometer, 12-bit ADC with noise and oversampling, faults.
 
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
 use crate::hash::StateHasher;
+use crate::noise::{Normal, unit_interval};
 
 /// Linear potentiometer on a cylinder, ratiometric to the ADC's reference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,7 +44,7 @@ impl PotentiometerParams {
     pub fn ratio(&self, stroke_m: f64) -> f64 {
         let u = (self.offset_m + self.gain * stroke_m) / self.electrical_stroke_m;
         let bow = if self.nonlinearity > 0.0 {
-            self.nonlinearity * (std::f64::consts::TAU * u).sin()
+            self.nonlinearity * libm::sin(std::f64::consts::TAU * u)
         } else {
             0.0
         };
@@ -164,17 +164,13 @@ impl AdcState {
         let top = f64::from((1u32 << params.bits) - 1);
         let ideal = ratio * f64::from(1u32 << params.bits);
         let mut sum = 0u64;
+        let mut normal = Normal::default();
         for _ in 0..params.oversampling {
             let noise = match params.noise {
                 AdcNoise::None => 0.0,
-                AdcNoise::Gaussian { sigma_lsb } => {
-                    let unit: f64 = StandardNormal.sample(&mut self.rng);
-                    sigma_lsb * unit
-                }
+                AdcNoise::Gaussian { sigma_lsb } => sigma_lsb * normal.sample(&mut self.rng),
                 AdcNoise::Uniform { half_width_lsb } => {
-                    // 53 random bits in 0..1.
-                    let bits = rand::Rng::next_u64(&mut self.rng) >> 11;
-                    half_width_lsb * (bits as f64 * (2.0 / (1u64 << 53) as f64) - 1.0)
+                    half_width_lsb * (2.0 * unit_interval(&mut self.rng) - 1.0)
                 }
             };
             sum += (ideal + noise).floor().clamp(0.0, top) as u64;

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use wheeleg_remote_host::Line as _;
+use wheeleg_remote_host::unicorn::{Place, Unicorn};
 use wheeleg_remote_link::{Inputs, Power, Ran, Reply, Request, Run};
-use wheeleg_sim::pil::Line as _;
-use wheeleg_sim::pil::unicorn::{Place, Unicorn};
 
 /// One emulated board by itself.
 pub(crate) struct Board(Unicorn);

@@ -5,13 +5,12 @@
 
 use std::ops::ControlFlow;
 
-use wheeleg_protocol::param::JointParam;
-use wheeleg_sim::config::{
-    EventAction, LegChoice, Motion, ParameterChoice, RobotConfig, Scenario, ScenarioEvent,
-    TargetSet, builtin,
+use wheeleg_config::{
+    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
 };
-use wheeleg_sim::pil::{Nodes, PilSummary};
-use wheeleg_sim::telemetry::{FootSample, JointSample, Recorder, Recording, Row};
+use wheeleg_protocol::param::JointParam;
+use wheeleg_remote_host::{Nodes, PilSummary};
+use wheeleg_telemetry::{FootSample, JointSample, Recorder, Recording, Row};
 
 /// The one robot.
 pub(crate) fn robot() -> RobotConfig {
@@ -62,41 +61,13 @@ fn with_events(motion: Motion, duration_s: f64, events: &[(f64, EventAction)]) -
     }
 }
 
-/// A user command without arguments.
-pub(crate) fn command(name: &str) -> EventAction {
-    EventAction::command(name)
-}
-
-/// A user command to one joint.
-pub(crate) fn command_to(name: &str, joint: u8) -> EventAction {
-    EventAction::Command {
-        name: name.to_owned(),
-        joint: Some(joint),
-        stroke_m: None,
-        travel_m: None,
-        board: None,
-        parameter: None,
-    }
-}
-
-/// A user command about one board, and perhaps a parameter of it, by number and raw value.
-pub(crate) fn command_about(
-    name: &str,
-    board: u8,
-    parameter: Option<(u16, Option<i32>)>,
-) -> EventAction {
-    let parameter = parameter.map(|(id, raw)| ParameterChoice { id, raw });
-    EventAction::about(name, board, parameter)
-}
-
 /// Simulates a scenario to its end, with some nodes outside.
 pub(crate) fn run_with(scenario: &Scenario, nodes: &Nodes) -> (Recording, PilSummary) {
     let mut recorder = Recorder::in_memory();
-    let outcome =
-        wheeleg_sim::sil::run_with(scenario, &robot(), 1, nodes, &mut recorder, &mut |_| {
-            ControlFlow::Continue(())
-        })
-        .expect("the run gets to its end");
+    let outcome = wheeleg_sim::run_with(scenario, &robot(), 1, nodes, &mut recorder, &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .expect("the run gets to its end");
     let recording = recorder.finish().expect("nothing is written to a file");
     (recording, outcome.pil.expect("boards outside"))
 }
@@ -104,7 +75,7 @@ pub(crate) fn run_with(scenario: &Scenario, nodes: &Nodes) -> (Recording, PilSum
 /// Simulates a scenario to its end.
 pub(crate) fn run(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Recording {
     let mut recorder = Recorder::in_memory();
-    let outcome = wheeleg_sim::sil::run(scenario, robot, seed, &mut recorder, &mut |_| {
+    let outcome = wheeleg_sim::run(scenario, robot, seed, &mut recorder, &mut |_| {
         ControlFlow::Continue(())
     })
     .expect("the run gets to its end");

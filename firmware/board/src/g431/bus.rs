@@ -42,9 +42,9 @@ const LATE_US: u32 = 30;
 #[repr(align(4))]
 struct DmaBytes<const N: usize>(UnsafeCell<[u8; N]>);
 
-// SAFETY: the receive ring is written by DMA alone and read by volatile reads of
-// bytes that are complete; the transmit buffer is written only while no
-// transmission is under way. Both from the main loop.
+// SAFETY: the receive ring is written by DMA alone, and only bytes that are complete are
+// read, see `ring_bytes`; the transmit buffer is written only while no transmission
+// is under way. Both from the main loop.
 unsafe impl<const N: usize> Sync for DmaBytes<N> {}
 
 static RING_BYTES: DmaBytes<RING> = DmaBytes(UnsafeCell::new([0; RING]));
@@ -195,14 +195,17 @@ impl Bus {
 
 /// A stretch of the ring.
 fn ring_bytes((start, length): (usize, usize)) -> Option<&'static [u8]> {
-    if length == 0 {
+    if length == 0 || start.saturating_add(length) > RING {
         return None;
     }
-    // SAFETY: the bytes before a mark's position are complete, and DMA comes
+    // SAFETY: inside the ring, and no reference to the rest of it is made, which DMA
+    // writes. The bytes before a mark's position are complete, and DMA comes
     // back to them 128 bytes, or 1.3 ms, later at the earliest. Should the main
     // loop be later than that, it reads newer bytes: any bytes are valid input.
-    let ring = unsafe { &*RING_BYTES.0.get() };
-    ring.get(start..start.saturating_add(length))
+    Some(unsafe {
+        let first = RING_BYTES.0.get().cast::<u8>().add(start);
+        core::slice::from_raw_parts(first, length)
+    })
 }
 
 /// Programs DMA, the guard and the two compare channels.

@@ -26,8 +26,9 @@ pub fn take_cause() -> ResetCause {
     reset::decode(flags, note)
 }
 
-/// The non-maskable interrupt: a flash word with a double error is noted for its
-/// reader; anything else is the clock, which has stopped.
+/// The non-maskable interrupt: a flash word with a double error is noted for its reader; anything
+/// else is taken for a clock that has stopped. So is a double error whose flag does not stand,
+/// because an earlier error's does (RM0440 §5.7.7).
 pub fn on_nmi() {
     if !flash::on_nmi() {
         reset(Note::ClockLoss);

@@ -1,6 +1,6 @@
 //! The two parameter pages of the internal flash.
 
-use super::{pac, watchdog};
+use super::pac;
 use crate::store::{Flash, FlashError};
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -60,8 +60,8 @@ impl ParameterPages {
             Change::Write { address, value } => {
                 flash.cr().write(|r| r.set_pg(true));
                 let (low, high) = (value as u32, (value >> 32) as u32);
-                // SAFETY: an aligned, erased double word of a page that holds no
-                // code; written as two words in the order that RM0440 §3.3.7 asks.
+                // SAFETY: an aligned double word of a page that holds no code, erased or
+                // overwritten with zeros; written as two words in the order that RM0440 §3.3.7 asks.
                 unsafe {
                     core::ptr::write_volatile(address as *mut u32, low);
                     cortex_m::asm::isb();
@@ -100,14 +100,13 @@ impl Flash for ParameterPages {
         let address = Self::address(page, word)?;
         // SAFETY: an aligned address inside the flash. A word that a power cut
         // left half-written has a double error, which the NMI handler turns into
-        // a note that `take_ecc_error` gives.
+        // a note that `take_ecc_error` gives, unless the flag of an earlier error
+        // still stands: then the checksum of the set decides.
         let value = unsafe { core::ptr::read_volatile(address as *const u64) };
         (!take_ecc_error()).then_some(value)
     }
 
     fn erase(&mut self, page: usize) -> Result<(), FlashError> {
-        // A blank store is erased twice, and half the watchdog's time is one erasure.
-        watchdog::feed();
         let number = FIRST.saturating_add(u32::try_from(page).map_err(|_| FlashError)?);
         if page >= 2 {
             return Err(FlashError);

@@ -1,4 +1,4 @@
-//! Supply supervision: below 2.9 V the outputs go off before the brown-out reset.
+//! Supply supervision: below about 2.9 V the outputs go off, as a rule before the brown-out reset.
 
 use super::{fatal, pac, pins};
 use crate::reset::Note;
@@ -6,7 +6,8 @@ use pac::Interrupt;
 
 /// EXTI line of the voltage detector (RM0440 §14.3).
 const LINE: usize = 16;
-/// PVD threshold 6: 2.9 V rising, 2.8 V falling (DATASHEET).
+/// PVD threshold 6: trips between 2.84 and 2.96 V on the way down (DATASHEET). Brown-out level 4 is
+/// 2.76 to 2.86 V: on a part at both ends the reset comes first, and the pins are hi-Z.
 const THRESHOLD: u8 = 6;
 
 /// Starts the detector.

@@ -139,6 +139,38 @@ fn every_flipped_bit_of_a_precharge_is_seen() {
     assert_eq!(ticks_to_hold(filling(), 1, forgotten), Some(1));
 }
 
+/// What is cleared later must not go on with what was damaged.
+#[test]
+fn after_damage_all_that_holds_a_history_of_strokes_begins_anew() {
+    let damages: [fn(&mut Node); 2] = [
+        |node| {
+            node.controller.observe(PositionMm::from_int(50));
+        },
+        |node| {
+            let (open, motion) = ([1000, 0, 0, 0], node.settings.motion);
+            for _ in 0..9 {
+                let at = PositionMm::from_int(50);
+                node.state.motion.rest(&open, at, &motion);
+            }
+        },
+    ];
+    for law in [0, 5] {
+        for damage in damages {
+            let parameters = JointParameters::default();
+            let law = parameters.with(JointParam::Law.id(), law, true).unwrap();
+            let mut node = armed_with(law);
+            let sound = node.motion_account();
+            damage(&mut node);
+            for tick in 1..40 {
+                node.tick(Micros(20_000 + tick * 1000));
+                assert_eq!(node.snapshot().velocity.raw(), 0, "{tick}");
+                assert_eq!(node.motion_account().pressures, sound.pressures);
+            }
+            assert_eq!(node.mode(), Mode::Hold);
+        }
+    }
+}
+
 #[test]
 fn a_request_does_not_hide_earlier_damage() {
     assert!(holds_after(|node| {

@@ -188,13 +188,21 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
             self.controller.forget();
+            // Nobody knows which stroke was damaged: with the next good reading all that holds
+            // a history of them begins anew.
+            self.monitor.restart();
         }
         // A pin that cannot be read keeps its last debounced level.
         if let Ok(raw) = switches {
             self.switches.sample(raw);
+        } else {
+            self.switches.missed();
         }
         let reading = self.monitor.sample(reading, &self.settings.sensor);
         self.state.measured = reading.position;
+        if reading.is_first {
+            self.restart_estimators();
+        }
         self.supervise_sensor(&reading, now);
         if let Some(fault) = self.found() {
             self.axis_fault(fault, now);
@@ -216,6 +224,15 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             faults: self.core.supervisor.faults().latched(),
             overran: self.core.supervisor.overrun().overruns() != overruns,
         }
+    }
+
+    /// Everything that holds a history of strokes begins anew, at the measured one: the piston
+    /// may have moved unseen, and its way here is no motion.
+    #[cold]
+    #[inline(never)]
+    fn restart_estimators(&mut self) {
+        self.controller.reset();
+        self.state.motion = MotionWatch::new(&self.settings.motion, self.state.measured);
     }
 
     /// An output that does not obey: releases all coils.

@@ -12,7 +12,7 @@
 //! an arm, wherever the set-point is.
 //!
 //! The next reference of a slot is counted down to the tick and handed to the
-//! control law, which does not use it yet.
+//! control law. The predictive law fills and vents ahead of it; the others do not use it.
 
 use super::settings::TickSettings;
 use crate::JOINT_TICK;

@@ -8,7 +8,6 @@ use super::settings::JointSettings;
 use crate::board::{Application, BoardCore, ack};
 use crate::hardware::{PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
-use crate::sensor::SensorMonitor;
 use wheeleg_control::joint::Correction;
 use wheeleg_protocol::{
     Correction as WireCorrection, InputBits, LimitBits, LinkLossAction, Message, NackReason,
@@ -176,7 +175,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 // Another calibration moves the stroke without a motion: neither
                 // a rate fault nor a velocity. The new one has to prove itself
                 // before the board may arm.
-                node.monitor = SensorMonitor::new();
+                node.monitor.restart();
                 node.controller.reset();
             }
             if sensor_differs || settings.tick.motion != node.settings.motion {
@@ -191,6 +190,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             node.core.times = settings.times;
             node.settings = settings.tick;
             node.parameters = trial;
+            node.core.parameters_changed();
         });
         Ok(())
     }

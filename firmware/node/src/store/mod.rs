@@ -13,7 +13,8 @@
 //! A save goes to the page that does not hold the newest set: erase, records,
 //! and last of all the word with the CRC. So a power cut at any instant leaves
 //! either the old set or the new one; in the first save of a blank store, which has no old set, one
-//! that counts as damaged. Words torn by the cut are unreadable or
+//! that counts as damaged. A save erases one page and no more: erasing stalls the processor for
+//! most of the time after which a link counts as lost. Words torn by the cut are unreadable or
 //! anything at all; the CRC decides.
 
 #[cfg(test)]
@@ -56,7 +57,7 @@ pub trait Flash {
     /// [`FlashError`] if the hardware reports one.
     fn erase(&mut self, page: usize) -> Result<(), FlashError>;
 
-    /// Writes an erased word.
+    /// Writes an erased word; or zero over any word, which needs no erasure (RM0440 §3.3.7).
     ///
     /// # Errors
     /// [`FlashError`] if the hardware reports one.
@@ -192,8 +193,9 @@ impl<F: Flash> Store<F> {
         let page = newest.map_or(0, |copy| 1_usize.saturating_sub(copy.page));
         let sequence = newest.map_or(0, |copy| copy.sequence.wrapping_add(1));
         if newest.is_none() {
-            // What can hardly be read may look whole some day, with any number.
-            self.flash.erase(1)?;
+            // What can hardly be read may look whole some day, with any number: without its
+            // first word it never does.
+            self.flash.write(1, 0, 0)?;
         }
         self.flash.erase(page)?;
         let mut digest = Checksum::default();

@@ -179,6 +179,8 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         // A pin that cannot be read keeps its last debounced level.
         if let Ok(raw) = switches {
             self.switches.sample(raw);
+        } else {
+            self.switches.missed();
         }
         let counts = actual.wrapping_difference(self.state.actual);
         self.state.actual = actual;

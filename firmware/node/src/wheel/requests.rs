@@ -219,6 +219,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.change(|node| {
             node.settings = settings;
             node.parameters = trial;
+            node.core.parameters_changed();
             if node.core.times.tick != settings.times.tick {
                 node.core.supervisor.restart_timing();
             }

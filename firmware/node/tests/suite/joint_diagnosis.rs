@@ -6,11 +6,12 @@ use crate::common::mock::Memory;
 use crate::common::{ARM, decode, frame, refusal};
 use wheeleg_node::mode::Mode;
 use wheeleg_node::parameters::JointParameters;
+use wheeleg_node::store::{Flash, FlashError, PAGES, Record, Store, WORDS};
 use wheeleg_protocol::LinkLossAction::Hold;
 use wheeleg_protocol::link::{SlotTiming, TURNAROUND_US};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
-    Address, Discover, Fault, FaultReport, Limit, LinkReport, LogEvent, LogRead, Message,
+    Address, Disarm, Discover, Fault, FaultReport, Limit, LinkReport, LogEvent, LogRead, Message,
     NackReason, NodeMode, ParamSave, ParamSet, ResetCause, SlotReply, Sync, SyncFlags, SyncSlots,
 };
 use wheeleg_units::Micros;
@@ -119,6 +120,80 @@ fn parameters_are_stored_when_disarmed_and_told_how_it_went() {
     assert!(matches!(rig.request(&ARM), Message::Ack(_)));
     assert_eq!(refusal(&rig.request(&SAVE)), Some(NackReason::Armed));
     assert!(!rig.node.save_is_due());
+}
+
+/// Two blank pages, and the time that was spent on them.
+struct Chip {
+    words: [[u64; WORDS]; PAGES],
+    took_ns: u32,
+}
+
+impl Flash for &mut Chip {
+    fn read(&self, page: usize, word: usize) -> Option<u64> {
+        Some(self.words[page][word])
+    }
+
+    fn erase(&mut self, page: usize) -> Result<(), FlashError> {
+        // The most that the part's data sheet allows.
+        self.took_ns += 24_500_000;
+        self.words[page] = [u64::MAX; WORDS];
+        Ok(())
+    }
+
+    fn write(&mut self, page: usize, word: usize, value: u64) -> Result<(), FlashError> {
+        self.took_ns += 83_000;
+        self.words[page][word] = value;
+        Ok(())
+    }
+}
+
+/// µs that the first save of every parameter takes, in which the processor stands still.
+fn first_save_us() -> u32 {
+    let mut chip = Chip {
+        words: [[u64::MAX; WORDS]; PAGES],
+        took_ns: 0,
+    };
+    let records: Vec<Record> = JointParam::ALL
+        .iter()
+        .map(|param| Record {
+            id: param.id(),
+            raw: param.info().max,
+        })
+        .collect();
+    let mut store = Store::new(&mut chip);
+    store.save(&records).unwrap();
+    chip.took_ns / 1000
+}
+
+#[test]
+fn the_first_save_of_a_blank_store_does_not_cost_the_link_whenever_it_is_asked_for() {
+    let stall_us = first_save_us();
+    for asked_ms in 0..10 {
+        let mut rig = JointRig::new();
+        rig.run_cycles(3, None);
+        let mut sync_at = rig.now;
+        for ms in 0..200 {
+            // What comes while the processor stands still is lost.
+            while sync_at < rig.now {
+                sync_at += 10_000;
+                rig.cycle += 1;
+            }
+            if sync_at == rig.now {
+                rig.sync(None, false);
+                sync_at += 10_000;
+            }
+            if ms == asked_ms {
+                assert_eq!(refusal(&rig.request(&SAVE)), Some(NackReason::Busy));
+            }
+            rig.tick();
+            if rig.node.save_is_due() {
+                rig.node.save(&mut Memory::default(), Micros(rig.now));
+                rig.now += stall_us.next_multiple_of(1000);
+            }
+        }
+        assert!(rig.node.faults().is_empty(), "asked after {asked_ms} ms");
+        assert!(matches!(rig.request(&SAVE), Message::Ack(_)));
+    }
 }
 
 #[test]
@@ -328,4 +403,22 @@ fn a_fault_record_tells_the_limits_in_force() {
     assert!(!record(&mut rig).limits.contains(Limit::SettledShut));
     rig.run_cycles(50, Some(setpoint(100.2, Hold)));
     assert!(record(&mut rig).limits.contains(Limit::SettledShut));
+}
+
+/// Asked for, armed before it was done, disarmed: asked again it is done, not told to have failed.
+#[test]
+fn a_save_that_arming_has_prevented_is_forgotten() {
+    let mut memory = Memory::default();
+    let mut rig = JointRig::new();
+    rig.run_cycles(3, None);
+    assert_eq!(refusal(&rig.request(&SAVE)), Some(NackReason::Busy));
+    assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    rig.node.save(&mut memory, Micros(rig.now));
+    rig.run_cycles(1, None);
+    assert!(matches!(
+        rig.request(&Message::Disarm(Disarm {})),
+        Message::Ack(_)
+    ));
+    assert!(matches!(save(&mut rig, &mut memory), Message::Ack(_)));
+    assert_eq!(memory.saves, 1);
 }

@@ -5,7 +5,9 @@ use crate::common::joint::{JointRig, setpoint};
 use crate::common::{ARM, frame_from, refusal};
 use wheeleg_node::hardware::SensorError;
 use wheeleg_node::mode::Mode;
+use wheeleg_node::parameters::JointParameters;
 use wheeleg_protocol::LinkLossAction::{Hold, HoldThenExhaust};
+use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
     DisarmReason, EmergencyBrake, Fault, FaultReport, Identify, Message, NackReason, OpenAllValves,
     OpenMode,
@@ -424,5 +426,61 @@ fn the_watchdog_works_whatever_the_counter_shows_at_reset() {
         rig.run(60);
         assert_eq!(rig.node.mode(), Mode::Hold, "{start:#X}");
         assert!(rig.node.faults().contains(Fault::LinkLost));
+    }
+}
+
+/// At 100 mm, then blind for four ticks, with what the board made of each, and at `back` mm since.
+fn blind_for_a_moment(law: i32, back: f64, mut watch: impl FnMut(&JointRig)) -> JointRig {
+    let parameters = JointParameters::default();
+    let parameters = parameters.with(JointParam::Law.id(), law, true).unwrap();
+    let mut rig = JointRig::with(parameters);
+    rig.run_cycles(3, None);
+    rig.sensor.set(Ok(AdcCode::MIN));
+    for _ in 0..4 {
+        rig.tick();
+        watch(&rig);
+    }
+    assert!(rig.node.faults().contains(Fault::SensorRange));
+    rig.move_to(back);
+    rig
+}
+
+#[test]
+fn a_blind_axis_keeps_its_place_and_estimates_afresh_when_it_sees_again() {
+    let stands = |rig: &JointRig, at: f64| {
+        let snapshot = rig.node.snapshot();
+        let error = snapshot.measured.to_f64() - at;
+        assert!(error.abs() < 0.01, "at {at}: {snapshot:?}");
+        assert_eq!(snapshot.velocity.raw(), 0, "at {at}: {snapshot:?}");
+    };
+    for law in [0, 5] {
+        for back in [100.0, 60.0] {
+            let mut rig = blind_for_a_moment(law, back, |rig| stands(rig, 100.0));
+            for _ in 0..60 {
+                rig.tick();
+                stands(&rig, back);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_axis_that_stood_still_while_blind_has_no_valve_to_open_when_it_is_armed() {
+    for law in [0, 5] {
+        for back in [100.0, 60.0] {
+            let mut rig = blind_for_a_moment(law, back, |_| {});
+            rig.sync(None, false);
+            rig.run(12);
+            assert!(matches!(rig.clear(), Message::Ack(_)), "law {law}");
+            assert!(matches!(rig.request(&ARM), Message::Ack(_)), "law {law}");
+            for tick in 0..300 {
+                if tick % 10 == 0 {
+                    rig.sync(None, false);
+                }
+                rig.tick();
+                assert!(!rig.any_open(), "law {law}, back at {back}, tick {tick}");
+            }
+            assert_eq!(rig.node.mode(), Mode::Armed);
+        }
     }
 }

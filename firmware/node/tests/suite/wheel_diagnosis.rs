@@ -8,7 +8,7 @@ use wheeleg_node::parameters::WheelParameters;
 use wheeleg_protocol::param::{WheelParam, parameter_sum};
 use wheeleg_protocol::{
     ClearFault, Fault, FaultReport, LinkReport, Message, NackReason, ParamSave, ParamSet,
-    ResetCause, WheelFilter,
+    ResetCause, Speed7, WheelFilter, WheelMaxSpeed, WheelSampleTimer,
 };
 use wheeleg_units::Micros;
 
@@ -86,6 +86,46 @@ fn parameters_are_stored_when_asked_and_a_damaged_set_is_a_fault() {
         assert_eq!(refusal(&rig.request(&ARM)), refused);
         let _ = rig.request(&Message::ClearFault(ClearFault {}));
         assert!(matches!(rig.request(&ARM), Message::Ack(_)));
+    }
+}
+
+/// A master that never fetches the answer, and another one, or the same, that changes
+/// parameters afterwards: what was stored is no longer what is in force.
+#[test]
+fn a_save_is_done_only_for_the_parameters_that_it_has_stored() {
+    let save = Message::ParamSave(ParamSave {});
+    let changes = [
+        Message::WheelFilter(WheelFilter {
+            zero: 1,
+            pole: 2,
+            gain: 3,
+        }),
+        Message::WheelMaxSpeed(WheelMaxSpeed {
+            speed: Speed7::new(5).unwrap(),
+        }),
+        Message::WheelSampleTimer(WheelSampleTimer { timer: 100 }),
+        Message::ParamSet(ParamSet {
+            id: WheelParam::FilterGain.id(),
+            value: 20,
+        }),
+    ];
+    for change in changes {
+        let mut memory = Memory::default();
+        let mut rig = WheelRig::new();
+        rig.run_ms(40, None);
+        assert_eq!(refusal(&rig.request(&save)), Some(NackReason::Busy));
+        rig.node.save(&mut memory, Micros(rig.now));
+        let before = *rig.node.parameters();
+        assert_eq!(refusal(&rig.request(&change)), None);
+        assert_ne!(*rig.node.parameters(), before);
+
+        let answer = rig.request(&save);
+        assert_eq!(refusal(&answer), Some(NackReason::Busy), "{change:?}");
+        assert!(rig.node.save_is_due());
+        rig.node.save(&mut memory, Micros(rig.now));
+        assert!(matches!(rig.request(&save), Message::Ack(_)));
+        let changed = rig.node.parameters().changed_from_default();
+        assert_eq!(memory.set, changed.collect::<Vec<_>>());
     }
 }
 

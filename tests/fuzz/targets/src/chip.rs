@@ -54,6 +54,8 @@ pub(crate) struct Chip {
     pub(crate) erased: [u32; PAGES],
     /// Writes to each page that have begun.
     pub(crate) written: [u32; PAGES],
+    /// First words of each page whose overwriting with zeros has begun.
+    pub(crate) voided: [u32; PAGES],
 }
 
 /// A generator of its own: what is drawn does not depend on anything else.
@@ -86,6 +88,7 @@ impl Chip {
             operations: 0,
             erased: [0; PAGES],
             written: [0; PAGES],
+            voided: [0; PAGES],
         }
     }
 
@@ -178,18 +181,25 @@ impl Chip {
         if done == Err(Torn::Nothing) {
             return Err(FlashError);
         }
-        // A word may be written once per erasure (RM0440 §3.3.7).
-        if place != Word::Steady(u64::MAX) {
+        // A word may be written once per erasure, but with zeros (RM0440 §3.3.7).
+        if value == 0 && word == 0 {
+            self.voided[page] += 1;
+        } else if place == Word::Steady(u64::MAX) {
+            self.written[page] += 1;
+        } else {
             return Err(FlashError);
         }
-        self.written[page] += 1;
         // Bits go to zero in any order.
+        let left = |seed| match place {
+            Word::Steady(old) => value | old & draw64(seed),
+            _ => value | draw64(seed),
+        };
         self.pages[page][word] = match done {
             Ok(()) | Err(Torn::All) => Word::Steady(value),
             Err(Torn::Nothing) => place,
-            Err(Torn::Some(seed)) => Word::Steady(value | draw64(seed)),
+            Err(Torn::Some(seed)) => Word::Steady(left(seed)),
             Err(Torn::Unreadable) => Word::Unreadable,
-            Err(Torn::Unsteady(seed)) => Word::Unsteady(value, value | draw64(seed)),
+            Err(Torn::Unsteady(seed)) => Word::Unsteady(value, left(seed)),
         };
         done.map_err(|_| FlashError)
     }

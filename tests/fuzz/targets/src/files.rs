@@ -3,8 +3,8 @@
 //! and what passes passes twice and with every number compared. The simulator
 //! reads no log back, so these stand for recorded data.
 
-use wheeleg_sim::check::vectors::check_text;
-use wheeleg_sim::config::AxisConfig;
+use wheeleg_config::AxisConfig;
+use wheeleg_studies::check::vectors::check_text;
 
 /// Longest text.
 const LENGTH_MAX: usize = 64 * 1024;

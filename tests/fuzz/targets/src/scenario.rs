@@ -1,7 +1,7 @@
 //! Scenario and robot files of any content: no panic; what is accepted lies in
 //! its range, and what is refused is explained.
 
-use wheeleg_sim::config::{ConfigError, RobotConfig, Scenario};
+use wheeleg_config::{ConfigError, RobotConfig, Scenario};
 
 /// Longest text; the robot file has 30 KiB.
 const LENGTH_MAX: usize = 64 * 1024;

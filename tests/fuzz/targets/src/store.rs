@@ -151,12 +151,30 @@ impl Play {
         self.saves += 1;
         let set = self.set(size);
         let (erased, written) = (self.chip.erased, self.chip.written);
+        let voided = self.chip.voided;
         let unsteady = self.pages.iter().any(|page| page.unsteady);
         self.chip.power(mishap);
         let saved = Store::new(Port(&mut self.chip)).save(&set);
         let struck = mishap.filter(|_| self.chip.struck());
         let unsteady_now = struck.is_some_and(|m| matches!(m.torn, Torn::Unsteady(_)));
+        let erasures = |chip: &Chip| chip.erased.iter().sum::<u32>();
+        let begun = erasures(&self.chip) - erased.iter().sum::<u32>();
+        assert!(
+            begun <= 1,
+            "the processor stands still for {begun} erasures"
+        );
         for page in 0..PAGES {
+            if self.chip.voided[page] != voided[page] {
+                assert!(
+                    unsteady || self.newest != Some(page),
+                    "the newest set is given up before the next one stands"
+                );
+                self.damaged(page);
+                self.pages[page].unsteady |= unsteady_now;
+                if struck.is_none() {
+                    self.pages[page] = Page::default();
+                }
+            }
             let writes = (self.chip.written[page] - written[page]) as usize;
             if self.chip.erased[page] == erased[page] {
                 assert_eq!(writes, 0, "written and not erased");

@@ -11,7 +11,7 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
 
-/// Beyond this angle (rad) the three parts are too short and the C library is asked.
+/// Beyond this angle (rad) the three parts are too short and the crate `libm` is asked.
 const LIMIT_RAD: f64 = 1.0e5;
 
 /// Adding this rounds to an integer and leaves it in the low bits.
@@ -54,7 +54,7 @@ fn turned(x: f64) -> (f64, f64) {
     if x.abs() < LIMIT_RAD {
         reduced(x)
     } else {
-        x.sin_cos()
+        libm::sincos(x)
     }
 }
 
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn far_and_impossible_angles() {
         for x in [LIMIT_RAD, -LIMIT_RAD, 1e12, -3e20] {
-            assert_eq!(sin_cos(x), x.sin_cos());
+            assert_eq!(sin_cos(x), libm::sincos(x));
         }
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let (s, c) = sin_cos(x);

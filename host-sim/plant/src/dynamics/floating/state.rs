@@ -108,8 +108,8 @@ impl FloatingState {
         } else {
             let angle = angle_squared.sqrt();
             (
-                (1.0 - angle.cos()) / angle_squared,
-                (angle - angle.sin()) / (angle_squared * angle),
+                (1.0 - libm::cos(angle)) / angle_squared,
+                (angle - libm::sin(angle)) / (angle_squared * angle),
             )
         };
         let across = turn.cross(&shift);

@@ -130,7 +130,7 @@ impl RobotDynamics {
         finite("position", q)?;
         finite("velocity", qd)?;
         let p = &self.params;
-        let (sin_p, cos_p) = q[1].sin_cos();
+        let (sin_p, cos_p) = libm::sincos(q[1]);
         let pitch_rate = qd[1];
         let [gx, gy, gz] = p.gravity_m_s2;
         // Gravity and the direction of travel in chassis axes.

@@ -1,0 +1,112 @@
+//! Robots and scenarios that are part of the program, and files beside it.
+
+use std::path::Path;
+
+use super::error::{ConfigError, Problem};
+use super::{RobotConfig, Scenario, closest};
+
+macro_rules! embedded {
+    ($folder:literal: $($name:literal),* $(,)?) => {
+        &[$( ($name, concat!($folder, "/", $name, ".toml"),
+              include_str!(concat!("../../", $folder, "/", $name, ".toml"))), )*]
+    };
+}
+
+/// Scenario of a bare `wheeleg`.
+pub const DEFAULT_SCENARIO: &str = "three-step";
+/// Robot of a bare `wheeleg params`.
+pub const DEFAULT_ROBOT: &str = "wheeleg-2003";
+
+/// Robots: name, file name for messages, text.
+pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg-2003");
+
+/// Scenarios: name, file name for messages, text.
+pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
+    "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
+    "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
+);
+
+/// A robot by built-in name, or by path to a TOML file.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such robot or file, or if it is wrong.
+pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
+    let (file, text) = find("robot", name_or_path, ROBOTS)?;
+    RobotConfig::parse(&file, &text)
+}
+
+/// The robot that a scenario names. A relative path counts from the folder of
+/// the scenario's file, so that the two can be kept together.
+///
+/// # Errors
+/// As [`robot`].
+pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig, ConfigError> {
+    let built_in = |list: &[(&str, &str, &str)], name: &str| list.iter().any(|(n, ..)| *n == name);
+    if built_in(ROBOTS, robot_name_or_path)
+        || built_in(SCENARIOS, scenario)
+        || !is_path(robot_name_or_path)
+    {
+        return robot(robot_name_or_path);
+    }
+    let beside = Path::new(scenario)
+        .with_file_name("")
+        .join(robot_name_or_path);
+    robot(&beside.to_string_lossy())
+}
+
+/// A scenario by built-in name, or by path to a TOML file.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such scenario or file, or if it is wrong.
+pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
+    let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
+    Scenario::parse(&file, &text)
+}
+
+/// Whether a name is that of a file.
+fn is_path(name_or_path: &str) -> bool {
+    name_or_path.contains(['/', '\\'])
+        || Path::new(name_or_path)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+/// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
+/// holds a path separator is a path.
+pub(super) fn find(
+    kind: &str,
+    name_or_path: &str,
+    builtin: &[(&str, &str, &str)],
+) -> Result<(String, String), ConfigError> {
+    if let Some((_, file, text)) = builtin.iter().find(|(n, ..)| *n == name_or_path) {
+        return Ok(((*file).to_owned(), (*text).to_owned()));
+    }
+    if is_path(name_or_path) {
+        return std::fs::read_to_string(name_or_path)
+            .map(|text| (name_or_path.to_owned(), text))
+            .map_err(|e| {
+                let message = format!("cannot read the {kind} file: {e}");
+                ConfigError::new(
+                    format!("the {kind} file {name_or_path} is not usable"),
+                    vec![Problem::whole(name_or_path, message, None)],
+                )
+            });
+    }
+    let names: Vec<&str> = builtin.iter().map(|(n, ..)| *n).collect();
+    let list = format!(
+        "built in: {}; or give the path of a .toml file",
+        names.join(", ")
+    );
+    let help = match closest(name_or_path, names.iter().copied()) {
+        Some(word) => format!("did you mean `{word}`? {list}"),
+        None => list,
+    };
+    Err(ConfigError::new(
+        format!("unknown {kind} `{name_or_path}`"),
+        vec![Problem::whole(
+            name_or_path,
+            format!("no built-in {kind} has this name"),
+            Some(help),
+        )],
+    ))
+}

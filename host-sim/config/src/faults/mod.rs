@@ -1,0 +1,7 @@
+//! Faults as a run is given them: the catalogue, and one fault with target, value and time.
+
+mod kind;
+mod spec;
+
+pub use kind::{FaultKind, KINDS, KindInfo, NOT_IMPLEMENTED, Place, ValueSpec};
+pub use spec::{FaultSpec, SpecError, Victim};

@@ -1,0 +1,54 @@
+//! Robots and scenarios: TOML files in which every parameter has a value, a
+//! unit and a source, checked against one table of allowed units and ranges.
+
+pub mod axis;
+pub mod builtin;
+mod command;
+mod commissioned;
+mod error;
+pub mod faults;
+mod node;
+mod params;
+pub mod plant;
+mod quantity;
+mod reader;
+mod robot;
+mod scenario;
+mod suggest;
+pub mod timing;
+
+pub use axis::AxisConfig;
+pub use error::{ConfigError, Problem};
+pub use node::NodeParams;
+pub use node::raw_of;
+pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
+pub use quantity::Dimension;
+pub use quantity::{brief, pretty};
+pub use robot::{
+    BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
+};
+pub use scenario::{
+    EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet,
+};
+pub use suggest::closest;
+
+/// Commands that a scenario can give, by the names of the master's table.
+pub const COMMAND_NAMES: [&str; 17] = [
+    "JointReference",
+    "TransmitPosition",
+    "OpenAllValves",
+    "EmergencyBrake",
+    "WheelReference",
+    "Arm",
+    "Disarm",
+    "ClearFault",
+    "EmergencyStop",
+    "Stand",
+    "Hold",
+    "StartGait",
+    "StopGait",
+    "Commission",
+    "ReadParameter",
+    "WriteParameter",
+    "SaveParameters",
+];

@@ -1,0 +1,233 @@
+//! Board parameters set by a robot file, by the names of the protocol's tables.
+
+use wheeleg_node::acceptance::accepts;
+use wheeleg_protocol::Address;
+use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
+
+use super::command::ParameterChoice;
+use super::params::ParameterInfo;
+use super::quantity::{pretty, suffix};
+use super::reader::{Entry, Reader, range};
+
+/// Parameters that the master sends to the boards before arming, as raw
+/// numbers of the wire format.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NodeParams {
+    /// Per joint 1 to 6: (number, raw value), ascending.
+    pub joints: [Vec<(u16, i32)>; 6],
+    /// Per wheel 7, 8.
+    pub wheels: [Vec<(u16, i32)>; 2],
+}
+
+/// Names of the sections, and the joints (index from 0) that each sets. Later
+/// sections replace what earlier ones set.
+const JOINT_SECTIONS: [(&str, &[usize]); 4] = [
+    ("joint", &[0, 1, 2, 3, 4, 5]),
+    ("yaw", &[0, 3]),
+    ("horizontal", &[1, 4]),
+    ("vertical", &[2, 5]),
+];
+
+/// Reads `[node.joint]`, `[node.yaw]`, `[node.horizontal]`, `[node.vertical]`
+/// and `[node.wheel]`. What is not set keeps the board's default.
+pub(super) fn read(r: &mut Reader) -> NodeParams {
+    let mut params = NodeParams::default();
+    let sections = ["joint", "yaw", "horizontal", "vertical", "wheel"];
+    let Some(top) = r.optional_table("node", &sections) else {
+        return params;
+    };
+    r.reject_unknown(&top, &sections);
+    for (name, joints) in JOINT_SECTIONS {
+        for (id, raw) in section(r, &format!("node.{name}"), JOINT_PARAMS) {
+            for joint in joints {
+                set(&mut params.joints[*joint], id, raw);
+            }
+        }
+    }
+    for (id, raw) in section(r, "node.wheel", WHEEL_PARAMS) {
+        for wheel in &mut params.wheels {
+            set(wheel, id, raw);
+        }
+    }
+    list_defaults(r, "node.joint", JOINT_PARAMS);
+    list_defaults(r, "node.wheel", WHEEL_PARAMS);
+    contradictions(r, &params);
+    params
+}
+
+/// What a board refuses though every value is within its own limits. Named is each parameter
+/// without which, left at its default, the board takes the rest.
+fn contradictions(r: &mut Reader, params: &NodeParams) {
+    let stored = params.joints.iter().chain(&params.wheels);
+    // One board is enough: what its section sets, others have as well.
+    let mut refused = (Address::nodes().zip(stored)).filter(|(to, stored)| !accepts(*to, stored));
+    let Some((address, stored)) = refused.next() else {
+        return;
+    };
+    let of_joint =
+        |(_, joints): &&(_, &[usize])| address.slot().is_some_and(|i| joints.contains(&i));
+    let sections: Vec<&str> = if address.is_joint() {
+        let own = JOINT_SECTIONS.iter().rev().filter(of_joint);
+        own.map(|(name, _)| *name).collect()
+    } else {
+        vec!["wheel"]
+    };
+    let mut named = false;
+    for (place, (id, raw)) in stored.iter().enumerate() {
+        let mut without = stored.clone();
+        without.remove(place);
+        let info = params_at(address.raw()).iter().find(|row| row.id == *id);
+        let Some(info) = info.filter(|_| accepts(address, &without)) else {
+            continue;
+        };
+        let found = sections.iter().find_map(|name| {
+            let path = format!("node.{name}");
+            let (span, _) = r.table(&path)?.get(info.name)?;
+            Some((span, path))
+        });
+        let Some((span, path)) = found else { continue };
+        let value = tidy(f64::from(*raw) / scale(info.format));
+        r.problem(
+            Some(span),
+            format!(
+                "`{path}.{}` = {}{} contradicts other parameters: the board of {address} \
+                 refuses them together",
+                info.name,
+                pretty(value),
+                suffix(info.unit)
+            ),
+            "not with the others",
+            Some(format!("{path}.{}: {}", info.name, info.text)),
+        );
+        named = true;
+    }
+    if !named {
+        r.problem(
+            None,
+            format!("the board of {address} refuses its parameters together"),
+            "",
+            Some(format!(
+                "see the sections [node.{}]",
+                sections.join("], [node.")
+            )),
+        );
+    }
+}
+
+/// Reads `parameter`, by its name in the table of `board`, and `value`, a number in
+/// the parameter's unit.
+pub(super) fn choice(r: &mut Reader, entry: &Entry, board: Option<u8>) -> Option<ParameterChoice> {
+    entry.get("parameter")?;
+    let table = params_at(board.unwrap_or(1)).iter();
+    let names: Vec<(&str, &'static ParamInfo)> = table.map(|p| (p.name, p)).collect();
+    let info = r.choice(entry, "parameter", &names)?;
+    let raw = entry.get("value").and_then(|(span, item)| {
+        let value = item.as_float().or(item.as_integer().map(|n| n as f64));
+        let Some(value) = value.filter(|v| v.is_finite()) else {
+            let scale = scale(info.format);
+            let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+            let message = format!(
+                "`{}` = {} must be a number from {}",
+                entry.field_path("value"),
+                item.to_string().trim(),
+                range(min, max, info.unit)
+            );
+            r.problem(Some(span), message, "not a number", None);
+            return None;
+        };
+        // What is beyond its limits is refused by the board, which is there to do it.
+        Some(raw_of(info, value))
+    });
+    Some(ParameterChoice { id: info.id, raw })
+}
+
+/// A value in the parameter's unit as the raw number of its format.
+pub fn raw_of(info: &ParamInfo, value: f64) -> i32 {
+    (value * scale(info.format)).round() as i32
+}
+
+/// A raw number in its unit without the tail of its binary fraction.
+fn tidy(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+/// Lists what the file leaves at the board's default, so that a listing of the
+/// robot is complete.
+fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
+    let entry = r.table(path);
+    let unset = table
+        .iter()
+        .filter(|p| entry.as_ref().is_none_or(|e| e.get(p.name).is_none()));
+    for info in unset {
+        let scale = scale(info.format);
+        r.list(ParameterInfo {
+            path: format!("{path}.{}", info.name),
+            value: vec![tidy(f64::from(info.default) / scale)],
+            unit: info.unit.to_owned(),
+            min: tidy(f64::from(info.min) / scale),
+            max: tidy(f64::from(info.max) / scale),
+            source: "default of the board (protocol's parameter table)".to_owned(),
+            doc: info.text,
+        });
+    }
+}
+
+fn set(list: &mut Vec<(u16, i32)>, id: u16, raw: i32) {
+    match list.binary_search_by_key(&id, |(id, _)| *id) {
+        Ok(at) => list[at].1 = raw,
+        Err(at) => list.insert(at, (id, raw)),
+    }
+}
+
+fn section(r: &mut Reader, path: &str, table: &'static [ParamInfo]) -> Vec<(u16, i32)> {
+    let names: Vec<&str> = table.iter().map(|p| p.name).collect();
+    let Some(entry) = r.optional_table(path, &names) else {
+        return Vec::new();
+    };
+    r.reject_unknown(&entry, &names);
+    table
+        .iter()
+        .filter(|p| entry.get(p.name).is_some())
+        .filter_map(|p| Some((p.id, one(r, &entry, p)?)))
+        .collect()
+}
+
+/// Converts between a parameter's unit and its raw numbers.
+fn scale(format: Format) -> f64 {
+    f64::from(format.fraction_bits()).exp2()
+}
+
+fn one(r: &mut Reader, entry: &Entry, info: &'static ParamInfo) -> Option<i32> {
+    let scale = scale(info.format);
+    let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+    let range = range(min, max, info.unit);
+    let stated = (info.unit, range.as_str());
+    let (value, span, source) = r.table_quantity(entry, info.name, stated, info.text)?;
+    let path = format!("{}.{}", entry.path, info.name);
+    let raw = (value * scale).round();
+    let written = format!("`{path}` = {}{}", pretty(value), suffix(info.unit));
+    if !(f64::from(info.min)..=f64::from(info.max)).contains(&raw) {
+        r.problem(
+            Some(span),
+            format!("{written} is out of range: allowed {range}"),
+            "out of range",
+            Some(format!("{path}: {}", info.text)),
+        );
+        return None;
+    }
+    if scale == 1.0 && value.fract() != 0.0 {
+        let message = format!("{written} must be a whole number from {range}");
+        r.problem(Some(span), message, "not whole", None);
+        return None;
+    }
+    r.list(ParameterInfo {
+        path,
+        value: vec![value],
+        unit: info.unit.to_owned(),
+        min,
+        max,
+        source,
+        doc: info.text,
+    });
+    Some(raw as i32)
+}

@@ -1,0 +1,206 @@
+//! The plant's parameters: sections of a robot file, and their conversion.
+
+pub(super) mod pneumatics;
+pub mod sections;
+
+use wheeleg_plant::PlantParams;
+use wheeleg_plant::contact::ContactParams;
+use wheeleg_plant::cylinder::CylinderParams;
+use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
+use wheeleg_plant::ground::Ground;
+use wheeleg_plant::motor::MotorParams;
+use wheeleg_plant::sensors::AdcNoise;
+
+use self::pneumatics::{Pneumatics, Sensing};
+use self::sections::{BodySection, ContactSection, LinkSection, MotorSection, StartSection};
+use super::reader::Reader;
+
+/// Names of the plant's sections besides those of one cylinder.
+pub(super) const SECTIONS: [&str; 5] = ["start", "motor", "body", "link", "contact"];
+
+/// The six bodies of a leg, in the order of the chain.
+const LINKS: [&str; 6] = [
+    "yaw_barrel",
+    "yaw_rod",
+    "crank",
+    "yaw_carriage",
+    "horizontal_carriage",
+    "vertical_rod",
+];
+
+/// Reads all sections of the plant.
+pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
+    let pneumatics = Pneumatics::read(r);
+    if let Some(start) = r.table("start") {
+        r.reject_unknown(&start, &["yaw", "horizontal", "vertical"]);
+    }
+    let yaw = r.section::<StartSection>("start.yaw");
+    let horizontal = r.section::<StartSection>("start.horizontal");
+    let vertical = r.section::<StartSection>("start.vertical");
+    let motor = r.section::<MotorSection>("motor");
+    let sensing = Sensing::read(r, |sigma_lsb| AdcNoise::Gaussian { sigma_lsb });
+
+    let body = r.section::<BodySection>("body");
+    if let Some(link) = r.table("link") {
+        r.reject_unknown(&link, &LINKS);
+    }
+    let links = LINKS.map(|name| r.section::<LinkSection>(&format!("link.{name}")));
+    let contact = r.section::<ContactSection>("contact");
+
+    let starts = [yaw?, horizontal?, vertical?];
+    let (pneumatics, sensing) = (pneumatics?, sensing?);
+    let (body, motor) = (body?, motor?);
+    let [l1, l2, l3, l4, l5, l6] = links;
+    let links = [l1?, l2?, l3?, l4?, l5?, l6?];
+    Some(PlantParams {
+        gas: pneumatics.gas,
+        supply: pneumatics.supply,
+        cylinders: std::array::from_fn(|i| CylinderParams {
+            initial_pressure_a_pa: starts[i % 3].pressure_a,
+            initial_pressure_b_pa: starts[i % 3].pressure_b,
+            ..pneumatics.cylinder.clone()
+        }),
+        initial_stroke_m: std::array::from_fn(|i| starts[i % 3].stroke),
+        stroke_zero_m: std::array::from_fn(|i| body.stroke_zero[i % 3]),
+        body: dynamics_params(&body, &links, motor.reduction),
+        contact: contact_params(&contact?),
+        // The ground is the scenario's.
+        ground: Ground::default(),
+        motors: [motor_params(&motor); 2],
+        potentiometers: [sensing.potentiometer; 6],
+        adc: sensing.adc,
+        step_ns: sensing.step_ns,
+    })
+}
+
+fn motor_params(s: &MotorSection) -> MotorParams {
+    MotorParams {
+        supply_v: s.supply,
+        resistance_ohm: s.resistance,
+        inductance_h: s.inductance,
+        torque_constant_n_m_a: s.torque_constant,
+        reduction: s.reduction,
+        efficiency: s.efficiency,
+        efficiency_blend_rad_s: s.efficiency_blend,
+        friction_n_m: s.friction,
+        friction_blend_rad_s: s.friction_blend,
+        encoder_lines: s.encoder_lines,
+    }
+}
+
+fn dynamics_params(
+    s: &BodySection,
+    links: &[LinkSection; 6],
+    gear_ratio: f64,
+) -> RobotDynamicsParams {
+    RobotDynamicsParams {
+        crank_m: s.crank,
+        p4_m: s.p4,
+        min_cos_theta3: s.min_cos_theta3,
+        leg_bodies: links.map(|l| BodyParams {
+            mass_kg: l.mass,
+            com_m: l.com,
+            inertia_kg_m2: l.inertia,
+        }),
+        chassis_mass_kg: s.chassis_mass,
+        chassis_com_m: s.chassis_com,
+        chassis_pitch_inertia_kg_m2: s.chassis_pitch_inertia,
+        o4_m: s.o4,
+        foot_pad_m: s.foot_pad,
+        wheel_mass_kg: s.wheel_mass,
+        wheel_radius_m: s.wheel_radius,
+        wheel_inertia_kg_m2: s.wheel_inertia,
+        rotor_inertia_kg_m2: s.rotor_inertia,
+        gear_ratio,
+        // Friction of the cylinders is in the pneumatic model.
+        viscous: [s.chassis_viscous, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        gravity_m_s2: s.gravity,
+    }
+}
+
+fn contact_params(s: &ContactSection) -> ContactParams {
+    ContactParams {
+        stiffness_n_m: s.stiffness,
+        damping_s_m: s.damping,
+        mu_static: s.mu_static,
+        mu_kinetic: s.mu_kinetic,
+        stribeck_m_s: s.stribeck,
+        bristle_stiffness_n_m: s.bristle_stiffness,
+        bristle_damping_n_s_m: s.bristle_damping,
+        sole_radius_m: s.sole_radius,
+        switch_threshold_m: s.switch_threshold,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::builtin;
+    use serde_json::Value;
+
+    fn compare(path: &str, a: &Value, b: &Value) {
+        match (a, b) {
+            (Value::Number(x), Value::Number(y)) => {
+                let (x, y) = (x.as_f64().unwrap_or(0.0), y.as_f64().unwrap_or(1.0));
+                let scale = x.abs().max(y.abs());
+                assert!((x - y).abs() <= 1e-9 * scale, "{path}: {x} and {y}");
+            }
+            (Value::Object(x), Value::Object(y)) => {
+                assert_eq!(x.len(), y.len(), "{path}");
+                for (key, value) in x {
+                    compare(&format!("{path}.{key}"), value, &y[key]);
+                }
+            }
+            (Value::Array(x), Value::Array(y)) => {
+                assert_eq!(x.len(), y.len(), "{path}");
+                for (i, (x, y)) in x.iter().zip(y).enumerate() {
+                    compare(&format!("{path}[{i}]"), x, y);
+                }
+            }
+            _ => assert_eq!(a, b, "{path}"),
+        }
+    }
+
+    /// The plant's own tests run on a copy of these values that needs no file;
+    /// the two must not drift apart.
+    #[test]
+    fn robot_file_and_plant_tests_use_the_same_robot() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let file = serde_json::to_value(&robot.plant).expect("serialises");
+        let copy =
+            serde_json::to_value(wheeleg_plant::testing::wheeleg_2003()).expect("serialises");
+        compare("plant", &file, &copy);
+    }
+
+    /// The reference model's foot load rests on three numbers derived from
+    /// the masses; they must follow when the masses change.
+    #[test]
+    fn load_of_the_reference_model_follows_from_the_masses() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let body = &robot.plant.body;
+        let (leg, r) = (&body.leg_bodies, &robot.reference);
+        let b5_zero = robot.plant.stroke_zero_m[1];
+        let slide = leg[4].mass_kg + leg[5].mass_kg;
+        // First moments about the axle at the home yaw (theta1 = pi, theta4 =
+        // pi/2), frames as in MODEL.md; O1 is p4 behind O4.
+        let o1 = body.o4_m[0] - body.p4_m[0];
+        let fixed = leg[0].mass_kg * (o1 - leg[0].com_m[0])
+            + leg[1].mass_kg * (o1 + leg[1].com_m[0])
+            + leg[2].mass_kg * (body.o4_m[0] + leg[2].com_m[0])
+            + leg[3].mass_kg * (body.o4_m[0] + leg[3].com_m[2])
+            + leg[4].mass_kg * (body.o4_m[0] + leg[4].com_m[1])
+            + leg[5].mass_kg * (body.o4_m[0] + leg[5].com_m[1]);
+        let other = b5_zero + robot.gait.held_leg_s5_m;
+        let moment =
+            body.chassis_mass_kg * body.chassis_com_m[0] + 2.0 * fixed + slide * (b5_zero + other);
+        assert!((moment - r.load_moment_kg_m).abs() < 1e-9, "{moment}");
+        assert!((slide - r.slide_mass_kg).abs() < 1e-12);
+        assert!((body.o4_m[0] + b5_zero - r.load_arm_m).abs() < 1e-12);
+        assert!((leg[5].mass_kg - r.m6_kg).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_plant_accepts_the_robot() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        assert!(wheeleg_plant::Plant::new(&robot.plant).is_ok());
+    }
+}

@@ -1,0 +1,297 @@
+//! What a robot and a single axis share: air, supply, one cylinder with its
+//! valves, and the sensor that reads its stroke.
+
+use wheeleg_plant::chamber::GasModel;
+use wheeleg_plant::cylinder::{CylinderParams, ROD_MOST};
+use wheeleg_plant::endstop::EndStopParams;
+use wheeleg_plant::flow::{GasParams, Iso6358};
+use wheeleg_plant::friction::FrictionParams;
+use wheeleg_plant::sensors::{AdcNoise, AdcParams, PotentiometerParams};
+use wheeleg_plant::supply::{SupplyParams, SwitchParams};
+use wheeleg_plant::valve::ValveParams;
+
+use super::sections::{
+    AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
+    LineSection, NumericsSection, PotentiometerSection, SupplySection, SwitchSection, ValveSection,
+};
+use crate::quantity::pretty;
+use crate::reader::Reader;
+
+/// Names of the sections that [`Pneumatics`] and [`Sensing`] read.
+pub(crate) const SECTIONS: [&str; 13] = [
+    "gas",
+    "supply",
+    "source_switch",
+    "regulator",
+    "dump_valve",
+    "fill_valve",
+    "vent_valve",
+    "line",
+    "cylinder",
+    "friction",
+    "end_stop",
+    "sensor",
+    "numerics",
+];
+
+/// Air, its supply and one cylinder.
+pub(crate) struct Pneumatics {
+    pub gas: GasParams,
+    pub supply: SupplyParams,
+    /// Its initial pressures are 0 until the start is read.
+    pub cylinder: CylinderParams,
+}
+
+impl Pneumatics {
+    /// Reads `[gas]` to `[end_stop]`.
+    pub(crate) fn read(r: &mut Reader) -> Option<Self> {
+        let gas = r.section::<GasSection>("gas");
+        let supply = r.section::<SupplySection>("supply");
+        // A robot without the contact at the source has no such section.
+        let source_switch = r.optional_section::<SwitchSection>("source_switch");
+        check_contacts(r, supply.as_ref(), source_switch.as_ref());
+        let regulator = r.section::<FlowSection>("regulator");
+        let dump_valve = r.section::<ValveSection>("dump_valve");
+        let fill_valve = r.section::<ValveSection>("fill_valve");
+        let vent_valve = r.section::<ValveSection>("vent_valve");
+        let line = r.section::<LineSection>("line");
+        let cylinder = r.section::<CylinderSection>("cylinder");
+        check_rod(r, cylinder.as_ref());
+        let friction = r.section::<FrictionSection>("friction");
+        let end_stop = r.section::<EndStopSection>("end_stop");
+        Some(Self {
+            gas: gas_params(&gas?),
+            supply: supply_params(&supply?, source_switch?.as_ref(), &regulator?, &dump_valve?),
+            cylinder: cylinder_params(
+                &cylinder?,
+                &line?,
+                &fill_valve?,
+                &vent_valve?,
+                &friction?,
+                &end_stop?,
+            ),
+        })
+    }
+}
+
+/// The sensor of a stroke, and the step of the integration.
+pub(crate) struct Sensing {
+    pub potentiometer: PotentiometerParams,
+    pub adc: AdcParams,
+    pub step_ns: u64,
+}
+
+impl Sensing {
+    /// Reads `[sensor]` and `[numerics]`; `noise` says what kind of noise the
+    /// file's figure (LSB) states.
+    pub(crate) fn read(r: &mut Reader, noise: fn(f64) -> AdcNoise) -> Option<Self> {
+        if let Some(sensor) = r.table("sensor") {
+            r.reject_unknown(&sensor, &["potentiometer", "adc"]);
+        }
+        let potentiometer = r.section::<PotentiometerSection>("sensor.potentiometer");
+        let adc = r.section::<AdcSection>("sensor.adc");
+        let numerics = r.section::<NumericsSection>("numerics");
+        let (potentiometer, adc) = (potentiometer?, adc?);
+        Some(Self {
+            potentiometer: PotentiometerParams {
+                electrical_stroke_m: potentiometer.electrical_stroke,
+                offset_m: potentiometer.offset,
+                gain: potentiometer.gain,
+                nonlinearity: potentiometer.nonlinearity,
+            },
+            adc: AdcParams {
+                bits: adc.bits,
+                oversampling: adc.oversampling,
+                noise: if adc.noise > 0.0 {
+                    noise(adc.noise)
+                } else {
+                    AdcNoise::None
+                },
+            },
+            step_ns: (numerics?.step * 1e9).round() as u64,
+        })
+    }
+}
+
+/// A contact opens no higher than it closes, and the one at the source closes at what the
+/// source has.
+fn check_contacts(
+    r: &mut Reader,
+    supply: Option<&SupplySection>,
+    source_switch: Option<&Option<SwitchSection>>,
+) {
+    const OPENS: &str = "a contact opens at a lower pressure than it closes";
+    const NEVER: &str = "a contact that never closes: the robot would take its supply for lost";
+    if let Some(s) = supply {
+        let most = ("supply.switch_on", s.switch_on);
+        at_most(
+            r,
+            ["supply", "switch_off"],
+            (s.switch_off, "Pa"),
+            most,
+            OPENS,
+        );
+    }
+    let Some(Some(switch)) = source_switch else {
+        return;
+    };
+    let most = ("source_switch.on", switch.on);
+    at_most(r, ["source_switch", "off"], (switch.off, "Pa"), most, OPENS);
+    if let Some(s) = supply {
+        let most = ("supply.source_pressure", s.source_pressure);
+        at_most(r, ["source_switch", "on"], (switch.on, "Pa"), most, NEVER);
+    }
+}
+
+/// A rod leaves a chamber beside it.
+fn check_rod(r: &mut Reader, cylinder: Option<&CylinderSection>) {
+    const WHY: &str = "the air of chamber B acts on what the rod leaves of the piston";
+    if let Some(c) = cylinder {
+        let name = format!("{ROD_MOST} × cylinder.bore");
+        let most = (&*name, ROD_MOST * c.bore * 1e3);
+        at_most(r, ["cylinder", "rod"], (c.rod * 1e3, "mm"), most, WHY);
+    }
+}
+
+/// Holds a value of a section against that of another field, in a unit.
+fn at_most(
+    r: &mut Reader,
+    [section, key]: [&str; 2],
+    (value, unit): (f64, &str),
+    (limit, most): (&str, f64),
+    why: &str,
+) {
+    // To the rounding of conversions.
+    if value <= most * (1.0 + 1e-9) {
+        return;
+    }
+    let field = r.table(section).and_then(|table| table.get(key));
+    r.problem(
+        field.and_then(|(key, item)| item.span().or(Some(key))),
+        format!(
+            "`{section}.{key}` = {} {unit} is out of range: allowed up to {} {unit}, which is `{limit}`",
+            pretty(value),
+            pretty(most)
+        ),
+        "out of range",
+        Some(why.to_owned()),
+    );
+}
+
+fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {
+    Iso6358 {
+        conductance_m3_s_pa: c,
+        critical_ratio: b,
+        subsonic_exponent: m,
+        linear_ratio: linear,
+    }
+}
+
+fn valve(v: &ValveSection) -> ValveParams {
+    ValveParams {
+        flow: iso(
+            v.conductance,
+            v.critical_ratio,
+            v.subsonic_exponent,
+            v.linear_ratio,
+        ),
+        t_on_s: v.t_on,
+        t_off_s: v.t_off,
+    }
+}
+
+fn gas_params(s: &GasSection) -> GasParams {
+    GasParams {
+        gas_constant_j_kg_k: s.gas_constant,
+        heat_capacity_ratio: s.heat_capacity_ratio,
+        reference_density_kg_m3: s.reference_density,
+        reference_temperature_k: s.reference_temperature,
+        reference_pressure_pa: s.reference_pressure,
+        ambient_pressure_pa: s.ambient_pressure,
+        ambient_temperature_k: s.ambient_temperature,
+    }
+}
+
+fn supply_params(
+    s: &SupplySection,
+    source_switch: Option<&SwitchSection>,
+    regulator: &FlowSection,
+    dump: &ValveSection,
+) -> SupplyParams {
+    SupplyParams {
+        source_pressure_pa: s.source_pressure,
+        set_pressure_pa: s.set_pressure,
+        droop_pa: s.droop,
+        regulator_flow: iso(
+            regulator.conductance,
+            regulator.critical_ratio,
+            regulator.subsonic_exponent,
+            regulator.linear_ratio,
+        ),
+        reservoir_m3: s.reservoir,
+        initial_pressure_pa: s.initial_pressure,
+        dump_valve: valve(dump),
+        switch: SwitchParams {
+            on_pa: s.switch_on,
+            off_pa: s.switch_off,
+        },
+        source_switch: source_switch.map(|s| SwitchParams {
+            on_pa: s.on,
+            off_pa: s.off,
+        }),
+    }
+}
+
+fn cylinder_params(
+    c: &CylinderSection,
+    line: &LineSection,
+    fill: &ValveSection,
+    vent: &ValveSection,
+    f: &FrictionSection,
+    e: &EndStopSection,
+) -> CylinderParams {
+    CylinderParams {
+        bore_m: c.bore,
+        rod_m: c.rod,
+        stroke_m: c.stroke,
+        dead_volume_a_m3: c.dead_volume_a,
+        dead_volume_b_m3: c.dead_volume_b,
+        line_volume_m3: line.volume,
+        line_flow: Some(iso(
+            line.conductance,
+            line.critical_ratio,
+            line.subsonic_exponent,
+            line.linear_ratio,
+        )),
+        line_delay_s: line.delay,
+        dead_wall_area_m2: line.wall_area,
+        piston_leak_m3_s_pa: c.piston_leak,
+        rod_leak_m3_s_pa: c.rod_leak,
+        fill_valve: valve(fill),
+        vent_valve: valve(vent),
+        timing_spread: c.timing_spread,
+        gas_model: GasModel::Polytropic {
+            exponent: c.exponent,
+        },
+        friction: FrictionParams {
+            coulomb_n: f.coulomb,
+            static_n: f.static_force,
+            stribeck_m_s: f.stribeck,
+            viscous_n_s_m: f.viscous,
+            bristle_stiffness_n_m: f.bristle_stiffness,
+            bristle_damping_n_s_m: f.bristle_damping,
+            elastic_share: f.elastic_share,
+            // Not selected for the robot.
+            pressure_area_m2: 0.0,
+        },
+        end_stop: EndStopParams {
+            stiffness_n_m: e.stiffness,
+            damping_s_m: e.damping,
+            cushion_length_m: e.cushion_length,
+            cushion_damping_n_s_m: e.cushion_damping,
+        },
+        // Replaced per cylinder from [start].
+        initial_pressure_a_pa: 0.0,
+        initial_pressure_b_pa: 0.0,
+    }
+}

@@ -1,0 +1,277 @@
+//! The sections of a robot file that describe the plant: every parameter with
+//! its unit and range.
+
+use crate::params::params;
+
+params! {
+    /// Gas and atmosphere.
+    GasSection {
+        /// Specific gas constant.
+        gas_constant: f64, "gas_constant", SpecificHeat, 1.0, 5000.0;
+        /// Ratio of specific heats.
+        heat_capacity_ratio: f64, "heat_capacity_ratio", Number, 1.0, 2.0;
+        /// Density at the reference atmosphere (ANR).
+        reference_density: f64, "reference_density", Density, 0.01, 10.0;
+        /// Temperature of the reference atmosphere (ANR).
+        reference_temperature: f64, "reference_temperature", Temperature, 200.0, 400.0;
+        /// Pressure of the reference atmosphere (ANR).
+        reference_pressure: f64, "reference_pressure", Pressure, 5e4, 2e5;
+        /// Ambient pressure, absolute.
+        ambient_pressure: f64, "ambient_pressure", Pressure, 3e4, 2e5;
+        /// Temperature of surroundings, walls and supply.
+        ambient_temperature: f64, "ambient_temperature", Temperature, 230.0, 340.0;
+    }
+
+    /// Air supply.
+    SupplySection {
+        /// Pressure before the regulator, absolute.
+        source_pressure: f64, "source_pressure", Pressure, 1e5, 3e7;
+        /// Pressure that the regulator holds at no flow, absolute.
+        set_pressure: f64, "set_pressure", Pressure, 1e5, 2e6;
+        /// Pressure below the set point at which the regulator is fully open.
+        droop: f64, "droop", Pressure, 100.0, 1e6;
+        /// Volume of reservoir and manifold.
+        reservoir: f64, "reservoir", Volume, 1e-6, 1.0;
+        /// Reservoir pressure at the start, absolute.
+        initial_pressure: f64, "initial_pressure", Pressure, 5e4, 2e6;
+        /// The pressure switch at the reservoir closes above this, absolute.
+        switch_on: f64, "switch_on", Pressure, 1e4, 2e6;
+        /// The pressure switch at the reservoir opens below this, absolute.
+        switch_off: f64, "switch_off", Pressure, 1e4, 2e6;
+    }
+
+    /// A second contact of the pressure switch, before the regulator, in series with the one
+    /// at the reservoir; may be left out.
+    SwitchSection {
+        /// It closes above this, absolute.
+        on: f64, "on", Pressure, 1e4, 3e7;
+        /// It opens below this, absolute.
+        off: f64, "off", Pressure, 1e4, 3e7;
+    }
+
+    /// A flow path after ISO 6358.
+    FlowSection {
+        /// Sonic conductance C.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio b.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent m.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+    }
+
+    /// An on/off valve.
+    ValveSection {
+        /// Sonic conductance C of the open valve.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio b.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent m.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+        /// From energising to open.
+        t_on: f64, "t_on", Time, 0.0, 0.1;
+        /// From de-energising to shut.
+        t_off: f64, "t_off", Time, 0.0, 0.1;
+    }
+
+    /// Tube between the valves and each chamber.
+    LineSection {
+        /// Volume of the tube.
+        volume: f64, "volume", Volume, 0.0, 1e-3;
+        /// Travel time of the pressure wave.
+        delay: f64, "delay", Time, 0.0, 0.007;
+        /// Wall area of tube and dead volume for heat exchange.
+        wall_area: f64, "wall_area", Area, 0.0, 1.0;
+        /// Sonic conductance of the tube.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio of the tube.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent of the tube.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+    }
+
+    /// A cylinder.
+    CylinderSection {
+        /// Bore.
+        bore: f64, "bore", Length, 0.004, 0.2;
+        /// Diameter of the rod.
+        rod: f64, "rod", Length, 0.0, 0.2;
+        /// Stroke between the stops.
+        stroke: f64, "stroke", Length, 0.001, 2.0;
+        /// Dead volume at the end of chamber A.
+        dead_volume_a: f64, "dead_volume_a", Volume, 1e-8, 1e-3;
+        /// Dead volume at the end of chamber B.
+        dead_volume_b: f64, "dead_volume_b", Volume, 1e-8, 1e-3;
+        /// Leak past the piston seal.
+        piston_leak: f64, "piston_leak", SonicConductance, 0.0, 1e-9;
+        /// Leak past the rod seal.
+        rod_leak: f64, "rod_leak", SonicConductance, 0.0, 1e-9;
+        /// Factor on the switching times of fill A, vent A, fill B, vent B.
+        timing_spread: [f64; 4], "timing_spread", Number, 0.1, 10.0;
+        /// Polytropic exponent of the gas in the chambers.
+        exponent: f64, "exponent", Number, 1.0, 1.7;
+    }
+
+    /// Seal friction (LuGre type with an elastic share).
+    FrictionSection {
+        /// Coulomb force.
+        coulomb: f64, "coulomb", Force, 0.0, 500.0;
+        /// Break-away force.
+        static_force: f64, "static", Force, 0.0, 500.0;
+        /// Stribeck velocity.
+        stribeck: f64, "stribeck", Velocity, 1e-4, 1.0;
+        /// Viscous coefficient.
+        viscous: f64, "viscous", Damping, 0.0, 1000.0;
+        /// Bristle stiffness.
+        bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1e3, 1e6;
+        /// Bristle damping.
+        bristle_damping: f64, "bristle_damping", Damping, 0.0, 2000.0;
+        /// Share of the steady bristle deflection that is purely elastic.
+        elastic_share: f64, "elastic_share", Number, 0.0, 0.95;
+    }
+
+    /// End stops of a cylinder.
+    EndStopSection {
+        /// Stiffness of the hard stop.
+        stiffness: f64, "stiffness", Stiffness, 1e4, 1e7;
+        /// Hunt–Crossley damping factor.
+        damping: f64, "damping", PerVelocity, 0.0, 50.0;
+        /// Length of the cushion before each stop.
+        cushion_length: f64, "cushion_length", Length, 0.0, 0.05;
+        /// Damping of the cushion at the stop.
+        cushion_damping: f64, "cushion_damping", Damping, 0.0, 2000.0;
+    }
+
+    /// State of a cylinder at the start.
+    StartSection {
+        /// Stroke.
+        stroke: f64, "stroke", Length, 0.0, 0.18;
+        /// Pressure of chamber A, absolute.
+        pressure_a: f64, "pressure_a", Pressure, 1e4, 2e6;
+        /// Pressure of chamber B, absolute.
+        pressure_b: f64, "pressure_b", Pressure, 1e4, 2e6;
+    }
+
+    /// A wheel motor with its gear.
+    MotorSection {
+        /// Voltage of the bridge.
+        supply: f64, "supply", Voltage, 1.0, 60.0;
+        /// Winding, brushes and bridge.
+        resistance: f64, "resistance", Resistance, 0.01, 100.0;
+        /// Winding inductance.
+        inductance: f64, "inductance", Inductance, 0.0, 1.0;
+        /// Torque constant, equal to the EMF constant.
+        torque_constant: f64, "torque_constant", TorqueConstant, 1e-4, 1.0;
+        /// Reduction from motor to wheel.
+        reduction: f64, "reduction", Number, 1.0, 10_000.0;
+        /// Efficiency of gear and chain.
+        efficiency: f64, "efficiency", Number, 0.2, 1.0;
+        /// Motor speed over which the efficiency changes from driving to driven.
+        efficiency_blend: f64, "efficiency_blend", AngularVelocity, 0.01, 100.0;
+        /// Brush and bearing friction at the motor shaft.
+        friction: f64, "friction", Torque, 0.0, 1.0;
+        /// Motor speed over which that friction reverses.
+        friction_blend: f64, "friction_blend", AngularVelocity, 0.01, 100.0;
+        /// Encoder lines on the motor shaft, four edges each.
+        encoder_lines: u32, "encoder_lines", Count, 1.0, 10_000.0;
+    }
+
+    /// Position sensor of a joint.
+    PotentiometerSection {
+        /// Wiper travel over the whole electrical range.
+        electrical_stroke: f64, "electrical_stroke", Length, 0.001, 2.0;
+        /// Wiper position at stroke zero.
+        offset: f64, "offset", Length, -0.1, 0.1;
+        /// Gain error; 1 is ideal.
+        gain: f64, "gain", Number, 0.8, 1.2;
+        /// Independent linearity, share of the electrical stroke.
+        nonlinearity: f64, "nonlinearity", Number, 0.0, 0.05;
+    }
+
+    /// Converter of the position sensors.
+    AdcSection {
+        /// Resolution of one conversion.
+        bits: u32, "bits", Count, 8.0, 16.0;
+        /// Conversions averaged in one reading.
+        oversampling: u32, "oversampling", Count, 1.0, 256.0;
+        /// Standard deviation of one conversion, in its least significant bits; Gaussian.
+        noise: f64, "noise", Lsb, 0.0, 100.0;
+    }
+
+    /// Dimensions of the robot, chassis and wheels.
+    BodySection {
+        /// Crank from O3 to O4.
+        crank: f64, "crank", Length, 0.01, 2.0;
+        /// O4 seen from O1: forward, left.
+        p4: [f64; 2], "p4", Length, -2.0, 2.0;
+        /// Smallest accepted moment arm of the yaw cylinder, as a share of the crank.
+        min_cos_theta3: f64, "min_cos_theta3", Number, 0.0, 1.0;
+        /// Joint lengths b2, b5, b6 at stroke zero.
+        stroke_zero: [f64; 3], "stroke_zero", Length, 0.0, 10.0;
+        /// O4 of the left leg from the middle of the wheel axle: forward, left, up.
+        o4: [f64; 3], "o4", Length, -5.0, 5.0;
+        /// Sole below the foot point P.
+        foot_pad: f64, "foot_pad", Length, 0.0, 1.0;
+        /// Mass of the chassis without wheels and legs.
+        chassis_mass: f64, "chassis_mass", Mass, 0.1, 1000.0;
+        /// Centre of mass of the chassis from the wheel axle: forward, up.
+        chassis_com: [f64; 2], "chassis_com", Length, -5.0, 5.0;
+        /// Inertia of the chassis about its centre of mass, pitch axis.
+        chassis_pitch_inertia: f64, "chassis_pitch_inertia", Inertia, 1e-4, 1000.0;
+        /// Viscous friction of the chassis travel.
+        chassis_viscous: f64, "chassis_viscous", Damping, 0.0, 1000.0;
+        /// Mass of one wheel.
+        wheel_mass: f64, "wheel_mass", Mass, 0.01, 100.0;
+        /// Radius of the wheels.
+        wheel_radius: f64, "wheel_radius", Length, 0.01, 2.0;
+        /// Inertia of one wheel about its axle.
+        wheel_inertia: f64, "wheel_inertia", Inertia, 0.0, 100.0;
+        /// Inertia of one motor's rotor.
+        rotor_inertia: f64, "rotor_inertia", Inertia, 0.0, 1.0;
+        /// Gravity in ground axes: forward, left, normal to the ground.
+        gravity: [f64; 3], "gravity", Acceleration, -30.0, 30.0;
+    }
+
+    /// A rigid body of a leg, in its link frame.
+    LinkSection {
+        /// Mass.
+        mass: f64, "mass", Mass, 1e-3, 100.0;
+        /// Centre of mass.
+        com: [f64; 3], "com", Length, -2.0, 2.0;
+        /// Principal inertias at the centre of mass.
+        inertia: [f64; 3], "inertia", Inertia, 0.0, 100.0;
+    }
+
+    /// Soles and ground.
+    ContactSection {
+        /// Normal stiffness.
+        stiffness: f64, "stiffness", Stiffness, 1.0, 1e9;
+        /// Hunt–Crossley damping factor.
+        damping: f64, "damping", PerVelocity, 0.0, 1e3;
+        /// Coefficient of static friction.
+        mu_static: f64, "mu_static", Number, 0.0, 10.0;
+        /// Coefficient of kinetic friction; at most the static one.
+        mu_kinetic: f64, "mu_kinetic", Number, 0.0, 10.0;
+        /// Stribeck velocity.
+        stribeck: f64, "stribeck", Velocity, 1e-6, 10.0;
+        /// Bristle stiffness.
+        bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1.0, 1e9;
+        /// Bristle damping.
+        bristle_damping: f64, "bristle_damping", Damping, 0.0, 1e6;
+        /// Radius of the sole.
+        sole_radius: f64, "sole_radius", Length, 0.0, 1.0;
+        /// Penetration of a side of the sole that closes its switch.
+        switch_threshold: f64, "switch_threshold", Length, 0.0, 0.1;
+    }
+
+    /// Numerics of the plant.
+    NumericsSection {
+        /// Length of a full step; steps are cut at every valve edge.
+        step: f64, "step", Time, 1e-6, 1e-3;
+    }
+}

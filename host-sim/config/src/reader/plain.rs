@@ -1,0 +1,128 @@
+//! Texts, choices and whole numbers.
+
+use std::ops::RangeInclusive;
+
+use super::{Entry, Reader};
+use crate::suggest::closest;
+
+impl Reader {
+    /// Reads a text field; `None` and a problem if it is missing or not a text.
+    pub(crate) fn text(&mut self, entry: &Entry, key: &str) -> Option<String> {
+        let path = entry.field_path(key);
+        let Some((key_span, item)) = entry.get(key) else {
+            self.problem(
+                Some(entry.span.clone()),
+                format!("`{path}` is missing"),
+                "expected here",
+                Some(format!("write `{key} = \"…\"`")),
+            );
+            return None;
+        };
+        match item.as_str() {
+            Some(text) => Some(text.to_owned()),
+            None => {
+                let message = format!("`{path}` = {} must be a text", item.to_string().trim());
+                self.problem(item.span().or(Some(key_span)), message, "not a text", None);
+                None
+            }
+        }
+    }
+
+    /// Reads an optional list of texts, each of which `parse` turns into a value
+    /// or says why not.
+    pub(crate) fn texts<T>(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        parse: impl Fn(&str) -> Result<T, String>,
+    ) -> Vec<T> {
+        let Some((key_span, item)) = entry.get(key) else {
+            return Vec::new();
+        };
+        let path = entry.field_path(key);
+        let Some(list) = item.as_array() else {
+            let message = format!("`{path}` = {} must be a list", item.to_string().trim());
+            let example = format!("write `{key} = [\"…\", \"…\"]`");
+            let span = item.span().or(Some(key_span));
+            self.problem(span, message, "not a list", Some(example));
+            return Vec::new();
+        };
+        let mut values = Vec::new();
+        for (i, element) in list.iter().enumerate() {
+            let parsed = match element.as_str() {
+                Some(text) => parse(text),
+                None => Err(format!("{} is not a text", element.to_string().trim())),
+            };
+            match parsed {
+                Ok(value) => values.push(value),
+                Err(reason) => {
+                    let span = element.span().or_else(|| Some(key_span.clone()));
+                    self.problem(span, format!("`{path}[{i}]`: {reason}"), "not usable", None);
+                }
+            }
+        }
+        values
+    }
+
+    /// Reads a text field that must be one of `choices`.
+    pub(crate) fn choice<T: Copy>(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        choices: &[(&str, T)],
+    ) -> Option<T> {
+        let names: Vec<String> = choices.iter().map(|(n, _)| format!("\"{n}\"")).collect();
+        let names = names.join(", ");
+        if entry.get(key).is_none() {
+            self.problem(
+                Some(entry.span.clone()),
+                format!("`{}` is missing; accepted: {names}", entry.field_path(key)),
+                "expected here",
+                Some(format!("write `{key} = \"…\"`")),
+            );
+            return None;
+        }
+        let text = self.text(entry, key)?;
+        if let Some((_, value)) = choices.iter().find(|(name, _)| *name == text) {
+            return Some(*value);
+        }
+        let span = entry.get(key).and_then(|(k, i)| i.span().or(Some(k)));
+        let help = closest(&text, choices.iter().map(|(n, _)| *n))
+            .map(|word| format!("did you mean \"{word}\"?"));
+        self.problem(
+            span,
+            format!(
+                "`{}` = \"{text}\" is not known; accepted: {names}",
+                entry.field_path(key)
+            ),
+            "not known",
+            help,
+        );
+        None
+    }
+
+    /// Reads a whole number without unit, such as a seed.
+    pub(crate) fn whole(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        allowed: RangeInclusive<u64>,
+    ) -> Option<u64> {
+        let (key_span, item) = entry.get(key)?;
+        let value = item.as_integer().and_then(|v| u64::try_from(v).ok());
+        match value {
+            Some(v) if allowed.contains(&v) => Some(v),
+            _ => {
+                let message = format!(
+                    "`{}` = {} must be a whole number from {} to {}",
+                    entry.field_path(key),
+                    item.to_string().trim(),
+                    allowed.start(),
+                    allowed.end()
+                );
+                self.problem(item.span().or(Some(key_span)), message, "not allowed", None);
+                None
+            }
+        }
+    }
+}

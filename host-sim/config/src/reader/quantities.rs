@@ -1,0 +1,276 @@
+//! Quantities: a value with unit and source.
+
+use std::ops::Range;
+
+use toml_edit::Item;
+
+use super::entry::{fields, number};
+use super::{Entry, Reader};
+use crate::params::{FieldSpec, ParameterInfo};
+use crate::quantity::{Dimension, pretty, suffix};
+
+/// What is allowed, in words.
+pub(crate) fn range(min: f64, max: f64, unit: &str) -> String {
+    format!("{} to {}{}", pretty(min), pretty(max), suffix(unit))
+}
+
+impl Reader {
+    /// Reads one quantity `{ value, unit, source }` in SI.
+    pub(crate) fn quantity(&mut self, entry: &Entry, spec: &FieldSpec) -> Option<Vec<f64>> {
+        let path = entry.field_path(spec.key);
+        let example = format!(
+            "write `{} = {{ value = …, unit = \"{}\"{} }}`",
+            spec.key,
+            spec.dimension.units()[0].0,
+            if self.source_required {
+                ", source = \"…\""
+            } else {
+                ""
+            }
+        );
+        let inner = self.stated(entry, spec.key, &spec.dimension.unit_names(), &example)?;
+        let source = self.source(&inner);
+        let (factor, unit) = self.unit(&inner, spec, &example)?;
+        let Some((value_key, value)) = inner.get("value") else {
+            self.problem(
+                Some(inner.span.clone()),
+                format!("`{path}` has no value"),
+                "expected `value = …`",
+                Some(example),
+            );
+            return None;
+        };
+        let span = value.span().unwrap_or(value_key);
+        let range = range(spec.min / factor, spec.max / factor, &unit);
+        let written = self.numbers(&path, spec, &value, span.clone(), &range)?;
+        let mut ok = true;
+        for v in &written {
+            let si = v * factor;
+            // Half an ulp of slack: 20 * 1e-3 may round above a limit of 0.02.
+            let slack = 4.0 * f64::EPSILON * si.abs();
+            if !(si >= spec.min - slack && si <= spec.max + slack) {
+                ok = false;
+                self.problem(
+                    Some(span.clone()),
+                    format!(
+                        "`{path}` = {}{} is out of range: allowed {range}",
+                        pretty(*v),
+                        suffix(&unit)
+                    ),
+                    "out of range",
+                    Some(format!("{path}: {}", spec.doc)),
+                );
+                break;
+            }
+            if spec.integer && v.fract() != 0.0 {
+                ok = false;
+                self.problem(
+                    Some(span.clone()),
+                    format!(
+                        "`{path}` = {} must be a whole number from {range}",
+                        pretty(*v)
+                    ),
+                    "not whole",
+                    None,
+                );
+                break;
+            }
+        }
+        if !ok {
+            return None;
+        }
+        self.parameters.push(ParameterInfo {
+            path,
+            value: written.clone(),
+            unit,
+            min: spec.min / factor,
+            max: spec.max / factor,
+            source,
+            doc: spec.doc,
+        });
+        Some(written.into_iter().map(|v| v * factor).collect())
+    }
+
+    /// Reads a quantity that has exactly one unit, its `range` for help: value, position
+    /// of the value, source.
+    pub(crate) fn table_quantity(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        (unit, range): (&str, &str),
+        doc: &str,
+    ) -> Option<(f64, Range<usize>, String)> {
+        let path = entry.field_path(key);
+        let example = format!("write `{key} = {{ value = …, unit = \"{unit}\", source = \"…\" }}`");
+        let inner = self.stated(entry, key, &format!("\"{unit}\""), &example)?;
+        let source = self.source(&inner);
+        let value = inner.get("value");
+        let number_found = value.as_ref().and_then(|(_, v)| number(v.as_value()));
+        let found = value.as_ref().map_or_else(
+            || "nothing".to_owned(),
+            |(_, v)| v.to_string().trim().to_owned(),
+        );
+        let Some((value, number_found)) = value.zip(number_found) else {
+            let message =
+                format!("`{path}` needs a finite number from {range} as its value, not {found}");
+            self.problem(
+                Some(inner.span.clone()),
+                message,
+                "no number",
+                Some(example),
+            );
+            return None;
+        };
+        let written = inner.get("unit");
+        if written.as_ref().and_then(|(_, u)| u.as_str()) != Some(unit) {
+            let span = written
+                .and_then(|(k, i)| i.span().or(Some(k)))
+                .unwrap_or(inner.span);
+            let message = format!(
+                "`{path}` (value {}) is in another unit; accepted: \"{unit}\"",
+                pretty(number_found)
+            );
+            self.problem(
+                Some(span),
+                message,
+                "wrong unit",
+                Some(format!("{path}: {doc}")),
+            );
+            return None;
+        }
+        let span = value.1.span().unwrap_or(value.0);
+        Some((number_found, span, source))
+    }
+
+    /// The table `{ value, unit, source }` that `key` must hold, if it is there.
+    fn stated(&mut self, entry: &Entry, key: &str, units: &str, example: &str) -> Option<Entry> {
+        let path = entry.field_path(key);
+        let (key_span, item) = entry.get(key)?;
+        let span = item.span().unwrap_or(key_span);
+        let Some(table) = item.as_table_like() else {
+            let message = format!("`{path}` has no unit; accepted: {units}");
+            self.problem(
+                Some(span),
+                message,
+                "a bare value",
+                Some(example.to_owned()),
+            );
+            return None;
+        };
+        let inner = Entry {
+            path,
+            fields: fields(table),
+            span,
+        };
+        self.reject_unknown(&inner, &["value", "unit", "source"]);
+        Some(inner)
+    }
+
+    fn source(&mut self, inner: &Entry) -> String {
+        match inner.get("source") {
+            Some((key, item)) => match item.as_str().map(str::trim) {
+                Some(text) if !text.is_empty() => return text.to_owned(),
+                _ => self.problem(
+                    item.span().or(Some(key)),
+                    format!("`{}.source` must be a text", inner.path),
+                    "not a text",
+                    None,
+                ),
+            },
+            None if self.source_required => self.problem(
+                Some(inner.span.clone()),
+                format!("`{}` has no source", inner.path),
+                "expected `source = \"…\"`",
+                Some(
+                    "say where the value comes from: \"PAPER …\", \"DATASHEET …\", \
+                     \"DERIVED …\" or \"ASSUMED …\""
+                        .into(),
+                ),
+            ),
+            None => {}
+        }
+        String::new()
+    }
+
+    fn unit(&mut self, inner: &Entry, spec: &FieldSpec, example: &str) -> Option<(f64, String)> {
+        let path = &inner.path;
+        if spec.dimension == Dimension::Flag && inner.get("unit").is_none() {
+            return Some((1.0, "flag".into()));
+        }
+        let Some((key, item)) = inner.get("unit") else {
+            self.problem(
+                Some(inner.span.clone()),
+                format!(
+                    "`{path}` has no unit; accepted: {}",
+                    spec.dimension.unit_names()
+                ),
+                "expected `unit = \"…\"`",
+                Some(example.to_owned()),
+            );
+            return None;
+        };
+        let span = item.span().or(Some(key));
+        let Some(unit) = item.as_str() else {
+            let message = format!(
+                "`{path}.unit` must be a text; accepted: {}",
+                spec.dimension.unit_names()
+            );
+            self.problem(span, message, "not a text", None);
+            return None;
+        };
+        if let Some(factor) = spec.dimension.factor(unit) {
+            return Some((factor, unit.to_owned()));
+        }
+        let value = inner.get("value").map_or_else(String::new, |(_, v)| {
+            format!(" (value {})", v.to_string().trim())
+        });
+        let message = format!(
+            "`{path}`{value} is in \"{unit}\"; accepted: {}",
+            spec.dimension.unit_names()
+        );
+        self.problem(
+            span,
+            message,
+            "wrong unit",
+            Some(format!("{path}: {}", spec.doc)),
+        );
+        None
+    }
+
+    fn numbers(
+        &mut self,
+        path: &str,
+        spec: &FieldSpec,
+        value: &Item,
+        span: Range<usize>,
+        range: &str,
+    ) -> Option<Vec<f64>> {
+        let numbers: Option<Vec<f64>> = if spec.dimension == Dimension::Flag {
+            value.as_bool().map(|b| vec![f64::from(u8::from(b))])
+        } else if spec.components == 1 {
+            number(value.as_value()).map(|n| vec![n])
+        } else {
+            value
+                .as_array()
+                .and_then(|a| a.iter().map(|v| number(Some(v))).collect())
+        };
+        match numbers {
+            Some(numbers) if numbers.len() == spec.components => Some(numbers),
+            _ => {
+                let expected = match (spec.dimension, spec.components) {
+                    (Dimension::Flag, _) => "true or false".to_owned(),
+                    (_, 1) if spec.integer => format!("a whole number from {range}"),
+                    (_, 1) => format!("a finite number from {range}"),
+                    (_, n) => format!("a list of {n} finite numbers from {range}"),
+                };
+                self.problem(
+                    Some(span),
+                    format!("`{path}` = {} must be {expected}", value.to_string().trim()),
+                    "wrong type",
+                    None,
+                );
+                None
+            }
+        }
+    }
+}

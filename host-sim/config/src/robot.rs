@@ -1,0 +1,232 @@
+//! A robot: everything about the machine that a run needs, in SI units.
+
+use wheeleg_master::config::UniqueId;
+use wheeleg_plant::PlantParams;
+use wheeleg_plant::dynamics::floating::FloatingParams;
+use wheeleg_protocol::link::{BAUD, CYCLE_US};
+
+use super::commissioned;
+use super::error::ConfigError;
+use super::node::{self, NodeParams};
+use super::params::{ParameterInfo, params};
+use super::plant;
+use super::reader::Reader;
+
+params! {
+    /// Serial bus. The reply slots of the boards are built for one rate and one cycle.
+    BusParams {
+        /// Line rate of the RS-485 bus; what the boards are built for.
+        baud_bit_s: f64, "baud", BitRate, BAUD as f64, BAUD as f64;
+        /// Period of the SYNC frame; what the boards are built for.
+        cycle_s: f64, "cycle", Time, CYCLE_US as f64 * 1e-6, CYCLE_US as f64 * 1e-6;
+    }
+
+    /// Move to the start pose after arming.
+    HomingParams {
+        /// Speed of the references.
+        slew_m_s: f64, "slew", Velocity, 1e-3, 0.4;
+        /// Largest distance from the pose that counts as settled.
+        tolerance_m: f64, "tolerance", Length, 1e-4, 0.05;
+        /// Time within the tolerance before the pose is reached.
+        settle_s: f64, "settle", Time, 0.01, 10.0;
+        /// Longest duration of the whole move.
+        timeout_s: f64, "timeout", Time, 0.1, 600.0;
+    }
+
+    /// From power-up to the start of a scenario.
+    StartUpParams {
+        /// Rest in the start pose before the record begins.
+        rest_s: f64, "rest", Time, 0.0, 60.0;
+        /// Longest simulated time from power-up to rest in the start pose.
+        limit_s: f64, "limit", Time, 1.0, 3600.0;
+    }
+
+    /// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
+    GaitParams {
+        /// Number of steps.
+        steps: u16, "steps", Count, 1.0, 10_000.0;
+        /// Duration of one step.
+        period_s: f64, "period", Time, 0.5, 60.0;
+        /// Start of the lift: the reference of b6 jumps to 0.
+        lift_s: f64, "lift", Time, 0.0, 60.0;
+        /// Start of the reach: the reference of b5 jumps to the full stroke.
+        reach_s: f64, "reach", Time, 0.0, 60.0;
+        /// Start of the lowering: the reference of b6 jumps to the full stroke.
+        lower_s: f64, "lower", Time, 0.0, 60.0;
+        /// Start of the push: the wheels drive, b5 gives way.
+        push_s: f64, "push", Time, 0.0, 60.0;
+        /// Stroke of b5 and b6 used by a step.
+        stroke_m: f64, "stroke", Length, 1e-3, 0.18;
+        /// Stroke of b5 at which the held leg stands.
+        held_leg_s5_m: f64, "held_leg_s5", Length, 0.0, 0.18;
+        /// Stroke of b6 at which the held leg stands.
+        held_leg_s6_m: f64, "held_leg_s6", Length, 0.0, 0.18;
+        /// Stroke of both yaw cylinders; half is straight ahead.
+        yaw_s2_m: f64, "yaw_s2", Length, 0.0, 0.18;
+        /// Speed of the push.
+        push_speed_m_s: f64, "push_speed", Velocity, 1e-3, 0.4;
+        /// Acceleration of the push.
+        push_acceleration_m_s2: f64, "push_acceleration", Acceleration, 0.01, 5.0;
+        /// Stop the lowering of a foot where its switches close.
+        touchdown_reflex: bool, "touchdown_reflex", Flag, 0.0, 1.0;
+    }
+
+    /// Reference model of the paper's curves: a critically damped cylinder (MODEL.md 6.2).
+    ReferenceParams {
+        /// Time constant of the fast strokes (b6 retracting, b5 extending).
+        tau_fast_s: f64, "tau_fast", Time, 0.01, 1.0;
+        /// Time constant of b6 extending.
+        tau_extend_s: f64, "tau_extend", Time, 0.01, 1.0;
+        /// Pure delay between model and experiment.
+        delay_s: f64, "delay", Time, 0.0, 1.0;
+        /// Time over which the foot load falls to zero before the lift.
+        unload_s: f64, "unload", Time, 0.0, 1.0;
+        /// Start of the foot load's return within a step.
+        reload_start_s: f64, "reload_start", Time, 0.0, 60.0;
+        /// End of the foot load's return within a step.
+        reload_end_s: f64, "reload_end", Time, 0.0, 60.0;
+        /// Mass on the vertical rod.
+        m6_kg: f64, "m6", Mass, 0.01, 10.0;
+        /// Viscous friction of the vertical cylinder.
+        d6_n_s_m: f64, "d6", Damping, 0.0, 1000.0;
+        /// Gravity.
+        gravity_m_s2: f64, "gravity", Acceleration, 0.0, 20.0;
+        /// First moment of the robot's mass about the wheel axle, stepping leg drawn back, other leg at mid stroke.
+        load_moment_kg_m: f64, "load_moment", MassMoment, 0.0, 100.0;
+        /// Mass that moves forward with b5.
+        slide_mass_kg: f64, "slide_mass", Mass, 0.0, 100.0;
+        /// Distance of the drawn-back foot ahead of the axle.
+        load_arm_m: f64, "load_arm", Length, 0.01, 5.0;
+        /// Sampling of the positions from which the paper's velocities and accelerations are computed.
+        sample_period_s: f64, "sample_period", Time, 0.01, 0.2;
+    }
+
+    /// What only the robot with a floating chassis and its drawing need.
+    SpatialParams {
+        /// Inertia of the chassis about its centre of mass, roll axis.
+        chassis_roll_inertia_kg_m2: f64, "chassis_roll_inertia", Inertia, 1e-4, 1000.0;
+        /// Inertia of the chassis about its centre of mass, yaw axis.
+        chassis_yaw_inertia_kg_m2: f64, "chassis_yaw_inertia", Inertia, 1e-4, 1000.0;
+        /// Inertia of one wheel about a diameter, at its centre.
+        wheel_transverse_inertia_kg_m2: f64, "wheel_transverse_inertia", Inertia, 1e-6, 100.0;
+        /// Distance between the middle planes of the wheels.
+        track_m: f64, "track", Length, 0.05, 5.0;
+        /// Chassis box: length, width, height. For the drawing.
+        chassis_size_m: [f64; 3], "chassis_size", Length, 0.01, 5.0;
+        /// Width of a wheel. For the drawing.
+        wheel_width_m: f64, "wheel_width", Length, 1e-3, 1.0;
+    }
+}
+
+/// A robot file, checked and converted to SI.
+#[derive(Debug, Clone)]
+pub struct RobotConfig {
+    /// Name of the robot.
+    pub name: String,
+    /// One-line description.
+    pub description: String,
+    /// Serial bus.
+    pub bus: BusParams,
+    /// Move to the start pose.
+    pub homing: HomingParams,
+    /// From power-up to the start of a scenario.
+    pub start_up: StartUpParams,
+    /// Gait.
+    pub gait: GaitParams,
+    /// Reference model of the paper's figures.
+    pub reference: ReferenceParams,
+    /// Plant: pneumatics, motors, sensors, mechanism.
+    pub plant: PlantParams,
+    /// Masses and sizes beyond those of the plant.
+    pub spatial: SpatialParams,
+    /// Board parameters that differ from the boards' defaults.
+    pub node: NodeParams,
+    /// Unique id of the board that belongs to each address 1 to 8; `None` takes any.
+    pub commissioned: [Option<UniqueId>; 8],
+    /// Every parameter as written, for listings and reports.
+    pub parameters: Vec<ParameterInfo>,
+}
+
+impl RobotConfig {
+    /// Reads a robot from TOML text; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with every problem found: file, line, field, value,
+    /// accepted units or range.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        let what = format!("the robot file {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, true)?;
+        let top = r.table("");
+        if let Some(top) = &top {
+            let mut known = vec![
+                "name",
+                "description",
+                "bus",
+                "homing",
+                "start_up",
+                "gait",
+                "reference",
+                "spatial",
+                "node",
+                "commissioned",
+            ];
+            known.extend(plant::SECTIONS);
+            known.extend(plant::pneumatics::SECTIONS);
+            r.reject_unknown(top, &known);
+        }
+        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let description = top.as_ref().and_then(|t| r.text(t, "description"));
+        let bus = r.section::<BusParams>("bus");
+        let homing = r.section::<HomingParams>("homing");
+        let start_up = r.section::<StartUpParams>("start_up");
+        let gait = r.section::<GaitParams>("gait");
+        let reference = r.section::<ReferenceParams>("reference");
+        let plant = plant::read(&mut r);
+        let spatial = r.section::<SpatialParams>("spatial");
+        let node = node::read(&mut r);
+        let commissioned = commissioned::read(&mut r);
+        let robot = (|| {
+            Some(Self {
+                name: name?,
+                description: description?,
+                bus: bus?,
+                homing: homing?,
+                start_up: start_up?,
+                gait: gait?,
+                reference: reference?,
+                plant: plant?,
+                spatial: spatial?,
+                node,
+                commissioned,
+                parameters: Vec::new(),
+            })
+        })();
+        let (mut robot, parameters) = r.finish(&what, robot)?;
+        robot.parameters = parameters;
+        Ok(robot)
+    }
+
+    /// Parameters of the robot with a floating chassis.
+    #[must_use]
+    pub fn floating_params(&self) -> FloatingParams {
+        let s = &self.spatial;
+        FloatingParams {
+            robot: self.plant.body.clone(),
+            chassis_roll_inertia_kg_m2: s.chassis_roll_inertia_kg_m2,
+            chassis_yaw_inertia_kg_m2: s.chassis_yaw_inertia_kg_m2,
+            wheel_transverse_inertia_kg_m2: s.wheel_transverse_inertia_kg_m2,
+            track_m: s.track_m,
+        }
+    }
+
+    /// Fingerprint of all parameters: BLAKE3 over name, value and unit, in the
+    /// order of the listing, 64 hexadecimal digits.
+    #[must_use]
+    pub fn fingerprint(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for p in &self.parameters {
+            hasher.update(format!("{} = {} {}\n", p.path, p.value_text(), p.unit).as_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}

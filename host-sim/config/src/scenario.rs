@@ -1,0 +1,484 @@
+//! A scenario: which robot does what, for how long, and what happens to it.
+
+use wheeleg_master::command::Command;
+
+use super::command::{Arguments, command};
+use super::error::ConfigError;
+use super::params::FieldSpec;
+use super::quantity::Dimension;
+use super::reader::{Entry, Reader};
+use crate::faults::FaultSpec;
+
+/// A leg.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LegChoice {
+    /// Left (joints 1 to 3).
+    Left,
+    /// Right (joints 4 to 6).
+    Right,
+}
+
+/// What the robot is told to do once it stands at its start pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion {
+    /// Stand still.
+    Stand,
+    /// Square-wave gait of the robot's `[gait]`, one leg stepping, the other held.
+    SquareWave {
+        /// The stepping leg.
+        leg: LegChoice,
+    },
+    /// Sinusoidal foot trajectory of the paper's section 6.
+    Sinusoid {
+        /// The moving leg.
+        leg: LegChoice,
+        /// Forward travel of the foot over the whole arch, m.
+        length_m: f64,
+        /// Height of the arch, m.
+        height_m: f64,
+        /// Angular rate of the sine's argument, rad/s (1/8 in the paper).
+        rate_rad_s: f64,
+    },
+}
+
+/// What happens at a stated time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EventAction {
+    /// The master stops sending, in mid-cycle, and never comes back.
+    KillMaster,
+    /// The E-stop is pressed.
+    EStop,
+    /// The operator clears latched faults.
+    ClearFault,
+    /// A user command is given to the dispatcher.
+    Command(Command),
+}
+
+/// A timed event.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenarioEvent {
+    /// When, in s of scenario time.
+    pub at_s: f64,
+    /// What.
+    pub action: EventAction,
+}
+
+/// A rectangle of ground whose top is not at height zero. Axes as MODEL.md:
+/// x forward, y left, origin on the ground below the middle of the wheel axle
+/// at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundPatch {
+    /// From and to, m.
+    pub x_m: [f64; 2],
+    /// From and to, m.
+    pub y_m: [f64; 2],
+    /// Height of the top, m; above all patches that overlap counts the highest.
+    pub height_m: f64,
+}
+
+/// Which of the paper's and the project's targets a run is held against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TargetSet {
+    /// Figs. 12–16: A19–A23, A25–A27.
+    ThreeStep,
+    /// Standing: no valve switching at rest.
+    Stand,
+    /// Master lost: safe states in time, latched.
+    MasterLost,
+    /// E-stop: safe states in time, latched.
+    EStop,
+    /// Sinusoid of the paper's section 6: A4–A12.
+    Sinusoid,
+    /// Side of the foot that touches.
+    FootSide {
+        /// Switch that must close first: bit 0 front, 1 back, 2 left, 3 right.
+        bit: u8,
+    },
+    /// None.
+    None,
+}
+
+/// A scenario file, checked and converted to SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// Name, as in summaries and folder names.
+    pub name: String,
+    /// One-line description.
+    pub description: String,
+    /// Name or path of the robot.
+    pub robot: String,
+    /// Simulated time, s.
+    pub duration_s: f64,
+    /// Seed of all noise; `--seed` replaces it.
+    pub seed: u64,
+    /// What the robot does.
+    pub motion: Motion,
+    /// What happens to it, in order of time.
+    pub events: Vec<ScenarioEvent>,
+    /// Uneven ground.
+    pub ground: Vec<GroundPatch>,
+    /// Faults that are injected; those of the command line are added.
+    pub faults: Vec<FaultSpec>,
+    /// What it is held against.
+    pub targets: TargetSet,
+}
+
+const TOP: [&str; 10] = [
+    "name",
+    "description",
+    "robot",
+    "duration",
+    "seed",
+    "targets",
+    "motion",
+    "events",
+    "ground",
+    "faults",
+];
+
+const TARGETS: [(&str, TargetSet); 10] = [
+    ("three-step", TargetSet::ThreeStep),
+    ("stand", TargetSet::Stand),
+    ("master-lost", TargetSet::MasterLost),
+    ("e-stop", TargetSet::EStop),
+    ("sinusoid", TargetSet::Sinusoid),
+    ("foot-front", TargetSet::FootSide { bit: 0 }),
+    ("foot-back", TargetSet::FootSide { bit: 1 }),
+    ("foot-left", TargetSet::FootSide { bit: 2 }),
+    ("foot-right", TargetSet::FootSide { bit: 3 }),
+    ("none", TargetSet::None),
+];
+
+const LEGS: [(&str, LegChoice); 2] = [("left", LegChoice::Left), ("right", LegChoice::Right)];
+
+/// Longest run, s. An hour: memory holds about 2 MB per simulated second.
+const MAX_DURATION_S: f64 = 3600.0;
+
+const fn scalar(
+    key: &'static str,
+    dimension: Dimension,
+    min: f64,
+    max: f64,
+    doc: &'static str,
+) -> FieldSpec {
+    FieldSpec {
+        key,
+        dimension,
+        min,
+        max,
+        components: 1,
+        integer: false,
+        doc,
+    }
+}
+
+impl Scenario {
+    /// Reads a scenario from TOML text; `file` is the name for messages.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with every problem found.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        let what = format!("the scenario file {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, false)?;
+        let scenario = read(&mut r);
+        r.finish(&what, scenario).map(|(scenario, _)| scenario)
+    }
+}
+
+fn read(r: &mut Reader) -> Option<Scenario> {
+    let top = r.table("")?;
+    r.reject_unknown(&top, &TOP);
+    let name = r.text(&top, "name");
+    let description = r.text(&top, "description");
+    let robot = r.text(&top, "robot");
+    let duration = required(
+        r,
+        &top,
+        &scalar(
+            "duration",
+            Dimension::Time,
+            0.01,
+            MAX_DURATION_S,
+            "simulated time",
+        ),
+    );
+    let seed = match top.get("seed") {
+        Some(_) => r.whole(&top, "seed", 0..=i64::MAX as u64),
+        None => {
+            r.problem(
+                None,
+                "`seed` is missing".into(),
+                "expected at the top of the file",
+                Some("write `seed = 1`".into()),
+            );
+            None
+        }
+    };
+    let targets = r.choice(&top, "targets", &TARGETS);
+    let motion = motion(r);
+    let mut events: Vec<ScenarioEvent> = Vec::new();
+    for i in 0..r.array_len("events") {
+        let entry = r.entry("events", i);
+        events.extend(event(r, &entry, duration));
+    }
+    events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    let mut ground = Vec::new();
+    for i in 0..r.array_len("ground") {
+        let entry = r.entry("ground", i);
+        ground.extend(patch(r, &entry));
+    }
+    let faults = r.texts(&top, "faults", |text| {
+        let fault = text.parse::<FaultSpec>().map_err(|e| e.to_string())?;
+        match duration.filter(|end_s| fault.from_s >= *end_s) {
+            Some(end_s) => Err(format!(
+                "the fault `{fault}` does nothing: the scenario ends at {end_s} s, before it \
+                 could begin; allowed is a begin from 0 s to below {end_s} s"
+            )),
+            None => Ok(fault),
+        }
+    });
+    Some(Scenario {
+        name: name?,
+        description: description?,
+        robot: robot?,
+        duration_s: duration?,
+        seed: seed?,
+        motion: motion?,
+        events,
+        ground,
+        faults,
+        targets: targets?,
+    })
+}
+
+fn required(r: &mut Reader, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
+    if entry.get(spec.key).is_none() {
+        let place = if entry.path.is_empty() {
+            "at the top of the file".to_owned()
+        } else {
+            format!("in [{}]", entry.path)
+        };
+        let unit = spec.dimension.units()[0].0;
+        r.problem(
+            Some(entry.span.clone()),
+            format!("`{}` is missing {place}", spec.key),
+            "expected here",
+            Some(format!(
+                "write `{} = {{ value = …, unit = \"{unit}\" }}`",
+                spec.key
+            )),
+        );
+        return None;
+    }
+    optional(r, entry, spec)
+}
+
+fn optional(r: &mut Reader, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
+    entry.get(spec.key)?;
+    r.quantity(entry, spec).and_then(|v| v.first().copied())
+}
+
+#[derive(Clone, Copy)]
+enum MotionKind {
+    Stand,
+    SquareWave,
+    Sinusoid,
+}
+
+fn motion(r: &mut Reader) -> Option<Motion> {
+    let Some(entry) = r.table("motion") else {
+        r.problem(
+            None,
+            "section [motion] is missing".into(),
+            "expected in this file",
+            Some(
+                "write `[motion]` and below it `kind = \"square-wave\"` and `leg = \"left\"`"
+                    .into(),
+            ),
+        );
+        return None;
+    };
+    let kinds = [
+        ("stand", MotionKind::Stand),
+        ("square-wave", MotionKind::SquareWave),
+        ("sinusoid", MotionKind::Sinusoid),
+    ];
+    match r.choice(&entry, "kind", &kinds)? {
+        MotionKind::Stand => {
+            r.reject_misplaced(&entry, &["kind"], &TOP);
+            Some(Motion::Stand)
+        }
+        MotionKind::SquareWave => {
+            r.reject_misplaced(&entry, &["kind", "leg"], &TOP);
+            let leg = r.choice(&entry, "leg", &LEGS)?;
+            Some(Motion::SquareWave { leg })
+        }
+        MotionKind::Sinusoid => {
+            let known = ["kind", "leg", "length", "height", "rate"];
+            r.reject_misplaced(&entry, &known, &TOP);
+            let leg = r.choice(&entry, "leg", &LEGS);
+            let length = scalar(
+                "length",
+                Dimension::Length,
+                0.0,
+                0.25,
+                "forward travel of the foot",
+            );
+            let height = scalar("height", Dimension::Length, 0.0, 0.2, "height of the arch");
+            let rate = scalar(
+                "rate",
+                Dimension::AngularVelocity,
+                0.01,
+                10.0,
+                "rate of the sine's argument",
+            );
+            let length = required(r, &entry, &length);
+            let height = required(r, &entry, &height);
+            let rate = required(r, &entry, &rate);
+            Some(Motion::Sinusoid {
+                leg: leg?,
+                length_m: length?,
+                height_m: height?,
+                rate_rad_s: rate?,
+            })
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum ActionKind {
+    KillMaster,
+    EStop,
+    ClearFault,
+    Command,
+}
+
+fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<ScenarioEvent> {
+    let latest = duration_s.unwrap_or(MAX_DURATION_S);
+    let at = scalar(
+        "at",
+        Dimension::Time,
+        0.0,
+        latest,
+        "time of the event, within the duration of the scenario",
+    );
+    let before = r.problem_count();
+    let at_s = required(r, entry, &at);
+    let actions = [
+        ("kill-master", ActionKind::KillMaster),
+        ("e-stop", ActionKind::EStop),
+        ("clear-fault", ActionKind::ClearFault),
+        ("command", ActionKind::Command),
+    ];
+    let kind = r.choice(entry, "action", &actions)?;
+    let action = if matches!(kind, ActionKind::Command) {
+        r.reject_misplaced(
+            entry,
+            &[
+                "at",
+                "action",
+                "command",
+                "joint",
+                "stroke",
+                "travel",
+                "board",
+                "parameter",
+                "value",
+            ],
+            &TOP,
+        );
+        let commands: Vec<(&str, &str)> = super::COMMAND_NAMES.iter().map(|n| (*n, *n)).collect();
+        let name = r.choice(entry, "command", &commands);
+        let joint = r.whole(entry, "joint", 1..=6);
+        let stroke = scalar(
+            "stroke",
+            Dimension::Length,
+            0.0,
+            0.18,
+            "stroke of the joint",
+        );
+        let travel = scalar(
+            "travel",
+            Dimension::Length,
+            -32.0,
+            32.0,
+            "travel of the wheels",
+        );
+        let stroke_m = optional(r, entry, &stroke);
+        let travel_m = optional(r, entry, &travel);
+        let board = r.whole(entry, "board", 1..=8);
+        let board = board.map(|number| number as u8);
+        let parameter = super::node::choice(r, entry, board);
+        let given = Arguments {
+            joint: joint.map(|j| j as u8),
+            stroke_m,
+            travel_m,
+            board,
+            parameter,
+        };
+        let name = name?;
+        match command(name, &given) {
+            Ok(command) => EventAction::Command(command),
+            Err(missing) => {
+                // Of a field that is there and wrong, the reader has said what is wrong.
+                if r.problem_count() == before {
+                    r.problem(
+                        Some(entry.span.clone()),
+                        format!(
+                            "`{}`: the command {name} of the scenario needs `{missing}`",
+                            entry.path
+                        ),
+                        "in this event",
+                        Some(format!("add `{missing}` to the event")),
+                    );
+                }
+                return None;
+            }
+        }
+    } else {
+        r.reject_misplaced(entry, &["at", "action"], &TOP);
+        match kind {
+            ActionKind::KillMaster => EventAction::KillMaster,
+            ActionKind::EStop => EventAction::EStop,
+            _ => EventAction::ClearFault,
+        }
+    };
+    Some(ScenarioEvent {
+        at_s: at_s?,
+        action,
+    })
+}
+
+fn patch(r: &mut Reader, entry: &Entry) -> Option<GroundPatch> {
+    r.reject_misplaced(entry, &["x", "y", "height"], &TOP);
+    let mut range = |key: &'static str, doc: &'static str| -> Option<[f64; 2]> {
+        let spec = FieldSpec {
+            components: 2,
+            ..scalar(key, Dimension::Length, -100.0, 100.0, doc)
+        };
+        if entry.get(key).is_none() {
+            return required(r, entry, &spec).map(|_| [0.0; 2]);
+        }
+        let values = r.quantity(entry, &spec)?;
+        let range = [values[0], values[1]];
+        if range[0] >= range[1] {
+            let span = entry.get(key).and_then(|(k, i)| i.span().or(Some(k)));
+            let message = format!(
+                "`{}.{key}` must run from the smaller to the larger value",
+                entry.path
+            );
+            r.problem(span, message, "empty", None);
+            return None;
+        }
+        Some(range)
+    };
+    let x_m = range("x", "from and to, forward of the axle");
+    let y_m = range("y", "from and to, left of the middle");
+    let height = scalar("height", Dimension::Length, -0.2, 0.3, "height of the top");
+    let height_m = required(r, entry, &height);
+    Some(GroundPatch {
+        x_m: x_m?,
+        y_m: y_m?,
+        height_m: height_m?,
+    })
+}

@@ -1,0 +1,560 @@
+//! Robot and scenario files: what is wrong with them is said where it is wrong.
+
+use wheeleg_config::{ConfigError, RobotConfig, Scenario, builtin};
+use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
+
+const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
+const SCENARIO: &str = include_str!("../../scenarios/three-step.toml");
+
+/// One line per problem, with its help.
+fn report(error: &ConfigError) -> String {
+    let lines: Vec<String> = error
+        .problems()
+        .iter()
+        .map(|p| format!("{} | {}", p.summary(), p.help_text().unwrap_or("")))
+        .collect();
+    lines.join("\n")
+}
+
+fn robot_with(from: &str, to: &str) -> String {
+    assert_eq!(ROBOT.matches(from).count(), 1, "{from} must occur once");
+    let text = ROBOT.replace(from, to);
+    report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
+}
+
+/// The robot without its own board parameters, and these instead.
+fn robot_with_node(sections: &str) -> String {
+    let own = ROBOT.find("\n[node.joint]\n").expect("present");
+    format!("{}\n{sections}", &ROBOT[..own])
+}
+
+fn scenario_with(from: &str, to: &str) -> String {
+    assert_eq!(SCENARIO.matches(from).count(), 1, "{from} must occur once");
+    let text = SCENARIO.replace(from, to);
+    report(&Scenario::parse("my.toml", &text).expect_err("must be rejected"))
+}
+
+fn assert_all(report: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(report.contains(part), "`{part}` is not in:\n{report}");
+    }
+}
+
+/// Line of the robot file that holds `text`, from 1.
+fn line_of(text: &str) -> String {
+    let at = ROBOT.find(text).expect("present");
+    format!("my.toml:{}:", ROBOT[..at].matches('\n').count() + 1)
+}
+
+#[test]
+fn every_built_in_file_is_accepted() {
+    for (name, ..) in builtin::ROBOTS {
+        builtin::robot(name).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+    }
+    for (name, ..) in builtin::SCENARIOS {
+        let scenario = builtin::scenario(name).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+        assert_eq!(scenario.name, *name);
+        assert!(builtin::robot(&scenario.robot).is_ok());
+    }
+}
+
+#[test]
+fn every_parameter_is_listed_with_unit_source_and_range() {
+    let robot = builtin::robot("wheeleg-2003").expect("built in");
+    assert!(robot.parameters.len() > 100);
+    for p in &robot.parameters {
+        assert!(
+            !p.unit.is_empty() && !p.source.is_empty() && !p.doc.is_empty(),
+            "{}",
+            p.path
+        );
+        for v in &p.value {
+            assert!((p.min..=p.max).contains(v), "{}: {v}", p.path);
+        }
+    }
+    // Nothing in the file is silently ignored: as many entries as parameters.
+    let entries = ROBOT
+        .lines()
+        .filter(|l| l.contains("value =") && !l.starts_with('#'));
+    let written = robot
+        .parameters
+        .iter()
+        .filter(|p| !p.source.starts_with("default of the board"));
+    assert_eq!(entries.count(), written.count());
+    // What the file leaves out is listed too: the boards' whole tables.
+    let listed = |section: &str| {
+        let names = robot.parameters.iter().map(|p| p.path.as_str());
+        names.filter(|path| path.starts_with(section)).count()
+    };
+    assert_eq!(listed("node.joint."), JOINT_PARAMS.len());
+    assert_eq!(listed("node.wheel."), WHEEL_PARAMS.len());
+}
+
+#[test]
+fn values_arrive_in_si() {
+    let robot = builtin::robot("wheeleg-2003").expect("built in");
+    assert!((robot.bus.baud_bit_s - 1e6).abs() < 1e-9);
+    assert!((robot.bus.cycle_s - 0.010).abs() < 1e-15);
+    assert!((robot.gait.stroke_m - 0.18).abs() < 1e-15);
+    let valve = &robot.plant.cylinders[2].fill_valve;
+    assert!((valve.flow.conductance_m3_s_pa - 0.085e-8).abs() < 1e-18);
+    assert!((robot.plant.motors[0].efficiency - 0.70).abs() < 1e-12);
+}
+
+#[test]
+fn wrong_unit() {
+    let text = robot_with(
+        "bore          = { value = 20.0, unit = \"mm\"",
+        "bore          = { value = 20.0, unit = \"bar\"",
+    );
+    let line = line_of("bore          =");
+    assert_all(
+        &text,
+        &[
+            &line,
+            "`cylinder.bore`",
+            "20.0",
+            "\"bar\"",
+            "\"mm\"",
+            "\"m\"",
+        ],
+    );
+}
+
+#[test]
+fn out_of_range() {
+    let text = robot_with(
+        "bore          = { value = 20.0, unit = \"mm\"",
+        "bore          = { value = 900.0, unit = \"mm\"",
+    );
+    let line = line_of("bore          =");
+    assert_all(
+        &text,
+        &[
+            &line,
+            "`cylinder.bore` = 900 mm",
+            "out of range",
+            "4 to 200 mm",
+        ],
+    );
+}
+
+#[test]
+fn limits_themselves_are_allowed() {
+    // With the thickest rod that the bore allows.
+    for (bore, rod) in [("4.0", "3.6"), ("200.0", "180.0")] {
+        let text = ROBOT
+            .replace(
+                "bore          = { value = 20.0",
+                &format!("bore          = {{ value = {bore}"),
+            )
+            .replace(
+                "rod           = { value = 8.0",
+                &format!("rod           = {{ value = {rod}"),
+            );
+        let parsed = RobotConfig::parse("my.toml", &text);
+        assert!(parsed.is_ok(), "{bore}: {parsed:?}");
+    }
+}
+
+#[test]
+fn gain_out_of_range_and_in_a_wrong_unit() {
+    let gain = |entry: &str| {
+        let text = robot_with_node(&format!("[node.joint]\n{entry}\n"));
+        report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
+    };
+    let text = gain("proportional = { value = 40.0, unit = \"1/mm\", source = \"x\" }");
+    assert_all(
+        &text,
+        &["`node.joint.proportional` = 40 1/mm", "0 to 4 1/mm", "Kp"],
+    );
+    let text = gain("proportional = { value = 0.04, unit = \"1/m\", source = \"x\" }");
+    assert_all(&text, &["`node.joint.proportional`", "0.04", "\"1/mm\""]);
+    let text = gain("proportonal = { value = 0.04, unit = \"1/mm\", source = \"x\" }");
+    assert_all(
+        &text,
+        &[
+            "unknown field `proportonal`",
+            "[node.joint]",
+            "did you mean `proportional`?",
+        ],
+    );
+    let text = gain("velocity_window = { value = 3.5, unit = \"ticks\", source = \"x\" }");
+    assert_all(
+        &text,
+        &["`node.joint.velocity_window` = 3.5", "whole number from"],
+    );
+    let text = gain("duty_limit = { value = 1.5, unit = \"1\", source = \"x\" }");
+    assert_all(&text, &["= 1.5 is out of range: allowed 0 to 1 | "]);
+    let text = gain("proportional = { value = nan, unit = \"1/mm\", source = \"x\" }");
+    assert_all(&text, &["a finite number from 0 to 4 1/mm", "not nan"]);
+}
+
+#[test]
+fn board_parameters_become_raw_numbers_of_the_wire() {
+    let text = robot_with_node(
+        "[node.joint]\nproportional = { value = 0.5, unit = \"1/mm\", source = \"x\" }\n\
+         [node.vertical]\nproportional = { value = 0.25, unit = \"1/mm\", source = \"x\" }\n",
+    );
+    let robot = RobotConfig::parse("my.toml", &text).expect("accepted");
+    let gain = |joint: usize| {
+        let found = robot.node.joints[joint]
+            .iter()
+            .find(|(id, _)| *id == 0x0101);
+        found.map(|(_, raw)| *raw)
+    };
+    // I8F24.
+    assert_eq!(gain(0), Some(1 << 23));
+    assert_eq!(gain(2), Some(1 << 22));
+    assert_eq!(gain(5), Some(1 << 22));
+}
+
+/// The boards' reply slots are built for one rate and one cycle; a robot file
+/// that says otherwise would be simulated wrongly, so it is refused.
+#[test]
+fn bus_is_that_of_the_boards() {
+    let text = robot_with(
+        "value = 1.0, unit = \"Mbit/s\"",
+        "value = 2.0, unit = \"Mbit/s\"",
+    );
+    assert_all(&text, &["`bus.baud` = 2 Mbit/s", "allowed 1 to 1 Mbit/s"]);
+    let text = robot_with(
+        "cycle = { value = 10.0, unit = \"ms\"",
+        "cycle = { value = 5.0, unit = \"ms\"",
+    );
+    assert_all(&text, &["`bus.cycle` = 5 ms", "allowed 10 to 10 ms"]);
+}
+
+#[test]
+fn unknown_missing_and_mistyped_fields() {
+    let text = robot_with("bore          =", "boer          =");
+    assert_all(
+        &text,
+        &["unknown field `boer` in [cylinder]", "did you mean `bore`?"],
+    );
+    assert_all(&text, &["[cylinder] lacks bore (m)"]);
+
+    let text = robot_with("[cylinder]", "[cilinder]");
+    assert_all(
+        &text,
+        &[
+            "unknown field `cilinder` at the top",
+            "did you mean `cylinder`?",
+        ],
+    );
+    assert_all(&text, &["section [cylinder] is missing"]);
+
+    let text = robot_with(
+        "steps             = { value = 3,",
+        "steps             = { value = \"three\",",
+    );
+    let allowed = "must be a whole number from 1 to 10000 | ";
+    assert_all(&text, &["`gait.steps` = \"three\"", allowed]);
+
+    for value in ["3.5", "nan"] {
+        let text = robot_with(
+            "steps             = { value = 3,",
+            &format!("steps             = {{ value = {value},"),
+        );
+        assert_all(&text, &[&format!("`gait.steps` = {value}"), allowed]);
+    }
+    let text = robot_with(
+        "bore          = { value = 20.0",
+        "bore          = { value = nan",
+    );
+    assert_all(
+        &text,
+        &["`cylinder.bore` = nan", "a finite number from 4 to 200 mm"],
+    );
+}
+
+/// The unit of a pure number is written in a file, and says nothing in a sentence.
+#[test]
+fn a_pure_number_is_told_without_a_unit() {
+    let ratio = "heat_capacity_ratio   = { value = 1.4, unit = \"1\"";
+    let text = robot_with(ratio, &ratio.replace("1.4", "14.0"));
+    assert_all(
+        &text,
+        &["`gas.heat_capacity_ratio` = 14 is out of range: allowed 1 to 2 | "],
+    );
+    let text = robot_with("heat_capacity_ratio   =", "unknown               =");
+    assert_all(&text, &["[gas] lacks heat_capacity_ratio | "]);
+}
+
+/// The robot with this in the place of its `[source_switch]`, at the top of the file.
+fn with_source_switch(instead: &str) -> String {
+    let begin = ROBOT.find("[source_switch]\n").expect("present");
+    let end = ROBOT.find("[regulator]\n").expect("present");
+    assert!(begin < end);
+    format!("{instead}\n{}{}", &ROBOT[..begin], &ROBOT[end..])
+}
+
+/// `[source_switch]` with these thresholds, Pa.
+fn contact(on: &str, off: &str) -> String {
+    let field = |name: &str, value: &str| {
+        format!("{name} = {{ value = {value}, unit = \"Pa\", source = \"ASSUMED\" }}")
+    };
+    let (on, off) = (field("on", on), field("off", off));
+    with_source_switch(&format!("source_switch = {{ {on}, {off} }}"))
+}
+
+#[test]
+fn a_robot_has_a_contact_at_the_source_or_leaves_it_out() {
+    let fitted = |text: &str| {
+        let robot =
+            RobotConfig::parse("my.toml", text).unwrap_or_else(|e| panic!("{}", report(&e)));
+        let switch = robot.plant.supply.source_switch;
+        switch.map(|s| [s.on_pa, s.off_pa].map(f64::to_bits))
+    };
+    let pa = |on: f64, off: f64| Some([on, off].map(f64::to_bits));
+    assert_eq!(fitted(ROBOT), pa(821_325.0, 781_325.0));
+    assert_eq!(fitted(&with_source_switch("")), None);
+    // Both limits themselves: a contact without hysteresis, at what the source has.
+    let highest = contact("1101325.0", "1101325.0");
+    assert_eq!(fitted(&highest), pa(1_101_325.0, 1_101_325.0));
+}
+
+#[test]
+fn a_contact_at_the_source_that_is_written_wrongly_is_never_ignored() {
+    let rejected = |text: &str, parts: &[&str]| {
+        let error = RobotConfig::parse("my.toml", text).expect_err("must be rejected");
+        let text = report(&error);
+        assert_eq!(error.problems().len(), 1, "{text}");
+        assert_all(&text, parts);
+    };
+    let section = "must be one section [source_switch]";
+    for (wrong, found) in [
+        ("source_switch = 5", "`source_switch` = 5"),
+        ("source_switch = \"8 bar\"", "`source_switch` = \"8 bar\""),
+        ("source_switch = []", "`source_switch` = []"),
+    ] {
+        let text = with_source_switch(wrong);
+        rejected(&text, &["my.toml:1:", found, section, "it holds: on, off"]);
+    }
+    let text = ROBOT.replace("[source_switch]\n", "[[source_switch]]\n");
+    let line = line_of("[source_switch]\n");
+    rejected(&text, &[&line, "a list of tables", section, "on, off"]);
+
+    for (field, lacks) in [
+        ("\non  = {", "lacks on (Pa)"),
+        ("\noff = {", "lacks off (Pa)"),
+    ] {
+        assert_eq!(ROBOT.matches(field).count(), 1, "{field}");
+        let text = ROBOT.replace(field, &field.replace('\n', "\n# "));
+        rejected(&text, &[&line, "[source_switch]", lacks]);
+    }
+
+    rejected(
+        &contact("781325.0", "821325.0"),
+        &[
+            "my.toml:1:",
+            "`source_switch.off` = 821325 Pa",
+            "up to 781325 Pa, which is `source_switch.on`",
+        ],
+    );
+    rejected(
+        &contact("1101326.0", "781325.0"),
+        &[
+            "my.toml:1:",
+            "`source_switch.on` = 1101326 Pa",
+            "up to 1101325 Pa, which is `supply.source_pressure`",
+            "never closes",
+        ],
+    );
+}
+
+#[test]
+fn the_contact_at_the_reservoir_opens_no_higher_than_it_closes() {
+    let text = robot_with(
+        "switch_off       = { value = 641325.0",
+        "switch_off = { value = 661326.0",
+    );
+    let line = line_of("switch_off ");
+    assert_all(
+        &text,
+        &[
+            &line,
+            "`supply.switch_off` = 661326 Pa",
+            "up to 661325 Pa",
+            "`supply.switch_on`",
+        ],
+    );
+}
+
+#[test]
+fn no_section_of_another_type_is_ignored() {
+    let own = robot_with_node("");
+    for (text, section) in [
+        (format!("node = 5\n{own}"), "node"),
+        (format!("commissioned = 5\n{own}"), "commissioned"),
+        (
+            format!("supply = 5\n{}", own.replace("[supply]", "[suply]")),
+            "supply",
+        ),
+        (format!("node.joint = 5\n{own}"), "node.joint"),
+        (robot_with_node("[[node.joint]]"), "node.joint"),
+    ] {
+        let error = RobotConfig::parse("my.toml", &text).expect_err("must be rejected");
+        let part = format!("must be one section [{section}]");
+        assert_all(&report(&error), &[&format!("`{section}` = "), &part]);
+    }
+}
+
+#[test]
+fn bare_values_and_missing_sources_are_refused() {
+    let text = robot_with(
+        "baud  = { value = 1.0, unit = \"Mbit/s\", source = \"ASSUMED: RS-485, not in the paper\" }",
+        "baud  = 1000000",
+    );
+    assert_all(&text, &["`bus.baud` has no unit", "unit = \"bit/s\""]);
+    let text = robot_with(
+        "baud  = { value = 1.0, unit = \"Mbit/s\", source = \"ASSUMED: RS-485, not in the paper\" }",
+        "baud  = { value = 1.0, unit = \"Mbit/s\" }",
+    );
+    assert_all(&text, &["`bus.baud` has no source", "PAPER"]);
+}
+
+#[test]
+fn all_problems_are_reported_at_once_in_the_order_of_the_file() {
+    let text = ROBOT
+        .replace("baud  = { value = 1.0", "baud  = { value = -1.0")
+        .replace(
+            "bore          = { value = 20.0",
+            "bore          = { value = nan",
+        );
+    let error = RobotConfig::parse("my.toml", &text).expect_err("must be rejected");
+    let text = report(&error);
+    assert_eq!(error.problems().len(), 2, "{text}");
+    assert!(text.find("bus.baud") < text.find("cylinder.bore"), "{text}");
+}
+
+#[test]
+fn broken_toml_names_the_line() {
+    let error = RobotConfig::parse("my.toml", "name = \"x\"\nbroken = = 1\n").expect_err("broken");
+    assert_all(&report(&error), &["my.toml:2:", "not valid TOML"]);
+}
+
+#[test]
+fn scenario_mistakes() {
+    let text = scenario_with("kind = \"square-wave\"", "kind = \"squarewave\"");
+    assert_all(
+        &text,
+        &[
+            "`motion.kind` = \"squarewave\"",
+            "did you mean \"square-wave\"?",
+        ],
+    );
+
+    let text = scenario_with("value = 10.0, unit = \"s\"", "value = 10.0, unit = \"m\"");
+    assert_all(&text, &["`duration`", "10.0", "\"m\"", "\"s\""]);
+
+    let text = scenario_with("value = 10.0, unit = \"s\"", "value = 0.0, unit = \"s\"");
+    assert_all(&text, &["`duration` = 0 s", "0.01 to 3600 s"]);
+
+    let service = "targets = \"none\"\n[[events]]\nat = { value = 1.0, unit = \"s\" }\n\
+                   action = \"command\"\ncommand = \"WriteParameter\"\nboard = 1\n\
+                   parameter = \"proportional\"\nvalue = nan\n";
+    let text = scenario_with("targets = \"three-step\"\n", service);
+    assert_all(
+        &text,
+        &["`events[0].value` = nan must be a number from 0 to 4 1/mm"],
+    );
+
+    // Joints and boards count from 1: nothing may be left to be refused in the run.
+    for (line, allowed) in [
+        (
+            "joint = 0",
+            "`events[0].joint` = 0 must be a whole number from 1 to 6",
+        ),
+        (
+            "joint = 9",
+            "`events[0].joint` = 9 must be a whole number from 1 to 6",
+        ),
+        (
+            "board = 0",
+            "`events[0].board` = 0 must be a whole number from 1 to 8",
+        ),
+        (
+            "board = 9",
+            "`events[0].board` = 9 must be a whole number from 1 to 8",
+        ),
+    ] {
+        let event = format!(
+            "targets = \"none\"\n[[events]]\nat = {{ value = 1.0, unit = \"s\" }}\n\
+             action = \"command\"\ncommand = \"TransmitPosition\"\n{line}\n"
+        );
+        let text = scenario_with("targets = \"three-step\"\n", &event);
+        assert_all(&text, &["my.toml:", allowed]);
+        assert_eq!(text.lines().count(), 1, "{text}");
+    }
+
+    let bare = "\n[[events]]\nat = { value = 1.0, unit = \"s\" }\naction = \"command\"\n\
+                command = \"JointReference\"\njoint = 1\n";
+    let error = Scenario::parse("my.toml", &(SCENARIO.to_owned() + bare)).expect_err("no stroke");
+    let line = SCENARIO.lines().count() + 2;
+    assert_all(
+        &report(&error),
+        &[
+            &format!("my.toml:{line}: `events[0]`: "),
+            "JointReference",
+            "needs `stroke`",
+            "add `stroke` to the event",
+        ],
+    );
+
+    let late = "targets = \"none\"\nfaults = [\"master-silent@3s\", \"pot-open:joint3@12s\"]\n";
+    let text = scenario_with("targets = \"three-step\"\n", late);
+    assert_all(
+        &text,
+        &[
+            "my.toml:",
+            "`faults[1]`",
+            "pot-open:joint3@12s",
+            "below 10 s",
+        ],
+    );
+    assert_eq!(text.lines().count(), 1, "{text}");
+
+    let text = scenario_with("targets = \"three-step\"\n", "");
+    assert_all(&text, &["`targets` is missing", "\"stand\"", "\"none\""]);
+
+    let text = scenario_with(
+        "[motion]\n",
+        "[motion]\nfaults = [\"pot-open:joint3@2s\"]\n",
+    );
+    assert_all(
+        &text,
+        &[
+            "unknown field `faults` in [motion]",
+            "top of the file, above the first section",
+        ],
+    );
+
+    let text = scenario_with("seed = 1", "seed = -1");
+    assert_all(&text, &["`seed` = -1", "whole number"]);
+
+    let event = "\n[[events]]\nat = { value = 12.0, unit = \"s\" }\naction = \"kil-master\"\n";
+    let text = report(
+        &Scenario::parse("my.toml", &(SCENARIO.to_owned() + event)).expect_err("wrong event"),
+    );
+    assert_all(&text, &["`events[0].at` = 12 s", "0 to 10 s"]);
+    assert_all(&text, &["\"kil-master\"", "did you mean \"kill-master\"?"]);
+}
+
+#[test]
+fn unknown_names_and_missing_files() {
+    let error = builtin::scenario("three-stp").expect_err("unknown");
+    assert_all(
+        &format!("{error} {}", report(&error)),
+        &[
+            "unknown scenario `three-stp`",
+            "did you mean `three-step`?",
+            "master-lost",
+        ],
+    );
+    let error = builtin::robot("no/such/robot.toml").expect_err("missing");
+    assert_all(
+        &report(&error),
+        &["no/such/robot.toml", "cannot read the robot file"],
+    );
+}

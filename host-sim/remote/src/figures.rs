@@ -1,0 +1,117 @@
+//! Figures of the boards outside, for summary and report.
+
+use serde::Serialize;
+use wheeleg_remote_link::{Figures, Hello};
+
+use super::channel::{ChannelFigures, Count};
+use wheeleg_protocol::NODE_NAMES;
+
+/// Figures of one board.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct BoardFigures {
+    /// `joint1` … `wheel8`.
+    pub node: String,
+    /// Name of its image.
+    pub image: String,
+    /// Digest of the image, hexadecimal.
+    pub digest: String,
+    /// What it runs on.
+    pub host: String,
+    /// Bits compared with the application in this process.
+    pub compared_bits: u64,
+    /// Bits that differed.
+    pub differing_bits: u64,
+    /// Ticks worked off.
+    pub ticks: u64,
+    /// Instructions of a tick, interrupt entry and main loop included, median; `None`
+    /// where nobody counts them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tick_instructions_median: Option<u32>,
+    /// The same, mean, rounded up.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tick_instructions_mean: Option<u32>,
+    /// The same, worst.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tick_instructions_worst: Option<u32>,
+    /// Most instructions between two sleeps, whatever caused them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_awake_instructions: Option<u32>,
+    /// Deepest stack, bytes; `None` where it is not measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_used_bytes: Option<u32>,
+    /// Room for the stack, bytes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_size_bytes: Option<u32>,
+    /// Resets.
+    pub resets: u16,
+    /// Bytes that came late to the emulator.
+    pub late_bytes: u32,
+    /// Frames that the emulator told of after their first byte.
+    pub late_frames: u32,
+    /// Frames that did not leave whole: cut off by the driver's time limit, or not on the pins.
+    pub cut_frames: u16,
+}
+
+impl BoardFigures {
+    pub(crate) fn new(
+        address: u8,
+        hello: &Hello,
+        figures: &Figures,
+        ticks: &[u32],
+        late_frames: u32,
+        compared: Count,
+    ) -> Self {
+        // A board that cannot take a measurement sends zero.
+        let known = |figure: u32| (figure > 0).then_some(figure);
+        let sum: u64 = ticks.iter().map(|tick| u64::from(*tick)).sum();
+        let mean = sum.div_ceil(ticks.len().max(1) as u64);
+        let mut sorted = ticks.to_vec();
+        sorted.sort_unstable();
+        Self {
+            node: NODE_NAMES[usize::from(address) - 1].to_owned(),
+            image: hello.image.name.to_string(),
+            digest: hello
+                .image
+                .digest
+                .iter()
+                .map(|b| format!("{b:02x}"))
+                .collect(),
+            host: hello.host.to_string(),
+            compared_bits: compared.bits,
+            differing_bits: compared.differing,
+            ticks: ticks.len() as u64,
+            tick_instructions_median: sorted.get(sorted.len() / 2).copied().and_then(known),
+            // Not above the largest tick.
+            tick_instructions_mean: known(mean as u32),
+            tick_instructions_worst: sorted.last().copied().and_then(known),
+            longest_awake_instructions: known(figures.longest_awake),
+            stack_used_bytes: known(figures.stack_used),
+            stack_size_bytes: known(figures.stack_size),
+            resets: figures.resets,
+            late_bytes: figures.late_bytes,
+            late_frames,
+            cut_frames: figures.driver_timeouts,
+        }
+    }
+}
+
+/// What a run with boards outside adds to the summary.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PilSummary {
+    /// Where each node ran, addresses 1 to 8.
+    pub nodes: Vec<String>,
+    /// Bits compared with the application in this process.
+    pub compared_bits: u64,
+    /// Bits that differed.
+    pub differing_bits: u64,
+    /// Ticks compared.
+    pub compared_ticks: u64,
+    /// Transmissions compared.
+    pub compared_frames: u64,
+    /// The same by channel, all boards together.
+    pub channels: Vec<ChannelFigures>,
+    /// The first difference, in words.
+    pub first_difference: Option<String>,
+    /// The boards outside.
+    pub boards: Vec<BoardFigures>,
+}

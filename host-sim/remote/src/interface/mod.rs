@@ -1,0 +1,104 @@
+//! In what two interface definitions differ, told from their hashes.
+//!
+//! Master and boards exchange hashes alone, because a board has no room for more. What
+//! stands behind a hash is looked up here:
+//!
+//! * [`archive`]: the definitions so far;
+//! * [`difference`]: lines in which two of them differ.
+
+pub mod archive;
+pub mod difference;
+
+use difference::Change;
+
+/// One of two definitions that are compared: whose it is, and its hash.
+#[derive(Debug, Clone, Copy)]
+pub struct Side<'a> {
+    /// As the user knows who has it.
+    pub name: &'a str,
+    /// Hash of the definition.
+    pub hash: u64,
+}
+
+/// What differs between the definitions with these hashes.
+///
+/// # Errors
+/// The hash that is not in the archive.
+pub fn changes(here: u64, there: u64) -> Result<Vec<Change>, u64> {
+    let text = |hash| archive::text(hash).ok_or(hash);
+    Ok(difference::changes(&text(here)?, &text(there)?))
+}
+
+/// That nothing is known of a definition, and why that may be.
+pub fn not_archived(hash: u64) -> String {
+    format!(
+        "{hash:016x} is not an interface of this archive: a version between releases or newer \
+         than this program"
+    )
+}
+
+/// The first difference of two definitions as a sentence, or why there is none to tell.
+#[must_use]
+pub fn first_difference(here: Side<'_>, there: Side<'_>) -> String {
+    match changes(here.hash, there.hash) {
+        Err(hash) => format!("{}.", not_archived(hash)),
+        Ok(changes) => changes.first().map_or_else(
+            || "The interfaces are the same.".to_owned(),
+            |change| change.told(here.name, there.name),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_protocol::SCHEMA_HASH;
+
+    fn told(here: u64, there: u64) -> String {
+        let side = |name, hash| Side { name, hash };
+        first_difference(side("the master", here), side("the board", there))
+    }
+
+    /// Definitions that boards have had; their texts never change.
+    #[test]
+    fn first_differences_of_real_interfaces() {
+        assert_eq!(
+            told(0x2915_e091_a195_b5c9, 0xb6de_87f3_bac1_3d19),
+            "The first difference is in the message Discover (23): the master has \
+             `message 23 Discover Request`, the board has no such line."
+        );
+        assert_eq!(
+            told(0x2915_e091_a195_b5c9, 0x2595_7592_0114_d3d2),
+            "The first difference is in the enumeration LogEvent: the master has no such line, \
+             the board has `value 6 Precharged`."
+        );
+        assert_eq!(
+            told(0x2595_7592_0114_d3d2, 0x37a2_c972_7336_e2d2),
+            "The first difference is in the times of the line: the master has no such line, \
+             the board has `timing baud 1000000`."
+        );
+    }
+
+    #[test]
+    fn what_is_not_archived_or_the_same_is_told() {
+        assert_eq!(
+            told(SCHEMA_HASH, SCHEMA_HASH),
+            "The interfaces are the same."
+        );
+        for (here, there) in [(SCHEMA_HASH, 0x1234), (0x1234, SCHEMA_HASH)] {
+            let told = told(here, there);
+            assert!(
+                told.starts_with("0000000000001234 is not an interface"),
+                "{told}"
+            );
+        }
+    }
+
+    #[test]
+    fn all_changes_begin_with_the_first() {
+        let earlier = archive::newest_earlier().expect("one");
+        let all = changes(SCHEMA_HASH, earlier).expect("both are archived");
+        let first = all.first().expect("one").told("the master", "the board");
+        assert_eq!(first, told(SCHEMA_HASH, earlier));
+    }
+}

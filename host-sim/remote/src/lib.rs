@@ -1,0 +1,30 @@
+//! Boards elsewhere: the flashed images on an emulated STM32G431 ([`unicorn`]), the same
+//! applications on QEMU ([`qemu`]), or on a bench board behind a serial port ([`serial`]).
+//! Every board elsewhere has a native twin beside it, with which it is compared at every tick
+//! and frame. [`interface`] says in what two bus interfaces differ.
+
+mod channel;
+pub mod choice;
+mod compare;
+mod cores;
+mod error;
+mod figures;
+mod images;
+pub mod interface;
+mod line;
+mod outside;
+mod partner;
+pub mod qemu;
+pub mod serial;
+mod store;
+pub mod unicorn;
+
+pub use channel::{Channel, ChannelFigures, Count, Counts};
+pub use choice::{NodeChoice, NodeKind, Nodes};
+pub use compare::{Comparison, Difference};
+pub use error::RemoteError;
+pub use figures::{BoardFigures, PilSummary};
+pub use images::ensure_same_sources;
+pub use line::Line;
+pub use outside::Outside;
+pub use partner::{Partner, Stream};

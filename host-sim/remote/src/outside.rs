@@ -1,0 +1,545 @@
+//! Boards outside of this process, in the place of native ones.
+//!
+//! Beside each of them the same application runs here, on the same inputs. It
+//! gives the internals that an image does not show, and it is what the board is
+//! compared with at every tick and for every frame. What moves the plant and
+//! what goes on the line comes from the board outside.
+
+use std::cmp::Reverse;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use wheeleg_remote_link::{
+    Hello, Hook, Inputs, LINK_VERSION, MAX_RECEIVED, Outputs, Power, Ran, Reply, Request, Run,
+    Straps, Trip,
+};
+
+use super::choice::{NodeKind, Nodes};
+use super::compare::Comparison;
+use super::cores::Cores;
+use super::figures::{BoardFigures, PilSummary};
+use super::images::{self, Image};
+use super::line::Line;
+use super::partner::unexpected;
+use super::qemu::{Qemu, QemuOptions};
+use super::serial::{self as hil, HilOptions};
+use super::store;
+use super::unicorn::{Place, Unicorn};
+use crate::RemoteError;
+use wheeleg_config::RobotConfig;
+use wheeleg_protocol::NODE_NAMES;
+
+/// A byte on the line: end of its last bit in ns, and its value.
+pub(crate) type Heard = (u64, u8);
+
+/// One board outside.
+struct Board {
+    address: u8,
+    line: usize,
+    index: u8,
+    name: String,
+    hello: Hello,
+    ran: Ran,
+    /// Bytes that ended up to here have been handed over, ns.
+    heard_ns: u64,
+    /// The newest edge that it was run through, ns.
+    edge_ns: Option<u64>,
+    /// Inputs of the newest edges that have not been compared.
+    latched: VecDeque<(u64, Inputs)>,
+    /// Quadrature edges at which its counter stood at 0, of a wheel.
+    count_zero: i32,
+    /// Sent here by the native application, there by the board.
+    here: VecDeque<(u64, Vec<u8>)>,
+    there: VecDeque<(u64, Vec<u8>)>,
+    /// Time of the first tick after the newest start, ns; `None` while down.
+    running_from_ns: Option<u64>,
+    tripped: Option<Trip>,
+    /// First tick after a start that has not been told, ns.
+    started_ns: Option<u64>,
+    power: Power,
+    tick_instructions: Vec<u32>,
+    /// Frames that were told when others should have heard some of them.
+    late_frames: u32,
+}
+
+/// All boards outside.
+pub struct Outside {
+    /// Where each node runs.
+    nodes: Nodes,
+    lines: Vec<Box<dyn Line>>,
+    boards: Vec<Board>,
+    /// Board of each address from 1, as an index.
+    by_address: [Option<usize>; 8],
+    comparison: Comparison,
+    requests: Vec<usize>,
+    /// The first difference has been told.
+    told: bool,
+    /// Where boards run on cores of their own.
+    cores: Option<Cores>,
+}
+
+/// Of eight boards, those that run on the simulator's core: it has enough to do itself.
+const NEAR: usize = 4;
+
+/// The image of the board at `address`, among those that were found.
+fn image_of(images: &[Image], kind: &NodeKind, address: u8) -> Result<PathBuf, RemoteError> {
+    let wanted = images::kind(kind, address);
+    let found = images.iter().find(|image| Some(image.kind) == wanted);
+    found.map(|image| image.path.clone()).ok_or_else(|| {
+        RemoteError::new(
+            format!("there is no image for node {address} as {kind}"),
+            "",
+        )
+    })
+}
+
+impl Outside {
+    /// Starts the boards that do not run here, and powers them up. `None` when
+    /// all do.
+    ///
+    /// # Errors
+    /// [`RemoteError`] when a program or image is missing or does not
+    /// come up.
+    pub fn connect(nodes: &Nodes, robot: &RobotConfig) -> Result<Option<Self>, RemoteError> {
+        if nodes.all_native() {
+            return Ok(None);
+        }
+        let mut outside = Self {
+            nodes: nodes.clone(),
+            lines: Vec::new(),
+            boards: Vec::new(),
+            by_address: [None; 8],
+            comparison: Comparison::default(),
+            requests: Vec::new(),
+            told: false,
+            cores: None,
+        };
+        let images = images::find(nodes)?;
+        images.iter().for_each(Image::warn);
+        // Before cores are chosen: a process inherits what its starter is bound to.
+        for (address, kind) in (1..).zip(&nodes.0) {
+            match kind {
+                NodeKind::Sil | NodeKind::Pil => {}
+                NodeKind::Qemu => {
+                    let image = image_of(&images, kind, address)?;
+                    let options = QemuOptions::new(image);
+                    let line = outside.lines.len();
+                    outside.lines.push(Box::new(Qemu::partner(&options)?));
+                    outside.adopt(address, line, 0)?;
+                }
+                NodeKind::Hil(port) => {
+                    let line = outside.lines.len();
+                    let options = HilOptions::parse(&port.display().to_string())?;
+                    let application = if address <= 6 { "joint" } else { "wheel" };
+                    let (partner, _) = hil::connect(&options, application)?;
+                    outside.lines.push(Box::new(partner));
+                    outside.adopt(address, line, 0)?;
+                }
+            }
+        }
+        outside.start_pil(nodes, &images)?;
+        for number in 0..outside.boards.len() {
+            outside.power_up(number, robot)?;
+        }
+        Ok(Some(outside))
+    }
+
+    /// Spreads the byte-identical images over two cores, where there are two.
+    fn start_pil(&mut self, nodes: &Nodes, images: &[Image]) -> Result<(), RemoteError> {
+        let pil = (1..).zip(&nodes.0).filter(|(_, k)| **k == NodeKind::Pil);
+        let mut addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
+        // The wheels are near: their edges come twice as often as the joints' and at
+        // the same instant, when nobody else has anything to do.
+        addresses.sort_by_key(|address| *address <= 6);
+        if addresses.len() > NEAR {
+            self.cores = Cores::choose();
+        }
+        let near = match &self.cores {
+            Some(_) => addresses.len() * NEAR / nodes.0.len(),
+            None => addresses.len(),
+        };
+        let (near, far) = addresses.split_at(near);
+        for (mine, place) in [(far, Place::Far), (near, Place::Near)] {
+            if mine.is_empty() {
+                continue;
+            }
+            let paths = mine
+                .iter()
+                .map(|address| image_of(images, &NodeKind::Pil, *address))
+                .collect::<Result<Vec<_>, _>>()?;
+            let start = || Unicorn::start(&paths, place);
+            let started = match (&self.cores, place) {
+                (Some(cores), Place::Far) => cores.far(start),
+                _ => start(),
+            };
+            let line = self.lines.len();
+            self.lines.push(Box::new(started?));
+            for (index, address) in (0..).zip(mine) {
+                self.adopt(*address, line, index)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn ask(&mut self, line: usize, index: u8, request: &Request) -> Result<Reply, RemoteError> {
+        let line = &mut self.lines[line];
+        line.queue(index, request)?;
+        line.flush()?;
+        line.receive().map(|(_, reply)| reply)
+    }
+
+    fn adopt(&mut self, address: u8, line: usize, index: u8) -> Result<(), RemoteError> {
+        let name = NODE_NAMES[usize::from(address) - 1].to_owned();
+        let version = LINK_VERSION;
+        let hello = match self.ask(line, index, &Request::Hello { version })? {
+            Reply::Hello(hello) if hello.version == version => hello,
+            Reply::Hello(hello) => {
+                return Err(RemoteError::new(
+                    format!(
+                        "{name} speaks version {} of the board link, this program {version}",
+                        hello.version
+                    ),
+                    "build image and program from the same sources: cargo xtask pil --build",
+                ));
+            }
+            other => return Err(unexpected(&name, &other)),
+        };
+        self.by_address[usize::from(address) - 1] = Some(self.boards.len());
+        self.boards.push(Board {
+            address,
+            line,
+            index,
+            name,
+            hello,
+            ran: Ran::default(),
+            heard_ns: 0,
+            edge_ns: None,
+            latched: VecDeque::new(),
+            count_zero: 0,
+            here: VecDeque::new(),
+            there: VecDeque::new(),
+            running_from_ns: Some(0),
+            tripped: None,
+            started_ns: None,
+            power: Power::Good,
+            tick_instructions: Vec::new(),
+            late_frames: 0,
+        });
+        Ok(())
+    }
+
+    fn power_up(&mut self, number: usize, robot: &RobotConfig) -> Result<(), RemoteError> {
+        let (address, line, index) = {
+            let board = &self.boards[number];
+            (board.address, board.line, board.index)
+        };
+        let stored = match address {
+            1..=6 => &robot.node.joints[usize::from(address) - 1],
+            _ => &robot.node.wheels[usize::from(address) - 7],
+        };
+        for stretch in store::stretches(stored) {
+            match self.ask(line, index, &Request::Store(stretch))? {
+                Reply::Done => {}
+                other => return Err(unexpected(&self.boards[number].name, &other)),
+            }
+        }
+        let straps = Straps {
+            address,
+            unique_id: [address; 12],
+            crystal: true,
+        };
+        match self.ask(line, index, &Request::PowerUp(straps))? {
+            Reply::Ran(ran) => {
+                self.boards[number].ran = ran;
+                Ok(())
+            }
+            other => Err(unexpected(&self.boards[number].name, &other)),
+        }
+    }
+
+    fn number(&self, address: u8) -> Option<usize> {
+        self.by_address
+            .get(usize::from(address).wrapping_sub(1))
+            .copied()
+            .flatten()
+    }
+
+    /// Whether the board at `address` is outside.
+    pub fn has(&self, address: u8) -> bool {
+        self.number(address).is_some()
+    }
+
+    /// Outputs of the board at `address`, if it is outside.
+    pub fn outputs(&self, address: u8) -> Option<Outputs> {
+        self.number(address).map(|n| self.boards[n].ran.outputs)
+    }
+
+    /// First tick edge of the board at `address` since its newest start, ns, if it is
+    /// outside and not down.
+    pub fn running_from_ns(&self, address: u8) -> Option<u64> {
+        self.boards[self.number(address)?].running_from_ns
+    }
+
+    /// The newest edge of the board at `address`, ns; `None` for one that runs here.
+    pub fn edge_ns(&self, address: u8) -> Option<u64> {
+        self.boards[self.number(address)?].edge_ns
+    }
+
+    /// The reset of the board at `address` since the last call.
+    pub fn take_trip(&mut self, address: u8) -> Option<Trip> {
+        let n = self.number(address)?;
+        self.boards[n].tripped.take()
+    }
+
+    /// First tick of the board at `address` after a start that is known since the last
+    /// call, ns.
+    pub fn take_first_edge(&mut self, address: u8) -> Option<u64> {
+        let n = self.number(address)?;
+        self.boards[n].started_ns.take()
+    }
+
+    /// The counter of the wheel board at `address`, if that is outside, stood at 0 at
+    /// `edges` quadrature edges.
+    pub fn counts_from(&mut self, address: u8, edges: i64) {
+        if let Some(n) = self.number(address) {
+            // The counter wraps, as the board's does.
+            self.boards[n].count_zero = edges as i32;
+        }
+    }
+
+    /// Supply of the board at `address` from its next run on.
+    pub fn set_power(&mut self, address: u8, power: Power) {
+        if let Some(n) = self.number(address) {
+            self.boards[n].power = power;
+        }
+    }
+
+    /// Provokes a fault in the board at `address`; does nothing to one that runs here.
+    ///
+    /// # Errors
+    /// [`RemoteError`] if the board refuses.
+    pub fn hook(&mut self, address: u8, hook: Hook) -> Result<(), RemoteError> {
+        let Some(n) = self.number(address) else {
+            return Ok(());
+        };
+        let (line, index) = (self.boards[n].line, self.boards[n].index);
+        match self.ask(line, index, &Request::Hook(hook))? {
+            Reply::Done => Ok(()),
+            other => Err(unexpected(&self.boards[n].name, &other)),
+        }
+    }
+
+    /// Up to when all boards outside have heard the line, ns.
+    pub fn heard_by_all_ns(&self) -> u64 {
+        let heard = self.boards.iter().map(|board| board.heard_ns);
+        heard.min().unwrap_or(u64::MAX)
+    }
+
+    /// Queues a run of one board to `now_ns`, with what it has heard.
+    fn queue(
+        &mut self,
+        number: usize,
+        now_ns: u64,
+        edge: Option<Inputs>,
+        heard: &[Heard],
+        byte_ns: u64,
+    ) -> Result<(), RemoteError> {
+        let board = &mut self.boards[number];
+        let line = &mut self.lines[board.line];
+        let mut run = Run {
+            until_ns: now_ns,
+            power: board.power,
+            byte_ns: byte_ns as u32,
+            ..Run::default()
+        };
+        for (end_ns, byte) in heard {
+            let gap = !run.received.is_empty() && run.received_end_ns + byte_ns != *end_ns;
+            if gap || run.received.len() == MAX_RECEIVED {
+                // What follows does not join on: an own run up to here.
+                let part = Run {
+                    until_ns: run.received_end_ns,
+                    ..run.clone()
+                };
+                line.queue(board.index, &Request::Run(part))?;
+                self.requests.push(number);
+                run.received.clear();
+            }
+            let _ = run.received.push(*byte);
+            run.received_end_ns = *end_ns;
+        }
+        run.edge = edge;
+        if let Some(inputs) = edge {
+            board.edge_ns = Some(now_ns);
+            board.latched.push_back((now_ns, inputs));
+            if board.latched.len() > 4 {
+                board.latched.pop_front();
+            }
+        }
+        board.heard_ns = now_ns;
+        line.queue(board.index, &Request::Run(run))?;
+        self.requests.push(number);
+        Ok(())
+    }
+
+    /// Runs boards to `now_ns`: with an edge those that have inputs, to
+    /// the bare instant the others. `heard` gives what the board at an address has
+    /// heard after the instant named.
+    ///
+    /// # Errors
+    /// [`RemoteError`] when a board stops.
+    pub fn run(
+        &mut self,
+        now_ns: u64,
+        boards: &[(u8, Option<Inputs>)],
+        byte_ns: u64,
+        heard: impl Fn(u8, u64) -> Vec<Heard>,
+    ) -> Result<(), RemoteError> {
+        for (address, edge) in boards {
+            if let Some(number) = self.number(*address) {
+                let bytes = heard(*address, self.boards[number].heard_ns);
+                self.queue(number, now_ns, *edge, &bytes, byte_ns)?;
+            }
+        }
+        for line in &mut self.lines {
+            line.flush()?;
+        }
+        let mut asked = std::mem::take(&mut self.requests);
+        // The far boards, and those of other programs, are at work while the near ones
+        // answer.
+        asked.sort_by_key(|number| Reverse(self.boards[*number].line));
+        for number in asked.drain(..) {
+            let line = self.boards[number].line;
+            let (_, reply) = self.lines[line].receive()?;
+            self.take(number, reply)?;
+        }
+        self.requests = asked;
+        if let (Some(first), false) = (&self.comparison.first, self.told) {
+            self.told = true;
+            // Told at once: the run may end before its summary.
+            eprintln!("a board differs from the host: {first}");
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, number: usize, reply: Reply) -> Result<(), RemoteError> {
+        let board = &mut self.boards[number];
+        let Reply::Ran(ran) = reply else {
+            return Err(unexpected(&board.name, &reply));
+        };
+        for sent in &ran.sent {
+            board.late_frames += u32::from(sent.start_ns < board.heard_ns);
+            board.there.push_back((sent.start_ns, sent.bytes.to_vec()));
+        }
+        if let Some(trip) = ran.trip {
+            let down = board
+                .running_from_ns
+                .take()
+                .is_some_and(|from| from <= trip.at_ns);
+            if down {
+                board.tripped = Some(trip);
+                board.latched.clear();
+            }
+            board.running_from_ns = (trip.running_ns > 0).then_some(trip.running_ns);
+            board.started_ns = board.running_from_ns;
+        }
+        // The tick that was worked off last, once.
+        while let Some((edge_ns, inputs)) = board.latched.front() {
+            if *edge_ns > ran.seen_at_ns || ran.figures.resets != board.ran.figures.resets {
+                break;
+            }
+            // Before its first tick a board names time zero, too.
+            if *edge_ns == ran.seen_at_ns && *edge_ns > 0 {
+                let latched = Inputs {
+                    encoder: inputs.encoder.wrapping_sub(board.count_zero),
+                    ..*inputs
+                };
+                self.comparison
+                    .inputs(*edge_ns, board.address, &latched, &ran.seen);
+                board.tick_instructions.push(ran.figures.tick_instructions);
+            }
+            board.latched.pop_front();
+        }
+        board.ran = ran;
+        Ok(())
+    }
+
+    /// Compares the outputs that act from `now_ns` on with those of the native
+    /// application.
+    pub fn compare_outputs(&mut self, now_ns: u64, address: u8, here: &Outputs) {
+        if let Some(n) = self.number(address) {
+            let there = &self.boards[n].ran.outputs;
+            self.comparison.outputs(now_ns, address, here, there);
+        }
+    }
+
+    /// A transmission of the native application beside the board at `address`.
+    pub fn expect_frame(&mut self, address: u8, start_ns: u64, bytes: Vec<u8>) {
+        if let Some(n) = self.number(address) {
+            self.boards[n].here.push_back((start_ns, bytes));
+        }
+    }
+
+    /// What the board at `address` has scheduled to send since the last call.
+    pub fn take_frames(&mut self, address: u8) -> Vec<(u64, Vec<u8>)> {
+        let Some(n) = self.number(address) else {
+            return Vec::new();
+        };
+        let board = &mut self.boards[n];
+        let mut frames = Vec::new();
+        while let Some(there) = board.there.pop_front() {
+            let here = board.here.pop_front();
+            let side = |f: &(u64, Vec<u8>)| (f.0, f.1.clone());
+            let pair = (here.as_ref().map(side), side(&there));
+            let here = pair
+                .0
+                .as_ref()
+                .map(|(start, bytes)| (*start, bytes.as_slice()));
+            let out = Some((pair.1.0, pair.1.1.as_slice()));
+            self.comparison.frame(there.0, address, here, out);
+            frames.push(there);
+        }
+        frames
+    }
+
+    /// Frames that only the native application has sent are differences.
+    fn finish(&mut self, now_ns: u64) {
+        for board in &mut self.boards {
+            while let Some((start, bytes)) = board.here.pop_front() {
+                // One that is due later need not stand ready yet.
+                if start + 1_000_000 < now_ns {
+                    let here = Some((start, bytes.as_slice()));
+                    self.comparison.frame(start, board.address, here, None);
+                }
+            }
+        }
+    }
+
+    /// Comparison and figures, at the end of a run.
+    pub fn summary(&mut self, now_ns: u64) -> PilSummary {
+        self.finish(now_ns);
+        let compared = &mut self.comparison;
+        let mut figures = |b: &Board| {
+            BoardFigures::new(
+                b.address,
+                &b.hello,
+                &b.ran.figures,
+                &b.tick_instructions,
+                b.late_frames,
+                compared.of(b.address).total(),
+            )
+        };
+        let in_order = self.by_address.iter().flatten();
+        let boards = in_order.map(|n| figures(&self.boards[*n])).collect();
+        let total = self.comparison.total();
+        PilSummary {
+            nodes: self.nodes.0.iter().map(ToString::to_string).collect(),
+            compared_bits: total.bits,
+            differing_bits: total.differing,
+            channels: self.comparison.by_channel().figures(),
+            compared_ticks: self.comparison.ticks,
+            compared_frames: self.comparison.frames,
+            first_difference: self.comparison.first.as_ref().map(ToString::to_string),
+            boards,
+        }
+    }
+}

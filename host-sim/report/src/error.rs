@@ -1,0 +1,57 @@
+//! What can go wrong with a page, a figure or the folder that they go to.
+
+use std::path::PathBuf;
+
+use miette::Diagnostic;
+use thiserror::Error;
+
+/// A result that could not be drawn or written.
+#[derive(Debug, Error, Diagnostic)]
+pub enum ReportError {
+    /// A file or folder could not be written or created.
+    #[error("cannot {action} `{}`: {reason}", path.display())]
+    #[diagnostic(
+        code(wheeleg::output),
+        help("choose another folder with --out DIR, or make this one writable")
+    )]
+    Output {
+        /// What was tried, for example "create the folder".
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: std::io::Error,
+    },
+
+    /// Drawing a figure failed.
+    #[error("cannot draw {figure}: {reason}")]
+    #[diagnostic(
+        code(wheeleg::plot),
+        help("the run itself is complete; its log and summary are in the same folder")
+    )]
+    Plot {
+        /// Name of the figure.
+        figure: String,
+        /// What the plotting library said.
+        reason: String,
+    },
+
+    /// The report template failed.
+    #[error("cannot render the report: {0}")]
+    #[diagnostic(
+        code(wheeleg::report),
+        help("the run itself is complete; its log and summary are in the same folder")
+    )]
+    Template(#[from] minijinja::Error),
+}
+
+impl ReportError {
+    /// An output error for `path`.
+    pub fn output(action: &'static str, path: impl Into<PathBuf>, reason: std::io::Error) -> Self {
+        Self::Output {
+            action,
+            path: path.into(),
+            reason,
+        }
+    }
+}

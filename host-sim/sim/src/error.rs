@@ -1,0 +1,41 @@
+//! What ends a simulation early. Faults of the simulated robot are results, not errors.
+
+use miette::Diagnostic;
+use thiserror::Error;
+use wheeleg_remote_host::RemoteError;
+use wheeleg_telemetry::LogError;
+
+/// Why a simulation could not be built or continued.
+#[derive(Debug, Error, Diagnostic)]
+pub enum SimError {
+    /// A part refuses its parameters, the robot does not get ready, the plant leaves the range
+    /// of its model, or a fault cannot be injected.
+    #[error("{what}")]
+    #[diagnostic(code(wheeleg::simulation), help("{help}"))]
+    Simulation {
+        /// What went wrong.
+        what: String,
+        /// What the user can do.
+        help: String,
+    },
+
+    /// A board elsewhere failed.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Remote(#[from] RemoteError),
+
+    /// The recording failed.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Log(#[from] LogError),
+}
+
+impl SimError {
+    /// A simulation error with advice.
+    pub fn simulation(what: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Simulation {
+            what: what.into(),
+            help: help.into(),
+        }
+    }
+}

@@ -1,0 +1,488 @@
+//! Which faults a run can have: what makes no sense is refused, never left out
+//! in silence.
+
+use crate::SimError;
+use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_remote_host::{NodeKind, Nodes};
+
+/// Checks the faults of a scenario against its duration, the robot, each other, and
+/// where the nodes run.
+///
+/// # Errors
+/// [`SimError::Simulation`] with the first fault that cannot be, and why.
+pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<(), SimError> {
+    for fault in &scenario.faults {
+        can_be_there(fault, nodes)?;
+        does_something(fault, robot)?;
+        if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
+            return Err(SimError::simulation(
+                format!("the fault `{fault}` cannot begin or end while the robot runs"),
+                format!(
+                    "a board is built so: write `{}{}@0s`",
+                    fault.kind.name(),
+                    fault.victim
+                ),
+            ));
+        }
+        if fault.from_s >= scenario.duration_s {
+            let end_s = scenario.duration_s;
+            return Err(SimError::simulation(
+                format!(
+                    "the fault `{fault}` does nothing: scenario `{}` ends at {end_s} s, before it \
+                     could begin",
+                    scenario.name
+                ),
+                format!("choose a begin from 0 s to below {end_s} s"),
+            ));
+        }
+    }
+    no_rivals(&scenario.faults)
+}
+
+/// What strikes a board itself must be possible where that board runs: an image has a
+/// clock, a transmitter and an interface of its own; a board on QEMU has no watchdog that
+/// would end a stopped program, and a bench board a supply that nobody here can cut.
+fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
+    let Victim::Board(address) = fault.victim else {
+        return Ok(());
+    };
+    let number = usize::from(address).checked_sub(1);
+    let Some(there) = number.and_then(|i| nodes.0.get(i)) else {
+        return Ok(());
+    };
+    use FaultKind as F;
+    let (why, elsewhere) = match (there, fault.kind) {
+        (NodeKind::Sil, _) => return Ok(()),
+        (_, F::ClockDrift | F::Babble | F::BabbleUnguarded | F::OtherInterface) => {
+            ("an image brings its own", "`sil`")
+        }
+        (NodeKind::Pil, _) => return Ok(()),
+        (_, F::NodeHang) => (
+            "it has no watchdog that would start it again",
+            "`sil` or `pil`",
+        ),
+        (_, F::ProcessorFault) => ("nothing makes its processor fault there", "`sil` or `pil`"),
+        (NodeKind::Qemu, _) => return Ok(()),
+        // One that falls silent for good can keep its cable.
+        (_, F::NodeOff) if fault.until_s.is_none() => return Ok(()),
+        (_, F::NodeOff | F::NodeReset | F::BrownOut) => (
+            "a bench board is fed by the cable to this computer, whose voltage the \
+             simulator cannot switch off",
+            "`sil`, `pil` or `qemu`",
+        ),
+        _ => return Ok(()),
+    };
+    Err(SimError::simulation(
+        format!("the fault `{fault}` cannot strike a board that runs on `{there}`: {why}"),
+        format!("let that node run as {elsewhere}"),
+    ))
+}
+
+/// Whether a run with boards outside can be asked to equal one with all boards in this
+/// program: not on a disturbed line.
+///
+/// # Errors
+/// [`SimError::Simulation`] with the fault that stands against it.
+pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
+    use FaultKind as F;
+    let on_line = |fault: &&FaultSpec| {
+        matches!(
+            fault.kind,
+            F::BusFull
+                | F::BitErrors
+                | F::BytesLost
+                | F::BytesInserted
+                | F::FramesDelayed
+                | F::CycleJitter
+        )
+    };
+    match scenario.faults.iter().find(on_line) {
+        Some(fault) if !nodes.all_native() => Err(SimError::simulation(
+            format!(
+                "with the fault `{fault}`, boards outside of this program may differ from its \
+                 own: these get a frame as a whole, those byte by byte"
+            ),
+            "run without --compare-sil, which tells where boards differ at their pins",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// What would leave this robot as it is, is no fault.
+fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError> {
+    let plant = &robot.plant;
+    let (what, unit, sound) = match fault.kind {
+        FaultKind::SupplySag => {
+            let supply_pa = plant.supply.source_pressure_pa - plant.gas.ambient_pressure_pa;
+            ("source pressure", " bar", supply_pa * 1e-5)
+        }
+        FaultKind::FootSlips => {
+            let contact = &plant.contact;
+            (
+                "coefficient of friction",
+                "",
+                contact.mu_static.max(contact.mu_kinetic),
+            )
+        }
+        _ => return Ok(()),
+    };
+    if fault.value < sound {
+        return Ok(());
+    }
+    Err(SimError::simulation(
+        format!("the fault `{fault}` does nothing: the {what} of the robot is {sound:.2}{unit}"),
+        "choose a value below that",
+    ))
+}
+
+/// Parts of the robot, each with where it is, that a fault takes for itself as long as it
+/// lasts: the simulation keeps one fault of such a part, and its end restores the sound part;
+/// or the two exclude each other, as a wiper that is open and one that jumps.
+fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
+    use FaultKind as F;
+    let part = match fault.kind {
+        F::MasterSilent | F::MasterFrozen => "transmitter of the master",
+        F::NodeSilent | F::Babble | F::BabbleUnguarded => "transmitter",
+        F::NodeOff | F::NodeReset | F::BrownOut | F::NodeHang | F::ProcessorFault => {
+            "power and program"
+        }
+        F::PotOpen | F::PotShort | F::PotFrozen | F::PotNoisy => "potentiometer",
+        F::SwitchStuckOn | F::SwitchStuckOff => "foot switch",
+        F::EncoderLost | F::EncoderReversed => "encoder",
+        F::ValveStuckOpen | F::ValveStuckShut | F::ValveSlow => "valve",
+        F::ValveLeak => "cylinder",
+        F::SupplySag | F::SupplyLost => "air source",
+        F::InvalidParameter => return vec![("service tool", Victim::Robot)],
+        _ => return Vec::new(),
+    };
+    let mut parts = vec![(part, fault.victim)];
+    if let (F::ValveSlow, Victim::Valve(joint, _)) = (fault.kind, fault.victim) {
+        parts.push(("cylinder", Victim::Board(joint as u8 + 1)));
+    }
+    parts
+}
+
+/// What two faults at a time cannot both act on, in words.
+fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
+    let others = parts(b);
+    let of = |place: Victim| place.to_string().trim_start_matches(':').to_owned();
+    if let Some((part, place)) = parts(a).into_iter().find(|part| others.contains(part)) {
+        return Some(match place {
+            Victim::Robot => format!("the {part}"),
+            _ => format!("the {part} of {}", of(place)),
+        });
+    }
+    // Of those that combine with every other kind, one of a kind at a time.
+    (a.kind == b.kind && a.victim == b.victim).then(|| match a.victim {
+        Victim::Robot => whole(a.kind).to_owned(),
+        place => of(place),
+    })
+}
+
+/// What a fault strikes of which there is only one.
+fn whole(kind: FaultKind) -> &'static str {
+    use FaultKind as F;
+    match kind {
+        F::BusFull | F::BitErrors | F::BytesLost | F::BytesInserted | F::FramesDelayed => {
+            "the line"
+        }
+        F::MasterReset | F::LayerOneStall | F::CommandFlood | F::CycleJitter => "the master",
+        F::ClientReset => "the user's program",
+        F::TubeBurst => "the air supply",
+        F::FootLosesContact | F::FootSlips => "the ground",
+        F::DiskFull => "the recorder",
+        _ => "the robot",
+    }
+}
+
+/// Two faults of one part at a time: the end of one would undo the other. The same fault
+/// at the same place twice at a time has no meaning.
+fn no_rivals(faults: &[FaultSpec]) -> Result<(), SimError> {
+    for (i, a) in faults.iter().enumerate() {
+        for b in &faults[i + 1..] {
+            if a.from_s >= b.over_s() || b.from_s >= a.over_s() {
+                continue;
+            }
+            let Some(part) = contested(a, b) else {
+                continue;
+            };
+            let from_s = a.from_s.max(b.from_s);
+            return Err(SimError::simulation(
+                format!(
+                    "the faults `{a}` and `{b}` overlap on {part} from {from_s} s on, where they \
+                     cannot be combined"
+                ),
+                "leave one of them out, or end the first before the second begins",
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::builtin;
+
+    /// Admits faults to a run of the built-in robot with these nodes.
+    fn admitted(faults: &[&str], nodes: &Nodes) -> Result<(), SimError> {
+        let mut scenario = builtin::scenario("three-step").expect("built in");
+        let robot = builtin::robot(&scenario.robot).expect("built in");
+        scenario.faults = faults.iter().map(|f| f.parse().expect(f)).collect();
+        check(&scenario, &robot, nodes)
+    }
+
+    #[test]
+    fn faults_of_one_part_at_a_time_are_refused_with_both_names() {
+        for (a, b, part) in [
+            (
+                "valve-slow:joint3.fill-a=8@1s",
+                "valve-leak:joint3=10000@1.1s..1.2s",
+                "cylinder of joint3",
+            ),
+            (
+                "valve-slow:joint3.fill-a=8@1s",
+                "valve-slow:joint3.vent-b=2@1.1s..1.2s",
+                "cylinder of joint3",
+            ),
+            (
+                "valve-stuck-shut:joint3.fill-a@1s",
+                "valve-stuck-open:joint3.fill-a@0.9s..1.001s",
+                "valve of joint3.fill-a",
+            ),
+            (
+                "valve-stuck-shut:joint3.fill-a@1s",
+                "valve-slow:joint3.fill-a=2@1s",
+                "valve of joint3.fill-a",
+            ),
+            (
+                "pot-open:joint2@1s",
+                "pot-short:joint2@0s..2s",
+                "potentiometer of joint2",
+            ),
+            (
+                "pot-frozen:joint2@1s",
+                "pot-noisy:joint2=5@2s",
+                "potentiometer of joint2",
+            ),
+            (
+                "foot-switch-on:left.back@1s",
+                "foot-switch-off:left.back@1s",
+                "foot switch of left.back",
+            ),
+            (
+                "encoder-lost:wheel7@1s",
+                "encoder-reversed:wheel7@2s",
+                "encoder of wheel7",
+            ),
+            ("supply-sag=3@1s", "supply-lost@2s..3s", "the air source"),
+            (
+                "master-silent@1s",
+                "master-frozen@2s..3s",
+                "transmitter of the master",
+            ),
+            (
+                "node-silent:joint1@1s",
+                "babble:joint1@1s",
+                "transmitter of joint1",
+            ),
+            (
+                "node-off:joint1@1s",
+                "node-reset:joint1@2s",
+                "power and program of joint1",
+            ),
+            (
+                "node-hang:joint1@1s",
+                "brown-out:joint1=30@1.049s",
+                "power and program of joint1",
+            ),
+            (
+                "brown-out:joint1=30@1s",
+                "node-reset:joint1@1.029s",
+                "power and program of joint1",
+            ),
+            (
+                "invalid-parameter:joint1@1s",
+                "invalid-parameter:wheel7@1.1s",
+                "the service tool",
+            ),
+            ("supply-lost@1s", "supply-lost@2s", "the air source"),
+            (
+                "brown-out:joint1=30@1s",
+                "brown-out:joint1=40@1.02s",
+                "program of joint1 from 1.02 s on",
+            ),
+            (
+                "bit-errors=0.0001@1s",
+                "bit-errors=0.001@0.5s..1.5s",
+                "the line from 1 s on",
+            ),
+            (
+                "load-step:joint2=5@1s",
+                "load-step:joint2=60@2s",
+                "on joint2 from 2 s on",
+            ),
+            ("disk-full@1s", "disk-full@1s..2s", "the recorder"),
+        ] {
+            for pair in [[a, b], [b, a]] {
+                let refusal = admitted(&pair, &Nodes::default()).expect_err(a).to_string();
+                // Both as they are given, so that values and times tell them apart.
+                for fault in pair {
+                    assert!(refusal.contains(&format!("`{fault}`")), "{refusal}");
+                }
+                assert!(
+                    refusal.contains("overlap on") && refusal.contains(part),
+                    "{refusal}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn faults_one_after_the_other_or_of_different_parts_stay() {
+        for pair in [
+            [
+                "valve-slow:joint3.fill-a=8@1s..2s",
+                "valve-leak:joint3=10000@2s..3s",
+            ],
+            [
+                "valve-slow:joint3.fill-a=8@1s",
+                "valve-leak:joint2=10000@1s",
+            ],
+            [
+                "valve-stuck-open:joint3.fill-a@1s",
+                "valve-stuck-shut:joint3.vent-a@1s",
+            ],
+            [
+                "valve-stuck-open:joint3.fill-a@1s",
+                "valve-leak:joint3=100@1s..2s",
+            ],
+            ["pot-open:joint2@1s..2s", "pot-open:joint2@2s..3s"],
+            ["pot-open:joint2@1s", "pot-short:joint3@1s"],
+            ["encoder-lost:wheel7@1s", "encoder-reversed:wheel8@1s"],
+            ["encoder-lost:wheel7@1s", "node-silent:wheel7@2s..3s"],
+            ["supply-sag=3@1s", "tube-burst@2s"],
+            ["foot-slips=0.05@1s", "foot-loses-contact=0.03@2s..3s"],
+            ["bit-errors=1e-4@1s", "bytes-lost=1e-3@1s..2s"],
+            ["node-hang:joint1@1s", "brown-out:joint1=30@1.05s"],
+            ["brown-out:joint1=30@1s", "brown-out:joint1=30@2s"],
+            ["node-silent:joint1@1s", "node-reset:joint1@2s"],
+            ["invalid-parameter:joint1@1s", "invalid-parameter:wheel7@2s"],
+        ] {
+            let outcome = admitted(&pair, &Nodes::default());
+            assert!(outcome.is_ok(), "{pair:?}: {outcome:?}");
+        }
+    }
+
+    #[test]
+    fn a_fault_that_begins_when_all_is_over_is_refused_with_the_end() {
+        for fault in ["supply-lost@10s", "supply-lost@10s..11s", "supply-lost@12s"] {
+            let refusal = admitted(&[fault], &Nodes::default()).expect_err(fault);
+            let words = "scenario `three-step` ends at 10 s";
+            assert!(refusal.to_string().contains(words), "{refusal}");
+        }
+        for fault in ["supply-lost@9.999s", "supply-lost@9s..11s"] {
+            let outcome = admitted(&[fault], &Nodes::default());
+            assert!(outcome.is_ok(), "{fault}: {outcome:?}");
+        }
+    }
+
+    #[test]
+    fn what_leaves_this_robot_as_it_is_is_refused() {
+        let mut scenario = builtin::scenario("three-step").expect("built in");
+        let mut robot = builtin::robot(&scenario.robot).expect("built in");
+        robot.plant.supply.source_pressure_pa = 8e5 + robot.plant.gas.ambient_pressure_pa;
+        let mut outcome = |fault: &str| {
+            scenario.faults = vec![fault.parse().expect("a fault")];
+            check(&scenario, &robot, &Nodes::default())
+        };
+        for (fault, words) in [
+            (
+                "supply-sag=8@1s",
+                "source pressure of the robot is 8.00 bar",
+            ),
+            (
+                "supply-sag=9.9@1s",
+                "source pressure of the robot is 8.00 bar",
+            ),
+            ("foot-slips=0.8@1s", "friction of the robot is 0.80"),
+        ] {
+            let refusal = outcome(fault).expect_err(fault).to_string();
+            assert!(refusal.contains(words), "{refusal}");
+        }
+        assert!(outcome("supply-sag=7.9@1s").is_ok());
+        assert!(outcome("foot-slips=0.75@1s").is_ok());
+    }
+
+    #[test]
+    fn what_a_board_cannot_suffer_where_it_runs_is_refused() {
+        let admitted = |fault: &str, there: &str| {
+            let choice = there.parse().expect("a choice");
+            let nodes = Nodes::new(&NodeKind::Sil, &[choice]).expect("one choice");
+            admitted(&[fault], &nodes)
+        };
+        let power = [
+            "brown-out:joint3@1s",
+            "node-reset:joint3@1s",
+            "node-off:joint3@1s..2s",
+            "node-off:joint3@1s",
+        ];
+        let hang = ["node-hang:joint3@1s"];
+        let own = ["clock-drift:joint3=200@1s", "babble:joint3@1s"];
+        let all = || power.iter().chain(&hang).chain(&own);
+        for (there, possible, why) in [
+            ("joint3=pil", [&power[..], &hang].concat(), "its own"),
+            ("joint3=qemu", power.to_vec(), "no watchdog"),
+            (
+                "joint3=hil:/dev/ttyACM0",
+                vec!["node-off:joint3@1s"],
+                "cable to this computer",
+            ),
+        ] {
+            let mut refusals = String::new();
+            for fault in all() {
+                let outcome = admitted(fault, there);
+                if possible.contains(fault) {
+                    assert!(outcome.is_ok(), "{fault} {there}");
+                    continue;
+                }
+                let refusal = outcome.expect_err(fault).to_string();
+                for part in [fault.split([':', '@']).next(), there.split('=').nth(1)] {
+                    assert!(refusal.contains(part.expect("a part")), "{refusal}");
+                }
+                refusals.push_str(&refusal);
+            }
+            assert!(refusals.contains(why), "{refusals}");
+            assert!(admitted("pot-open:joint3@1s", there).is_ok());
+        }
+        for fault in all() {
+            assert!(admitted(fault, "joint4=qemu").is_ok(), "{fault}");
+        }
+    }
+    #[test]
+    fn on_a_disturbed_line_boards_outside_are_not_asked_to_equal_those_here() {
+        let comparable = |fault: &str, choices: &[&str]| {
+            let mut scenario = builtin::scenario("three-step").expect("built in");
+            scenario.faults = vec![fault.parse().expect("a fault")];
+            let choices: Vec<_> = choices.iter().map(|c| c.parse().expect("one")).collect();
+            let nodes = Nodes::new(&NodeKind::Sil, &choices).expect("choices");
+            ensure_comparable(&scenario, &nodes)
+        };
+        for fault in [
+            "bus-full@1s",
+            "bit-errors=1e-4@1s..4s",
+            "bytes-lost@1s",
+            "bytes-inserted@1s",
+            "frames-delayed=15@1s",
+            "cycle-jitter@1s",
+        ] {
+            let refusal = comparable(fault, &["joint3=pil"]).expect_err(fault);
+            let name = fault.split(['@', '=']).next().expect("a name");
+            assert!(refusal.to_string().contains(name), "{refusal}");
+            assert!(comparable(fault, &[]).is_ok(), "all in this program");
+        }
+        assert!(comparable("brown-out:joint3@1s", &["joint3=pil"]).is_ok());
+        assert!(comparable("master-silent@1s", &["joint3=pil"]).is_ok());
+    }
+}

@@ -1,0 +1,399 @@
+//! The faults under way: what they do to the plant, to signals and to the line.
+//!
+//! A fault acts at one of three places. On the plant it is done once, when it
+//! begins, and undone when it ends ([`Injector::strike`]). On a signal between
+//! plant and board, or on the line, it stands in the way as long as it lasts;
+//! the simulation asks at every passage. All chance comes from one random
+//! stream of the run's seed, which sound runs never draw from.
+
+use rand_pcg::Pcg64Mcg;
+use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
+use wheeleg_plant::ground::GroundPatch;
+use wheeleg_plant::noise::Normal;
+use wheeleg_plant::robot::{Plant, PlantState};
+use wheeleg_plant::sensors::{SensorFault, signal_rng};
+use wheeleg_plant::valve::ValveFault;
+use wheeleg_protocol::link::SlotTiming;
+
+use super::interface::of_other;
+use super::line::{LineErrors, record, rubbish};
+use rand::RngExt;
+use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+
+/// Half the side of the ground that falls away, m: further than a robot gets.
+const GROUND_M: f64 = 1e4;
+
+/// The faults of one run.
+#[derive(Debug)]
+pub(crate) struct Injector {
+    active: Vec<FaultSpec>,
+    rng: Pcg64Mcg,
+    line: LineErrors,
+    /// Encoder count at the begin of an encoder fault, per wheel.
+    encoder_at: [Option<i64>; 2],
+    /// Simulated time at the begin of a clock fault, per board, ns.
+    clock_from_ns: [u64; 8],
+    last_sync: Vec<u8>,
+}
+
+impl Injector {
+    /// No fault yet.
+    pub(crate) fn new(seed: u64) -> Self {
+        Self {
+            active: Vec::new(),
+            rng: signal_rng(seed, "faults"),
+            line: LineErrors::default(),
+            encoder_at: [None; 2],
+            clock_from_ns: [0; 8],
+            last_sync: Vec::new(),
+        }
+    }
+
+    /// A fault begins, or ends if `begin` is false. Plant faults are done here.
+    pub(crate) fn strike(
+        &mut self,
+        fault: &FaultSpec,
+        begin: bool,
+        now_ns: u64,
+        plant: &mut Plant,
+        state: &mut PlantState,
+    ) {
+        if let (FaultKind::ClockDrift, Victim::Board(address)) = (fault.kind, fault.victim) {
+            self.clock_from_ns[usize::from(address) - 1] = now_ns;
+        }
+        if begin {
+            self.active.push(*fault);
+        } else {
+            self.active.retain(|f| f != fault);
+        }
+        self.line = LineErrors {
+            bit: self.value(FaultKind::BitErrors),
+            lost: self.value(FaultKind::BytesLost),
+            inserted: self.value(FaultKind::BytesInserted),
+            delay_ns: (self.value(FaultKind::FramesDelayed) * 1e3) as u64,
+        };
+        on_sensors(fault, begin, plant, state);
+        on_air(fault, begin, plant, state);
+        on_ground(fault, begin, plant);
+        if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, Victim::Board(n)) =
+            (fault.kind, fault.victim)
+        {
+            self.encoder_at[usize::from(n) - 7] = None;
+        }
+    }
+
+    fn of(&self, kind: FaultKind) -> impl Iterator<Item = &FaultSpec> {
+        self.active.iter().filter(move |f| f.kind == kind)
+    }
+
+    fn is(&self, kind: FaultKind) -> bool {
+        self.of(kind).next().is_some()
+    }
+
+    fn strikes(&self, kind: FaultKind, address: u8) -> bool {
+        self.of(kind).any(|f| f.victim == Victim::Board(address))
+    }
+
+    /// The value of a fault of which there is one at a time (`admission`); 0 without it.
+    fn value(&self, kind: FaultKind) -> f64 {
+        self.of(kind).next().map_or(0.0, |f| f.value)
+    }
+
+    /// What the master puts on the line in place of `sync`; `None`: nothing.
+    pub(crate) fn master_sends(&mut self, sync: &[u8]) -> Option<Vec<u8>> {
+        if self.is(FaultKind::MasterSilent) {
+            return None;
+        }
+        if self.is(FaultKind::MasterFrozen) && !self.last_sync.is_empty() {
+            return Some(self.last_sync.clone());
+        }
+        self.last_sync.clear();
+        self.last_sync.extend_from_slice(sync);
+        Some(self.last_sync.clone())
+    }
+
+    /// Whether the master may use the line for requests.
+    pub(crate) fn master_requests(&self) -> bool {
+        !self.is(FaultKind::MasterSilent) && !self.is(FaultKind::MasterFrozen)
+    }
+
+    /// Whether layer 1 of the master is cut off.
+    pub(crate) fn layer_one_stalls(&self) -> bool {
+        self.is(FaultKind::LayerOneStall)
+    }
+
+    /// Commands per cycle of a user who floods the master.
+    pub(crate) fn flood(&self) -> usize {
+        self.value(FaultKind::CommandFlood) as usize
+    }
+
+    /// By how much the master's next cycle comes late (or early), ns.
+    pub(crate) fn cycle_jitter_ns(&mut self) -> i64 {
+        let largest = (self.value(FaultKind::CycleJitter) * 1e6) as i64;
+        if largest == 0 {
+            0
+        } else {
+            self.rng.random_range(-largest..=largest)
+        }
+    }
+
+    /// What the board's driver puts on the line of a frame; `None`: nothing.
+    pub(crate) fn board_sends(&mut self, address: u8, bytes: Vec<u8>) -> Option<Vec<u8>> {
+        if self.strikes(FaultKind::NodeSilent, address)
+            || self.strikes(FaultKind::BabbleUnguarded, address)
+        {
+            return None;
+        }
+        if self.strikes(FaultKind::Babble, address) {
+            // A byte more would end behind the limit.
+            let limit = SlotTiming::DEFAULT.driver_limit_us() / SlotTiming::DEFAULT.bytes_us(1);
+            return Some(rubbish(limit as usize, &mut self.rng));
+        }
+        if self.strikes(FaultKind::OtherInterface, address) {
+            return Some(of_other(bytes));
+        }
+        Some(bytes)
+    }
+
+    /// Whether the guard of the board's driver cuts its transmissions off.
+    pub(crate) fn cuts_off(&self, address: u8) -> bool {
+        self.strikes(FaultKind::Babble, address)
+    }
+
+    /// What a driver that is stuck on sends in the time of so many bytes.
+    pub(crate) fn babble(&mut self, address: u8, bytes: usize) -> Option<Vec<u8>> {
+        let stuck = self.strikes(FaultKind::BabbleUnguarded, address);
+        stuck.then(|| rubbish(bytes, &mut self.rng))
+    }
+
+    /// The next frame of a stream that fills the line, at most `room` bytes long.
+    pub(crate) fn stream(&self, room: usize) -> Option<Vec<u8>> {
+        if self.is(FaultKind::BusFull) {
+            record(room)
+        } else {
+            None
+        }
+    }
+
+    /// What a sound line makes of a transmission, and how late it is, ns; as
+    /// it is on a line without faults.
+    pub(crate) fn transmit(&mut self, bytes: Vec<u8>) -> (Vec<u8>, u64) {
+        if self.line.is_none() {
+            return (bytes, 0);
+        }
+        let received = self.line.corrupt(&bytes, &mut self.rng);
+        (received, self.line.delay_ns(&mut self.rng))
+    }
+
+    /// Converter code as the board reads it.
+    pub(crate) fn position_code(&mut self, joint: usize, code: u16, full_scale_m: f64) -> u16 {
+        let address = joint as u8 + 1;
+        let noise_mm: f64 = self
+            .of(FaultKind::PotNoisy)
+            .filter(|f| f.victim == Victim::Board(address))
+            .map(|f| f.value)
+            .sum();
+        if noise_mm == 0.0 {
+            return code;
+        }
+        let unit = Normal::default().sample(&mut self.rng);
+        let jump = noise_mm * 1e-3 / full_scale_m * 65536.0 * unit;
+        (f64::from(code) + jump).clamp(0.0, 65520.0) as u16
+    }
+
+    /// Foot switches as the board reads them: front, left, back, right.
+    pub(crate) fn switches(&self, leg: usize, sound: [bool; 4]) -> [bool; 4] {
+        let stuck = |kind, switch| {
+            self.of(kind)
+                .any(|f| f.victim == Victim::FootSwitch(leg, switch))
+        };
+        std::array::from_fn(|i| {
+            (sound[i] || stuck(FaultKind::SwitchStuckOn, i)) && !stuck(FaultKind::SwitchStuckOff, i)
+        })
+    }
+
+    /// Encoder edges as the board counts them.
+    pub(crate) fn edges(&mut self, wheel: usize, edges: i64) -> i64 {
+        let address = wheel as u8 + 7;
+        let lost = self.strikes(FaultKind::EncoderLost, address);
+        if !lost && !self.strikes(FaultKind::EncoderReversed, address) {
+            return edges;
+        }
+        let at = *self.encoder_at[wheel].get_or_insert(edges);
+        if lost { at } else { at - (edges - at) }
+    }
+
+    /// A board's own clock at simulated time `now_ns`, ns.
+    pub(crate) fn clock_ns(&self, address: u8, now_ns: u64) -> u64 {
+        let drift = self
+            .of(FaultKind::ClockDrift)
+            .filter(|f| f.victim == Victim::Board(address));
+        // The drift begins with the fault; before it the clock was right.
+        let since_ns = now_ns.saturating_sub(self.clock_from_ns[usize::from(address) - 1]);
+        drift.fold(now_ns, |t, f| {
+            t.saturating_add_signed((since_ns as f64 * f.value * 1e-6) as i64)
+        })
+    }
+
+    /// How long a board's clock takes for `ahead_us` on it, ns.
+    pub(crate) fn duration_ns(&self, address: u8, ahead_us: u32) -> u64 {
+        let ahead_ns = u64::from(ahead_us) * 1_000;
+        let drift = self
+            .of(FaultKind::ClockDrift)
+            .filter(|f| f.victim == Victim::Board(address));
+        drift.fold(ahead_ns, |ns, f| {
+            (ns as f64 / (1.0 + f.value * 1e-6)).round() as u64
+        })
+    }
+
+    /// Whether the recorder can write.
+    pub(crate) fn can_record(&self) -> bool {
+        !self.is(FaultKind::DiskFull)
+    }
+}
+
+fn on_sensors(fault: &FaultSpec, begin: bool, plant: &Plant, state: &mut PlantState) {
+    let Victim::Board(address @ 1..=6) = fault.victim else {
+        return;
+    };
+    let joint = usize::from(address) - 1;
+    let defect = match fault.kind {
+        FaultKind::PotOpen => SensorFault::Open,
+        FaultKind::PotShort => SensorFault::Short,
+        FaultKind::PotFrozen => SensorFault::Stuck {
+            ratio: plant.position_ratio(state, joint),
+        },
+        _ => return,
+    };
+    state.adc[joint].fault = if begin { defect } else { SensorFault::None };
+}
+
+fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantState) {
+    let supply = plant.params().supply;
+    let ambient = plant.params().gas.ambient_pressure_pa;
+    let core = &mut state.core;
+    match (fault.kind, fault.victim) {
+        (FaultKind::ValveStuckOpen | FaultKind::ValveStuckShut, Victim::Valve(joint, valve)) => {
+            let stuck = if fault.kind == FaultKind::ValveStuckOpen {
+                ValveFault::StuckOpen
+            } else {
+                ValveFault::StuckShut
+            };
+            let cylinder = &mut core.cylinders[joint];
+            cylinder.valves[valve].fault = if begin { stuck } else { ValveFault::None };
+            cylinder.refresh();
+        }
+        (FaultKind::ValveSlow, Victim::Valve(joint, valve)) => {
+            rebuild(plant, joint, begin, |c| {
+                c.timing_spread[valve] *= fault.value
+            });
+        }
+        (FaultKind::ValveLeak, Victim::Board(address @ 1..=6)) => {
+            rebuild(plant, usize::from(address) - 1, begin, |c| {
+                c.piston_leak_m3_s_pa *= fault.value;
+                c.rod_leak_m3_s_pa *= fault.value;
+            });
+        }
+        (FaultKind::SupplySag, _) => {
+            let sagged = ambient + fault.value * 1e5;
+            core.supply.source_pressure_pa = if begin {
+                sagged
+            } else {
+                supply.source_pressure_pa
+            };
+        }
+        (FaultKind::SupplyLost, _) => {
+            core.supply.source_pressure_pa = if begin {
+                ambient
+            } else {
+                supply.source_pressure_pa
+            };
+        }
+        (FaultKind::TubeBurst, _) => {
+            core.supply.dump.fault = if begin {
+                ValveFault::StuckOpen
+            } else {
+                ValveFault::None
+            };
+        }
+        (FaultKind::LoadStep, Victim::Board(address @ 1..=6)) => {
+            let force_n = if begin { fault.value } else { 0.0 };
+            plant.assembly.mechanics.load_n[usize::from(address) - 1] = force_n;
+        }
+        _ => {}
+    }
+}
+
+/// A cylinder with changed parameters, or the sound one again: one fault at a time.
+///
+/// The catalogue's ranges keep every changed parameter in the plant's own.
+fn rebuild(plant: &mut Plant, joint: usize, begin: bool, change: impl FnOnce(&mut CylinderParams)) {
+    let mut params = plant.params().cylinders[joint].clone();
+    if begin {
+        change(&mut params);
+    }
+    let gas = plant.params().gas;
+    if let Ok(model) = CylinderModel::new(&params, &gas) {
+        plant.assembly.cylinders[joint] = model;
+    }
+}
+
+fn on_ground(fault: &FaultSpec, begin: bool, plant: &mut Plant) {
+    match fault.kind {
+        FaultKind::FootSlips => {
+            let sound = plant.params().contact;
+            let mechanics = &mut plant.assembly.mechanics;
+            mechanics.contact = sound;
+            if begin {
+                let contact = &mut mechanics.contact;
+                contact.mu_static = contact.mu_static.min(fault.value);
+                contact.mu_kinetic = contact.mu_kinetic.min(fault.value);
+            }
+        }
+        FaultKind::FootLosesContact => {
+            let sound = plant.params().ground.clone();
+            let mechanics = &mut plant.assembly.mechanics;
+            mechanics.ground = sound;
+            if begin {
+                // The wheels run on their own plane, so the ground may go under the feet alone.
+                for patch in &mut mechanics.ground.patches {
+                    patch.height_m -= fault.value;
+                }
+                mechanics.ground.patches.push(GroundPatch {
+                    x_m: [-GROUND_M, GROUND_M],
+                    y_m: [-GROUND_M, GROUND_M],
+                    height_m: -fault.value,
+                });
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::builtin;
+
+    /// An encoder counts from where its own fault began, whatever else strikes its board.
+    #[test]
+    fn another_fault_of_the_board_leaves_a_faulty_encoder_where_it_stood() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let mut plant = Plant::new(&robot.plant).expect("a plant");
+        let mut state = plant.initial_state(1).expect("a state");
+        let mut injector = Injector::new(1);
+        let mut strike = |injector: &mut Injector, text: &str, begin| {
+            let fault = text.parse().expect(text);
+            injector.strike(&fault, begin, 0, &mut plant, &mut state);
+        };
+        strike(&mut injector, "encoder-lost:wheel7@1s", true);
+        assert_eq!(injector.edges(0, 100), 100);
+        strike(&mut injector, "node-silent:wheel7@2s..3s", true);
+        assert_eq!(injector.edges(0, 250), 100);
+        strike(&mut injector, "encoder-lost:wheel7@1s", false);
+        assert_eq!(injector.edges(0, 300), 300);
+        strike(&mut injector, "encoder-reversed:wheel7@4s", true);
+        assert_eq!(injector.edges(0, 400), 400);
+        assert_eq!(injector.edges(0, 430), 370);
+    }
+}

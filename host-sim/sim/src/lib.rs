@@ -1,0 +1,285 @@
+//! Software in the loop: the board and master crates, natively, on a byte-timed
+//! bus, around the simulated plant.
+//!
+//! A run starts with power-up. The boards test themselves, the master
+//! enumerates and arms them, and the robot moves to its start pose; all of this
+//! is simulated like the rest. Scenario time 0, where the record begins, is the
+//! instant at which the robot stands at rest in that pose.
+
+mod audit;
+mod boards;
+mod bus;
+mod downtime;
+mod edges;
+mod error;
+pub mod faults;
+mod hal;
+mod memory;
+mod observe;
+mod operator;
+mod power;
+mod session;
+mod setup;
+mod strangers;
+mod strike;
+mod traffic;
+mod words;
+mod world;
+
+use std::ops::ControlFlow;
+
+use wheeleg_master::command::{Command, CommandCode};
+use wheeleg_master::config::UniqueId;
+use wheeleg_master::event::Event;
+use wheeleg_node::joint::MotionAccount;
+use wheeleg_node::snapshot::JointSnapshot;
+use wheeleg_plant::assembly::CylinderOutputs;
+use wheeleg_protocol::LinkQuality;
+
+pub use self::audit::LineAudit;
+pub use self::boards::{JointBoard, identity};
+pub use self::downtime::DownTimes;
+pub use self::error::SimError;
+pub use self::power::BOARD_START_UP_NS;
+pub use self::session::Session;
+pub use self::words::hex;
+
+use self::world::{Happened, World};
+use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_remote_host::{Nodes, Outside, PilSummary};
+use wheeleg_telemetry::Recorder;
+
+/// Longest time from power-up to the end of commissioning, s.
+const COMMISSION_S: f64 = 2.0;
+/// Beginning of every event in the record that tells of the time before it.
+pub const START_UP: &str = "start-up, ";
+
+/// What a caller sees of one joint board and its cylinder after every tick, start-up
+/// included, when it asks to ([`run_watched`]).
+#[derive(Debug, Clone, Copy)]
+pub struct WatchedJoint<'a> {
+    /// Time since power-up, s.
+    pub now_s: f64,
+    /// Joint 1..=6.
+    pub joint: u8,
+    /// The board's internals.
+    pub board: &'a JointSnapshot,
+    /// What it makes of its piston.
+    pub account: MotionAccount,
+    /// What the cylinder is.
+    pub cylinder: &'a CylinderOutputs,
+}
+
+/// Looks at every joint after every tick.
+pub type JointWatcher<'a> = &'a mut dyn FnMut(&WatchedJoint<'_>);
+
+/// Who is told of a run while it lasts.
+pub struct Onlookers<'a> {
+    progress: &'a mut dyn FnMut(f64) -> Control,
+    watcher: Option<JointWatcher<'a>>,
+}
+
+impl<'a> Onlookers<'a> {
+    /// One who is told the time, and can stop the run.
+    pub fn new(progress: &'a mut dyn FnMut(f64) -> Control) -> Self {
+        Self {
+            progress,
+            watcher: None,
+        }
+    }
+}
+
+/// Whether to go on, as the caller of [`run`] decides at every bus cycle.
+pub type Control = ControlFlow<()>;
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOutcome {
+    /// Scenario time simulated and recorded, s.
+    pub recorded_s: f64,
+    /// All simulated time, start-up included, s.
+    pub simulated_s: f64,
+    /// The caller stopped the run before its end.
+    pub stopped: bool,
+    /// What boards outside of this process did, if there were any.
+    pub pil: Option<PilSummary>,
+    /// Frames that were sent and accepted.
+    pub line: LineAudit,
+    /// Frames and errors that the master counted, by kind.
+    pub link: LinkQuality,
+    /// When boards outside were down.
+    pub down_times: DownTimes,
+}
+
+/// Runs a scenario and records it.
+///
+/// `progress` is called once per bus cycle with the scenario time in s, negative
+/// during start-up; the run ends early when it breaks.
+///
+/// # Errors
+/// [`SimError::Simulation`] when a part refuses its parameters, the robot does
+/// not get ready, or the plant leaves the range of its model; I/O errors of the
+/// recorder.
+pub fn run(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    recorder: &mut Recorder,
+    progress: &mut dyn FnMut(f64) -> Control,
+) -> Result<RunOutcome, SimError> {
+    let native = Nodes::default();
+    run_with(scenario, robot, seed, &native, recorder, progress)
+}
+
+/// As [`run`], with some or all nodes outside of this process.
+///
+/// # Errors
+/// As [`run`]; also when a board outside does not come up or stops.
+pub fn run_with(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    nodes: &Nodes,
+    recorder: &mut Recorder,
+    progress: &mut dyn FnMut(f64) -> Control,
+) -> Result<RunOutcome, SimError> {
+    let boards = Boards::connect(nodes, robot)?;
+    let onlookers = Onlookers::new(progress);
+    run_on(boards, scenario, robot, seed, recorder, onlookers)
+}
+
+/// As [`run`], with `watcher` called for every joint after every tick, in the time of
+/// the start-up, too.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    recorder: &mut Recorder,
+    watcher: JointWatcher<'_>,
+) -> Result<RunOutcome, SimError> {
+    let onlookers = Onlookers {
+        progress: &mut |_| Control::Continue(()),
+        watcher: Some(watcher),
+    };
+    run_on(
+        Boards::default(),
+        scenario,
+        robot,
+        seed,
+        recorder,
+        onlookers,
+    )
+}
+
+/// What a run has in place of boards that find their own way.
+#[derive(Default)]
+pub struct Boards {
+    /// Those outside of this process; `None`: all are here.
+    outside: Option<Outside>,
+    /// Of those here, when they are down after a fault, if not when they would be.
+    kept: DownTimes,
+}
+
+impl Boards {
+    /// Connects those that are outside.
+    ///
+    /// # Errors
+    /// As [`Outside::connect`].
+    pub fn connect(nodes: &Nodes, robot: &RobotConfig) -> Result<Self, SimError> {
+        Ok(Self {
+            outside: Outside::connect(nodes, robot)?,
+            kept: DownTimes::default(),
+        })
+    }
+
+    /// All here, and down when the boards of another run were.
+    pub fn native_with(kept: DownTimes) -> Self {
+        Self {
+            outside: None,
+            kept,
+        }
+    }
+}
+
+/// As [`run_with`], on boards that are connected already.
+///
+/// # Errors
+/// As [`run_with`].
+pub fn run_on(
+    boards: Boards,
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    recorder: &mut Recorder,
+    mut onlookers: Onlookers<'_>,
+) -> Result<RunOutcome, SimError> {
+    let mut session = Session::new(boards, scenario, robot, seed)?;
+    let mut stopped = false;
+    while !session.is_over() && !stopped {
+        let happened = session.advance()?;
+        if happened == Happened::JointTick
+            && let Some(watcher) = &mut onlookers.watcher
+        {
+            session.show(watcher);
+        }
+        session.handle(happened, recorder)?;
+        if happened == Happened::MasterCycle {
+            let t_s = session.scenario_s().unwrap_or(-1.0);
+            stopped = (onlookers.progress)(t_s).is_break();
+            recorder.status()?;
+        }
+    }
+    Ok(session.finish(stopped, recorder))
+}
+
+/// Powers the robot up and takes its boards over for the commissioned ones; gives
+/// their unique ids, addresses 1 to 8.
+///
+/// # Errors
+/// [`SimError::Simulation`] with the reason if a board is missing, doubled, of
+/// another version or of the wrong kind.
+pub fn commission(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    nodes: &Nodes,
+) -> Result<[UniqueId; 8], SimError> {
+    let boards = Boards::connect(nodes, robot)?;
+    let plant = setup::plant(scenario, robot);
+    let master = setup::master(scenario, robot);
+    let mut world = World::new(robot, &plant, master, seed, boards)?;
+    for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
+        world.strike(fault, true)?;
+    }
+    let mut ids = [[0; 12]; 8];
+    let mut said: Vec<String> = Vec::new();
+    let mut asked = false;
+    let limit_ns = (robot.start_up.limit_s.min(COMMISSION_S) * 1e9) as u64;
+    while world.now_ns() < limit_ns {
+        world.step()?;
+        // Every board has been asked who it is by then, more than once.
+        if !asked && world.now_ns() >= limit_ns / 2 {
+            asked = true;
+            world
+                .submit(Command::Commission)
+                .map_err(|why| operator::refused(&Command::Commission, &why))?;
+        }
+        while let Some((_, event)) = world.master().take_event() {
+            match event {
+                Event::Commissioned { node, unique_id } => {
+                    ids[usize::from(node) - 1] = unique_id;
+                }
+                Event::Done(ticket) if ticket.code == CommandCode::Commission => return Ok(ids),
+                Event::Link { .. } | Event::Log { .. } | Event::NodeReady(_) => {}
+                other => said.push(words::describe(&other)),
+            }
+        }
+    }
+    Err(SimError::simulation(
+        format!("the boards cannot be commissioned: {}", said.join("; ")),
+        "mend what the master names, and try again",
+    ))
+}

@@ -1,0 +1,319 @@
+//! Samples of the running world for the recorder: what was commanded, what the
+//! boards sensed, what physically is.
+
+use wheeleg_master::setpoint::Phase;
+use wheeleg_master::telemetry::Record;
+use wheeleg_node::mode::Mode;
+use wheeleg_plant::robot::Outputs;
+use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality};
+
+use super::world::World;
+use wheeleg_telemetry::{
+    BodySample, BusSample, EventKind, FootSample, JointSample, MasterSample, Recorder,
+    SupplySample, WheelSample,
+};
+
+const PA_PER_BAR: f64 = 1e5;
+
+/// Turns the world into samples; remembers what it needs for differences.
+#[derive(Debug, Default)]
+pub(super) struct Observer {
+    modes: [Option<Mode>; 8],
+    faults: [FaultBits; 8],
+    grounded: [Option<bool>; 2],
+    cycles: u32,
+    bus_bytes: u64,
+    bus_busy_ns: u64,
+    last: Option<Record>,
+    step: u16,
+}
+
+fn bits(levels: impl IntoIterator<Item = bool>) -> u8 {
+    levels
+        .into_iter()
+        .enumerate()
+        .fold(0, |bits, (i, high)| bits | u8::from(high) << i)
+}
+
+/// A board's foot inputs as the log numbers them: bit 0 front, 1 back, 2 left, 3 right.
+fn switch_bits(inputs: u8) -> u8 {
+    bits(
+        [
+            InputBits::FOOT_FRONT,
+            InputBits::FOOT_REAR,
+            InputBits::FOOT_LEFT,
+            InputBits::FOOT_RIGHT,
+        ]
+        .map(|bit| inputs & bit.raw() != 0),
+    )
+}
+
+impl Observer {
+    /// Samples everything fast, at the start of a joint tick.
+    pub(super) fn tick(&mut self, world: &World, t_ns: u64, recorder: &mut Recorder) {
+        let out = world.outputs();
+        self.joints(world, out, t_ns, recorder);
+        self.wheels(world, out, t_ns, recorder);
+        for foot in 0..2 {
+            let vertical = world.joints()[3 * foot + 2].snapshot();
+            recorder.foot(
+                t_ns,
+                foot,
+                FootSample {
+                    normal_force_n: out.foot_force_n[foot][2],
+                    friction_force_n: out.foot_force_n[foot][0],
+                    clearance_mm: out.foot_clearance_m[foot] * 1e3,
+                    switches: switch_bits(vertical.switches),
+                },
+            );
+            self.notice_contact(foot, out.foot_switches[foot], t_ns, recorder);
+        }
+        recorder.body(
+            t_ns,
+            BodySample {
+                travel_mm: out.travel_m * 1e3,
+                speed_mm_s: out.speed_m_s * 1e3,
+                pitch_deg: out.pitch_rad.to_degrees(),
+                pitch_rate_deg_s: out.pitch_rate_rad_s.to_degrees(),
+            },
+        );
+        let gas = &world.plant().params().gas;
+        recorder.supply(
+            t_ns,
+            SupplySample {
+                pressure_bar: out.supply_pressure_pa / PA_PER_BAR,
+                air_used_dm3: out.air_used_kg / gas.reference_density_kg_m3 * 1e3,
+                dump_commanded: world.wheels()[0].dumps(),
+                dump_open: out.dumping,
+                pressure_switch: world.wheels()[0].snapshot().supply_present,
+            },
+        );
+        if recorder.wants_state(t_ns) {
+            recorder.state(
+                t_ns,
+                blake3::Hash::from(world.state_hash()).to_hex().to_string(),
+            );
+        }
+    }
+
+    fn joints(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
+        let inputs = world.tick_inputs();
+        for (i, board) in world.joints().iter().enumerate() {
+            let node = board.snapshot();
+            let c = &out.cylinders[i];
+            let [fill_a_us, vent_a_us, fill_b_us, vent_b_us] = inputs.on_us[i];
+            recorder.joint(
+                t_ns,
+                i,
+                JointSample {
+                    commanded_mm: node.commanded.to_f64(),
+                    reference_mm: node.reference.to_f64(),
+                    sensed_mm: node.measured.to_f64(),
+                    sensed_velocity_mm_s: node.velocity.to_f64(),
+                    position_mm: c.stroke_m * 1e3,
+                    velocity_mm_s: c.velocity_m_s * 1e3,
+                    acceleration_raw_m_s2: c.acceleration_m_s2,
+                    acceleration_m_s2: 0.0,
+                    pressure_a_bar: c.pressure_pa[0] / PA_PER_BAR,
+                    pressure_b_bar: c.pressure_pa[1] / PA_PER_BAR,
+                    force_net_raw_n: c.forces.net_n(),
+                    force_net_n: 0.0,
+                    force_pressure_n: c.forces.pressure_n,
+                    drive: node.duty.to_f64(),
+                    fill_a_us,
+                    vent_a_us,
+                    fill_b_us,
+                    vent_b_us,
+                    valves_open: bits(c.valve_open),
+                    valve_edges: inputs.edges[i],
+                    limits: node.limits.raw(),
+                    mode: node.mode.code(),
+                    faults: u32::from(node.faults.raw()),
+                },
+            );
+            self.notice(i, node.mode, node.faults, t_ns, recorder);
+        }
+    }
+
+    fn wheels(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
+        let params = world.plant().params();
+        let radius_mm = params.body.wheel_radius_m * 1e3;
+        for (i, board) in world.wheels().iter().enumerate() {
+            let node = board.snapshot();
+            let motor = &params.motors[i];
+            let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
+            let counts_to_mm = radius_mm * std::f64::consts::TAU / counts_per_turn;
+            recorder.wheel(
+                t_ns,
+                i,
+                WheelSample {
+                    reference_mm: f64::from(node.control.command.get()) * counts_to_mm,
+                    sensed_mm: f64::from(node.count.get()) * counts_to_mm,
+                    position_mm: out.wheel_angle_rad[i] * radius_mm,
+                    velocity_mm_s: out.wheel_rate_rad_s[i] * radius_mm,
+                    drive: f64::from(node.drive_percent) / 100.0,
+                    current_a: out.motor_current_a[i],
+                    torque_n_m: out.wheel_torque_n_m[i],
+                    count: node.count.get(),
+                    limits: node.limits.raw(),
+                    mode: node.mode.code(),
+                    faults: u32::from(node.faults.raw()),
+                },
+            );
+            self.notice(6 + i, node.mode, node.faults, t_ns, recorder);
+        }
+    }
+
+    /// Touchdowns and lifts as they physically are become events in words; what the
+    /// master made of its switches stands beside them.
+    fn notice_contact(
+        &mut self,
+        foot: usize,
+        switches: [bool; 4],
+        t_ns: u64,
+        recorder: &mut Recorder,
+    ) {
+        let grounded = switches.contains(&true);
+        let before = self.grounded[foot].replace(grounded);
+        if before.is_none_or(|before| before == grounded) {
+            return;
+        }
+        let side = ["left", "right"][foot];
+        let text = if grounded {
+            let closed: Vec<&str> = ["front", "left", "back", "right"]
+                .into_iter()
+                .zip(switches)
+                .filter_map(|(name, closed)| closed.then_some(name))
+                .collect();
+            format!("ground: {side} foot touches, {}", closed.join(", "))
+        } else {
+            format!("ground: {side} foot free")
+        };
+        recorder.event(t_ns, EventKind::Contact, text);
+    }
+
+    /// Changes of mode and fault become events in words.
+    fn notice(
+        &mut self,
+        index: usize,
+        mode: Mode,
+        faults: FaultBits,
+        t_ns: u64,
+        recorder: &mut Recorder,
+    ) {
+        let name = if index < 6 {
+            format!("joint {}", index + 1)
+        } else {
+            format!("wheel {}", index + 1)
+        };
+        if self.modes[index] != Some(mode) {
+            if let Some(before) = self.modes[index] {
+                recorder.event(
+                    t_ns,
+                    EventKind::Mode,
+                    format!("{name}: {before:?} to {mode:?}"),
+                );
+            }
+            self.modes[index] = Some(mode);
+        }
+        let before = self.faults[index];
+        if before != faults {
+            self.faults[index] = faults;
+            for fault in faults.iter().filter(|fault| !before.contains(*fault)) {
+                recorder.event(t_ns, EventKind::Fault, format!("{name}: {fault}"));
+            }
+            if faults.is_empty() {
+                recorder.event(t_ns, EventKind::Fault, format!("{name}: faults cleared"));
+            }
+        }
+    }
+
+    /// Passes over a bus cycle of the start-up, so that the first sample shows
+    /// the traffic of its own cycle alone.
+    pub(super) fn pass(&mut self, world: &World) {
+        let line = world.bus().counters();
+        (self.bus_bytes, self.bus_busy_ns) = (line.bytes, line.busy_ns);
+    }
+
+    /// Samples bus and master, once per bus cycle. `record` is the master's own
+    /// record of the cycle that has just ended, if it lives; it is logged at the
+    /// time that this cycle began.
+    pub(super) fn cycle(
+        &mut self,
+        world: &World,
+        record: Option<Record>,
+        (start_ns, now_ns): (u64, u64),
+        cycle_ns: u64,
+        recorder: &mut Recorder,
+    ) {
+        let t_ns = now_ns - start_ns;
+        let began_ns = record.map_or(now_ns, |r| r.time_us * 1_000);
+        let line = world.bus().counters();
+        let bytes = line.bytes - self.bus_bytes;
+        let busy_ns = line.busy_ns - self.bus_busy_ns;
+        (self.bus_bytes, self.bus_busy_ns) = (line.bytes, line.busy_ns);
+        if let Some(record) = record {
+            self.last = Some(record);
+        }
+        let last = self.last.filter(|_| world.master_alive());
+        recorder.bus(
+            t_ns,
+            BusSample {
+                cycle: self.cycles,
+                bytes: bytes as u32,
+                load: busy_ns as f64 / cycle_ns as f64,
+                replies: last.map_or(0, |r| r.replies.iter().flatten().count() as u8),
+                collisions: line.collisions as u32,
+                errors: self.last.map_or(0, |r| r.counters.link.errors()),
+            },
+        );
+        self.cycles += 1;
+        recorder.master(
+            began_ns.saturating_sub(start_ns),
+            self.master_sample(world.master_alive()),
+        );
+    }
+
+    /// Frames and errors that the master counted.
+    pub(super) fn link(&self) -> LinkQuality {
+        self.last
+            .map(|record| record.counters.link)
+            .unwrap_or_default()
+    }
+
+    fn master_sample(&mut self, alive: bool) -> MasterSample {
+        let Some(record) = self.last else {
+            return MasterSample {
+                alive,
+                ..MasterSample::default()
+            };
+        };
+        let phase = match record.phase {
+            Phase::Unload => 1,
+            Phase::Lift | Phase::Reach => 2,
+            Phase::Lower => 3,
+            Phase::Push => 5,
+            Phase::Rest => 4,
+            _ => 0,
+        };
+        let moving = phase != 0 || record.phase == Phase::Trajectory;
+        if moving {
+            self.step = record.step + 1;
+        }
+        let counters = &record.counters;
+        MasterSample {
+            alive,
+            step: u32::from(self.step),
+            phase,
+            link_loss_action: (1..=6)
+                .filter_map(|n| record.slots.joint(Address::joint(n)?))
+                .map(|slot| u8::from(slot.on_link_loss != LinkLossAction::Hold))
+                .max()
+                .unwrap_or(0),
+            fifo_drops: counters.lost_setpoints
+                + counters.lost_feedback
+                + counters.lost_records
+                + counters.lost_events,
+        }
+    }
+}

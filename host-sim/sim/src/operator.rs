@@ -1,0 +1,301 @@
+//! The person at the console: gets the robot ready, starts the motion, and
+//! carries out the scenario's events, all through the master's dispatcher.
+
+use wheeleg_master::command::Command;
+use wheeleg_master::contact::Side;
+use wheeleg_master::dispatcher::Reject;
+use wheeleg_master::event::Event;
+use wheeleg_master::layer1::foot::FootShape;
+use wheeleg_protocol::{LinkRecord, LogEvent};
+use wheeleg_units::PositionMm;
+
+use super::START_UP;
+use super::words::{describe, reject};
+use super::world::World;
+use crate::SimError;
+use wheeleg_config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
+use wheeleg_telemetry::{EventKind, LinkSample, Recorder};
+
+/// What to do about a robot that does not get ready, where no board is to blame.
+const HELP: &str = "check supply pressure, board gains and start pose in the robot file";
+
+/// How far the start-up has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Enumerating,
+    Arming,
+    Homing,
+    Settling { until_ns: u64 },
+}
+
+/// The operator of one run.
+pub(super) struct Operator {
+    motion: Motion,
+    events: Vec<ScenarioEvent>,
+    rest_ns: u64,
+    limit_ns: u64,
+    stage: Stage,
+    notes: Vec<(u64, EventKind, String)>,
+    next_event: usize,
+    flood_refused: bool,
+}
+
+/// Side of a leg as the master names it.
+pub(super) fn side(leg: LegChoice) -> Side {
+    match leg {
+        LegChoice::Left => Side::Left,
+        LegChoice::Right => Side::Right,
+    }
+}
+
+impl Operator {
+    /// An operator at a robot that is just being switched on.
+    pub(super) fn new(scenario: &Scenario, start_up: &StartUpParams) -> Self {
+        let ns = |s: f64| (s * 1e9).round() as u64;
+        Self {
+            motion: scenario.motion,
+            events: scenario.events.clone(),
+            rest_ns: ns(start_up.rest_s),
+            limit_ns: ns(start_up.limit_s),
+            stage: Stage::Enumerating,
+            notes: Vec::new(),
+            next_event: 0,
+            flood_refused: false,
+        }
+    }
+
+    /// One look at the robot during start-up; true once it stands at rest in
+    /// its start pose.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] with the reason if it does not get there.
+    pub(super) fn prepare(&mut self, world: &mut World) -> Result<bool, SimError> {
+        let now_ns = world.now_ns();
+        let now_us = now_ns / 1000;
+        while let Some((time_us, event)) = world.master().take_event() {
+            // Counters and logs are no part of the story.
+            if is_advice(&event) {
+                self.notes
+                    .push((time_us, EventKind::Fault, describe(&event)));
+            } else if !matches!(event, Event::Link { .. } | Event::Log { .. }) {
+                self.notes
+                    .push((time_us, EventKind::Info, describe(&event)));
+            }
+            match event {
+                Event::Homed if self.stage == Stage::Homing => {
+                    self.stage = Stage::Settling {
+                        until_ns: now_ns + self.rest_ns,
+                    };
+                }
+                Event::HomingFailed { .. } | Event::Hold(_) | Event::Refused { .. } => {
+                    return Err(self.not_ready(now_ns, HELP));
+                }
+                Event::SchemaMismatch { .. } => {
+                    let help = "build and flash this board from the sources of this program; \
+                         `wheeleg interface HASH --all` prints all that differs";
+                    return Err(self.not_ready(now_ns, help));
+                }
+                Event::ForeignBoard { .. } => {
+                    let help = "put the board back that was commissioned, or take this one over: \
+                         `wheeleg commission`";
+                    return Err(self.not_ready(now_ns, help));
+                }
+                _ => {}
+            }
+        }
+        let (command, next) = match self.stage {
+            Stage::Enumerating if world.master().is_ready() => (Command::Arm, Stage::Arming),
+            Stage::Arming if world.master().is_armed() => (Command::Stand, Stage::Homing),
+            Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
+            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, HELP)),
+            _ => return Ok(false),
+        };
+        world
+            .master()
+            .submit(command, now_us)
+            .map_err(|why| refused(&command, &why))?;
+        self.stage = next;
+        Ok(false)
+    }
+
+    fn not_ready(&self, now_ns: u64, help: &str) -> SimError {
+        let story: Vec<String> = self
+            .notes
+            .iter()
+            .rev()
+            .take(6)
+            .rev()
+            .map(|(us, _, text)| format!("{:.3} s: {text}", *us as f64 * 1e-6))
+            .collect();
+        SimError::simulation(
+            format!(
+                "the robot did not get ready in {:.2} s of simulated time (stage {:?}); last events: {}",
+                now_ns as f64 * 1e-9,
+                self.stage,
+                story.join("; ")
+            ),
+            help,
+        )
+    }
+
+    /// Writes the story of the start-up into the record, at time 0.
+    pub(super) fn report_start_up(&self, recorder: &mut Recorder) {
+        for (us, kind, text) in &self.notes {
+            let at_s = *us as f64 * 1e-6;
+            recorder.event(
+                0,
+                *kind,
+                format!("{START_UP}{at_s:.3} s after power-up: {text}"),
+            );
+        }
+    }
+
+    /// Starts the scenario's motion.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the dispatcher refuses it.
+    pub(super) fn begin(&self, world: &mut World) -> Result<(), SimError> {
+        let command = match self.motion {
+            Motion::Stand => return Ok(()),
+            Motion::SquareWave { .. } => Command::StartGait,
+            Motion::Sinusoid {
+                leg,
+                length_m,
+                height_m,
+                rate_rad_s,
+            } => Command::FootTrajectory {
+                side: side(leg),
+                shape: FootShape::Arch {
+                    forward_mm: PositionMm::from_f64(length_m * 1e3),
+                    left_mm: PositionMm::ZERO,
+                    height_mm: PositionMm::from_f64(height_m * 1e3),
+                    rate_rad_s: rate_rad_s as f32,
+                },
+            },
+        };
+        let now_us = world.now_ns() / 1000;
+        world
+            .master()
+            .submit(command, now_us)
+            .map(|_| ())
+            .map_err(|why| refused(&command, &why))
+    }
+
+    /// The events of the scenario that are due at `t_ns`, each once.
+    pub(super) fn due(&mut self, t_ns: u64) -> Vec<ScenarioEvent> {
+        let t_s = t_ns as f64 * 1e-9;
+        let rest = &self.events[self.next_event..];
+        let due: Vec<ScenarioEvent> = rest
+            .iter()
+            .take_while(|e| e.at_s <= t_s + 1e-9)
+            .cloned()
+            .collect();
+        self.next_event += due.len();
+        due
+    }
+
+    /// Gives a command in mid-run. A refusal is an event, as on the real console.
+    ///
+    /// # Errors
+    /// Never at present; kept for commands that cannot be given at all.
+    pub(super) fn submit(
+        &self,
+        world: &mut World,
+        command: Command,
+        t_ns: u64,
+        recorder: &mut Recorder,
+    ) -> Result<(), SimError> {
+        let name = format!("{:?}", command.code());
+        if !world.master_alive() {
+            recorder.event(
+                t_ns,
+                EventKind::Command,
+                format!("{name}: nobody answers, the master is dead"),
+            );
+            return Ok(());
+        }
+        let text = match world.submit(command) {
+            Ok(_) => format!("{name}: accepted"),
+            Err(why) => format!("{name} refused: {}", reject(&why)),
+        };
+        recorder.event(t_ns, EventKind::Command, text);
+        Ok(())
+    }
+
+    /// A user who gives commands without end, as a fault of the run. The first
+    /// refusal is an event; the others are counted by the master.
+    pub(super) fn flood(&mut self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
+        let now_us = world.now_ns() / 1000;
+        for i in 0..world.faults().flood() {
+            let joint = (i % 6) as u8 + 1;
+            let command = Command::TransmitPosition { joint };
+            let answer = world.master().submit(command, now_us);
+            if let (Err(why), false) = (answer, self.flood_refused) {
+                self.flood_refused = true;
+                let text = format!("flood of commands: number {i} refused: {}", reject(&why));
+                recorder.event(t_ns, EventKind::Command, text);
+            }
+        }
+    }
+
+    /// Writes the master's events into the record.
+    pub(super) fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
+        while let Some((_, event)) = world.master().take_event() {
+            let kind = match event {
+                _ if is_advice(&event) => EventKind::Fault,
+                Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
+                Event::Hold(_)
+                | Event::FootSwitch { .. }
+                | Event::HomingFailed { .. }
+                | Event::SchemaMismatch { .. }
+                | Event::ForeignBoard { .. }
+                | Event::WrongRole(_)
+                | Event::NodeLost(_)
+                | Event::Found { .. }
+                | Event::Diagnosis { .. }
+                | Event::DuplicateAddress { .. } => EventKind::Fault,
+                Event::Log { .. } | Event::LogLost { .. } => EventKind::Log,
+                Event::Link { node, record } => {
+                    let node = usize::from(node) - 1;
+                    recorder.link(t_ns, node, link_sample(&record));
+                    continue;
+                }
+                Event::Done(_)
+                | Event::Refused { .. }
+                | Event::Position { .. }
+                | Event::Parameter { .. } => EventKind::Command,
+                Event::Armed | Event::Disarmed => EventKind::Mode,
+                _ => EventKind::Info,
+            };
+            recorder.event(t_ns, kind, describe(&event));
+        }
+    }
+}
+
+/// What a board logs and somebody should act on, so that it is told as a finding is.
+fn is_advice(event: &Event) -> bool {
+    matches!(event, Event::Log { entry, .. } if entry.event == LogEvent::PrechargeLate)
+}
+
+pub(super) fn refused(command: &Command, why: &Reject) -> SimError {
+    SimError::simulation(
+        format!("the master refuses {:?}: {}", command.code(), reject(why)),
+        "the events of the log tell what the robot was doing",
+    )
+}
+
+fn link_sample(record: &LinkRecord) -> LinkSample {
+    LinkSample {
+        frames: record.frames,
+        overflow: record.overflow,
+        truncated: record.truncated,
+        short: record.short,
+        crc: record.crc,
+        version: record.version,
+        length: record.length,
+        address: record.address,
+        unsent: record.unsent,
+        drift_ppm: i32::from(record.drift_ppm),
+        parameters: record.parameters,
+    }
+}

@@ -1,0 +1,117 @@
+//! From a robot and a scenario to the configuration of plant and master: the
+//! one place where the two files' SI values become the master's units.
+
+use std::f64::consts::TAU;
+
+use fixed::types::I16F16;
+use wheeleg_master::MasterConfig;
+use wheeleg_master::config::{SwitchFrame, WheelDrive};
+use wheeleg_master::layer0::odometry::WheelGeometry;
+use wheeleg_master::layer1::homing::HomingConfig;
+use wheeleg_master::layer1::params::{GaitParams, Pattern};
+use wheeleg_node::parameters::JointParameters;
+use wheeleg_plant::PlantParams;
+use wheeleg_plant::ground::{Ground, GroundPatch};
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use super::operator::side;
+use wheeleg_config::{LegChoice, Motion, RobotConfig, Scenario};
+
+/// The leg that moves; the left one where the scenario does not say.
+fn stepping_leg(scenario: &Scenario) -> LegChoice {
+    match scenario.motion {
+        Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => leg,
+        Motion::Stand => LegChoice::Left,
+    }
+}
+
+fn millimetres(m: f64) -> PositionMm {
+    PositionMm::from_f64(m * 1e3)
+}
+
+fn microseconds(s: f64) -> u32 {
+    (s * 1e6).round() as u32
+}
+
+/// Sums of the joints' parameters, as the file of the robot gives them.
+fn sums(robot: &RobotConfig) -> [Option<u32>; 8] {
+    let sum = |set: &Vec<(u16, i32)>| {
+        let with = |parameters: JointParameters, (id, raw): &(u16, i32)| {
+            parameters.with(*id, *raw, true).ok()
+        };
+        let set = set.iter().try_fold(JointParameters::default(), with);
+        set.map(|set| set.sum())
+    };
+    std::array::from_fn(|i| robot.node.joints.get(i).and_then(sum))
+}
+
+/// The plant of the robot, standing on the scenario's ground in the start pose of the gait.
+///
+/// Powering up in the start pose, chambers at their initial pressures, is the
+/// paper's home position; the start-up then arms and settles there.
+pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
+    let gait = &robot.gait;
+    let home = [gait.yaw_s2_m, 0.0, gait.stroke_m];
+    let held = [gait.yaw_s2_m, gait.held_leg_s5_m, gait.held_leg_s6_m];
+    let mut plant = robot.plant.clone();
+    let (left, right) = match stepping_leg(scenario) {
+        LegChoice::Left => (home, held),
+        LegChoice::Right => (held, home),
+    };
+    plant.initial_stroke_m[..3].copy_from_slice(&left);
+    plant.initial_stroke_m[3..].copy_from_slice(&right);
+    let patch = |p: &wheeleg_config::GroundPatch| GroundPatch {
+        x_m: p.x_m,
+        y_m: p.y_m,
+        height_m: p.height_m,
+    };
+    plant.ground = Ground {
+        patches: scenario.ground.iter().map(patch).collect(),
+    };
+    plant
+}
+
+/// The master's configuration; [`super::world::World`] adds the sample time of
+/// the wheel boards.
+pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
+    let gait = &robot.gait;
+    let cycles = |s: f64| (s / robot.bus.cycle_s).round() as u16;
+    let motor = &robot.plant.motors[0];
+    let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
+    let circumference_um = robot.plant.body.wheel_radius_m * TAU * 1e6;
+    MasterConfig {
+        gait: GaitParams {
+            steps: gait.steps,
+            period_us: microseconds(gait.period_s),
+            lift_us: microseconds(gait.lift_s),
+            reach_us: microseconds(gait.reach_s),
+            lower_us: microseconds(gait.lower_s),
+            push_us: microseconds(gait.push_s),
+            stroke_mm: millimetres(gait.stroke_m),
+            held_leg_s5_mm: millimetres(gait.held_leg_s5_m),
+            held_leg_s6_mm: millimetres(gait.held_leg_s6_m),
+            yaw_s2_mm: millimetres(gait.yaw_s2_m),
+            push_speed_mm_s: VelocityMmS::from_f64(gait.push_speed_m_s * 1e3),
+            push_acceleration_mm_s2: I16F16::from_num(gait.push_acceleration_m_s2 * 1e3),
+            pattern: Pattern::Single(side(stepping_leg(scenario))),
+            touchdown_reflex: gait.touchdown_reflex,
+        },
+        homing: HomingConfig {
+            slew_mm_s: VelocityMmS::from_f64(robot.homing.slew_m_s * 1e3),
+            tolerance_mm: millimetres(robot.homing.tolerance_m),
+            settle_cycles: cycles(robot.homing.settle_s),
+            timeout_cycles: cycles(robot.homing.timeout_s),
+        },
+        wheels: WheelGeometry {
+            counts_per_revolution: counts.round() as u32,
+            circumference_um: circumference_um.round() as u32,
+        },
+        // The paper's wheel boards make the trapezoid themselves.
+        wheel_drive: WheelDrive::Profile,
+        // The plant's soles name left and right as the robot looks, on both legs.
+        switch_frame: SwitchFrame::Robot,
+        commissioned: robot.commissioned,
+        parameters: sums(robot),
+        ..MasterConfig::default()
+    }
+}

@@ -1,0 +1,281 @@
+//! What is on the line beside the master and its eight boards: a second board
+//! with the address straps of another one, and a service tool that writes
+//! parameters.
+
+use wheeleg_node::Transmission;
+use wheeleg_protocol::frame::{VERSION, encode};
+use wheeleg_protocol::param::{ParamInfo, params_at};
+use wheeleg_protocol::{
+    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, NackReason, ParamGet,
+    ParamSet, ParamValue, ResetCause,
+};
+
+use super::boards::{JointBoard, WheelBoard, twin_identity};
+use super::bus::{Bus, Delivery, Driver};
+use super::traffic::{NS_PER_US, micros};
+use crate::SimError;
+use wheeleg_config::NodeParams;
+use wheeleg_config::timing::SERVICE_NS;
+
+/// A second board drives the line as this plus the address.
+const TWIN: Driver = 0x40;
+/// The service tool.
+pub(super) const SERVICE: Driver = 0x80;
+/// A stream that fills the line: the last wheel board sends it.
+pub(super) const STREAM: Driver = 8;
+/// Listens only.
+pub(super) const AUDITOR: Driver = 0xFE;
+
+/// Potentiometer of a board that lies on the bench: mid travel.
+const BENCH_CODE: u16 = 0x8000;
+/// Longest exchange of the service tool on the line, and some: it must end
+/// before the next SYNC, ns.
+const EXCHANGE_NS: u64 = 700_000;
+/// How long the tool waits for an answer, µs.
+const PATIENCE_US: u64 = 20_000;
+/// First number of the tool's requests: none of the master's.
+const FIRST_SEQUENCE: u16 = 0xF000;
+/// A parameter that no board has.
+const NO_PARAMETER: u16 = 0x7FFF;
+
+/// Everybody else on the line.
+#[derive(Default)]
+pub(super) struct Strangers {
+    /// Boards with the address of another one.
+    joints: Vec<(u8, JointBoard)>,
+    wheels: Vec<(u8, WheelBoard)>,
+    service: Option<Service>,
+    notes: Vec<String>,
+}
+
+impl Strangers {
+    /// Another board with the straps of `address` is plugged in, on the bench
+    /// side of its sensors and valves.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the board refuses its parameters.
+    pub(super) fn plug_in(&mut self, address: u8, stored: &NodeParams) -> Result<(), SimError> {
+        let i = usize::from(address) - 1;
+        let Some(who) = Address::new(address).map(twin_identity) else {
+            return Ok(());
+        };
+        if i < 6 {
+            let board = JointBoard::new(who, Some(&stored.joints[i]), ResetCause::PowerUp)?;
+            self.joints.push((address, board));
+        } else {
+            let board = WheelBoard::new(who, Some(&stored.wheels[i - 6]), ResetCause::PowerUp)?;
+            self.wheels.push((address, board));
+        }
+        Ok(())
+    }
+
+    /// It is unplugged.
+    pub(super) fn unplug(&mut self, address: u8) {
+        self.joints.retain(|(own, _)| *own != address);
+        self.wheels.retain(|(own, _)| *own != address);
+    }
+
+    /// The service tool begins to write parameters of the board at `address`.
+    pub(super) fn write_parameters(&mut self, address: u8) {
+        self.service = Address::new(address).map(Service::new);
+    }
+
+    /// One tick of the joints among the second boards.
+    pub(super) fn joint_tick(&mut self, now_ns: u64) {
+        for (_, board) in &mut self.joints {
+            board.tick(micros(now_ns), BENCH_CODE, [false; 4]);
+        }
+    }
+
+    /// One sample of the wheels among the second boards that stand for `address`.
+    pub(super) fn wheel_sample(&mut self, address: u8, now_ns: u64) {
+        for (_, board) in self.wheels.iter_mut().filter(|(own, _)| *own == address) {
+            board.tick(micros(now_ns), 0, true);
+        }
+    }
+
+    /// Hears a delivery.
+    pub(super) fn hear(&mut self, bus: &Bus, delivery: &Delivery) {
+        for (address, board) in &mut self.joints {
+            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
+                board.on_bus_bytes(&bytes, micros(end_ns));
+            }
+        }
+        for (address, board) in &mut self.wheels {
+            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
+                board.on_bus_bytes(&bytes, micros(end_ns));
+            }
+        }
+        if let Some(service) = &mut self.service
+            && let Some((bytes, _)) = bus.heard_by(SERVICE, delivery)
+        {
+            self.notes.extend(service.hear(&bytes));
+        }
+    }
+
+    /// What a second board wants to send.
+    pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
+        let joints = self.joints.iter_mut();
+        let mut joints = joints.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
+        if let Some(sent) = joints.next() {
+            return Some(sent);
+        }
+        let wheels = self.wheels.iter_mut();
+        let mut wheels = wheels.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
+        wheels.next()
+    }
+
+    /// The next request of the service tool, if it has one and `left_ns` until the
+    /// next SYNC is enough.
+    pub(super) fn service_request(&mut self, now_us: u64, left_ns: u64) -> Option<Vec<u8>> {
+        if left_ns < EXCHANGE_NS {
+            return None;
+        }
+        self.service.as_mut()?.request(now_us)
+    }
+
+    /// What happened, in words; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+}
+
+/// One step of the service tool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Write {
+    /// Reads the value before and after each write.
+    Read,
+    /// Above the parameter's upper limit.
+    TooLarge,
+    /// A number that names no parameter.
+    Unknown,
+    /// A value of another size: a float of eight bytes that is not a number.
+    OtherType,
+}
+
+const STEPS: [Write; 7] = [
+    Write::Read,
+    Write::TooLarge,
+    Write::Read,
+    Write::Unknown,
+    Write::Read,
+    Write::OtherType,
+    Write::Read,
+];
+
+// The fault's earliest end is checked where it is read.
+const _: () = assert!(SERVICE_NS == STEPS.len() as u64 * PATIENCE_US * NS_PER_US);
+
+/// A tool that speaks on the master's behalf, between its requests.
+struct Service {
+    to: Address,
+    parameter: &'static ParamInfo,
+    decoder: Decoder,
+    step: usize,
+    /// Sequence and end of patience of the open request, µs.
+    open: Option<(u16, u64)>,
+    value: Option<i32>,
+    changed: bool,
+}
+
+impl Service {
+    fn new(to: Address) -> Self {
+        let table = params_at(to.raw());
+        // One that may be set at any time, so that nothing but its limit refuses it.
+        let fits = |p: &&ParamInfo| !p.disarmed_only && p.max < i32::MAX;
+        Self {
+            to,
+            parameter: table.iter().find(fits).unwrap_or(&table[0]),
+            decoder: Decoder::new(),
+            step: 0,
+            open: None,
+            value: None,
+            changed: false,
+        }
+    }
+
+    fn request(&mut self, now_us: u64) -> Option<Vec<u8>> {
+        let step = *STEPS.get(self.step)?;
+        if self.open.is_some_and(|(_, patience)| now_us < patience) {
+            return None;
+        }
+        let sequence = FIRST_SEQUENCE + self.step as u16;
+        self.open = Some((sequence, now_us + PATIENCE_US));
+        let id = self.parameter.id;
+        let set = |id: u16, value: i32| Message::from(ParamSet { id, value });
+        let message = match step {
+            Write::Read => Message::from(ParamGet { id }),
+            Write::TooLarge => set(id, self.parameter.max + 1),
+            Write::Unknown => set(NO_PARAMETER, 1),
+            Write::OtherType => return self.raw(sequence),
+        };
+        let envelope = Envelope {
+            source: Address::MASTER,
+            destination: self.to,
+            sequence,
+        };
+        let mut buffer = [0; MAX_ENCODED];
+        Some(message.emit(envelope, &mut buffer).ok()?.to_vec())
+    }
+
+    /// A sound frame whose payload is no value of the protocol.
+    fn raw(&self, sequence: u16) -> Option<Vec<u8>> {
+        let header = Header {
+            version: VERSION,
+            message_type: MessageType::ParamSet.code(),
+            source: Address::MASTER,
+            destination: self.to,
+            sequence,
+        };
+        let mut payload = self.parameter.id.to_le_bytes().to_vec();
+        payload.extend(f64::NAN.to_le_bytes());
+        let mut buffer = [0; MAX_ENCODED];
+        Some(encode(&header, &payload, &mut buffer).ok()?.to_vec())
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> Vec<String> {
+        let mut notes = Vec::new();
+        for byte in bytes {
+            let Some(Ok(frame)) = self.decoder.push(*byte) else {
+                continue;
+            };
+            let envelope = Envelope::from(frame.header);
+            let awaited = self.open.is_some_and(|(s, _)| s == envelope.sequence);
+            if envelope.source != self.to || !awaited {
+                continue;
+            }
+            if let Ok(message) = Message::parse(&frame) {
+                notes.extend(self.answer(&message));
+                self.open = None;
+                self.step += 1;
+            }
+        }
+        notes
+    }
+
+    fn answer(&mut self, answer: &Message) -> Option<String> {
+        let (who, name) = (self.to, self.parameter.name);
+        let what = match *STEPS.get(self.step)? {
+            Write::Read => {
+                let Message::ParamValue(ParamValue { value, .. }) = answer else {
+                    return Some(format!("{who} does not tell its parameter {name}"));
+                };
+                let before = *self.value.get_or_insert(*value);
+                self.changed |= before != *value;
+                let last = self.step + 1 == STEPS.len();
+                let verdict = if self.changed { "CHANGED" } else { "unchanged" };
+                return last.then(|| format!("{who}: parameter {name} {verdict}, raw {value}"));
+            }
+            Write::TooLarge => format!("{name} above its limit"),
+            Write::Unknown => format!("parameter 0x{NO_PARAMETER:04X}"),
+            Write::OtherType => format!("{name} as a float, not a number"),
+        };
+        Some(match answer {
+            Message::Nack(nack) => {
+                let reason: NackReason = nack.reason;
+                format!("{who} refuses {what}: {}", reason.text())
+            }
+            _ => format!("{who} takes {what}: WRONG"),
+        })
+    }
+}

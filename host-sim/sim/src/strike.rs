@@ -1,0 +1,86 @@
+//! Faults that stop boards or programs: what they do at the instant at which they strike.
+
+use wheeleg_protocol::ResetCause;
+use wheeleg_remote_link as link;
+
+use super::power::{Client, Down};
+use super::world::World;
+use crate::SimError;
+use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::timing::{JOINT_TICK_NS, WATCHDOG_NS};
+
+impl World {
+    /// What a fault does to the power of a board or to a program.
+    ///
+    /// # Errors
+    /// [`SimError`] if a board outside refuses it.
+    pub(super) fn strike_power(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
+        let after_ns = |ms: f64| self.now_ns.saturating_add((ms * 1e6) as u64);
+        match fault.kind {
+            FaultKind::MasterReset if begin => {
+                self.master_alive = false;
+                self.master_back_ns = Some(after_ns(fault.value));
+            }
+            FaultKind::ClientReset if begin => self.client = Client::connect(&mut self.master),
+            _ => {}
+        }
+        let Victim::Board(address) = fault.victim else {
+            return Ok(());
+        };
+        let down = match fault.kind {
+            FaultKind::NodeOff if begin => Down::Off { until_ns: u64::MAX },
+            FaultKind::NodeOff => Down::Off { until_ns: 0 },
+            FaultKind::NodeReset if begin => Down::Off {
+                until_ns: self.now_ns.saturating_add(JOINT_TICK_NS),
+            },
+            FaultKind::BrownOut if begin => Down::Off {
+                until_ns: after_ns(fault.value),
+            },
+            FaultKind::NodeHang if begin => Down::Hung {
+                until_ns: self.now_ns.saturating_add(WATCHDOG_NS),
+            },
+            FaultKind::ProcessorFault if begin => return self.fault_processor(address),
+            _ => return Ok(()),
+        };
+        if let Down::Off { .. } = down {
+            self.memories[usize::from(address) - 1].power_fails(self.now_ns);
+        }
+        self.down[usize::from(address) - 1] = down;
+        let Some(outside) = &mut self.outside else {
+            return Ok(());
+        };
+        match down {
+            Down::Hung { .. } => Ok(outside.hook(address, link::Hook::StopProcessor)?),
+            _ => {
+                outside.set_power(address, link::Power::BrownOut);
+                // At once: it may be back before the board is run otherwise.
+                self.run_outside(&[(address, None)])
+            }
+        }
+    }
+
+    /// The processor of a board faults: its handler turns the outputs off and resets it.
+    fn fault_processor(&mut self, address: u8) -> Result<(), SimError> {
+        let i = usize::from(address) - 1;
+        self.memories[i].power_fails(self.now_ns);
+        match &mut self.outside {
+            Some(outside) if outside.has(address) => {
+                // Until its own reset.
+                self.down[i] = Down::Hung {
+                    until_ns: self.now_ns.saturating_add(JOINT_TICK_NS),
+                };
+                outside.hook(address, link::Hook::FaultProcessor)?;
+                self.run_outside(&[(address, None)])
+            }
+            // How long its start takes is known from the run that this one repeats.
+            _ if self.kept.rule(address) => {
+                self.down[i] = Down::Off { until_ns: u64::MAX };
+                Ok(())
+            }
+            _ => {
+                self.begin_start(address, ResetCause::ProcessorFault);
+                Ok(())
+            }
+        }
+    }
+}

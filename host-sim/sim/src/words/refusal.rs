@@ -1,0 +1,132 @@
+//! Why a command is not carried out, with what to do about it.
+
+use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject};
+use wheeleg_master::finding::Finding;
+use wheeleg_master::layer1::params::{PERIOD_MAX_US, ParamError, STEPS_MAX};
+use wheeleg_protocol::{Fault, FaultBits};
+
+use super::{board, other_interface};
+
+/// A command that was accepted and then not carried out.
+pub(super) fn refusal(reason: &Refusal) -> String {
+    match *reason {
+        Refusal::Expired => "its deadline passed while it waited: give it again".to_owned(),
+        Refusal::NotArmed => "it needs armed axes: clear a stop if there was one, then arm".to_owned(),
+        Refusal::NotDisarmed => "it needs disarmed axes: disarm first".to_owned(),
+        Refusal::Moving => {
+            "the robot is moving: wait for the end of the motion, or give Hold, or StopGait in a gait"
+                .to_owned()
+        }
+        Refusal::NotMoving => "no gait is under way; Hold ends any other motion".to_owned(),
+        Refusal::NotAtStart => {
+            "the robot does not stand in the start pose (give Stand first), or this is not the \
+             leg that steps first"
+                .to_owned()
+        }
+        Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
+        Refusal::NoAir => {
+            "the supply pressure switch is open: wait until the reservoir is full, then ask again; \
+             if it stays open, check compressor, hose and regulator"
+                .to_owned()
+        }
+        Refusal::NodeMissing { node } => {
+            let remedy = Finding::NodeLost.remedy();
+            format!("{} has not been heard or identified yet. {remedy}", board(node))
+        }
+        Refusal::NoAnswer { node } => {
+            let remedy = Finding::NodeLost.remedy();
+            format!("{} does not answer. {remedy}", board(node))
+        }
+        Refusal::SchemaMismatch {
+            node,
+            master,
+            theirs,
+        } => format!("{}: {}", board(node), other_interface(node, master, theirs)),
+        Refusal::WrongRole { node } => format!("{}: {}", board(node), Finding::WrongRole),
+        Refusal::ForeignBoard { node } => format!("{}: {}", board(node), Finding::ForeignBoard),
+        Refusal::DuplicateAddress { node } => {
+            format!("{}: {}", board(node), Fault::DuplicateAddress)
+        }
+        Refusal::NoSuchBoard { node } => format!("there is no board {node}: they are 1 to 8"),
+        Refusal::NodeFault { node, faults } => {
+            let faults = FaultBits::from_raw(faults);
+            let words: Vec<String> = faults.iter().map(|fault| fault.to_string()).collect();
+            format!("{}: {}", board(node), words.join(" "))
+        }
+        Refusal::NodeReset { node } => format!(
+            "{} was reset meanwhile: do it again, and read back what it holds",
+            board(node)
+        ),
+        Refusal::NodeRefused { node, reason } => format!("{}: {}", board(node), reason.text()),
+        Refusal::NodeBusy { node } => format!(
+            "{} stays busy, as while it stores parameters: give it again",
+            board(node)
+        ),
+        Refusal::NotConfirmed => {
+            "all boards agreed to arm, but one did not close its loop in time, or a joint still \
+             fills: check supply pressure and precharge, then arm again"
+                .to_owned()
+        }
+        Refusal::NoSuchJoint { joint } => format!("there is no joint {joint}: they are 1 to 6"),
+        Refusal::Parameter(ref error) => parameter(error),
+        Refusal::Busy => "other requests are still under way: wait for their answers".to_owned(),
+        Refusal::Interrupted => {
+            "a stop or another command came between: see what came before it, then give it again"
+                .to_owned()
+        }
+        Refusal::NotSettled { joint } => format!(
+            "joint {joint} did not reach the start pose in time: check its load and supply pressure"
+        ),
+    }
+}
+
+/// A command that was not accepted.
+pub(crate) fn reject(reason: &Reject) -> String {
+    match *reason {
+        Reject::Expired { late_us } => format!("its deadline passed {late_us} µs ago"),
+        Reject::DeadlineTooFar => {
+            let most_s = DEADLINE_MAX_US / 1_000_000;
+            format!("its deadline lies more than {most_s} s ahead")
+        }
+        Reject::Duplicate => "its client has sent this number before".to_owned(),
+        Reject::OutOfOrder { last } => format!("its client has sent number {last} before"),
+        Reject::UnknownClient => "its client is unknown".to_owned(),
+        Reject::Refused(ref why) => refusal(why),
+        Reject::QueueFull { layer } => format!(
+            "the queue to layer {} is full: give fewer commands at a time",
+            layer as u8
+        ),
+    }
+}
+
+fn parameter(error: &ParamError) -> String {
+    match *error {
+        ParamError::OutOfRange {
+            field,
+            min,
+            max,
+            value,
+        } => format!("`{field}` is {value}, allowed are {min} to {max}"),
+        ParamError::Steps { value } => {
+            format!("`steps` is {value}, allowed are 1 to {STEPS_MAX}")
+        }
+        ParamError::Order { field } => {
+            format!("`{field}` is out of order: lift, reach or lower, push, period")
+        }
+        ParamError::PeriodTooLong { value_us } => format!(
+            "`period` is {} s, allowed are at most {} s",
+            f64::from(value_us) * 1e-6,
+            f64::from(PERIOD_MAX_US) * 1e-6
+        ),
+        ParamError::PushTooLong { needs_us, has_us } => format!(
+            "the push takes {} s, the step leaves {} s for it",
+            f64::from(needs_us) * 1e-6,
+            f64::from(has_us) * 1e-6
+        ),
+        ParamError::NotFinite { field } => format!("`{field}` is not a finite number"),
+        ParamError::OutOfReach { at_ms } => format!(
+            "the foot would leave the reach of its leg {} s after the start",
+            f64::from(at_ms) * 1e-3
+        ),
+    }
+}

@@ -1,0 +1,516 @@
+//! Boards, bus, master and plant on one clock.
+//!
+//! The clock counts nanoseconds. Four kinds of events exist, and at equal times
+//! they are taken in this order: bytes delivered by the bus, joint ticks
+//! (1 kHz, addresses ascending), wheel samples, master cycles (100 Hz). The
+//! plant is advanced to a tick before its inputs are latched; bus events do
+//! not touch it.
+
+use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::{Reject, Ticket};
+use wheeleg_master::{Master, MasterConfig};
+use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
+use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_remote_link as link;
+
+use super::Boards;
+use super::audit::{Audit, LineAudit};
+use super::boards::{JointBoard, WheelBoard, identity};
+use super::bus::Bus;
+use super::downtime::DownTimes;
+use super::edges::Sensed;
+use super::memory::Memory;
+use super::power::{Client, Down};
+use super::strangers::Strangers;
+use super::traffic::NS_PER_US;
+use crate::SimError;
+use crate::faults::Injector;
+use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::timing::JOINT_TICK_NS;
+use wheeleg_config::{NodeParams, RobotConfig};
+use wheeleg_remote_host::Outside;
+
+/// What has just happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Happened {
+    /// Bytes reached the boards.
+    Delivery,
+    /// All joint boards ran one tick; the plant stands at its start.
+    JointTick,
+    /// A wheel board ran one sample.
+    WheelSample,
+    /// The master started a bus cycle (or would have, were it alive).
+    MasterCycle,
+}
+
+/// Everything that is simulated.
+pub(super) struct World {
+    pub(super) plant: Plant,
+    pub(super) state: PlantState,
+    pub(super) inputs: Inputs,
+    pub(super) outputs: Outputs,
+    pub(super) joints: [JointBoard; 6],
+    pub(super) wheels: [WheelBoard; 2],
+    /// Quadrature edges of each wheel at its newest sample and the one before it.
+    pub(super) wheel_edges: [[i64; 2]; 2],
+    pub(super) bus: Bus,
+    pub(super) audit: Audit,
+    pub(super) master: Master,
+    pub(super) master_alive: bool,
+    pub(super) cycle_ns: u64,
+    pub(super) now_ns: u64,
+    pub(super) next_joint_ns: u64,
+    pub(super) next_wheel_ns: [u64; 2],
+    pub(super) cycles: u64,
+    pub(super) next_cycle_ns: u64,
+    pub(super) tick_inputs: TickInputs,
+    pub(super) faults: Injector,
+    pub(super) down: [Down; 8],
+    /// First tick edge of each board since its processor has started, ns.
+    pub(super) clock_zero_ns: [u64; 8],
+    pub(super) strangers: Strangers,
+    pub(super) config: MasterConfig,
+    pub(super) master_back_ns: Option<u64>,
+    pub(super) client: Client,
+    pub(super) outside: Option<Outside>,
+    /// When boards outside were down in this run.
+    pub(super) down_times: DownTimes,
+    /// When boards here are down after a fault, of those that do not find it themselves.
+    pub(super) kept: DownTimes,
+    pub(super) stored: NodeParams,
+    /// Parameter memories, addresses 1 to 8.
+    pub(super) memories: [Memory; 8],
+}
+
+/// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct TickInputs {
+    /// On-times, µs, per joint `[fill A, vent A, fill B, vent B]`.
+    pub on_us: [[u16; 4]; 6],
+    /// Commanded edges since the start, per joint.
+    pub edges: [u32; 6],
+}
+
+impl TickInputs {
+    /// Takes the on-times of the next tick and counts the edges they make.
+    fn take(&mut self, joint: usize, on_us: [u16; 4]) {
+        for (before, now) in self.on_us[joint].iter().zip(on_us) {
+            let full = VALVE_TICK_US;
+            let stood_on = *before == full;
+            let starts_on = now > 0;
+            self.edges[joint] += u32::from(stood_on != starts_on);
+            self.edges[joint] += u32::from(starts_on && now < full);
+        }
+        self.on_us[joint] = on_us;
+    }
+}
+
+const VALVE_TICK_US: u16 = 1000;
+
+/// Duty of a bridge, −1..=1.
+fn duty(outputs: &link::Outputs) -> f64 {
+    let magnitude = f64::from(outputs.bridge_percent) / 100.0;
+    if outputs.bridge_backward {
+        -magnitude
+    } else {
+        magnitude
+    }
+}
+
+impl World {
+    /// Builds the robot in its initial pose, everything unpowered.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if a part refuses its parameters.
+    pub(super) fn new(
+        robot: &RobotConfig,
+        plant: &PlantParams,
+        master: MasterConfig,
+        seed: u64,
+        boards: Boards,
+    ) -> Result<Self, SimError> {
+        let Boards { outside, kept } = boards;
+        let refused = |part: &str, e: &dyn std::fmt::Display| {
+            SimError::simulation(
+                format!("the {part} refuses its parameters: {e}"),
+                format!(
+                    "correct the robot `{}`; `wheeleg params` lists it",
+                    robot.name
+                ),
+            )
+        };
+        let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
+        let state = plant
+            .initial_state(seed)
+            .map_err(|e| refused("plant", &e))?;
+        let stored = &robot.node;
+        let who = |n: u8| {
+            let address = Address::new(n).map(identity);
+            address.ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
+        };
+        let joint = |n: u8| {
+            JointBoard::new(
+                who(n)?,
+                Some(&stored.joints[usize::from(n) - 1]),
+                ResetCause::PowerUp,
+            )
+        };
+        let wheel = |n: u8| {
+            WheelBoard::new(
+                who(n)?,
+                Some(&stored.wheels[usize::from(n) - 7]),
+                ResetCause::PowerUp,
+            )
+        };
+        let outputs = plant.outputs(&state);
+        let mut bus = Bus::new(robot.bus.baud_bit_s as u32);
+        if outside.is_some() {
+            bus.keep_delivered();
+        }
+        let wheels = [wheel(7)?, wheel(8)?];
+        // Both ends count speeds per sample, so the master must know the board's.
+        let master = MasterConfig {
+            wheel_sample_us: wheels[0].period_us(),
+            ..master
+        };
+        let mut brain = Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?;
+        Ok(Self {
+            outputs,
+            plant,
+            state,
+            inputs: Inputs::default(),
+            joints: [
+                joint(1)?,
+                joint(2)?,
+                joint(3)?,
+                joint(4)?,
+                joint(5)?,
+                joint(6)?,
+            ],
+            wheels,
+            wheel_edges: [[0; 2]; 2],
+            bus,
+            audit: Audit::default(),
+            client: Client::connect(&mut brain),
+            master: brain,
+            config: master,
+            master_back_ns: None,
+            strangers: Strangers::default(),
+            master_alive: true,
+            cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
+            now_ns: 0,
+            next_joint_ns: 0,
+            next_wheel_ns: [0; 2],
+            cycles: 0,
+            next_cycle_ns: 0,
+            tick_inputs: TickInputs::default(),
+            faults: Injector::new(seed),
+            down: [Down::No; 8],
+            clock_zero_ns: [0; 8],
+            down_times: DownTimes::new(std::array::from_fn(|i| {
+                let there = outside.as_ref();
+                there.is_some_and(|o| o.has(i as u8 + 1))
+            })),
+            kept,
+            outside,
+            memories: std::array::from_fn(|i| {
+                // Joints first, then wheels, as on the bus.
+                let wheel = || stored.wheels.get(i - stored.joints.len());
+                let kept = stored.joints.get(i).or_else(wheel);
+                Memory::new(kept.map_or(&[], Vec::as_slice))
+            }),
+            stored: stored.clone(),
+        })
+    }
+
+    /// When the next event is, ns.
+    pub(super) fn next_ns(&self) -> u64 {
+        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
+        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        let due_ns = self.bus.next_delivery_ns();
+        due_ns.map_or(tick_ns, |due_ns| due_ns.min(tick_ns))
+    }
+
+    /// Takes the next event.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] when the plant leaves the range of its model.
+    pub(super) fn step(&mut self) -> Result<Happened, SimError> {
+        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
+        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        if let Some(due) = self.bus.next_delivery_ns()
+            && due <= tick_ns
+        {
+            self.now_ns = due;
+            self.keep_down_times()?;
+            self.deliver()?;
+            return Ok(Happened::Delivery);
+        }
+        self.now_ns = tick_ns;
+        self.keep_down_times()?;
+        if self.next_joint_ns == tick_ns {
+            self.joint_tick()?;
+            return Ok(Happened::JointTick);
+        }
+        if wheel_ns == tick_ns {
+            self.wheel_sample(usize::from(self.next_wheel_ns[0] != tick_ns))?;
+            return Ok(Happened::WheelSample);
+        }
+        self.master_cycle();
+        Ok(Happened::MasterCycle)
+    }
+
+    fn advance_plant(&mut self) -> Result<(), SimError> {
+        self.plant
+            .advance_to(&mut self.state, self.now_ns)
+            .map_err(|e| unphysical(self.now_ns, &e))
+    }
+
+    /// Positions and foot contacts as the boards read them now.
+    fn sense(&mut self) -> Sensed {
+        let feet = self.outputs.foot_switches;
+        let mut sensed = Sensed::default();
+        for i in 0..6 {
+            let code = self.plant.read_position(&mut self.state, i);
+            let stroke_m = self.plant.params().potentiometers[i].electrical_stroke_m;
+            sensed.codes[i] = self.faults.position_code(i, code, stroke_m);
+            sensed.feet[i] = self.faults.switches(i / 3, feet[i / 3]);
+        }
+        sensed
+    }
+
+    fn joint_tick(&mut self) -> Result<(), SimError> {
+        self.advance_plant()?;
+        self.bring_up()?;
+        // A board outside answers with the outputs that act from this edge on
+        // when it is told the inputs of the edge. Neither depends on the other.
+        let sensed = if self.outside.is_some() {
+            self.outputs = self.plant.outputs(&self.state);
+            let sensed = self.sense();
+            self.joint_edge_outside(&sensed)?;
+            Some(sensed)
+        } else {
+            None
+        };
+        for (i, address) in (0..6).zip(1..) {
+            let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
+            let on_us = match (outside, self.down[i]) {
+                (Some(outputs), _) => outputs.valve_on_us,
+                (None, down) if down.is_off() => [0; 4],
+                (None, _) => self.joints[i].active_on_us(),
+            };
+            self.tick_inputs.take(i, on_us);
+            self.inputs.valve_on_us[i] = on_us;
+        }
+        let outside = self.outside.as_ref().and_then(|o| o.outputs(7));
+        self.inputs.dump = match (outside, self.down[6]) {
+            (Some(outputs), _) => outputs.dump,
+            // The dump valve shuts without current: air stays on.
+            (None, down) if down.is_off() => false,
+            (None, _) => self.wheels[0].dumps(),
+        };
+        self.plant
+            .apply(&mut self.state, &self.inputs)
+            .map_err(|e| unphysical(self.now_ns, &e))?;
+        self.outputs = self.plant.outputs(&self.state);
+        let sensed = match sensed {
+            Some(sensed) => sensed,
+            None => self.sense(),
+        };
+        for (i, address) in (0..6).zip(1..) {
+            let now = self.clock(address, self.now_ns);
+            if self.runs(address) {
+                self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
+                self.store(address);
+            }
+        }
+        self.strangers.joint_tick(self.now_ns);
+        self.next_joint_ns += JOINT_TICK_NS;
+        self.babble(JOINT_TICK_NS);
+        self.collect_transmissions();
+        self.offer_line();
+        Ok(())
+    }
+
+    /// What a wheel board reads now: encoder edges and the supply switch.
+    pub(super) fn wheel_inputs(&mut self, wheel: usize) -> (i64, bool) {
+        let core = &self.state.core;
+        let mechanics = &self.plant.assembly.mechanics;
+        let angle_rad = mechanics.wheel_angle_rad(&core.motion);
+        let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
+        let edges = self.faults.edges(wheel, edges);
+        (edges, core.supply.pressure_switch())
+    }
+
+    fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
+        self.advance_plant()?;
+        self.start_wheel(wheel)?;
+        self.start_counters();
+        let (edges, switch) = self.wheel_inputs(wheel);
+        self.wheel_edge_outside(wheel)?;
+        self.wheel_edges[wheel] = [edges, self.wheel_edges[wheel][0]];
+        let address = wheel as u8 + 7;
+        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
+        // Only the bridge takes new inputs here: the valves keep their tick.
+        let drives = self.drives(address);
+        self.inputs.bridge_duty[wheel] = match outside {
+            Some(outputs) => duty(&outputs),
+            None if !drives => 0.0,
+            // The program hands its newest output over at the next edge; stopped, it does not.
+            None if self.hangs(address) => self.inputs.bridge_duty[wheel],
+            None => self.wheels[wheel].active_duty(),
+        };
+        // A board that does not drive lets its wheel coast, wherever it runs.
+        self.inputs.bridge_enabled[wheel] = drives;
+        let motor = &mut self.state.core.motion.motors[wheel];
+        motor.duty = self.inputs.bridge_duty[wheel];
+        motor.enabled = self.inputs.bridge_enabled[wheel];
+        let now = self.clock(address, self.now_ns);
+        if self.runs(address) {
+            self.wheels[wheel].tick(now, edges, switch);
+            self.store(address);
+        }
+        self.strangers.wheel_sample(address, self.now_ns);
+        self.next_wheel_ns[wheel] += u64::from(self.wheels[wheel].period_us()) * NS_PER_US;
+        self.collect_transmissions();
+        Ok(())
+    }
+
+    /// The boards outside of this process.
+    pub(super) fn outside(&mut self) -> Option<&mut Outside> {
+        self.outside.as_mut()
+    }
+
+    /// A fault begins, or ends.
+    ///
+    /// # Errors
+    /// [`SimError`] if a board outside refuses it, or one that starts anew.
+    pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
+        let (plant, state) = (&mut self.plant, &mut self.state);
+        self.faults.strike(fault, begin, self.now_ns, plant, state);
+        match (fault.kind, fault.victim) {
+            (FaultKind::DuplicateAddress, Victim::Board(address)) if begin => {
+                self.strangers.plug_in(address, &self.stored)?;
+            }
+            (FaultKind::DuplicateAddress, Victim::Board(address)) => {
+                self.strangers.unplug(address);
+            }
+            (FaultKind::InvalidParameter, Victim::Board(address)) if begin => {
+                self.strangers.write_parameters(address);
+            }
+            _ => {}
+        }
+        self.strike_power(fault, begin)
+    }
+
+    /// What happened on the line beside the boards' own doing, in words; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<String> {
+        self.strangers.take_notes()
+    }
+
+    /// What a listener says that knows what was sent.
+    pub(super) fn audit(&self) -> LineAudit {
+        self.audit.counts()
+    }
+
+    /// The faults under way.
+    pub(super) fn faults(&self) -> &Injector {
+        &self.faults
+    }
+
+    /// The master dies: it never sends or hears again.
+    pub(super) fn kill_master(&mut self) {
+        self.master_alive = false;
+    }
+
+    /// Whether the master lives.
+    pub(super) fn master_alive(&self) -> bool {
+        self.master_alive
+    }
+
+    /// The master, for user commands and its events.
+    pub(super) fn master(&mut self) -> &mut Master {
+        &mut self.master
+    }
+
+    /// A command of the user's program.
+    ///
+    /// # Errors
+    /// See [`Reject`].
+    pub(super) fn submit(&mut self, command: Command) -> Result<Ticket, Reject> {
+        let now_us = self.now_ns / NS_PER_US;
+        self.client.submit(&mut self.master, command, now_us)
+    }
+
+    /// Simulated time since power-up, ns.
+    pub(super) fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Everything that can be seen of the plant at the last joint tick.
+    pub(super) fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// BLAKE3 of the plant's state.
+    pub(super) fn state_hash(&self) -> [u8; 32] {
+        self.plant.state_hash(&self.state)
+    }
+
+    /// Commands of the tick that has just begun.
+    pub(super) fn tick_inputs(&self) -> &TickInputs {
+        &self.tick_inputs
+    }
+
+    /// The joint boards, addresses 1 to 6.
+    pub(super) fn joints(&self) -> &[JointBoard; 6] {
+        &self.joints
+    }
+
+    /// The wheel boards, addresses 7 and 8.
+    pub(super) fn wheels(&self) -> &[WheelBoard; 2] {
+        &self.wheels
+    }
+
+    /// The line.
+    pub(super) fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    /// The plant's model.
+    pub(super) fn plant(&self) -> &Plant {
+        &self.plant
+    }
+}
+
+fn unphysical(now_ns: u64, error: &wheeleg_plant::PlantError) -> SimError {
+    SimError::simulation(
+        format!(
+            "the plant left its range at {:.4} s after power-up: {error}",
+            now_ns as f64 * 1e-9
+        ),
+        "what was logged up to here is complete; check the robot's parameters",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TickInputs;
+
+    #[test]
+    fn edges_are_counted_where_the_line_changes() {
+        let mut inputs = TickInputs::default();
+        let mut take = |on: u16| {
+            let before = inputs.edges[0];
+            inputs.take(0, [on, 0, 0, 0]);
+            inputs.edges[0] - before
+        };
+        assert_eq!(take(0), 0, "stays off");
+        assert_eq!(take(1000), 1, "on at the tick edge, stays on");
+        assert_eq!(take(1000), 0, "stays on");
+        assert_eq!(take(350), 1, "off within the tick");
+        assert_eq!(take(350), 2, "on and off");
+        assert_eq!(take(1000), 1);
+        assert_eq!(take(0), 1, "off at the tick edge");
+    }
+}

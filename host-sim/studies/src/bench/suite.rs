@@ -1,0 +1,339 @@
+//! The experiments of the comparison: moves, factors, combinations, delays.
+//!
+//! Every experiment is a function of an axis's data sheet, a controller and a
+//! seed. The controller's gains come from the data sheet alone; what a factor
+//! changes is changed in the plant only. [`identify`] may find the valves'
+//! delays before the first move, as on a board at start-up.
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use wheeleg_control::joint::ConfigError;
+use wheeleg_plant::PlantError;
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::sensors::AdcNoise;
+
+use super::{Bench, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
+use super::{design, design_with, identify};
+use wheeleg_config::brief;
+
+/// An experiment could not be made.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum BenchError {
+    /// The plant refused its parameters or left its range.
+    #[error("the plant of the axis: {0}")]
+    #[diagnostic(
+        code(wheeleg::bench::plant),
+        help("check the axis file against the ranges in its messages")
+    )]
+    Plant(#[from] PlantError),
+    /// The design is not one the board accepts.
+    #[error("the board refuses the design for this axis: {0:?}")]
+    #[diagnostic(
+        code(wheeleg::bench::design),
+        help(
+            "the axis's data lie outside what the joint board supports; see the parameter table in SPEC.md"
+        )
+    )]
+    Design(ConfigError),
+    /// A value that the board's parameter table does not hold.
+    #[error(
+        "the design needs `{name}` = {} {unit}; a joint board allows {} to {} {unit}",
+        brief(*.value),
+        brief(*.min),
+        brief(*.max)
+    )]
+    #[diagnostic(
+        code(wheeleg::bench::parameter),
+        help(
+            "the axis's data lie outside what the joint board supports; see the parameter table in SPEC.md"
+        )
+    )]
+    Parameter {
+        /// Name in the table.
+        name: &'static str,
+        /// What the design needs.
+        value: f64,
+        /// Smallest value of the table.
+        min: f64,
+        /// Largest value of the table.
+        max: f64,
+        /// Unit.
+        unit: &'static str,
+    },
+    /// The board refuses the set of parameters.
+    #[error("{0}")]
+    #[diagnostic(
+        code(wheeleg::bench::board),
+        help("please report this with the axis file")
+    )]
+    Board(String),
+}
+
+/// What differs from the data sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Factors {
+    /// Force on the rod as a share of the force left at the actual supply on the
+    /// weaker side, −0.8…0.8; positive extends.
+    pub load_share: f64,
+    /// Moving mass \[kg\]; `None` leaves the sheet's.
+    pub mass_kg: Option<f64>,
+    /// Supply pressure \[Pa gauge\]; `None` leaves the sheet's.
+    pub supply_pa: Option<f64>,
+    /// Factor on all friction forces.
+    pub friction: f64,
+    /// Factor on the valves' switching times.
+    pub valve_delay: f64,
+    /// Spread between the valves: fill A and vent B switch slower by this share,
+    /// vent A and fill B faster.
+    pub valve_spread: f64,
+    /// Factor on the converter's noise.
+    pub noise: f64,
+}
+
+impl Factors {
+    /// Nothing differs.
+    pub const NONE: Self = Self {
+        load_share: 0.0,
+        mass_kg: None,
+        supply_pa: None,
+        friction: 1.0,
+        valve_delay: 1.0,
+        valve_spread: 0.0,
+        noise: 1.0,
+    };
+
+    /// One combination of the random suite: load ±0.8, mass 2/3 to 16/3 of the
+    /// sheet's, supply from 2 bar below to 1 bar above the sheet's, friction and
+    /// valve delay 0.5…2; mass, friction and delay uniform in their logarithm.
+    #[must_use]
+    pub fn random(sheet: &AxisParams, seed: u64) -> Self {
+        let gauge = sheet.supply.set_pressure_pa - sheet.gas.ambient_pressure_pa;
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let mut unit = || rng.random_range(0.0..1.0_f64);
+        Self {
+            load_share: 0.8 * (2.0 * unit() - 1.0),
+            mass_kg: Some(sheet.moving_mass_kg * 2.0 / 3.0 * 8.0_f64.powf(unit())),
+            supply_pa: Some(gauge + 1e5 * (3.0 * unit() - 2.0)),
+            friction: 2.0_f64.powf(2.0 * unit() - 1.0),
+            valve_delay: 2.0_f64.powf(2.0 * unit() - 1.0),
+            ..Self::NONE
+        }
+    }
+
+    /// The plant with these factors.
+    #[must_use]
+    pub fn plant(&self, sheet: &AxisParams) -> AxisParams {
+        let mut p = sheet.clone();
+        if let Some(mass) = self.mass_kg {
+            p.moving_mass_kg = mass;
+        }
+        if let Some(gauge) = self.supply_pa {
+            let absolute = gauge + p.gas.ambient_pressure_pa;
+            p.supply.set_pressure_pa = absolute;
+            p.supply.initial_pressure_pa = absolute;
+            p.supply.source_pressure_pa = p.supply.source_pressure_pa.max(absolute + 1e5);
+        }
+        let f = &mut p.cylinder.friction;
+        f.coulomb_n *= self.friction;
+        f.static_n *= self.friction;
+        f.viscous_n_s_m *= self.friction;
+        for (spread, sign) in p
+            .cylinder
+            .timing_spread
+            .iter_mut()
+            .zip([1.0, -1.0, -1.0, 1.0])
+        {
+            *spread *= self.valve_delay * (1.0 + sign * self.valve_spread);
+        }
+        match &mut p.adc.noise {
+            AdcNoise::Uniform {
+                half_width_lsb: width,
+            }
+            | AdcNoise::Gaussian { sigma_lsb: width } => {
+                *width *= self.noise;
+            }
+            AdcNoise::None => {}
+        }
+        p.load_n += self.load_share * force_left_n(&p);
+        p
+    }
+
+    /// Force left over the load: 1.25 means a quarter more than the load needs.
+    #[must_use]
+    pub fn static_margin(&self, sheet: &AxisParams) -> f64 {
+        let p = self.plant(sheet);
+        force_left_n(&p) / p.load_n.abs().max(1e-9)
+    }
+}
+
+/// Force at the supply of a plant on the weaker side, less break-away friction \[N\].
+#[must_use]
+pub fn force_left_n(p: &AxisParams) -> f64 {
+    let c = &p.cylinder;
+    let area = std::f64::consts::FRAC_PI_4 * (c.bore_m * c.bore_m - c.rod_m * c.rod_m);
+    let gauge = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
+    gauge * area - c.friction.static_n
+}
+
+/// Whether a controller finds the valves' delays before its first move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StartUp {
+    /// The data sheet's delays are used.
+    Sheet,
+    /// They are found by [`identify`].
+    Identified,
+}
+
+/// The design of a controller for a plant of which it knows the sheet and,
+/// after [`StartUp::Identified`], the valves' delays.
+///
+/// # Errors
+/// [`BenchError`].
+pub fn designed(
+    sheet: &AxisParams,
+    plant: &AxisParams,
+    kind: Kind,
+    start: StartUp,
+    seed: u64,
+) -> Result<Design, BenchError> {
+    Ok(match start {
+        StartUp::Sheet => design(sheet, kind),
+        StartUp::Identified => design_with(sheet, identify(plant, sheet, seed)?, kind),
+    })
+}
+
+/// A supervised board on its plant, moved from place to place.
+pub struct Rig {
+    bench: Bench<Node>,
+    at_m: f64,
+}
+
+impl Rig {
+    /// Power-up of a board with a design on a plant at rest.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn new(plant: &AxisParams, design: &Design, seed: u64) -> Result<Self, BenchError> {
+        Ok(Self {
+            bench: Bench::new(plant, seed, Node::new(design)?)?,
+            at_m: plant.initial_stroke_m,
+        })
+    }
+
+    /// Plant and board.
+    #[must_use]
+    pub fn bench(&self) -> &Bench<Node> {
+        &self.bench
+    }
+
+    /// Where the reference stands \[m\].
+    #[must_use]
+    pub const fn at_m(&self) -> f64 {
+        self.at_m
+    }
+
+    /// A step of the reference, recorded from 0.05 s before it.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn step(&mut self, to_m: f64, seconds: f64) -> Result<Trace, BenchError> {
+        self.step_with(to_m, &[], seconds)
+    }
+
+    /// A step with loads that change.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn step_with(
+        &mut self,
+        to_m: f64,
+        loads: &[LoadEvent],
+        seconds: f64,
+    ) -> Result<Trace, BenchError> {
+        let motion = Motion::Step {
+            at_s: LEAD_S,
+            from_m: self.at_m,
+            to_m,
+        };
+        self.run(&motion, loads, seconds)
+    }
+
+    /// Any motion; it must begin where the reference stands.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn run(
+        &mut self,
+        motion: &Motion,
+        loads: &[LoadEvent],
+        seconds: f64,
+    ) -> Result<Trace, BenchError> {
+        self.at_m = motion.to_m();
+        Ok(self.bench.run(motion, loads, seconds)?)
+    }
+}
+
+/// Recording before a motion begins \[s\].
+pub const LEAD_S: f64 = 0.05;
+
+/// Steps to one place after the other, from power-up: the first is the learning
+/// move.
+///
+/// # Errors
+/// [`BenchError`].
+pub fn steps(
+    sheet: &AxisParams,
+    factors: &Factors,
+    kind: Kind,
+    start: StartUp,
+    seed: u64,
+    targets_m: &[f64],
+    seconds: f64,
+) -> Result<Vec<Trace>, BenchError> {
+    let plant = factors.plant(sheet);
+    let design = designed(sheet, &plant, kind, start, seed)?;
+    let mut rig = Rig::new(&plant, &design, seed)?;
+    targets_m
+        .iter()
+        .map(|to_m| rig.step(*to_m, seconds))
+        .collect()
+}
+
+/// The retract move from the extended end stop, after the controller has pushed
+/// against the stop for 3 s: the start from home of the paper's test. Chamber
+/// pressures come from the simulation alone. `notice_s` is how long before the
+/// move the board is told of it.
+///
+/// # Errors
+/// [`BenchError`].
+pub fn home_retract(
+    plant: &AxisParams,
+    design: &Design,
+    seed: u64,
+    notice_s: f64,
+) -> Result<Trace, BenchError> {
+    let board = Firmware::new(design).map_err(BenchError::Design)?;
+    let mut start = plant.clone();
+    let stroke_m = plant.cylinder.stroke_m;
+    start.initial_stroke_m = 0.9 * stroke_m;
+    let mut bench = Bench::new(&start, seed, board)?;
+    // A little beyond the stop, so that a law without a settle band keeps pushing.
+    let home_m = stroke_m + 1e-3;
+    bench.run(
+        &Motion::Step {
+            at_s: 0.05,
+            from_m: start.initial_stroke_m,
+            to_m: home_m,
+        },
+        &[],
+        3.0,
+    )?;
+    bench.notice_s = notice_s;
+    let motion = Motion::Step {
+        at_s: 0.7,
+        from_m: home_m,
+        to_m: 0.1 * stroke_m,
+    };
+    Ok(bench.run(&motion, &[], 3.0)?)
+}

@@ -1,0 +1,178 @@
+//! One case alone: what happened in it, tick by tick.
+
+use std::path::{Path, PathBuf};
+
+use super::case::{CaseId, Row, Scene};
+use super::moves::Played;
+use super::{axis_error, draw, load, save};
+use crate::StudyError;
+use crate::bench::Trace;
+use wheeleg_report::output;
+use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
+use wheeleg_report::subfolder;
+
+/// A case that was played alone.
+#[derive(Debug, Clone)]
+pub struct Single {
+    /// Its row.
+    pub row: Row,
+    /// What happened; `None` if it is not feasible.
+    pub played: Option<Played>,
+}
+
+/// Plays the case `id` on the axis that `axes` (built-in names or files) hold under
+/// its name.
+///
+/// # Errors
+/// [`StudyError`] if no axis has the name, or it cannot be used.
+pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
+    let mut known = Vec::new();
+    for file in axes {
+        let config = load(file, &[id.kind])?;
+        if config.name == id.axis {
+            let failed = |e| axis_error(file, &e);
+            let scene =
+                Scene::new(&config.name, &config.axis, id.variation, id.seed).map_err(failed)?;
+            let played = scene.play(id.kind, id.motion).map_err(failed)?;
+            let row = scene.row(id.kind, id.motion, played.as_ref(), None);
+            return Ok(Single { row, played });
+        }
+        known.push(config.name);
+    }
+    Err(StudyError::refused(
+        format!(
+            "no axis is named `{}`; known: {}",
+            id.axis,
+            known.join(", ")
+        ),
+        "give the axis file of the case with --axis FILE",
+    ))
+}
+
+impl Single {
+    /// Writes `summary.json`, the rows of every measured move as CSV, and a figure of
+    /// each, into `folder`; earlier results in it are set aside. The figures.
+    ///
+    /// # Errors
+    /// [`StudyError`] if something cannot be drawn or written.
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
+        output::prepare(folder)?;
+        let json = serde_json::to_string_pretty(&self.row).unwrap_or_default();
+        save(&folder.join("summary.json"), &format!("{json}\n"))?;
+        let Some(played) = &self.played else {
+            return Ok(Vec::new());
+        };
+        let tables = subfolder(folder, "csv")?;
+        let plots = subfolder(folder, "figures")?;
+        let first = std::iter::once(("first".to_owned(), &played.first));
+        let measured = played.measured.iter().enumerate();
+        let all = first.chain(measured.map(|(k, t)| (format!("measured-{}", k + 1), t)));
+        let mut figures = Vec::new();
+        for (name, trace) in all {
+            save(&tables.join(format!("{name}.csv")), &rows(trace))?;
+            figures.push(figure(&name, &self.row.case.id, trace));
+        }
+        let drawn = draw(&plots, figures)?;
+        Ok(drawn
+            .into_iter()
+            .map(|(f, _)| plots.join(format!("{}.png", f.id)))
+            .collect())
+    }
+}
+
+/// A recording as CSV, units in the head line.
+fn rows(trace: &Trace) -> String {
+    use std::fmt::Write as _;
+    let mut text = String::from(
+        "time_s,reference_mm,stroke_mm,measured_mm,speed_mm_s,pressure_a_bar_abs,pressure_b_bar_abs,\
+load_n,fill_a_us,vent_a_us,fill_b_us,vent_b_us,switches,air_kg,settled\n",
+    );
+    for (k, r) in trace.rows.iter().enumerate() {
+        let [a, b] = r.pressure_pa.map(|p| p * 1e-5);
+        let [fa, va, fb, vb] = r.on_us;
+        let _ = writeln!(
+            text,
+            "{:.3},{:.4},{:.4},{:.4},{:.2},{a:.4},{b:.4},{:.2},{fa},{va},{fb},{vb},{},{:.6e},{}",
+            k as f64 * 1e-3,
+            r.reference_m * 1e3,
+            r.stroke_m * 1e3,
+            r.measured_m * 1e3,
+            r.velocity_m_s * 1e3,
+            r.load_n,
+            r.switches,
+            r.air_kg,
+            u8::from(r.settled),
+        );
+    }
+    text
+}
+
+type Points = Vec<(f64, f64)>;
+
+/// Stroke, pressures and valves of a recording, one above the other.
+pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
+    let time = |k: usize| k as f64 * 1e-3;
+    let end = time(trace.rows.len());
+    let of = |f: &dyn Fn(&crate::bench::Row) -> f64| -> Points {
+        let rows = trace.rows.iter().enumerate();
+        rows.map(|(k, r)| (time(k), f(r))).collect()
+    };
+    let stroke = vec![
+        line(
+            "reference",
+            colour::COMMAND,
+            2,
+            of(&|r| r.reference_m * 1e3),
+        ),
+        line("stroke", colour::ROBOT, 2, of(&|r| r.stroke_m * 1e3)),
+    ];
+    let pressure = vec![
+        line("A", colour::MODEL, 2, of(&|r| r.pressure_pa[0] * 1e-5)),
+        line("B", colour::SECOND, 2, of(&|r| r.pressure_pa[1] * 1e-5)),
+    ];
+    let valves = ["fill A", "vent A", "fill B", "vent B"];
+    let valves = valves.iter().enumerate().map(|(i, name)| {
+        let samples = trace.rows.iter().enumerate();
+        let samples = samples.map(|(k, r)| (time(k), f64::from(r.on_us[i]) * 1e-3));
+        RasterRow {
+            label: (*name).to_owned(),
+            colour: if i < 2 { colour::MODEL } else { colour::SECOND },
+            upper: runs(samples, 1, 1e-3),
+            lower: None,
+        }
+    });
+    let lines = |title: &str, unit: &str, series: Vec<Series>| {
+        let content = Content::lines((unit, range(&series)), series);
+        Panel::new(title, (0.0, end), 200, content)
+    };
+    Figure {
+        id: id.to_owned(),
+        title: title.to_owned(),
+        caption: String::new(),
+        panels: vec![
+            lines("Stroke", "[mm]", stroke),
+            lines("Chamber pressure", "[bar abs]", pressure),
+            Panel::new(
+                "On-time of the valves in each tick",
+                (0.0, end),
+                110,
+                Content::Raster(valves.collect()),
+            ),
+        ],
+    }
+}
+
+/// Range of all points with a little air.
+pub(crate) fn range(series: &[Series]) -> (f64, f64) {
+    let values = || series.iter().flat_map(|s| &s.points).map(|p| p.1);
+    let (low, high) = (
+        values().fold(f64::INFINITY, f64::min),
+        values().fold(f64::NEG_INFINITY, f64::max),
+    );
+    if low.is_finite() && high > low {
+        let air = 0.05 * (high - low);
+        (low - air, high + air)
+    } else {
+        (-1.0, 1.0)
+    }
+}

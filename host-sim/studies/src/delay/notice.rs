@@ -1,0 +1,125 @@
+//! What an announced move gains: the counter chamber vented and the drive chamber
+//! filled ahead of time.
+
+use indicatif::ProgressBar;
+use serde::Serialize;
+use wheeleg_plant::axis::AxisParams;
+
+use super::trial::{Law, Outcome, Start, Trial};
+use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, median, quantile, run_all};
+use crate::StudyError;
+
+/// Notice \[s\].
+pub const NOTICES_S: [f64; 9] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4];
+/// Moves that are announced.
+const STARTS: [Start; 5] = [
+    Start::HomeHeld,
+    Start::HomeRest,
+    Start::StopHeld,
+    Start::MidExtend,
+    Start::MidRetract,
+];
+/// Force beside the axis's own on the move from home \[N\], positive extends.
+const LOADS_N: [f64; 4] = [-30.0, -15.0, 15.0, 30.0];
+
+/// Starts of one kind at one notice, worst of all seeds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Noticed {
+    /// Law; only the default one uses the notice.
+    pub law: Law,
+    /// Kind of move.
+    pub start: Start,
+    /// Load beside the axis's own \[N\].
+    pub load_n: f64,
+    /// Notice \[s\].
+    pub notice_s: f64,
+    /// Median start delay \[s\]; `None` if a start never came.
+    pub median_s: Option<f64>,
+    /// Largest start delay \[s\]; `None` if a start never came.
+    pub delay_s: Option<f64>,
+    /// Largest motion between notice and command \[mm\].
+    pub early_mm: f64,
+}
+
+impl Noticed {
+    /// Starts in time, and stands until then.
+    #[must_use]
+    pub fn meets(&self) -> bool {
+        self.delay_s.is_some_and(|d| d <= NOTICED_LIMIT_S) && self.early_mm <= EARLY_LIMIT_MM
+    }
+}
+
+/// All of them.
+#[derive(Debug, Serialize)]
+pub struct Notice {
+    /// Seeds of each row.
+    pub seeds: u32,
+    /// Rows in the order of law, kind, load and notice.
+    pub rows: Vec<Noticed>,
+    /// Default law from the held home, announced by the longest notice; first seed.
+    #[serde(skip)]
+    pub home: Outcome,
+}
+
+impl Notice {
+    /// Rows of a law and kind without load.
+    pub fn of(&self, law: Law, start: Start) -> impl Iterator<Item = &Noticed> {
+        self.rows
+            .iter()
+            .filter(move |r| r.law == law && r.start == start && r.load_n == 0.0)
+    }
+
+    /// Shortest notice from which on every longer one meets the bar, without load \[s\].
+    #[must_use]
+    pub fn enough_s(&self, start: Start) -> Option<f64> {
+        let rows: Vec<&Noticed> = self.of(Law::Default, start).collect();
+        let first = rows.iter().rposition(|r| !r.meets()).map_or(0, |i| i + 1);
+        rows.get(first).map(|r| r.notice_s)
+    }
+}
+
+/// Measures all rows.
+///
+/// # Errors
+/// [`StudyError::Refused`] if the axis cannot be simulated.
+pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Notice, StudyError> {
+    let mut cases = Vec::new();
+    for start in STARTS {
+        cases.extend(NOTICES_S.map(|notice_s| (Law::Default, start, 0.0, notice_s)));
+    }
+    for load_n in LOADS_N {
+        cases.extend(NOTICES_S.map(|notice_s| (Law::Default, Start::HomeHeld, load_n, notice_s)));
+    }
+    cases.extend([0.0, 0.4].map(|notice_s| (Law::Paper, Start::HomeHeld, 0.0, notice_s)));
+    let trials: Vec<Trial> = cases
+        .iter()
+        .flat_map(|case| (1..=u64::from(seeds)).map(move |seed| (case, seed)))
+        .map(|(&(law, start, load_n, notice_s), seed)| {
+            let mut trial = Trial::new(axis, law, start, seed);
+            trial.axis.load_n += load_n;
+            trial.notice_s = notice_s;
+            trial
+        })
+        .collect();
+    bar.inc_length(trials.len() as u64);
+    let mut outcomes = run_all(&trials, bar)?;
+    let each = seeds as usize;
+    let rows = cases
+        .iter()
+        .zip(outcomes.chunks(each))
+        .map(|(&(law, start, load_n, notice_s), group)| {
+            let delays: Option<Vec<f64>> = group.iter().map(|o| o.delay_s).collect();
+            Noticed {
+                law,
+                start,
+                load_n,
+                notice_s,
+                median_s: delays.as_deref().and_then(median),
+                delay_s: delays.as_deref().and_then(|d| quantile(d, 1.0)),
+                early_mm: group.iter().map(|o| o.early_mm).fold(0.0, f64::max),
+            }
+        })
+        .collect();
+    let home = outcomes.swap_remove((NOTICES_S.len() - 1) * each);
+    Ok(Notice { seeds, rows, home })
+}

@@ -1,0 +1,68 @@
+//! One exported file; what stands in its place is kept.
+
+use std::path::{Path, PathBuf};
+
+use crate::StudyError;
+
+/// The first of `FILE.previous`, `FILE.previous-2`, … that does not exist.
+fn free_place(path: &Path) -> PathBuf {
+    let named = |suffix: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(suffix);
+        PathBuf::from(name)
+    };
+    let numbered = (2_u32..).map(|n| format!(".previous-{n}"));
+    std::iter::once(".previous".to_owned())
+        .chain(numbered)
+        .map(|suffix| named(&suffix))
+        .find(|place| !place.exists())
+        .unwrap_or_else(|| named(".previous"))
+}
+
+/// Writes a file. One of the same name that says something else is set aside first, as the results
+/// of a run are; a missing folder is created.
+///
+/// # Errors
+/// [`StudyError::Output`] with the path and what the operating system said.
+pub fn write_new(path: &Path, text: &str) -> Result<(), StudyError> {
+    if std::fs::read(path).is_ok_and(|old| old == text.as_bytes()) {
+        return Ok(());
+    }
+    if path.is_dir() {
+        let reason = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+        return Err(StudyError::output("write the file", path, reason));
+    }
+    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| StudyError::output("create the folder", folder, e))?;
+    }
+    if path.exists() {
+        let previous = free_place(path);
+        std::fs::rename(path, &previous).map_err(|e| StudyError::output("set aside", path, e))?;
+        eprintln!("earlier {} moved to {}", path.display(), previous.display());
+    }
+    std::fs::write(path, text).map_err(|e| StudyError::output("write the file", path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn nothing_is_overwritten_and_the_same_text_is_no_change() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let path = temporary.path().join("a/robot.urdf");
+        let previous = |n: &str| temporary.path().join(format!("a/robot.urdf.previous{n}"));
+        write_new(&path, "one").expect("written");
+        write_new(&path, "one").expect("unchanged");
+        assert!(!previous("").exists());
+        write_new(&path, "two").expect("written");
+        write_new(&path, "three").expect("written");
+        assert_eq!(fs::read_to_string(&path).expect("new"), "three");
+        assert_eq!(fs::read_to_string(previous("")).expect("kept"), "one");
+        assert_eq!(fs::read_to_string(previous("-2")).expect("kept"), "two");
+        let error = write_new(temporary.path(), "x").expect_err("a folder");
+        assert!(error.to_string().contains("cannot write"), "{error}");
+    }
+}

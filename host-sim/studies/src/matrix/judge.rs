@@ -1,0 +1,366 @@
+//! Holds what was measured against what must come of a row.
+
+use super::measure::Measured;
+use super::row::{Expect, Row, Stop};
+use super::run::Ran;
+use wheeleg_config::RobotConfig;
+
+/// Mode of a board that is disarmed.
+const IDLE: u8 = 1;
+
+/// Wheels must stand within this after their ramp may begin at the latest, ms.
+const WHEEL_STOP_MS: f64 = 440.0;
+/// Sampling of the log and rounding of times, ms.
+const TICK_MS: f64 = 1.0;
+/// Load of the line that counts as full.
+const FULL: f64 = 0.95;
+/// What degrades may leave its course by this before it is stopped, mm.
+pub(super) const DEGRADED_MM: f64 = 40.0;
+/// From the detection to the safe state, where the begin of the trouble is chance, ms.
+pub(super) const REACTION_MS: f64 = 60.0;
+
+/// How a row came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// As it must.
+    Pass,
+    /// Not as it must.
+    Fail,
+    /// It was not run.
+    NotImplemented,
+}
+
+impl Verdict {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Pass => "PASS",
+            Self::Fail => "FAIL",
+            Self::NotImplemented => "not implemented",
+        }
+    }
+}
+
+/// A row with what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The row.
+    pub row: Row,
+    /// Whether it came out as it must.
+    pub verdict: Verdict,
+    /// What did not, or why it was not run.
+    pub failures: Vec<String>,
+    /// What parts of a stop may take beyond the limit for all axes.
+    pub after_all: AfterAll,
+    /// What was measured.
+    pub measured: Measured,
+    /// The faults as they were injected.
+    pub faults: Vec<String>,
+}
+
+impl Outcome {
+    pub(super) fn not_implemented(row: Row, robot: &RobotConfig, reason: &str) -> Self {
+        Self {
+            row,
+            verdict: Verdict::NotImplemented,
+            failures: vec![reason.to_owned()],
+            after_all: AfterAll::of(robot),
+            measured: Measured::default(),
+            faults: Vec::new(),
+        }
+    }
+}
+
+/// Collects what is wrong.
+#[derive(Default)]
+struct Failures(Vec<String>);
+
+impl Failures {
+    fn check(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        if !holds {
+            self.0.push(what());
+        }
+    }
+
+    /// A time that must be known and at most `limit`.
+    fn within(&mut self, what: &str, value: Option<f64>, limit: f64) {
+        match value {
+            Some(ms) if ms <= limit + 1e-6 => {}
+            Some(ms) => self
+                .0
+                .push(format!("{what} after {ms:.1} ms, allowed {limit:.1}")),
+            None => self.0.push(format!("{what}: never")),
+        }
+    }
+}
+
+/// Judges a run.
+pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Outcome {
+    let mut f = Failures::default();
+    let after_all = AfterAll::of(robot);
+    match row.expect {
+        Expect::Stop(expected) => {
+            detected(&mut f, expected.detected_ms, &m);
+            if m.stopped {
+                stop(&mut f, &row, &expected, &after_all, &m);
+            } else {
+                // Then nothing of the stop has a time.
+                f.0.push("not all axes stop".to_owned());
+            }
+        }
+        Expect::GoesOn { deviation_mm } => goes_on(&mut f, deviation_mm, &m),
+        Expect::Degrades => degrades(&mut f, &after_all, &m),
+        Expect::StartsAnew { board } => starts_anew(&mut f, board, ran, &m),
+        Expect::NoArming => no_arming(&mut f, ran),
+        Expect::NotImplemented(_) => {}
+    }
+    if let (Some(error), false) = (&ran.error, row.expect == Expect::NoArming) {
+        f.0.push(format!("the run ended early: {error}"));
+    }
+    f.check(m.wrong_frames == 0, || {
+        format!("{} frames accepted that nobody sent", m.wrong_frames)
+    });
+    for words in row.reads {
+        f.check(m.reads.iter().any(|line| line.contains(words)), || {
+            format!("the user does not read `{words}`")
+        });
+    }
+    for words in row.silent_about {
+        f.check(!m.reads.iter().any(|line| line.contains(words)), || {
+            format!("the user reads `{words}`, which blames what is sound")
+        });
+    }
+    f.check(!m.reads.iter().any(|line| line.contains("WRONG")), || {
+        "a board takes what it must refuse".to_owned()
+    });
+    let answering = row.answering;
+    f.check(m.replies >= answering, || {
+        format!("only {} boards answer, {answering} must", m.replies)
+    });
+    if row.strikes.iter().any(|s| s.what == "bus-full") {
+        f.check(m.bus_load >= FULL, || {
+            format!("the line is loaded to {:.2} only", m.bus_load)
+        });
+    }
+    let verdict = if f.0.is_empty() {
+        Verdict::Pass
+    } else {
+        Verdict::Fail
+    };
+    Outcome {
+        row,
+        verdict,
+        failures: f.0,
+        after_all,
+        measured: m,
+        faults: ran.faults.iter().map(ToString::to_string).collect(),
+    }
+}
+
+/// What is left of a stop when all axes are commanded to: beyond their limit, ms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AfterAll {
+    /// Until the slowest valve is shut.
+    pub physical_ms: f64,
+    /// Until both rims stand.
+    pub wheels_ms: f64,
+}
+
+impl AfterAll {
+    fn of(robot: &RobotConfig) -> Self {
+        Self {
+            physical_ms: closing_ms(robot) + TICK_MS,
+            wheels_ms: WHEEL_STOP_MS,
+        }
+    }
+}
+
+/// Valves that were commanded shut at the latest after `all_ms` let no more air through.
+fn physically_shut(f: &mut Failures, after_all: &AfterAll, m: &Measured, all_ms: f64) {
+    f.within(
+        "valves physically shut",
+        m.physical_ms,
+        all_ms + after_all.physical_ms,
+    );
+}
+
+/// Closing time of the slowest valve with its line, ms.
+fn closing_ms(robot: &RobotConfig) -> f64 {
+    let valves = robot.plant.cylinders.iter();
+    let closing = valves.map(|c| c.fill_valve.t_off_s.max(c.vent_valve.t_off_s) + c.line_delay_s);
+    closing.fold(0.0, f64::max) * 1e3
+}
+
+fn detected(f: &mut Failures, [from, to]: [f64; 2], m: &Measured) {
+    f.within("detected", m.detected_ms, to);
+    if let Some(ms) = m.detected_ms {
+        f.check(ms >= from - 1e-6, || {
+            format!("detected after {ms:.1} ms, not before {from:.1}")
+        });
+    }
+}
+
+fn stop(f: &mut Failures, row: &Row, expected: &Stop, after_all: &AfterAll, m: &Measured) {
+    if expected.axis > 0 {
+        f.within(
+            "valves of the axis commanded shut",
+            m.own_commanded_ms,
+            expected.own_ms,
+        );
+    }
+    f.within("all valves commanded shut", m.commanded_ms, expected.all_ms);
+    f.within("all boards tell a safe mode", m.sensed_ms, expected.all_ms);
+    physically_shut(f, after_all, m, expected.all_ms);
+    f.within(
+        "both wheels stand",
+        m.wheels_stand_ms,
+        expected.all_ms + after_all.wheels_ms,
+    );
+    f.check(m.latched, || "not latched".to_owned());
+    if let Some(limit) = row.held_mm {
+        f.check(m.held_mm.is_some_and(|mm| mm <= limit), || {
+            format!("a held joint moves by {:?} mm, allowed {limit}", m.held_mm)
+        });
+    }
+    if row.estop {
+        f.within("supply dump commanded", m.dump_ms, expected.all_ms);
+    }
+}
+
+fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
+    f.check(!m.drives, || "an axis drives".to_owned());
+    let rows = ran.recording.joints.get(usize::from(board) - 1);
+    let last = rows.and_then(|rows| rows.last()).map(|row| row.v.mode);
+    f.check(last == Some(IDLE), || {
+        format!("the board ends in mode {last:?}, not disarmed")
+    });
+    if let Some(ms) = m.detected_ms {
+        f.0.push(format!(
+            "a fault is latched, or all axes hold, after {ms:.1} ms"
+        ));
+    }
+}
+
+fn no_arming(f: &mut Failures, ran: &Ran) {
+    f.check(ran.error.is_some(), || "the robot gets ready".to_owned());
+    let outputs = ran.outputs;
+    f.check(outputs.ticks > 0, || {
+        "no board got to its first tick".to_owned()
+    });
+    f.check(outputs.driven == 0, || {
+        format!(
+            "a joint board drives in {} of {} ticks",
+            outputs.driven, outputs.ticks
+        )
+    });
+}
+
+fn goes_on(f: &mut Failures, limit_mm: f64, m: &Measured) {
+    f.check(!m.stopped, || "the motion stops".to_owned());
+    if let Some(ms) = m.detected_ms {
+        f.0.push(format!(
+            "a fault is latched, or all axes hold, after {ms:.1} ms"
+        ));
+    }
+    match m.deviation_mm {
+        Some(mm) => f.check(mm <= limit_mm, || {
+            format!("a stroke deviates by {mm:.3} mm, allowed {limit_mm}")
+        }),
+        // One that stops has failed already.
+        None => f.check(m.stopped, || "nothing to compare with".to_owned()),
+    }
+}
+
+fn degrades(f: &mut Failures, after_all: &AfterAll, m: &Measured) {
+    match m.detected_ms {
+        None => {
+            f.check(!m.stopped, || "stopped without a reason".to_owned());
+            if let Some(mm) = m.deviation_mm {
+                f.check(mm <= DEGRADED_MM, || {
+                    format!("a stroke deviates by {mm:.1} mm")
+                });
+            }
+        }
+        Some(detected) => {
+            let all_ms = detected + REACTION_MS;
+            f.check(m.stopped, || "detected, but not all axes stop".to_owned());
+            f.within("all valves commanded shut", m.commanded_ms, all_ms);
+            f.within("all boards tell a safe mode", m.sensed_ms, all_ms);
+            physically_shut(f, after_all, m, all_ms);
+            f.within(
+                "both wheels stand",
+                m.wheels_stand_ms,
+                all_ms + after_all.wheels_ms,
+            );
+            f.check(m.latched, || "not latched".to_owned());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::matrix::run::Outputs;
+    use crate::matrix::select;
+    use wheeleg_config::builtin;
+    use wheeleg_sim::LineAudit;
+    use wheeleg_telemetry::Recording;
+
+    /// A run in which nothing was recorded.
+    fn empty_run() -> Ran {
+        Ran {
+            at_s: 0.0,
+            faults: Vec::new(),
+            recording: Recording::default(),
+            line: LineAudit::default(),
+            arming_asked: true,
+            outputs: Outputs::default(),
+            error: None,
+        }
+    }
+
+    #[test]
+    fn a_held_joint_that_moves_too_far_fails_its_row() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["valve-stuck-open/vent".to_owned()]).expect("a row")[0];
+        let ran = empty_run();
+        let moved = |held_mm| {
+            let measured = Measured {
+                held_mm,
+                stopped: true,
+                ..Measured::default()
+            };
+            let outcome = judge(*row, &robot, &ran, measured);
+            outcome.failures.iter().any(|f| f.contains("held joint"))
+        };
+        let limit = row.held_mm.expect("a limit");
+        assert!(!moved(Some(limit)));
+        assert!(moved(Some(limit + 0.1)) && moved(None));
+    }
+
+    #[test]
+    fn a_row_that_must_stop_and_goes_on_fails() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["pot-open".to_owned()]).expect("a row")[0];
+        let ran = empty_run();
+        let failures = |m| judge(*row, &robot, &ran, m).failures.join("; ");
+        let on = failures(Measured::default());
+        assert!(on.contains("detected: never") && on.contains("not all axes stop"));
+        // One that has stopped is judged by every time that it lacks.
+        let stopped = failures(Measured {
+            stopped: true,
+            ..Measured::default()
+        });
+        for what in [
+            "valves of the axis commanded shut: never",
+            "all valves commanded shut: never",
+            "all boards tell a safe mode: never",
+            "valves physically shut: never",
+            "both wheels stand: never",
+            "not latched",
+        ] {
+            assert!(stopped.contains(what), "{what}: {stopped}");
+        }
+    }
+}

@@ -1,0 +1,339 @@
+//! Runs rows of the matrix on the simulated robot, two at a time.
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+use wheeleg_master::command::Command;
+use wheeleg_node::mode::ModeRules as _;
+use wheeleg_protocol::param::{ParamInfo, params_at};
+
+use super::judge::{Outcome, judge};
+use super::measure::{Measured, measure};
+use super::row::{Ask, Expect, Phase, Row, Variant};
+use super::rows::ROWS;
+use crate::StudyError;
+use wheeleg_config::builtin::DEFAULT_SCENARIO;
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_config::{
+    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
+    raw_of,
+};
+use wheeleg_remote_host::Nodes;
+use wheeleg_sim::faults::check;
+use wheeleg_sim::{self as sil, LineAudit, WatchedJoint};
+use wheeleg_telemetry::{Recorder, Recording};
+
+/// Rows at a time.
+const THREADS: usize = 2;
+/// E-stop after the instant, s.
+pub(super) const ESTOP_S: f64 = 0.1;
+/// Arming is asked for this long before the end, s.
+const ARM_S: f64 = 0.6;
+/// Steps of the long walk.
+const LONG_STEPS: u16 = 18;
+/// Duration of the runs without faults, s: no run that is compared is longer.
+const SOUND_S: f64 = 7.0;
+
+/// A run of a row.
+pub(super) struct Ran {
+    pub(super) at_s: f64,
+    pub(super) faults: Vec<FaultSpec>,
+    pub(super) recording: Recording,
+    pub(super) line: LineAudit,
+    /// Arming was asked for when every fault was over.
+    pub(super) arming_asked: bool,
+    /// From power-up on.
+    pub(super) outputs: Outputs,
+    /// The run ended before its time, and why.
+    pub(super) error: Option<String>,
+}
+
+/// What the joint boards had on their outputs from power-up on, in the time of the start-up, too.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Outputs {
+    /// Ticks that were looked at, of all joints.
+    pub(super) ticks: u64,
+    /// Ticks among them with a valve energised, or under control.
+    pub(super) driven: u64,
+}
+
+/// The robots and their runs without faults.
+struct Robots {
+    scenario: Scenario,
+    robots: [RobotConfig; 3],
+    /// Walking as plain robot, walking with reflex, standing.
+    sound: [OnceLock<Result<Recording, String>>; 3],
+    seed: u64,
+}
+
+impl Robots {
+    fn new(seed: u64) -> Result<Self, StudyError> {
+        let scenario = builtin::scenario(DEFAULT_SCENARIO)?;
+        let plain = builtin::robot_of(&scenario.robot, DEFAULT_SCENARIO)?;
+        let mut reflex = plain.clone();
+        reflex.gait.touchdown_reflex = true;
+        let mut long = plain.clone();
+        long.gait.steps = LONG_STEPS;
+        Ok(Self {
+            scenario,
+            robots: [plain, reflex, long],
+            sound: Default::default(),
+            seed,
+        })
+    }
+
+    fn robot(&self, variant: Variant) -> &RobotConfig {
+        match variant {
+            Variant::Plain => &self.robots[0],
+            Variant::Reflex => &self.robots[1],
+            Variant::Long => &self.robots[2],
+        }
+    }
+
+    fn scenario(&self, stands: bool, duration_s: f64) -> Scenario {
+        let leg = LegChoice::Left;
+        Scenario {
+            duration_s,
+            motion: if stands {
+                Motion::Stand
+            } else {
+                Motion::SquareWave { leg }
+            },
+            events: Vec::new(),
+            faults: Vec::new(),
+            targets: TargetSet::None,
+            ..self.scenario.clone()
+        }
+    }
+
+    /// The same run without the fault; `None` for the long walk.
+    fn sound(&self, row: &Row) -> Result<Option<&Recording>, StudyError> {
+        let stands = stands(row.phase);
+        let index = match (row.variant, stands) {
+            (Variant::Plain, false) => 0,
+            (Variant::Reflex, _) => 1,
+            (Variant::Plain, true) => 2,
+            (Variant::Long, _) => return Ok(None),
+        };
+        let run = self.sound[index].get_or_init(|| {
+            let scenario = self.scenario(stands, SOUND_S);
+            let run = simulate(&scenario, self.robot(row.variant), self.seed);
+            run.error.map_or(Ok(run.recording), Err)
+        });
+        run.as_ref()
+            .map(Some)
+            .map_err(|e| StudyError::refused(format!("the run without a fault fails: {e}"), ""))
+    }
+
+    fn run(&self, row: &Row) -> Result<Outcome, StudyError> {
+        let robot = self.robot(row.variant);
+        if let Some(reason) = row.not_implemented() {
+            return Ok(Outcome::not_implemented(*row, robot, reason));
+        }
+        let at_s = instant_s(row, robot, self.seed);
+        let faults = faults(row, at_s)?;
+        let duration_s = at_s + row.after_s;
+        let mut scenario = self.scenario(stands(row.phase), duration_s);
+        scenario.faults.clone_from(&faults);
+        let event = |at_s: f64, action| ScenarioEvent { at_s, action };
+        if row.estop {
+            scenario
+                .events
+                .push(event(at_s + ESTOP_S, EventAction::EStop));
+        }
+        for (after_s, ask) in row.asks {
+            scenario
+                .events
+                .push(event(at_s + after_s, EventAction::Command(asked(ask))));
+        }
+        let arm_s = duration_s - ARM_S;
+        let stops = matches!(row.expect, Expect::Stop(_) | Expect::Degrades);
+        if stops {
+            scenario
+                .events
+                .push(event(arm_s, EventAction::Command(Command::Arm)));
+        }
+        check(&scenario, robot, &Nodes::default())?;
+        let arming_asked = stops && faults.iter().all(|fault| fault.over_s() < arm_s);
+        let ran = Ran {
+            at_s,
+            faults,
+            arming_asked,
+            ..simulate(&scenario, robot, self.seed)
+        };
+        let measured: Measured = measure(row, &ran, self.sound(row)?);
+        Ok(judge(*row, robot, &ran, measured))
+    }
+}
+
+/// What a user asks of a board's parameters.
+///
+/// # Panics
+/// If a row names a parameter that its board does not have.
+fn asked(ask: &Ask) -> Command {
+    let row = |node: u8, of: &str| -> &ParamInfo {
+        let row = params_at(node).iter().find(|info| info.name == of);
+        row.expect("a parameter of the board")
+    };
+    match *ask {
+        Ask::Disarm => Command::Disarm,
+        Ask::Save(node) => Command::SaveParameters { node },
+        Ask::Read(node, of) => Command::ReadParameter {
+            node,
+            id: row(node, of).id,
+        },
+        Ask::Write(node, of, value) => Command::WriteParameter {
+            node,
+            id: row(node, of).id,
+            raw: raw_of(row(node, of), value),
+        },
+    }
+}
+
+fn stands(phase: Phase) -> bool {
+    matches!(phase, Phase::Stand | Phase::PowerUp)
+}
+
+/// A run in memory; an error ends it and is told.
+fn simulate(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Ran {
+    let mut recorder = Recorder::in_memory();
+    let mut outputs = Outputs::default();
+    let mut look = |joint: &WatchedJoint<'_>| {
+        let driven = joint.board.pulses != [0; 4] || joint.board.mode.may_drive();
+        outputs.ticks += 1;
+        outputs.driven += u64::from(driven);
+    };
+    let run = sil::run_watched(scenario, robot, seed, &mut recorder, &mut look);
+    let (line, error) = match run {
+        Ok(outcome) => (outcome.line, None),
+        Err(e) => (LineAudit::default(), Some(e.to_string())),
+    };
+    let (recording, error) = match recorder.finish() {
+        Ok(recording) => (recording, error),
+        Err(e) => (Recording::default(), error.or(Some(e.to_string()))),
+    };
+    Ran {
+        at_s: 0.0,
+        faults: Vec::new(),
+        recording,
+        line,
+        arming_asked: false,
+        outputs,
+        error,
+    }
+}
+
+/// The instant of a row, s: somewhere in its phase, by the seed, on a whole tick.
+fn instant_s(row: &Row, robot: &RobotConfig, seed: u64) -> f64 {
+    let gait = &robot.gait;
+    let (from_s, to_s) = match row.phase {
+        Phase::PowerUp => return 0.0,
+        Phase::Stand => (0.5, 0.6),
+        Phase::Start => (0.1, 0.2),
+        Phase::FirstReach => (gait.reach_s - 0.1, gait.reach_s),
+        Phase::BeforeReach => {
+            let reach_s = gait.period_s + gait.reach_s;
+            (reach_s - 0.1, reach_s)
+        }
+        Phase::Flight => (gait.reach_s + 0.1, gait.lower_s - 0.1),
+        Phase::BeforeLower => (gait.lower_s - 0.1, gait.lower_s),
+        Phase::SecondLower => {
+            let lower_s = gait.period_s + gait.lower_s;
+            (lower_s - 0.1, lower_s)
+        }
+        Phase::Push => (gait.push_s + 0.2, gait.push_s + 0.8),
+        Phase::BeforeLift => (gait.period_s - 0.1, gait.period_s),
+    };
+    let name = blake3::hash(format!("{} {seed}", row.id).as_bytes());
+    let share = f64::from(name.as_bytes()[0]) / 256.0;
+    ((from_s + share * (to_s - from_s)) * 1e3).round() * 1e-3
+}
+
+/// The faults of a row at its instant.
+fn faults(row: &Row, at_s: f64) -> Result<Vec<FaultSpec>, StudyError> {
+    row.strikes
+        .iter()
+        .map(|strike| {
+            let from_s = at_s + strike.after_s;
+            let mut text = format!("{}@{from_s:.3}s", strike.what);
+            if strike.lasts_s.is_finite() {
+                text.push_str(&format!("..{:.3}s", from_s + strike.lasts_s));
+            }
+            text.parse()
+                .map_err(|e: wheeleg_config::faults::SpecError| {
+                    StudyError::refused(format!("row {}: {e}", row.id), "please report this")
+                })
+        })
+        .collect()
+}
+
+/// Rows by name; all where `ids` is empty.
+///
+/// # Errors
+/// [`StudyError::Refused`] for a name that no row has, and for one that is not implemented.
+pub fn select(ids: &[String]) -> Result<Vec<&'static Row>, StudyError> {
+    if ids.is_empty() {
+        return Ok(ROWS.iter().collect());
+    }
+    let find = |id: &String| {
+        let row = ROWS.iter().find(|row| row.id == id).ok_or_else(|| {
+            StudyError::refused(
+                format!("the fault matrix has no row `{id}`{}", meant(id)),
+                "`wheeleg faults rows` prints all of them",
+            )
+        })?;
+        row.not_implemented().map_or(Ok(row), |reason| {
+            Err(StudyError::refused(
+                format!("the row `{id}` is not implemented: {reason}"),
+                "`wheeleg faults rows` says which rows are",
+            ))
+        })
+    };
+    let mut rows: Vec<&'static Row> = Vec::new();
+    for id in ids {
+        let row = find(id)?;
+        if !rows.contains(&row) {
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+/// Rows that a name which none has may stand for: those that begin with it, else the nearest.
+fn meant(id: &str) -> String {
+    let ids = ROWS.iter().map(|row| row.id);
+    let begin: Vec<String> = ids
+        .clone()
+        .filter(|row| !id.is_empty() && row.starts_with(id))
+        .map(|row| format!("`{row}`"))
+        .collect();
+    if !begin.is_empty() {
+        return format!("; these begin with it: {}", begin.join(", "));
+    }
+    wheeleg_config::closest(id, ids).map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
+}
+
+/// Runs rows; `progress` is told each as it is done.
+///
+/// # Errors
+/// [`StudyError`] if a run without a fault fails, or a row of the table is wrong.
+pub fn run(
+    rows: &[&'static Row],
+    seed: u64,
+    progress: &(dyn Fn(&Row) + Sync),
+) -> Result<Vec<Outcome>, StudyError> {
+    let robots = Robots::new(seed)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(THREADS)
+        .build()
+        .map_err(|e| StudyError::refused(format!("cannot start threads: {e}"), ""))?;
+    pool.install(|| {
+        rows.par_iter()
+            .map(|row| {
+                let outcome = robots.run(row);
+                progress(row);
+                outcome
+            })
+            .collect()
+    })
+}

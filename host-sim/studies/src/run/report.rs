@@ -1,0 +1,273 @@
+//! What a run leaves behind: figures, tables, summary and one HTML page.
+
+use std::path::{Path, PathBuf};
+
+use super::Summary;
+use super::{figures, html};
+use crate::StudyError;
+use crate::analysis::Analysis;
+use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_report::subfolder;
+use wheeleg_telemetry::{Recording, write_csv};
+
+/// Samples per second in the CSV files; every sample is in memory, 500 per
+/// second are in the MCAP log.
+const CSV_RATE_HZ: u32 = 100;
+
+/// Writes everything but the log into `folder`, which must exist; returns the
+/// path of the report.
+///
+/// # Errors
+/// [`StudyError::Output`] if a file cannot be written, [`StudyError::Plot`] or
+/// [`StudyError::Report`] if a figure or the page cannot be made.
+pub(super) fn write(
+    folder: &Path,
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    recording: &Recording,
+    analysis: &Analysis,
+    summary: &Summary,
+) -> Result<PathBuf, StudyError> {
+    let source = figures::Source {
+        scenario,
+        robot,
+        recording,
+        analysis,
+    };
+    let tables = subfolder(folder, "csv")?;
+    write_csv(&tables, recording, CSV_RATE_HZ)?;
+    let plots = subfolder(folder, "figures")?;
+    let mut drawn = Vec::new();
+    for figure in figures::figures(&source) {
+        figure.png(&plots.join(format!("{}.png", figure.id)))?;
+        let svg = figure.svg()?;
+        let path = plots.join(format!("{}.svg", figure.id));
+        std::fs::write(&path, &svg)
+            .map_err(|e| StudyError::output("write the figure", &path, e))?;
+        drawn.push((figure, svg));
+    }
+    let json = summary.to_json();
+    let path = folder.join("summary.json");
+    std::fs::write(&path, json).map_err(|e| StudyError::output("write the summary", &path, e))?;
+    let page = html::render(&source, summary, &drawn)?;
+    let path = folder.join("report.html");
+    std::fs::write(&path, page).map_err(|e| StudyError::output("write the report", &path, e))?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::{self, testing};
+    use crate::run::RunInfo;
+    use wheeleg_config::builtin;
+    use wheeleg_telemetry::{EventSample, Row};
+
+    /// Every file of a run, from a recording made of the reference model.
+    fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario(scenario).expect("built in");
+        let recording = testing::from_reference(&robot, 0.25, 0.0);
+        let analysis = analysis::analyse(&scenario, &robot, &recording);
+        let info = RunInfo {
+            seed: 7,
+            simulated_s: 10.0,
+            recorded_s: 10.0,
+            wall_s: 0.25,
+            complete: true,
+            pil: None,
+        };
+        let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
+        write(
+            folder.path(),
+            &scenario,
+            &robot,
+            &recording,
+            &analysis,
+            &summary,
+        )
+        .expect("written");
+        (folder, summary)
+    }
+
+    #[test]
+    fn page_stands_alone_and_holds_figures_targets_and_provenance() {
+        let (folder, summary) = report("three-step");
+        let page = std::fs::read_to_string(folder.path().join("report.html")).expect("written");
+        // The only addresses are anchors in the page and the SVG name space.
+        let links = page.replace("http://www.w3.org/2000/svg", "");
+        for forbidden in ["http:", "https:", "src=", "<script", "@import", "url("] {
+            assert!(!links.contains(forbidden), "{forbidden}");
+        }
+        for number in 12..=16 {
+            assert!(page.contains(&format!("Fig. {number}:")), "Fig. {number}");
+        }
+        assert!(page.matches("<svg").count() >= 9);
+        for target in &summary.targets {
+            assert!(page.contains(&target.id), "{}", target.id);
+        }
+        assert!(page.contains(&summary.hash) && page.contains("cylinder.bore"));
+        assert!(page.contains("latched the step of the command"));
+    }
+
+    #[test]
+    fn a_run_that_was_cut_short_is_not_judged() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario("three-step").expect("built in");
+        let recording = testing::from_reference(&robot, 0.25, 0.0);
+        let analysis = analysis::analyse(&scenario, &robot, &recording);
+        let (folder, mut summary) = report("three-step");
+        let mut page = |complete: bool| {
+            summary.complete = complete;
+            let (r, a) = (&recording, &analysis);
+            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            std::fs::read_to_string(folder.path().join("report.html")).expect("written")
+        };
+        let (whole, part) = (page(true), page(false));
+        let verdict = "required targets met</span>";
+        assert!(whole.contains(verdict) && whole.contains(">PASS<"));
+        assert!(!whole.contains("was stopped after") && !whole.contains("not judged"));
+        assert!(!part.contains(verdict) && !part.contains(">PASS<") && !part.contains(">FAIL<"));
+        assert!(part.contains("was stopped after") && part.contains("not judged"));
+    }
+
+    /// The motion begins 0.25 s after the record: only the figures count from there.
+    #[test]
+    fn the_page_tells_events_in_scenario_time_and_what_the_log_lacks() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario("three-step").expect("built in");
+        let mut recording = testing::from_reference(&robot, 0.25, 0.0);
+        recording.events.push(Row {
+            t_ns: 3_000_000_000,
+            v: EventSample {
+                kind: "fault".to_owned(),
+                text: "a thing".to_owned(),
+            },
+        });
+        let mut analysis = analysis::analyse(&scenario, &robot, &recording);
+        analysis.start_s = 0.25;
+        let (folder, mut summary) = report("three-step");
+        let mut page = |dropped: u64| {
+            summary.dropped_messages = dropped;
+            let (r, a) = (&recording, &analysis);
+            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            std::fs::read_to_string(folder.path().join("report.html")).expect("written")
+        };
+        let (whole, part) = (page(0), page(321));
+        assert!(whole.contains(">3.000</td><td>fault</td><td>a thing"));
+        assert!(whole.contains("0.250 s of scenario time"));
+        let loss = "messages could not be written to the log";
+        assert!(!whole.contains(loss) && part.contains(loss) && part.contains("321 of "));
+    }
+
+    #[test]
+    fn the_page_shows_what_boards_outside_did_and_what_differed() {
+        use wheeleg_remote_host::{BoardFigures, ChannelFigures, PilSummary};
+        let page = |differing: u64| {
+            let (folder, mut summary) = report("master-lost");
+            let robot = builtin::robot("wheeleg-2003").expect("built in");
+            let scenario = builtin::scenario("master-lost").expect("built in");
+            let recording = testing::from_reference(&robot, 0.25, 0.0);
+            let analysis = analysis::analyse(&scenario, &robot, &recording);
+            let mut nodes = vec!["sil".to_owned(); 8];
+            nodes[2] = "pil".to_owned();
+            summary.pil = Some(PilSummary {
+                nodes,
+                compared_bits: 1_234_567,
+                differing_bits: differing,
+                channels: vec![ChannelFigures {
+                    channel: "converter code",
+                    compared_bits: 1_234_567,
+                    differing_bits: differing,
+                }],
+                compared_ticks: 10_000,
+                compared_frames: 1_000,
+                first_difference: (differing > 0).then(|| "7 here, 8 there".to_owned()),
+                boards: vec![BoardFigures {
+                    node: "joint3".to_owned(),
+                    image: "joint".to_owned(),
+                    digest: "40842fedd013525c".to_owned(),
+                    host: "STM32G431CB, somewhere".to_owned(),
+                    compared_bits: 1_234_567,
+                    differing_bits: differing,
+                    ticks: 10_000,
+                    tick_instructions_median: Some(1_111),
+                    tick_instructions_mean: Some(1_120),
+                    tick_instructions_worst: Some(1_444),
+                    longest_awake_instructions: Some(2_000),
+                    stack_used_bytes: Some(3_456),
+                    stack_size_bytes: Some(24_576),
+                    resets: 0,
+                    late_bytes: 0,
+                    late_frames: 0,
+                    cut_frames: 0,
+                }],
+            });
+            let (r, a) = (&recording, &analysis);
+            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            std::fs::read_to_string(folder.path().join("report.html")).expect("written")
+        };
+        let (equal, other) = (page(0), page(5));
+        for word in [
+            "joint3",
+            "40842fedd013525c",
+            "converter code",
+            "1\u{2009}444",
+            "natively",
+        ] {
+            assert!(equal.contains(word), "{word}");
+        }
+        assert!(equal.contains("0 bits differ<") && !equal.contains("first difference"));
+        assert!(other.contains("5 bits differ") && other.contains("7 here, 8 there"));
+        let native = report("master-lost");
+        let native = std::fs::read_to_string(native.0.path().join("report.html")).expect("written");
+        assert!(
+            !native.contains("id=\"boards\""),
+            "no boards outside, no section"
+        );
+    }
+
+    #[test]
+    fn figures_are_written_as_png_and_svg() {
+        let (folder, _) = report("master-lost");
+        let figures = folder.path().join("figures");
+        for id in ["fig12-b5", "fig16-f6", "event", "event-valves", "feet"] {
+            let png = std::fs::read(figures.join(format!("{id}.png"))).expect("PNG");
+            assert_eq!(&png[1..4], b"PNG", "{id}");
+            assert!(png.len() > 5_000, "{id}: {}", png.len());
+            let svg = std::fs::read_to_string(figures.join(format!("{id}.svg"))).expect("SVG");
+            assert!(
+                svg.contains("time since the start of the motion [s]"),
+                "{id}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_scenario_gives_a_report() {
+        for (name, ..) in builtin::SCENARIOS {
+            let (folder, _) = report(name);
+            assert!(folder.path().join("report.html").exists(), "{name}");
+        }
+    }
+
+    #[test]
+    fn summary_has_the_documented_fields() {
+        let (folder, summary) = report("three-step");
+        let text = std::fs::read_to_string(folder.path().join("summary.json")).expect("written");
+        let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(value["scenario"], "three-step");
+        assert_eq!(value["seed"], 7);
+        assert_eq!(value["hash"], summary.hash.as_str());
+        assert_eq!(value["simulated_s"], 10.0);
+        assert_eq!(value["wall_s"], 0.25);
+        assert_eq!(value["realtime_factor"], 40.0);
+        let targets = value["targets"].as_array().expect("a list");
+        for target in targets {
+            for key in ["id", "value", "unit", "min", "max", "pass"] {
+                assert!(target.get(key).is_some(), "{key}");
+            }
+        }
+    }
+}

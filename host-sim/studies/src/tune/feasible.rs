@@ -1,0 +1,121 @@
+//! What an axis must have before any controller can hold it.
+
+use wheeleg_plant::axis::AxisParams;
+
+use crate::StudyError;
+use crate::bench::suite::force_left_n;
+use crate::compare::MARGIN;
+
+/// Refuses an axis that cannot do what its own file asks.
+///
+/// # Errors
+/// [`StudyError::Refused`] names file, field, value and allowed range.
+pub(super) fn check(file: &str, p: &AxisParams) -> Result<(), StudyError> {
+    let refuse = |field: &str, value: String, allowed: String, why: String| {
+        Err(StudyError::refused(
+            format!("{file}: `{field}` = {value} is out of range for this axis: allowed {allowed}"),
+            why,
+        ))
+    };
+    let (c, pot) = (&p.cylinder, &p.potentiometer);
+    let gauge_pa = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
+    let left_n = force_left_n(p);
+    if left_n <= 0.0 {
+        return refuse(
+            "friction.static",
+            format!("{:.1} N", c.friction.static_n),
+            format!("less than {:.1} N", left_n + c.friction.static_n),
+            format!(
+                "at {:.2} bar gauge (supply.set_pressure) the weaker side of a bore of {:.0} mm cannot break away",
+                gauge_pa * 1e-5,
+                c.bore_m * 1e3
+            ),
+        );
+    }
+    let most_n = left_n / MARGIN;
+    if p.load_n.abs() > most_n * (1.0 + 1e-9) {
+        return refuse(
+            "moving.load",
+            format!("{:.1} N", p.load_n),
+            format!("−{most_n:.1} to {most_n:.1} N"),
+            format!(
+                "the static margin is {:.2} and must be at least {MARGIN}: the weaker side has {left_n:.1} N left over \
+friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take load away",
+                left_n / p.load_n.abs(),
+                gauge_pa * 1e-5
+            ),
+        );
+    }
+    // Where the wiper stands with the rod out.
+    let reach_m = pot.offset_m + c.stroke_m * pot.gain;
+    if reach_m > 0.99 * pot.electrical_stroke_m {
+        return refuse(
+            "sensor.potentiometer.electrical_stroke",
+            format!("{:.1} mm", pot.electrical_stroke_m * 1e3),
+            format!("at least {:.1} mm", reach_m / 0.99 * 1e3),
+            "the wiper must stay within 99 % of the track over the whole cylinder.stroke, or the board takes it for a broken wire".into(),
+        );
+    }
+    if pot.offset_m < 0.01 * pot.electrical_stroke_m {
+        return refuse(
+            "sensor.potentiometer.offset",
+            format!("{:.1} mm", pot.offset_m * 1e3),
+            format!("at least {:.1} mm", 0.01 * pot.electrical_stroke_m * 1e3),
+            "the wiper must stay above 1 % of the track with the rod in, or the board takes it for a short circuit".into(),
+        );
+    }
+    if p.initial_stroke_m > c.stroke_m {
+        return refuse(
+            "start.stroke",
+            format!("{:.1} mm", p.initial_stroke_m * 1e3),
+            format!("0 to {:.1} mm", c.stroke_m * 1e3),
+            "the piston must start within cylinder.stroke".into(),
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::AxisConfig;
+
+    fn message(change: impl FnOnce(&mut AxisParams)) -> String {
+        let mut p = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        change(&mut p);
+        check("mine.toml", &p).map_or_else(|e| e.to_string(), |()| String::new())
+    }
+
+    #[test]
+    fn what_cannot_be_held_is_refused_by_its_field() {
+        assert_eq!(message(|_| ()), "");
+        // 143.3 N are left on the weaker side: 114.7 N at a margin of 1.25.
+        assert_eq!(message(|p| p.load_n = 114.6), "");
+        let text = message(|p| p.load_n = -115.0);
+        assert!(
+            text.contains("mine.toml: `moving.load` = -115.0 N"),
+            "{text}"
+        );
+        assert!(text.contains("−114.7 to 114.7 N"), "{text}");
+        let text = message(|p| p.cylinder.friction.static_n = 160.0);
+        assert!(
+            text.contains("`friction.static`") && text.contains("less than 158.3 N"),
+            "{text}"
+        );
+        let text = message(|p| p.potentiometer.electrical_stroke_m = 0.18);
+        assert!(
+            text.contains("electrical_stroke") && text.contains("at least 191.9 mm"),
+            "{text}"
+        );
+        let text = message(|p| p.potentiometer.offset_m = 0.001);
+        assert!(
+            text.contains("offset") && text.contains("at least 2.0 mm"),
+            "{text}"
+        );
+        let text = message(|p| p.initial_stroke_m = 0.2);
+        assert!(
+            text.contains("`start.stroke`") && text.contains("0 to 180.0 mm"),
+            "{text}"
+        );
+    }
+}

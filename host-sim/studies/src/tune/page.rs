@@ -1,0 +1,181 @@
+//! The page of a tuned axis: before and after.
+
+use minijinja::{Value, context};
+
+use super::{Test, Tuned};
+use crate::StudyError;
+use crate::bench::Trace;
+use crate::compare::{Figures, MARGIN, Move, number, panel};
+use wheeleg_report::plot::{Figure, Series, colour, line};
+use wheeleg_report::{page, pictures};
+
+const TEMPLATE: &str = include_str!("page.html");
+
+/// Points of a recording over the time from the start of its motion.
+fn points(trace: &Trace, value: impl Fn(&crate::bench::Row) -> f64) -> Vec<(f64, f64)> {
+    let start_s = trace.motion.start_s();
+    let rows = trace.rows.iter().enumerate();
+    rows.map(|(k, r)| (k as f64 * 1e-3 - start_s, value(r)))
+        .collect()
+}
+
+/// Stroke, or stroke less reference, before and after, with the first move after
+/// power-up thin beside it where it is of the same kind.
+fn series(
+    test: &Test,
+    index: usize,
+    value: impl Fn(&crate::bench::Row) -> f64 + Copy,
+) -> Vec<Series> {
+    let points = |played: &super::Played| points(&played.measured[index], value);
+    let [before, after] = &test.played;
+    vec![
+        line("before", colour::MODEL, 2, points(before)),
+        line("after", colour::ROBOT, 3, points(after)),
+    ]
+}
+
+/// Figures before and after.
+pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
+    let stroke = |r: &crate::bench::Row| r.stroke_m * 1e3;
+    let error = |r: &crate::bench::Row| (r.stroke_m - r.reference_m) * 1e3;
+    let end = |test: &Test, index: usize| {
+        let trace = &test.played[0].measured[index];
+        trace.rows.len() as f64 * 1e-3 - trace.motion.start_s()
+    };
+    tuned
+        .tests
+        .iter()
+        .filter(|t| t.motion != Move::Hold)
+        .map(|test| {
+            let mut panels = Vec::new();
+            for index in 0..test.played[0].measured.len() {
+                let end_s = end(test, index).min(if test.motion == Move::Sine { 5.0 } else { 2.0 });
+                let way = match (test.motion, index) {
+                    (Move::Step20 | Move::Step100, 0) | (Move::SCurve, 1) => "Retracting",
+                    (Move::Sine, _) => "Sinusoid",
+                    _ => "Extending",
+                };
+                let (title, unit) = (format!("{way}: stroke"), "[mm]");
+                panels.push(panel(&title, unit, end_s, series(test, index, stroke), None, &[]));
+                panels.push(panel(
+                    &format!("{way}: stroke less reference"),
+                    unit,
+                    end_s,
+                    series(test, index, error),
+                    Some((-5.0, 5.0)),
+                    &[-1.0, 1.0],
+                ));
+            }
+            Figure {
+                id: test.motion.name().to_owned(),
+                title: format!("{}: before and after", test.motion.name()),
+                caption: "After the learning move. Red lines at ±1 mm; larger errors are drawn at the edge.".to_owned(),
+                panels,
+            }
+        })
+        .collect()
+}
+
+type Cell = fn(&Figures) -> Option<f64>;
+
+/// Figures of a test that have a value, before and after.
+const LINES: [(&str, usize, Cell); 12] = [
+    ("error at rest [mm]", 2, |f| f.steady_error_mm.map(f64::abs)),
+    ("overshoot [mm]", 2, |f| f.overshoot_mm),
+    ("rise [s]", 3, |f| f.rise_s),
+    ("settled within ±1 mm [s]", 3, |f| f.settle_s),
+    ("worst error [mm]", 2, |f| f.worst_mm),
+    ("RMS error [mm]", 2, |f| f.rms_mm),
+    ("switches per s", 0, |f| f.switches_per_s),
+    ("switches in 10 s at rest", 0, |f| {
+        f.rest_switches.map(|n| n as f64)
+    }),
+    ("air per move [l ANR]", 2, |f| f.air_nl),
+    ("recovery after contact [s]", 2, |f| f.recovery_s),
+    ("first move: overshoot [mm]", 2, |f| f.first_overshoot_mm),
+    ("first move: settled [s]", 3, |f| f.first_settle_s),
+];
+
+fn lines(test: &Test) -> Vec<Value> {
+    let step = matches!(test.motion, Move::Step20 | Move::Step100) || test.motion.loses_contact();
+    let shown = |name: &str| match name {
+        "settled within ±1 mm [s]" | "rise [s]" => step,
+        "worst error [mm]" | "RMS error [mm]" => !step,
+        "recovery after contact [s]" => test.motion.loses_contact(),
+        "switches in 10 s at rest" => test.motion == Move::Hold,
+        "overshoot [mm]" => test.motion != Move::Hold && test.motion != Move::Sine,
+        name if name.starts_with("first") => test.motion == Move::Step100,
+        _ => true,
+    };
+    let note = |f: &Figures| match (f.stopped, f.limit_cycle) {
+        (Some(true), _) => "stopped by supervision",
+        (_, Some(true)) => "limit cycle",
+        _ => "stable",
+    };
+    let mut list: Vec<Value> = LINES
+        .iter()
+        .filter(|(name, ..)| shown(name))
+        .map(|(name, digits, value)| {
+            context! {
+                name => *name,
+                before => number(value(&test.before), *digits),
+                after => number(value(&test.after), *digits),
+            }
+        })
+        .collect();
+    list.push(context! {
+        name => "behaviour", before => note(&test.before), after => note(&test.after),
+    });
+    list
+}
+
+pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<String, StudyError> {
+    let ms = |s: f64| format!("{:.2}", s * 1e3);
+    let short = |v: f64| {
+        let text = format!("{v:.6}");
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        text.replace('-', "−")
+    };
+    let tests: Vec<Value> = tuned
+        .tests
+        .iter()
+        .map(|t| context! { name => t.motion.name(), lines => lines(t) })
+        .collect();
+    let parameters: Vec<Value> = tuned
+        .parameters
+        .iter()
+        .map(|p| {
+            context! {
+                name => p.name,
+                before => short(p.before),
+                after => short(p.after),
+                unit => p.unit,
+                text => p.text,
+            }
+        })
+        .collect();
+    let valve = &tuned.config.axis.cylinder.fill_valve;
+    let large = tuned.tests.iter().find(|t| t.motion == Move::Step100);
+    let settle = |f: fn(&Test) -> Option<f64>| number(large.and_then(f), 3);
+    let values = context! {
+        version => env!("CARGO_PKG_VERSION"),
+        name => &*tuned.config.name,
+        description => &*tuned.config.description,
+        seed => tuned.seed,
+        grain => format!("{:.2}", tuned.grain.ratio),
+        coarse => crate::bench::grain::COARSE,
+        advice => tuned.grain.advice(),
+        margin => if tuned.margin >= 1e3 { "no load".to_owned() } else { format!("{:.2}", tuned.margin) },
+        least => MARGIN,
+        sheet_on => ms(valve.t_on_s),
+        sheet_off => ms(valve.t_off_s),
+        found => tuned.delays.map(|d| context! { on => ms(d.t_on_s), off => ms(d.t_off_s) }),
+        before => settle(|t| t.before.settle_s),
+        after => settle(|t| t.after.settle_s),
+        tests => tests,
+        parameters => parameters,
+        toml => &*tuned.toml,
+        figures => pictures(figures),
+    };
+    Ok(page(TEMPLATE, values)?)
+}

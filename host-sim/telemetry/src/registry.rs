@@ -1,0 +1,145 @@
+//! What a signal is, and the list of all of them.
+
+use super::samples;
+
+/// Which layer of the machine a signal belongs to (ARCHITECTURE.md).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layer {
+    /// Simulated physics: what really happens.
+    Plant,
+    /// A node's board: what its firmware sees and commands.
+    Node,
+    /// The bus.
+    Bus,
+    /// Layer 0 and 1 of the master.
+    Master,
+    /// The host program.
+    Host,
+}
+
+impl Layer {
+    /// Lower-case name, as in the channel metadata.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plant => "plant",
+            Self::Node => "node",
+            Self::Bus => "bus",
+            Self::Master => "master",
+            Self::Host => "host",
+        }
+    }
+}
+
+/// JSON type of a signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FieldType {
+    /// A real number with `decimals` digits after the point.
+    Number,
+    /// An integer.
+    Integer,
+    /// True or false.
+    Boolean,
+    /// Text.
+    Text,
+}
+
+impl FieldType {
+    /// Name in JSON Schema.
+    #[must_use]
+    pub const fn json(self) -> &'static str {
+        match self {
+            Self::Number => "number",
+            Self::Integer => "integer",
+            Self::Boolean => "boolean",
+            Self::Text => "string",
+        }
+    }
+}
+
+/// One signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldDef {
+    /// Name, with the unit as suffix where there is one.
+    pub name: &'static str,
+    /// Unit; `1` for pure numbers, `bits`, `code` or `text` where there is none.
+    pub unit: &'static str,
+    /// JSON type.
+    pub ty: FieldType,
+    /// Digits after the point in the log: its resolution is `10^-decimals`.
+    pub decimals: u8,
+    /// Where the value comes from.
+    pub layer: Layer,
+    /// Meaning.
+    pub doc: &'static str,
+}
+
+/// One log channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChannelDef {
+    /// Topic name in the log.
+    pub topic: &'static str,
+    /// Schema name in the log.
+    pub schema: &'static str,
+    /// Logged samples per second; 0 for a channel written on change.
+    pub rate_hz: u32,
+    /// Meaning.
+    pub doc: &'static str,
+    /// Signals in payload order.
+    pub fields: &'static [FieldDef],
+}
+
+/// A typed telemetry sample; implemented by the declarations in [`samples`].
+pub trait Sample: Clone {
+    /// Schema name in the log.
+    const SCHEMA: &'static str;
+    /// Signals in payload order.
+    const FIELDS: &'static [FieldDef];
+
+    /// Appends the sample as one JSON object.
+    fn encode_json(&self, out: &mut Vec<u8>);
+
+    /// Appends the values of all fields in order: numbers and integers little-endian in their own
+    /// width, a boolean as one byte, a text as its length (u32) and its UTF-8 bytes.
+    fn bytes(&self, out: &mut Vec<u8>);
+
+    /// Calls `cell` with the text of each field in order.
+    fn cells(&self, cell: &mut dyn FnMut(&[u8]));
+}
+
+/// All channels, in log order.
+#[must_use]
+pub fn channels() -> &'static [ChannelDef] {
+    &samples::CHANNELS
+}
+
+/// JSON Schema (draft 2020-12) of a sample, with the unit and resolution of
+/// every property.
+#[must_use]
+pub fn json_schema(schema: &str, fields: &[FieldDef]) -> String {
+    let properties: serde_json::Map<String, serde_json::Value> = fields
+        .iter()
+        .map(|f| {
+            let mut property = serde_json::json!({
+                "type": f.ty.json(),
+                "unit": f.unit,
+                "layer": f.layer.name(),
+                "description": f.doc,
+            });
+            if f.ty == FieldType::Number {
+                // A non-finite value is logged as null.
+                property["type"] = serde_json::json!(["number", "null"]);
+                property["resolution"] = serde_json::json!(10_f64.powi(-i32::from(f.decimals)));
+            }
+            (f.name.to_owned(), property)
+        })
+        .collect();
+    serde_json::json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": schema,
+        "type": "object",
+        "properties": properties,
+        "required": fields.iter().map(|f| f.name).collect::<Vec<_>>(),
+    })
+    .to_string()
+}

@@ -1,0 +1,456 @@
+//! The declaration of every telemetry signal.
+
+use super::encode::{push_fixed, push_i64, push_json_string, push_u64};
+use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample};
+
+/// A Rust type that can be a signal.
+trait Value {
+    const TYPE: FieldType;
+    fn json(&self, out: &mut Vec<u8>, decimals: u8);
+    /// Appends the value little-endian, in its own width; a text with its length (u32) before it.
+    fn bytes(&self, out: &mut Vec<u8>);
+}
+
+impl Value for f64 {
+    const TYPE: FieldType = FieldType::Number;
+    fn json(&self, out: &mut Vec<u8>, decimals: u8) {
+        push_fixed(out, *self, decimals);
+    }
+    fn bytes(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&self.to_le_bytes());
+    }
+}
+
+impl Value for bool {
+    const TYPE: FieldType = FieldType::Boolean;
+    fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
+        out.extend_from_slice(if *self { b"true" } else { b"false" });
+    }
+    fn bytes(&self, out: &mut Vec<u8>) {
+        out.push(u8::from(*self));
+    }
+}
+
+impl Value for String {
+    const TYPE: FieldType = FieldType::Text;
+    fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
+        push_json_string(out, self);
+    }
+    fn bytes(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&(self.len() as u32).to_le_bytes());
+        out.extend_from_slice(self.as_bytes());
+    }
+}
+
+macro_rules! integer_values {
+    ($($t:ty => $push:ident as $wide:ty),*) => {$(
+        impl Value for $t {
+            const TYPE: FieldType = FieldType::Integer;
+            fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
+                $push(out, <$wide>::from(*self));
+            }
+            fn bytes(&self, out: &mut Vec<u8>) {
+                out.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    )*};
+}
+integer_values!(u8 => push_u64 as u64, u16 => push_u64 as u64, u32 => push_u64 as u64, i32 => push_i64 as i64);
+
+/// Declares sample structs: `name: type, "unit", decimals, layer;`. The doc
+/// comment of a field is its description in the log and in the documentation.
+macro_rules! samples {
+    ($(
+        $(#[doc = $sdoc:literal])*
+        $name:ident = $schema:literal {
+            $( $(#[doc = $fdoc:literal])* $field:ident: $ty:ty, $unit:literal, $decimals:literal, $layer:ident; )*
+        }
+    )*) => {$(
+        $(#[doc = $sdoc])*
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct $name {
+            $( $(#[doc = $fdoc])* #[doc = concat!(" Unit: ", $unit, ".")] pub $field: $ty, )*
+        }
+
+        impl Sample for $name {
+            const SCHEMA: &'static str = $schema;
+            const FIELDS: &'static [FieldDef] = &[$(
+                FieldDef {
+                    name: stringify!($field),
+                    unit: $unit,
+                    ty: <$ty as Value>::TYPE,
+                    decimals: $decimals,
+                    layer: Layer::$layer,
+                    doc: concat!($($fdoc),*).trim_ascii(),
+                },
+            )*];
+
+            fn encode_json(&self, out: &mut Vec<u8>) {
+                let mut separator = b'{';
+                $(
+                    out.push(separator);
+                    out.extend_from_slice(concat!("\"", stringify!($field), "\":").as_bytes());
+                    self.$field.json(out, $decimals);
+                    separator = b',';
+                )*
+                let _ = separator;
+                out.push(b'}');
+            }
+
+            fn bytes(&self, out: &mut Vec<u8>) {
+                $( self.$field.bytes(out); )*
+            }
+
+            fn cells(&self, cell: &mut dyn FnMut(&[u8])) {
+                let mut text = Vec::with_capacity(24);
+                $(
+                    text.clear();
+                    self.$field.json(&mut text, $decimals);
+                    cell(&text);
+                )*
+            }
+        }
+    )*};
+}
+
+samples! {
+    /// One pneumatic joint: command, sensor, physics and node state, 1 kHz.
+    JointSample = "wheeleg.Joint" {
+        /// Reference stroke of the newest SYNC slot: what the master commands. The measured stroke while not driving.
+        commanded_mm: f64, "mm", 4, Node;
+        /// Reference stroke that the control law is given, after the board's slew limit.
+        reference_mm: f64, "mm", 4, Node;
+        /// Stroke as the node measures it.
+        sensed_mm: f64, "mm", 4, Node;
+        /// Piston speed as the node estimates it.
+        sensed_velocity_mm_s: f64, "mm/s", 3, Node;
+        /// True stroke.
+        position_mm: f64, "mm", 4, Plant;
+        /// True piston speed, positive when extending.
+        velocity_mm_s: f64, "mm/s", 3, Plant;
+        /// True piston acceleration, unfiltered.
+        acceleration_raw_m_s2: f64, "m/s2", 4, Plant;
+        /// Piston acceleration, 20 Hz low-pass. Computed by the recorder; any value passed in is replaced.
+        acceleration_m_s2: f64, "m/s2", 4, Plant;
+        /// Absolute pressure in chamber A (extends).
+        pressure_a_bar: f64, "bar", 5, Plant;
+        /// Absolute pressure in chamber B (retracts).
+        pressure_b_bar: f64, "bar", 5, Plant;
+        /// Net generalised force on the joint (pressure forces less seal friction less end-stop reaction), unfiltered.
+        force_net_raw_n: f64, "N", 3, Plant;
+        /// Net generalised force, 20 Hz low-pass. Computed by the recorder; any value passed in is replaced.
+        force_net_n: f64, "N", 3, Plant;
+        /// Pressure force alone, unfiltered.
+        force_pressure_n: f64, "N", 3, Plant;
+        /// Controller output as a signed duty, positive extends.
+        drive: f64, "1", 5, Node;
+        /// Commanded on-time of valve fill A in this tick.
+        fill_a_us: u16, "us", 0, Node;
+        /// Commanded on-time of valve vent A in this tick.
+        vent_a_us: u16, "us", 0, Node;
+        /// Commanded on-time of valve fill B in this tick.
+        fill_b_us: u16, "us", 0, Node;
+        /// Commanded on-time of valve vent B in this tick.
+        vent_b_us: u16, "us", 0, Node;
+        /// Valves physically open at the sample time: bit 0 fill A, 1 vent A, 2 fill B, 3 vent B.
+        valves_open: u8, "bits", 0, Plant;
+        /// Commanded valve edges (on or off, all four valves) since the start.
+        valve_edges: u32, "1", 0, Node;
+        /// Limits that shaped the output in this tick, as in the protocol's table of limits.
+        limits: u8, "bits", 0, Node;
+        /// Node mode: 0 boot, 1 idle, 2 armed, 3 tracking, 4 hold, 5 exhaust, 6 fault.
+        mode: u8, "code", 0, Node;
+        /// Latched fault bits of the node, as in the protocol's fault table.
+        faults: u32, "bits", 0, Node;
+    }
+
+    /// One wheel drive.
+    WheelSample = "wheeleg.Wheel" {
+        /// Reference position of the profile, at the wheel rim.
+        reference_mm: f64, "mm", 3, Node;
+        /// Travel of the rim as the node counts it.
+        sensed_mm: f64, "mm", 3, Node;
+        /// True travel of the rim.
+        position_mm: f64, "mm", 3, Plant;
+        /// True rim speed.
+        velocity_mm_s: f64, "mm/s", 3, Plant;
+        /// Motor command as a signed duty.
+        drive: f64, "1", 5, Node;
+        /// Motor current.
+        current_a: f64, "A", 4, Plant;
+        /// Torque on the wheel.
+        torque_n_m: f64, "N m", 4, Plant;
+        /// Encoder position, 24-bit wrapping count.
+        count: i32, "count", 0, Node;
+        /// Limits that shaped the output in this sample, as for joints.
+        limits: u8, "bits", 0, Node;
+        /// Node mode, as for joints.
+        mode: u8, "code", 0, Node;
+        /// Latched fault bits of the node.
+        faults: u32, "bits", 0, Node;
+    }
+
+    /// Chassis motion, 1 kHz.
+    BodySample = "wheeleg.Body" {
+        /// Forward travel of the chassis.
+        travel_mm: f64, "mm", 4, Plant;
+        /// Forward speed of the chassis.
+        speed_mm_s: f64, "mm/s", 4, Plant;
+        /// Pitch about the wheel axle, nose up positive.
+        pitch_deg: f64, "deg", 5, Plant;
+        /// Pitch rate.
+        pitch_rate_deg_s: f64, "deg/s", 4, Plant;
+    }
+
+    /// One foot, 1 kHz.
+    FootSample = "wheeleg.Foot" {
+        /// Ground force normal to the sole.
+        normal_force_n: f64, "N", 3, Plant;
+        /// Ground force along the direction of travel.
+        friction_force_n: f64, "N", 3, Plant;
+        /// Height of the sole above the ground below it.
+        clearance_mm: f64, "mm", 4, Plant;
+        /// Optical switches as the node sees them: bit 0 front, 1 back, 2 left, 3 right.
+        switches: u8, "bits", 0, Node;
+    }
+
+    /// Bus traffic of one cycle.
+    BusSample = "wheeleg.Bus" {
+        /// Cycle number.
+        cycle: u32, "1", 0, Bus;
+        /// Bytes on the wire in this cycle, both directions.
+        bytes: u32, "byte", 0, Bus;
+        /// Part of the cycle in which the wire was busy.
+        load: f64, "1", 5, Bus;
+        /// Nodes that answered in their slot.
+        replies: u8, "1", 0, Bus;
+        /// Transmissions that overlapped another one since the start.
+        collisions: u32, "1", 0, Bus;
+        /// Frames that the master rejected since the start, all reasons.
+        errors: u32, "1", 0, Master;
+    }
+
+    /// Air supply.
+    SupplySample = "wheeleg.Supply" {
+        /// Absolute pressure in the supply manifold.
+        pressure_bar: f64, "bar", 5, Plant;
+        /// Air taken from the source since the start, at reference conditions (ANR).
+        air_used_dm3: f64, "dm3", 5, Plant;
+        /// Dump valve commanded open.
+        dump_commanded: bool, "flag", 0, Node;
+        /// Dump valve physically open.
+        dump_open: bool, "flag", 0, Plant;
+        /// Supply-pressure switch as the node sees it.
+        pressure_switch: bool, "flag", 0, Node;
+    }
+
+    /// Master state, once per bus cycle.
+    MasterSample = "wheeleg.Master" {
+        /// Alive: false after the scenario has killed it.
+        alive: bool, "flag", 0, Master;
+        /// Step of the gait, counted from 1; 0 before the first.
+        step: u32, "1", 0, Master;
+        /// Gait phase within the step: 0 none, 1 unload, 2 lift, 3 lower, 4 load, 5 advance.
+        phase: u8, "code", 0, Master;
+        /// Link-loss action sent for the stepping leg: 0 hold, 1 hold then exhaust.
+        link_loss_action: u8, "code", 0, Master;
+        /// Records dropped by full queues since the start.
+        fifo_drops: u32, "1", 0, Master;
+    }
+
+    /// Fingerprint of the whole simulated state, so that a difference below the resolution of the log still changes the hash.
+    StateSample = "wheeleg.State" {
+        /// BLAKE3 of the plant state, hexadecimal.
+        plant: String, "hex", 0, Host;
+    }
+
+    /// What a board has heard on the bus since it started, as it tells when the master asks. Counters stop at their largest value.
+    LinkSample = "wheeleg.Link" {
+        /// Sound frames.
+        frames: u32, "1", 0, Node;
+        /// Frames with too many bytes.
+        overflow: u16, "1", 0, Node;
+        /// Frames that end inside a COBS block.
+        truncated: u16, "1", 0, Node;
+        /// Frames shorter than header and CRC.
+        short: u16, "1", 0, Node;
+        /// Frames with a wrong CRC.
+        crc: u16, "1", 0, Node;
+        /// Frames of another protocol version.
+        version: u16, "1", 0, Node;
+        /// Frames with a wrong length field.
+        length: u16, "1", 0, Node;
+        /// Frames with an address that does not exist.
+        address: u16, "1", 0, Node;
+        /// Own frames that were replaced before they were sent.
+        unsent: u16, "1", 0, Node;
+        /// Board clock less master clock over the last second.
+        drift_ppm: i32, "ppm", 0, Node;
+        /// Sum of the parameters in force.
+        parameters: u32, "1", 0, Node;
+    }
+
+    /// Something that happened.
+    EventSample = "wheeleg.Event" {
+        /// Kind: info, scenario, command, mode, fault, contact.
+        kind: String, "text", 0, Host;
+        /// What happened, in words.
+        text: String, "text", 0, Host;
+    }
+}
+
+/// Kind of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EventKind {
+    /// For information.
+    Info,
+    /// The scenario acted (master killed, E-stop pressed).
+    Scenario,
+    /// A user command was given or answered.
+    Command,
+    /// A node or the master changed its mode.
+    Mode,
+    /// A fault was latched or cleared.
+    Fault,
+    /// A foot touched or left the ground.
+    Contact,
+    /// A record of a board's own log.
+    Log,
+}
+
+impl EventKind {
+    /// Lower-case name, as logged.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Scenario => "scenario",
+            Self::Command => "command",
+            Self::Mode => "mode",
+            Self::Fault => "fault",
+            Self::Contact => "contact",
+            Self::Log => "log",
+        }
+    }
+}
+
+const fn channel<S: Sample>(topic: &'static str, rate_hz: u32, doc: &'static str) -> ChannelDef {
+    ChannelDef {
+        topic,
+        schema: S::SCHEMA,
+        rate_hz,
+        doc,
+        fields: S::FIELDS,
+    }
+}
+
+/// Samples per second in the log for the fast channels. The recording in
+/// memory, which the analysis uses, has every 1 kHz sample.
+const FAST_HZ: u32 = 500;
+/// One sample per bus cycle.
+const CYCLE_HZ: u32 = 100;
+
+pub(super) static CHANNELS: [ChannelDef; 25] = [
+    channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
+    channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),
+    channel::<JointSample>("/joint/3", FAST_HZ, "Left vertical cylinder (b6)"),
+    channel::<JointSample>("/joint/4", FAST_HZ, "Right yaw cylinder (b2)"),
+    channel::<JointSample>("/joint/5", FAST_HZ, "Right horizontal cylinder (b5)"),
+    channel::<JointSample>("/joint/6", FAST_HZ, "Right vertical cylinder (b6)"),
+    channel::<WheelSample>("/wheel/7", CYCLE_HZ, "Left wheel"),
+    channel::<WheelSample>("/wheel/8", CYCLE_HZ, "Right wheel"),
+    channel::<BodySample>("/body", CYCLE_HZ, "Chassis"),
+    channel::<FootSample>("/foot/left", FAST_HZ, "Left foot"),
+    channel::<FootSample>("/foot/right", FAST_HZ, "Right foot"),
+    channel::<BusSample>("/bus", CYCLE_HZ, "Serial bus, per cycle"),
+    channel::<SupplySample>("/supply", CYCLE_HZ, "Air supply"),
+    channel::<MasterSample>("/master", CYCLE_HZ, "Master, layers 0 and 1"),
+    channel::<StateSample>("/state", 10, "Fingerprint of the simulated state"),
+    channel::<EventSample>("/events", 0, "Events"),
+    channel::<EventSample>("/run", 0, "Scenario, robot and seed of this log, at time 0"),
+    channel::<LinkSample>("/link/1", 0, "Bus as heard by joint 1"),
+    channel::<LinkSample>("/link/2", 0, "Bus as heard by joint 2"),
+    channel::<LinkSample>("/link/3", 0, "Bus as heard by joint 3"),
+    channel::<LinkSample>("/link/4", 0, "Bus as heard by joint 4"),
+    channel::<LinkSample>("/link/5", 0, "Bus as heard by joint 5"),
+    channel::<LinkSample>("/link/6", 0, "Bus as heard by joint 6"),
+    channel::<LinkSample>("/link/7", 0, "Bus as heard by wheel 7"),
+    channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::json_schema;
+
+    #[test]
+    fn payload_is_json_with_exactly_the_declared_fields_in_order() {
+        let sample = JointSample {
+            reference_mm: 90.0,
+            velocity_mm_s: -378.4,
+            fill_a_us: 350,
+            valves_open: 0b1001,
+            ..JointSample::default()
+        };
+        let mut out = Vec::new();
+        sample.encode_json(&mut out);
+        let value: serde_json::Value = serde_json::from_slice(&out).expect("valid JSON");
+        let object = value.as_object().expect("an object");
+        assert_eq!(object.len(), JointSample::FIELDS.len());
+        for field in JointSample::FIELDS {
+            assert!(object.contains_key(field.name), "{}", field.name);
+        }
+        assert_eq!(value["velocity_mm_s"], -378.4);
+        assert_eq!(value["fill_a_us"], 350);
+        assert_eq!(value["valves_open"], 9);
+        let text = String::from_utf8(out).expect("UTF-8");
+        assert!(
+            text.starts_with("{\"commanded_mm\":0,\"reference_mm\":90,"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn every_field_has_a_unit_and_a_description_and_a_matching_suffix() {
+        for channel in &CHANNELS {
+            assert!(!channel.doc.is_empty());
+            for f in channel.fields {
+                let id = format!("{} {}", channel.topic, f.name);
+                assert!(!f.unit.is_empty(), "{id}");
+                assert!(f.doc.len() > 5, "{id}: {:?}", f.doc);
+                let suffix = match f.unit {
+                    "mm" => "_mm",
+                    "mm/s" => "_mm_s",
+                    "m/s2" => "_m_s2",
+                    "bar" => "_bar",
+                    "N" => "_n",
+                    "N m" => "_n_m",
+                    "A" => "_a",
+                    "us" => "_us",
+                    "deg" => "_deg",
+                    "deg/s" => "_deg_s",
+                    "dm3" => "_dm3",
+                    _ => "",
+                };
+                assert!(f.name.ends_with(suffix), "{id} is in {}", f.unit);
+            }
+        }
+    }
+
+    #[test]
+    fn topics_are_unique_and_rates_divide_the_sample_rate() {
+        for (i, a) in CHANNELS.iter().enumerate() {
+            assert!(CHANNELS[..i].iter().all(|b| b.topic != a.topic));
+            assert!(a.rate_hz == 0 || 1000 % a.rate_hz == 0, "{}", a.topic);
+        }
+    }
+
+    #[test]
+    fn schema_names_every_field_with_its_unit() {
+        let schema: serde_json::Value =
+            serde_json::from_str(&json_schema("wheeleg.Foot", FootSample::FIELDS)).expect("JSON");
+        assert_eq!(schema["properties"]["clearance_mm"]["unit"], "mm");
+        assert_eq!(schema["properties"]["clearance_mm"]["resolution"], 1e-4);
+        assert_eq!(schema["required"].as_array().map(Vec::len), Some(4));
+    }
+}

@@ -1,0 +1,205 @@
+//! The log: readable by others, complete up to a cut, and hashed reproducibly.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use mcap::read::Options;
+use wheeleg_telemetry::{
+    BodySample, BusSample, EventKind, FootSample, JointSample, LinkSample, MasterSample, Recorder,
+    Recording, SupplySample, WheelSample, channels, write_csv,
+};
+
+/// Three seconds of made-up but lively samples on every channel.
+fn fill(recorder: &mut Recorder, amplitude: f64) {
+    recorder.provenance("seed", "1");
+    for ms in 0..3000_u64 {
+        let t_ns = ms * 1_000_000;
+        let x = amplitude * (ms as f64 * 0.01).sin();
+        for joint in 0..6 {
+            let sample = JointSample {
+                position_mm: 90.0 + x + joint as f64,
+                force_net_raw_n: x,
+                ..JointSample::default()
+            };
+            recorder.joint(t_ns, joint, sample);
+        }
+        for side in 0..2 {
+            recorder.wheel(t_ns, side, WheelSample::default());
+            let foot = FootSample {
+                normal_force_n: x.abs(),
+                ..FootSample::default()
+            };
+            recorder.foot(t_ns, side, foot);
+        }
+        recorder.body(t_ns, BodySample::default());
+        recorder.supply(t_ns, SupplySample::default());
+        if ms % 10 == 0 {
+            recorder.bus(t_ns, BusSample::default());
+            recorder.master(t_ns, MasterSample::default());
+        }
+        if recorder.wants_state(t_ns) {
+            recorder.state(t_ns, format!("{ms:064x}"));
+        }
+        if ms == 1234 {
+            recorder.event(t_ns, EventKind::Info, "a, \"quoted\" text");
+            for node in 0..8 {
+                recorder.link(t_ns, node, LinkSample::default());
+            }
+        }
+    }
+}
+
+fn log_to(path: &Path, amplitude: f64) -> Recording {
+    let mut recorder = Recorder::create(path).expect("writable");
+    fill(&mut recorder, amplitude);
+    recorder.finish().expect("no I/O error")
+}
+
+#[test]
+fn hash_depends_on_the_samples_and_on_nothing_else() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let a = log_to(&folder.path().join("a.mcap"), 10.0);
+    let b = log_to(&folder.path().join("b.mcap"), 10.0);
+    let mut recorder = Recorder::in_memory();
+    fill(&mut recorder, 10.0);
+    let memory = recorder.finish().expect("no file");
+    assert_eq!(a.hash, b.hash);
+    assert_eq!(a.hash, memory.hash);
+    assert_eq!(a.hash.len(), 64);
+    let other = log_to(&folder.path().join("c.mcap"), 10.000_1);
+    assert_ne!(a.hash, other.hash);
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
+    assert_eq!(bytes("a.mcap"), bytes("b.mcap"));
+}
+
+#[test]
+fn every_channel_has_name_unit_and_schema_and_every_message_fits_it() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("log.mcap");
+    let recording = log_to(&path, 10.0);
+    let bytes = std::fs::read(&path).expect("written");
+    let mut topics = BTreeSet::new();
+    let mut messages = 0;
+    for message in mcap::MessageStream::new(&bytes).expect("an MCAP file") {
+        let message = message.expect("a readable message");
+        messages += 1;
+        let channel = &message.channel;
+        assert_eq!(channel.message_encoding, "json");
+        let schema = channel.schema.as_ref().expect("a schema");
+        assert_eq!(schema.encoding, "jsonschema");
+        let value: serde_json::Value = serde_json::from_slice(&message.data).expect("JSON");
+        if topics.insert(channel.topic.clone()) {
+            let schema: serde_json::Value = serde_json::from_slice(&schema.data).expect("JSON");
+            let properties = schema["properties"].as_object().expect("properties");
+            assert_eq!(
+                value.as_object().map(serde_json::Map::len),
+                Some(properties.len())
+            );
+            for (name, property) in properties {
+                assert!(value.get(name).is_some(), "{name}");
+                let unit = property["unit"].as_str().expect("a unit");
+                assert_eq!(channel.metadata[&format!("unit.{name}")], unit);
+                assert!(channel.metadata["unit"].contains(name.as_str()));
+            }
+        }
+    }
+    let declared: BTreeSet<String> = channels().iter().map(|c| c.topic.to_owned()).collect();
+    assert_eq!(topics, declared);
+    assert_eq!(messages, recording.messages);
+}
+
+#[test]
+fn log_is_thinned_to_the_declared_rates_and_memory_is_not() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("log.mcap");
+    let recording = log_to(&path, 10.0);
+    assert_eq!(recording.joints[0].len(), 3000);
+    let bytes = std::fs::read(&path).expect("written");
+    let count = |topic: &str| {
+        mcap::MessageStream::new(&bytes)
+            .expect("an MCAP file")
+            .filter(|m| m.as_ref().is_ok_and(|m| m.channel.topic == topic))
+            .count()
+    };
+    for (topic, expected) in [
+        ("/joint/1", 1500),
+        ("/wheel/7", 300),
+        ("/state", 30),
+        ("/events", 1),
+    ] {
+        assert_eq!(count(topic), expected, "{topic}");
+    }
+}
+
+/// A killed process leaves a file without its end; at whatever byte it is cut,
+/// everything up to the last whole chunk is there.
+#[test]
+fn cut_log_is_readable_up_to_the_last_chunk() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("log.mcap");
+    log_to(&path, 10.0);
+    let bytes = std::fs::read(&path).expect("written");
+    let last_time = |bytes: &[u8]| {
+        mcap::MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
+            .expect("an MCAP file")
+            .map_while(Result::ok)
+            .map(|m| m.log_time)
+            .last()
+    };
+    let whole = last_time(&bytes).expect("messages");
+    assert_eq!(whole, 2_998_000_000);
+    let mut before = 0;
+    for tenth in 3..10 {
+        let cut = bytes.len() * tenth / 10 + 17 * tenth;
+        let t = last_time(&bytes[..cut]).unwrap_or(0);
+        assert!(t >= before && t < whole, "{tenth}: {t}");
+        // Little is lost: a chunk, about 0.25 s.
+        let expected = whole as f64 * cut as f64 / bytes.len() as f64;
+        assert!(t as f64 > expected - 0.45e9, "{tenth}: {t} of {expected}");
+        before = t;
+    }
+}
+
+/// What is on disk while the process still runs, without any clean-up.
+#[test]
+fn log_is_on_disk_before_the_recorder_is_closed() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("log.mcap");
+    let mut recorder = Recorder::create(&path).expect("writable");
+    fill(&mut recorder, 10.0);
+    let bytes = std::fs::read(&path).expect("written");
+    std::mem::forget(recorder);
+    let last = mcap::MessageStream::new_with_options(&bytes, Options::IgnoreEndMagic.into())
+        .expect("an MCAP file")
+        .map_while(Result::ok)
+        .map(|m| m.log_time)
+        .last();
+    assert!(last.is_some_and(|t| t >= 2_700_000_000), "{last:?}");
+}
+
+#[test]
+fn csv_has_units_in_its_header_and_the_recorded_values() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let mut recorder = Recorder::in_memory();
+    fill(&mut recorder, 10.0);
+    let recording = recorder.finish().expect("no file");
+    write_csv(folder.path(), &recording, 100).expect("writable");
+    let mut table = csv::Reader::from_path(folder.path().join("joint-3.csv")).expect("written");
+    let header = table.headers().expect("a header").clone();
+    assert_eq!(&header[0], "time [s]");
+    let position = header
+        .iter()
+        .position(|h| h == "position_mm [mm]")
+        .expect("a column with its unit");
+    let rows: Vec<csv::StringRecord> = table.records().map(|r| r.expect("a row")).collect();
+    assert_eq!(rows.len(), 300);
+    assert_eq!(&rows[100][0], "1");
+    let value: f64 = rows[100][position].parse().expect("a number");
+    let truth = recording.joints[2][1000].v.position_mm;
+    assert!((value - truth).abs() <= 0.51e-4);
+    let events = std::fs::read_to_string(folder.path().join("events.csv")).expect("written");
+    assert!(
+        events.contains("1.234,info,\"a, \"\"quoted\"\" text\""),
+        "{events}"
+    );
+}

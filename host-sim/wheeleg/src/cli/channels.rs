@@ -1,0 +1,92 @@
+//! `wheeleg channels`: the telemetry registry, as text or JSON.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::print;
+use wheeleg_studies::StudyError;
+use wheeleg_telemetry::channels;
+
+/// Arguments of `wheeleg channels`.
+#[derive(Debug, Args)]
+pub(super) struct ChannelsArgs {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the telemetry channels.
+pub(super) fn command(args: &ChannelsArgs) -> Result<ExitCode, StudyError> {
+    print(&text(args.json))
+}
+
+/// The listing.
+pub(super) fn text(json: bool) -> String {
+    if json {
+        let list: Vec<serde_json::Value> = channels()
+            .iter()
+            .map(|c| {
+                let fields: Vec<serde_json::Value> = c
+                    .fields
+                    .iter()
+                    .map(|f| {
+                        serde_json::json!({
+                            "name": f.name,
+                            "unit": f.unit,
+                            "type": f.ty.json(),
+                            "layer": f.layer.name(),
+                            "description": f.doc,
+                        })
+                    })
+                    .collect();
+                serde_json::json!({
+                    "topic": c.topic,
+                    "schema": c.schema,
+                    "rate_hz": c.rate_hz,
+                    "description": c.doc,
+                    "fields": fields,
+                })
+            })
+            .collect();
+        return format!("{:#}\n", serde_json::json!({ "channels": list }));
+    }
+    let mut out = String::new();
+    let mut described: Vec<&str> = Vec::new();
+    for c in channels() {
+        let rate = match c.rate_hz {
+            0 => "on change".to_owned(),
+            r => format!("{r} Hz"),
+        };
+        let _ = writeln!(out, "{:13} {rate:10} {:16} {}", c.topic, c.schema, c.doc);
+        if described.contains(&c.schema) {
+            continue;
+        }
+        described.push(c.schema);
+        for f in c.fields {
+            let _ = writeln!(
+                out,
+                "    {:22} {:6} {:8} {:7} {}",
+                f.name,
+                f.unit,
+                f.ty.json(),
+                f.layer.name(),
+                f.doc
+            );
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn listing_names_every_field_once() {
+        let text = text(false);
+        assert_eq!(text.matches("force_net_raw_n").count(), 1);
+        assert!(text.contains("/joint/6") && text.contains("500 Hz"));
+    }
+}

@@ -1,0 +1,48 @@
+//! `wheeleg commission`: the unique ids of a robot's boards, for its file.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::print;
+use wheeleg_config::builtin;
+use wheeleg_config::builtin::DEFAULT_SCENARIO;
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_protocol::NODE_NAMES;
+use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes};
+use wheeleg_sim::{self as sil, hex};
+use wheeleg_studies::StudyError;
+
+/// Arguments of `wheeleg commission`.
+#[derive(Debug, Args)]
+pub(super) struct CommissionArgs {
+    /// Robot, built in or path of a TOML file.
+    #[arg(default_value = "wheeleg-2003")]
+    robot: String,
+    /// Injects a fault, as for `wheeleg run`; only those that a board is built with.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<FaultSpec>,
+    /// Where the nodes run, as for `wheeleg run`.
+    #[arg(long, value_name = "KIND", default_value = "sil")]
+    nodes: NodeKind,
+    /// Where one node runs, instead, as for `wheeleg run`.
+    #[arg(long = "node", value_name = "NODE=KIND")]
+    node: Vec<NodeChoice>,
+}
+
+/// Powers the robot up and prints the section for its file.
+pub(super) fn command(args: &CommissionArgs) -> Result<ExitCode, StudyError> {
+    let robot = builtin::robot(&args.robot)?;
+    let mut scenario = builtin::scenario(DEFAULT_SCENARIO)?;
+    scenario.faults.clone_from(&args.faults);
+    let nodes = Nodes::new(&args.nodes, &args.node)?;
+    let ids = sil::commission(&scenario, &robot, scenario.seed, &nodes)?;
+    let mut out = String::from(
+        "# Boards of this robot: another one at one of these addresses bars arming.\n[commissioned]\n",
+    );
+    for (name, id) in NODE_NAMES.iter().zip(ids) {
+        let _ = writeln!(out, "{name} = \"{}\"", hex(id));
+    }
+    print(&out)
+}

@@ -1,0 +1,188 @@
+//! `wheeleg compare`: every controller on the same plants, moves and inputs.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::{print, whole};
+use wheeleg_config::axis::AXES;
+use wheeleg_studies::StudyError;
+use wheeleg_studies::bench::{Grain, Kind};
+use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
+
+/// So many false alarms are named; all of them are in the report.
+const ALARMS_TOLD: usize = 5;
+
+/// Arguments of `wheeleg compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    /// Built-in axis or path of an axis file; may be given several times
+    /// [default: all built-in axes].
+    #[arg(long = "axis", value_name = "AXIS")]
+    axes: Vec<String>,
+    /// Controller; may be given several times [default: all].
+    #[arg(long = "controller", value_name = "NAME", value_parser = controller)]
+    controllers: Vec<Kind>,
+    /// Move; may be given several times [default: all as on the sheet, step-100 and
+    /// s-curve with factors changed].
+    #[arg(long = "move", value_name = "MOVE", value_parser = motion)]
+    moves: Vec<Move>,
+    /// Number of seeds for the cases as on the sheet.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0_u64, u64::MAX - 1000))]
+    seed: u64,
+    /// Random combinations of factors per axis [default: 200; 20 with --quick].
+    #[arg(long, value_name = "N", value_parser = whole(0_u64, 10_000))]
+    combinations: Option<u64>,
+    /// One seed, fewer factors and combinations, a coarser bound.
+    #[arg(long)]
+    quick: bool,
+    /// Threads [default: as many as the machine has].
+    #[arg(long, value_name = "N", value_parser = whole(1_u16, 1024))]
+    threads: Option<u16>,
+    /// Folder for report, figures and tables. Results of an earlier run in it move to
+    /// its folder `previous`.
+    #[arg(long, value_name = "DIR", default_value = "runs/compare")]
+    out: PathBuf,
+    /// Play one case alone, by its id in the tables:
+    /// AXIS/CONTROLLER/MOVE/VARIATION/SEED.
+    #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "quick"])]
+    case: Option<CaseId>,
+    /// Print all cases as JSON on stdout, an array of one object each.
+    #[arg(long)]
+    json: bool,
+}
+
+fn controller(name: &str) -> Result<Kind, String> {
+    Kind::of_name(name).ok_or_else(|| format!("known: {}", Kind::ALL.map(Kind::name).join(", ")))
+}
+
+fn motion(name: &str) -> Result<Move, String> {
+    Move::of_name(name).ok_or_else(|| format!("known: {}", Move::ALL.map(Move::name).join(", ")))
+}
+
+/// What was given, each once; all if nothing was.
+fn chosen<T: Clone + PartialEq>(given: &[T], all: &[T]) -> Vec<T> {
+    let mut list = Vec::new();
+    for item in if given.is_empty() { all } else { given } {
+        if !list.contains(item) {
+            list.push(item.clone());
+        }
+    }
+    list
+}
+
+/// Columns on the terminal: the heading, the cell of [`Comparison::table`], and whether
+/// it is shown if no moves were chosen.
+const COLUMNS: [(&str, usize, bool); 12] = [
+    ("error mm", 0, true),
+    ("20 mm", 1, false),
+    ("overshoot", 2, true),
+    ("settled s", 4, true),
+    ("worst s", 5, true),
+    ("ratio", 6, true),
+    ("S-curve", 7, true),
+    ("sinusoid", 9, false),
+    ("rest sw.", 11, true),
+    ("recovery", 13, true),
+    ("helped", 14, false),
+    ("cycles", 15, false),
+];
+
+/// The table of an axis: of the moves that were chosen, columns with figures.
+fn axis_table(comparison: &Comparison, axis: &str) -> String {
+    let table = comparison.table(axis);
+    let is_played = |index: usize| table.iter().any(|(_, cells)| cells[index] != "–");
+    let by_default = comparison.options.moves.is_none();
+    let columns: Vec<(&str, usize)> = COLUMNS
+        .into_iter()
+        .filter(|&(_, index, default)| {
+            if by_default {
+                default
+            } else {
+                is_played(index)
+            }
+        })
+        .map(|(heading, index, _)| (heading, index))
+        .collect();
+    let line = |name: &str, cells: &mut dyn Iterator<Item = &str>| {
+        let cells: String = cells.map(|cell| format!("{cell:>10}")).collect();
+        format!("  {name:<12}{cells}\n")
+    };
+    let mut text = format!("{axis}\n");
+    text += &line("", &mut columns.iter().map(|(heading, _)| *heading));
+    for (kind, cells) in &table {
+        text += &line(
+            kind.name(),
+            &mut columns.iter().map(|&(_, index)| &*cells[index]),
+        );
+    }
+    text
+}
+
+/// Plays, writes and prints.
+pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
+    let built_in: Vec<String> = AXES.iter().map(|(name, ..)| (*name).to_owned()).collect();
+    let axes = chosen(&args.axes, &built_in);
+    if let Some(id) = &args.case {
+        return case(id, &axes, args);
+    }
+    let options = Options {
+        axes,
+        kinds: chosen(&args.controllers, &Kind::ALL),
+        moves: (!args.moves.is_empty()).then(|| chosen(&args.moves, &[])),
+        seeds: if args.quick { 1 } else { args.seeds },
+        seed: args.seed,
+        combinations: args
+            .combinations
+            .unwrap_or(if args.quick { 20 } else { 200 }),
+        quick: args.quick,
+        threads: args.threads.map_or(0, usize::from),
+    };
+    let finished = Comparison::run(&options)?.write(&args.out)?;
+    let comparison = &finished.comparison;
+    if args.json {
+        return print(&comparison.to_json());
+    }
+    let mut out = String::new();
+    for axis in &comparison.axes {
+        out.push_str(&axis_table(comparison, &axis.config.name));
+        if let Some(advice) = Grain::of(&axis.config.axis).advice() {
+            let _ = writeln!(out, "  {advice}");
+        }
+    }
+    let alarms = comparison.false_alarms();
+    let mut told = String::new();
+    for row in alarms.clone().take(ALARMS_TOLD) {
+        let _ = writeln!(told, "  {}: {}", row.case.id, row.figures.faults);
+    }
+    let alarms = alarms.count();
+    if alarms > ALARMS_TOLD {
+        let _ = writeln!(told, "  and {} more, in the report", alarms - ALARMS_TOLD);
+    }
+    let infeasible = comparison.infeasible().len();
+    let _ = writeln!(
+        out,
+        "cases       {}, false alarms {alarms}, infeasible corners {infeasible}\n{told}report      {}",
+        comparison.rows.len(),
+        finished.report.display()
+    );
+    print(&out)
+}
+
+fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, StudyError> {
+    let single = compare::play(id, axes)?;
+    let figures = single.write(&args.out)?;
+    let row = serde_json::to_string_pretty(&single.row).unwrap_or_default();
+    let mut out = format!("{row}\n");
+    if !args.json {
+        for figure in figures {
+            let _ = writeln!(out, "{}", figure.display());
+        }
+    }
+    print(&out)
+}

@@ -1,0 +1,242 @@
+//! `wheeleg faults`: what can go wrong, and what the robot does about it.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+
+use super::{TARGETS_MISSED, print};
+use wheeleg_config::faults::{KINDS, KindInfo};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::matrix::{self, Verdict};
+
+/// Arguments of `wheeleg faults`.
+#[derive(Debug, Args)]
+pub(super) struct FaultsArgs {
+    #[command(subcommand)]
+    command: FaultsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum FaultsCommand {
+    /// List the faults that a run can be given with --fault.
+    List {
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the rows of the fault matrix: what goes wrong, when, what must come of it.
+    Rows,
+    /// Run rows of the fault matrix and hold them against what must come of them; writes
+    /// report and summary. Exit code 1 if a row does not come out as it must.
+    Run(RunArgs),
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// All rows; those that are not implemented are listed and not counted.
+    #[arg(long)]
+    all: bool,
+    /// One row, as `wheeleg faults rows` names it; may be given several times.
+    #[arg(long, value_name = "ID", conflicts_with = "all")]
+    row: Vec<String>,
+    /// Seed of all noise, and of the instants.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results. Results of an earlier run in it move to its folder `previous`.
+    #[arg(long, value_name = "DIR", default_value = "runs/faults")]
+    out: PathBuf,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Lists faults and rows, or runs rows.
+pub(super) fn command(args: &FaultsArgs) -> Result<ExitCode, StudyError> {
+    match &args.command {
+        FaultsCommand::List { json } => print(&listing(*json)),
+        FaultsCommand::Rows => print(&rows()),
+        FaultsCommand::Run(args) => run(args),
+    }
+}
+
+/// Width of a column that holds the ids of rows.
+fn id_width() -> usize {
+    let widths = matrix::ROWS.iter().map(|row| row.id.len());
+    widths.max().unwrap_or(0)
+}
+
+fn rows() -> String {
+    let mut out = String::from("Rows of the fault matrix (wheeleg faults run --row ID):\n\n");
+    let width = id_width();
+    for row in matrix::ROWS {
+        let mut strikes: Vec<&str> = row.strikes.iter().map(|s| s.what).collect();
+        if row.estop {
+            strikes.push("E-stop");
+        }
+        let what = match row.not_implemented() {
+            Some(reason) => format!("not implemented: {reason}"),
+            None => format!("{}; {}", strikes.join(", "), row.phase.words()),
+        };
+        let _ = writeln!(out, "  {:width$}  {what}", row.id);
+    }
+    out
+}
+
+fn run(args: &RunArgs) -> Result<ExitCode, StudyError> {
+    if !args.all && args.row.is_empty() {
+        return Err(StudyError::refused(
+            "`wheeleg faults run` is not told which rows: give --row ID, or --all",
+            "`wheeleg faults rows` lists the rows; --row may be given several times",
+        ));
+    }
+    let rows = matrix::select(&args.row)?;
+    let finished = matrix::write(&rows, args.seed, &args.out)?;
+    if args.json {
+        print(&format!("{:#}\n", finished.summary))?;
+    } else {
+        print(&verdicts(&finished))?;
+    }
+    Ok(if finished.passed() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(TARGETS_MISSED)
+    })
+}
+
+fn verdicts(finished: &matrix::Finished) -> String {
+    let width = id_width();
+    let mut out = format!(
+        "{:15}  {:width$} {:>9} {:>9} {:>9} {:>9}  latched\n",
+        "verdict", "row", "detected", "commanded", "telemetry", "physical"
+    );
+    let ms = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} ms"));
+    for o in &finished.outcomes {
+        let m = &o.measured;
+        let _ = write!(out, "{:15}  {:width$}", o.verdict.words(), o.row.id);
+        if o.verdict != Verdict::NotImplemented {
+            let times = [m.detected_ms, m.commanded_ms, m.sensed_ms, m.physical_ms].map(ms);
+            let _ = write!(
+                out,
+                " {:>9} {:>9} {:>9} {:>9}",
+                times[0], times[1], times[2], times[3]
+            );
+            let _ = write!(out, "  {}", if m.latched { "yes" } else { "no" });
+        }
+        out.push('\n');
+        for failure in &o.failures {
+            let _ = writeln!(out, "{:17}{failure}", "");
+        }
+    }
+    let count = |verdict| matrix::count(&finished.outcomes, verdict);
+    let _ = writeln!(
+        out,
+        "\n{} rows as they must be, {} not, {} not implemented\nreport  {}",
+        count(Verdict::Pass),
+        count(Verdict::Fail),
+        count(Verdict::NotImplemented),
+        finished.report.display()
+    );
+    out
+}
+
+fn listing(json: bool) -> String {
+    if json {
+        let list: Vec<serde_json::Value> = KINDS.iter().map(row_json).collect();
+        let missing: Vec<serde_json::Value> = matrix::not_implemented()
+            .map(|(name, reason)| serde_json::json!({ "name": name, "reason": reason }))
+            .collect();
+        let lists = serde_json::json!({ "faults": list, "not_implemented": missing });
+        return format!("{lists:#}\n");
+    }
+    let mut out = String::from(
+        "Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]);\nthose that are over by themselves take no second TIME:\n",
+    );
+    for row in KINDS {
+        let _ = writeln!(out, "\n  {}", row.name);
+        let _ = writeln!(out, "      {}", row.doc);
+        let _ = writeln!(out, "      strikes {}", row.place.expected());
+        if let Some(v) = row.value {
+            let _ = writeln!(
+                out,
+                "      value {}, default {}: {}",
+                v.range(),
+                v.default,
+                v.doc
+            );
+        }
+    }
+    out.push_str("\nNot implemented, refused by name:\n\n");
+    let width = id_width();
+    for (name, reason) in matrix::not_implemented() {
+        let _ = writeln!(out, "  {name:width$}  {reason}");
+    }
+    out
+}
+
+fn row_json(row: &KindInfo) -> serde_json::Value {
+    serde_json::json!({
+        "name": row.name,
+        "description": row.doc,
+        "strikes": row.place.expected(),
+        "value": row.value.map(|v| serde_json::json!({
+            "unit": v.unit, "min": v.min, "max": v.max, "gap": v.gap, "default": v.default, "description": v.doc,
+        })),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_is_listed_with_its_state() {
+        let text = listing(false);
+        for row in KINDS {
+            assert!(
+                text.contains(&format!("\n  {}\n", row.name)),
+                "{}",
+                row.name
+            );
+        }
+        let json: serde_json::Value = serde_json::from_str(&listing(true)).expect("JSON");
+        assert_eq!(json["faults"].as_array().map(Vec::len), Some(KINDS.len()));
+    }
+
+    #[test]
+    fn rows_stand_in_two_columns_and_each_says_what_goes_wrong() {
+        let text = rows();
+        let lines = text.lines().skip(2);
+        assert_eq!(lines.clone().count(), matrix::ROWS.len());
+        for (line, row) in lines.zip(matrix::ROWS) {
+            let (id, what) = line.split_at(2 + id_width() + 2);
+            assert!(id.trim() == row.id && id.ends_with("  "), "{line}");
+            assert!(
+                what.starts_with(|c: char| c.is_ascii_alphabetic()),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_not_implemented_is_listed_apart() {
+        let text = listing(false);
+        let (faults, missing) = text.split_once("\nNot implemented").expect("a section");
+        let json: serde_json::Value = serde_json::from_str(&listing(true)).expect("JSON");
+        let list = json["not_implemented"].as_array().expect("a list");
+        let rows = matrix::ROWS
+            .iter()
+            .filter(|r| r.not_implemented().is_some());
+        assert!(list.len() == 9 && rows.clone().count() == 9, "{list:?}");
+        for (row, listed) in rows.zip(list) {
+            assert_eq!(listed["name"], row.id);
+            let reason = row.not_implemented().unwrap_or("");
+            let line = format!("  {:1$}  {reason}\n", row.id, id_width());
+            assert!(
+                missing.contains(&line) && !faults.contains(row.id),
+                "{line}"
+            );
+        }
+    }
+}

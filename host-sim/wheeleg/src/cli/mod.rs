@@ -1,0 +1,141 @@
+//! The command line: one file per command.
+
+mod channels;
+mod check;
+mod commission;
+mod compare;
+mod delay;
+mod export;
+mod faults;
+mod figures;
+mod interface;
+mod list;
+mod params;
+mod plant;
+mod run;
+mod tune;
+mod usage;
+
+use std::fmt::Display;
+use std::io::Write as _;
+use std::process::ExitCode;
+use std::str::FromStr;
+
+use clap::{Parser, Subcommand};
+
+use wheeleg_config::builtin::DEFAULT_SCENARIO;
+use wheeleg_studies::StudyError;
+
+/// Exit code when `--strict` is given and a required target is not met.
+const TARGETS_MISSED: u8 = 1;
+/// Exit code of any error (wrong input, unwritable output, failed simulation).
+const FAILED: u8 = 2;
+/// Exit code after Ctrl-C, as shells expect it.
+const INTERRUPTED: u8 = 130;
+
+/// Simulator and control stack of the hybrid robot Wheeleg.
+///
+/// Without a command, runs the three-step test of the 2003 paper, with the options of `run`.
+#[derive(Debug, Parser)]
+#[command(name = "wheeleg", version, about, after_help = EXIT_CODES, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    options: run::RunOptions,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
+1 a required target is not met (--strict only), or a checked quantity beyond tolerance; 2 error; 130 stopped with Ctrl-C.";
+
+/// Parses a whole number from `low` to `high`, and says so of any other.
+fn whole<N>(low: N, high: N) -> impl Fn(&str) -> Result<N, String> + Clone + Send + Sync
+where
+    N: FromStr + PartialOrd + Display + Copy + Send + Sync,
+{
+    move |text| {
+        let number = text.parse().ok().filter(|n| (low..=high).contains(n));
+        number.ok_or_else(|| format!("allowed are whole numbers from {low} to {high}"))
+    }
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a scenario; writes log, tables, figures, summary and report.
+    Run(run::RunArgs),
+    /// List the built-in scenarios and robots.
+    List(list::ListArgs),
+    /// Print every parameter of a robot: value, unit, range, source, meaning.
+    Params(params::ParamsArgs),
+    /// Faults that can be injected, what they strike and which are not implemented yet.
+    Faults(faults::FaultsArgs),
+    /// Print the telemetry channels: signals, units, rates, meaning.
+    Channels(channels::ChannelsArgs),
+    /// Write the robot for other programs.
+    Export(export::ExportArgs),
+    /// Print the unique ids of a robot's boards, as a section for its file.
+    Commission(commission::CommissionArgs),
+    /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
+    Figures(figures::FiguresArgs),
+    /// Measure and explain the start delay of a pneumatic joint; writes a report.
+    Delay(delay::DelayArgs),
+    /// Compare controllers on one or more axes; writes report, figures and tables.
+    Compare(compare::CompareArgs),
+    /// Find gains and delays of one axis; writes a report and parameters for a board.
+    Tune(tune::TuneArgs),
+    /// Check the pneumatic plant of an axis, or export it for another integrator.
+    Plant(plant::PlantArgs),
+    /// Check the model against numbers that others computed.
+    Check(check::CheckArgs),
+    /// Tell in what the bus interface of this program differs from another.
+    Interface(interface::InterfaceArgs),
+}
+
+/// Parses the command line, does what it says, and returns the exit code.
+#[must_use]
+pub(crate) fn main() -> ExitCode {
+    let cli = usage::parse::<Cli>(std::env::args_os());
+    let cli = cli.unwrap_or_else(|wrong| wrong.exit());
+    let result = match cli.command {
+        None => run::scenario(DEFAULT_SCENARIO, &cli.options),
+        Some(Command::Run(args)) => run::command(&args),
+        Some(Command::Faults(args)) => faults::command(&args),
+        Some(Command::List(args)) => list::command(&args),
+        Some(Command::Params(args)) => params::command(&args),
+        Some(Command::Channels(args)) => channels::command(&args),
+        Some(Command::Export(args)) => export::command(&args),
+        Some(Command::Commission(args)) => commission::command(&args),
+        Some(Command::Figures(args)) => figures::command(&args),
+        Some(Command::Delay(args)) => delay::command(&args),
+        Some(Command::Compare(args)) => compare::command(&args),
+        Some(Command::Tune(args)) => tune::command(&args),
+        Some(Command::Plant(args)) => plant::command(&args),
+        Some(Command::Check(args)) => check::command(&args),
+        Some(Command::Interface(args)) => interface::command(&args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("{:?}", miette::Report::new(error));
+        ExitCode::from(FAILED)
+    })
+}
+
+/// Writes to stdout. A reader that has gone away (`| head`) is no error.
+fn print(text: &str) -> Result<ExitCode, StudyError> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(StudyError::output("write to", "standard output", e))
+        }
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_line_is_consistent() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,284 @@
+//! `wheeleg run`: one scenario on one robot.
+
+use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::{INTERRUPTED, TARGETS_MISSED, print};
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
+use wheeleg_report::output;
+use wheeleg_studies::StudyError;
+use wheeleg_studies::analysis::Target;
+use wheeleg_studies::run::{self, Finished, Options};
+use wheeleg_telemetry as telemetry;
+
+/// Arguments of `wheeleg run`.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    /// Built-in scenario or path of a TOML file.
+    #[arg(default_value = wheeleg_config::builtin::DEFAULT_SCENARIO)]
+    scenario: String,
+    #[command(flatten)]
+    options: RunOptions,
+}
+
+/// Options of `wheeleg run`, and of `wheeleg` without a command.
+#[derive(Debug, Args)]
+pub(super) struct RunOptions {
+    /// Folder for the results [default: runs/<scenario>-seed<N>]. Results of an
+    /// earlier run in it move to its folder `previous`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of all noise, instead of the scenario's.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_seed)]
+    seed: Option<u64>,
+    /// Robot (built in, or path of a TOML file), instead of the scenario's.
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    /// Injects a fault, for example `master-silent@3.2s`; may be given several
+    /// times. `wheeleg faults list` prints them all.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<FaultSpec>,
+    /// Where the nodes run: `sil` in this program, `pil` as the firmware images on
+    /// emulated boards, `qemu` as the same applications on QEMU.
+    #[arg(long, value_name = "KIND", default_value = "sil")]
+    nodes: NodeKind,
+    /// Where one node runs, instead: `joint3=pil`, `wheel7=qemu`,
+    /// `joint1=hil:/dev/ttyACM0`; may be given several times.
+    #[arg(long = "node", value_name = "NODE=KIND")]
+    node: Vec<NodeChoice>,
+    /// Run the scenario once more with all nodes in this program; exit with code
+    /// 2 unless both logs are the same to the bit. Images of other firmware sources
+    /// than this program's are refused, as are faults of the line.
+    #[arg(long)]
+    compare_sil: bool,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+    /// Exit with code 1 if a required target is not met, not only if boards differ.
+    #[arg(long)]
+    strict: bool,
+}
+
+fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("a seed is a whole number from 0 to {}", u64::MAX))
+}
+
+/// Runs the scenario and prints its verdicts.
+pub(super) fn command(args: &RunArgs) -> Result<ExitCode, StudyError> {
+    scenario(&args.scenario, &args.options)
+}
+
+/// Runs a scenario, by name or path, and prints its verdicts.
+pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, StudyError> {
+    let options = Options {
+        scenario: scenario.to_owned(),
+        robot: args.robot.clone(),
+        seed: args.seed,
+        out: args.out.clone(),
+        faults: args.faults.clone(),
+        nodes: Nodes::new(&args.nodes, &args.node)?,
+        compared: args.compare_sil,
+    };
+    if args.compare_sil {
+        pil::ensure_same_sources(&options.nodes)?;
+    }
+    let finished = run::run(&options)?;
+    // A part of a run equals no whole one.
+    if args.compare_sil && finished.summary.complete {
+        compare_sil(&options, &finished)?;
+    }
+    if args.json {
+        print(&finished.summary.to_json())?;
+    } else {
+        print(&run_text(&finished))?;
+    }
+    Ok(if !finished.summary.complete {
+        eprintln!("interrupted; the files hold what was recorded until then");
+        ExitCode::from(INTERRUPTED)
+    } else if differing_bits(&finished) > 0 {
+        eprintln!("boards differ from the native application beside them");
+        ExitCode::from(TARGETS_MISSED)
+    } else if args.strict && !finished.summary.passed {
+        ExitCode::from(TARGETS_MISSED)
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+/// Bits in which boards outside differ from the application here.
+fn differing_bits(finished: &Finished) -> u64 {
+    let pil = finished.summary.pil.as_ref();
+    pil.map_or(0, |pil| pil.differing_bits)
+}
+
+/// Repeats a run with all nodes here. The logs hold every input, output,
+/// frame and internal at its time, so equal hashes mean equal runs. Boards here are down
+/// when those outside were; that time is the hardware's.
+fn compare_sil(options: &Options, finished: &Finished) -> Result<(), StudyError> {
+    let folder = finished.report.parent().unwrap_or(Path::new("."));
+    let native = run::repeat_natively(options, finished, folder.join(output::NATIVE))?;
+    if native.summary.hash == finished.summary.hash {
+        eprintln!("the log is that of the native run, to the bit");
+        return Ok(());
+    }
+    let here = folder.join(output::NATIVE).join("log.mcap");
+    let first = telemetry::first_difference(&here, &folder.join("log.mcap"))?;
+    let first = match first {
+        Some(first) => format!("first difference: {first}"),
+        None => "but what could be written to them does not".to_owned(),
+    };
+    let pil = finished.summary.pil.as_ref();
+    let pins = match pil.and_then(|p| p.first_difference.as_ref()) {
+        Some(pins) => format!("; first at a board's pins: {pins}"),
+        None => "; no board differed from the application beside it".to_owned(),
+    };
+    Err(StudyError::refused(
+        format!(
+            "the logs differ: {} on the host, {} with the boards; {first}{pins}",
+            native.summary.hash, finished.summary.hash
+        ),
+        format!("both logs are below {}", folder.display()),
+    ))
+}
+
+/// Comparison and figures of boards outside of this program.
+fn pil_text(pil: &PilSummary) -> String {
+    let mut out = format!(
+        "boards  {} bits of {} ticks and {} frames compared with the native application, {} differ\n",
+        pil.compared_bits, pil.compared_ticks, pil.compared_frames, pil.differing_bits
+    );
+    if let Some(first) = &pil.first_difference {
+        let _ = writeln!(out, "        first difference: {first}");
+    }
+    for board in &pil.boards {
+        let _ = write!(out, "        {} on {}:", board.node, board.host);
+        // What nobody measures where the board runs is left out.
+        let ticks = (
+            board.tick_instructions_worst,
+            board.tick_instructions_median,
+        );
+        if let (Some(worst), Some(median)) = ticks {
+            let _ = write!(out, " tick {worst} instructions (median {median}),");
+        }
+        if let (Some(used), Some(size)) = (board.stack_used_bytes, board.stack_size_bytes) {
+            let _ = write!(out, " stack {used} of {size} B,");
+        }
+        let _ = writeln!(out, " {} resets", board.resets);
+    }
+    out
+}
+
+/// Messages printed; the report has all of them.
+const MESSAGES: usize = 40;
+
+/// What went wrong, with the remedies.
+fn messages_text(messages: &[String]) -> String {
+    let mut out = String::new();
+    for message in messages.iter().take(MESSAGES) {
+        let _ = writeln!(out, "event   {message}");
+    }
+    if let Some(more) = messages.len().checked_sub(MESSAGES).filter(|n| *n > 0) {
+        let _ = writeln!(out, "event   and {more} more, in the report");
+    }
+    out
+}
+
+fn run_text(finished: &Finished) -> String {
+    let s = &finished.summary;
+    let mut out = String::new();
+    // A part of a run meets or misses nothing.
+    if s.complete && !s.targets.is_empty() {
+        out.push_str(&target_table(&s.targets));
+        let required = s.targets.iter().filter(|t| t.required);
+        let met = required.clone().filter(|t| t.pass).count();
+        let _ = writeln!(out, "\n{met} of {} required targets met", required.count());
+    }
+    if !s.complete {
+        let _ = writeln!(
+            out,
+            "\nstopped after {:.2} s of simulated time; what was recorded is complete up to there",
+            s.simulated_s
+        );
+    }
+    if s.dropped_messages > 0 {
+        let _ = writeln!(
+            out,
+            "\n{} messages could not be written to the log",
+            s.dropped_messages
+        );
+    }
+    if let Some(pil) = &s.pil {
+        out.push('\n');
+        out.push_str(&pil_text(pil));
+    }
+    let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);
+    for fault in &s.faults {
+        let _ = writeln!(out, "fault   {fault}");
+    }
+    out.push_str(&messages_text(&s.messages));
+    let _ = writeln!(out, "hash    {}", s.hash);
+    let _ = writeln!(
+        out,
+        "time    {:.2} s simulated in {:.2} s, {:.1} times faster than real time",
+        s.simulated_s, s.wall_s, s.realtime_factor
+    );
+    let _ = writeln!(out, "report  {}", finished.report.display());
+    out
+}
+
+fn target_table(targets: &[Target]) -> String {
+    let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let cells: Vec<[String; 5]> = targets
+        .iter()
+        .map(|t| {
+            [
+                t.verdict().to_owned(),
+                t.id.clone(),
+                t.value_text(),
+                t.unit.to_owned(),
+                t.band_text(),
+            ]
+        })
+        .collect();
+    let head = ["verdict", "target", "value", "unit", "band"].map(str::to_owned);
+    let width = |i: usize| {
+        let widths = cells
+            .iter()
+            .chain([&head])
+            .map(|row| row[i].chars().count());
+        widths.max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..5).map(width).collect();
+    let mut out = String::new();
+    let mut row = |c: &[String; 5], description: &str| {
+        let verdict = format!("{:w$}", c[0], w = widths[0]);
+        let verdict = match (colour, c[0].as_str()) {
+            (true, "PASS") => format!("\x1b[32m{verdict}\x1b[0m"),
+            (true, "FAIL") => format!("\x1b[1;31m{verdict}\x1b[0m"),
+            _ => verdict,
+        };
+        let _ = writeln!(
+            out,
+            "{verdict}  {:b$}  {:>c$} {:d$}  {:e$}  {description}",
+            c[1],
+            c[2],
+            c[3],
+            c[4],
+            b = widths[1],
+            c = widths[2],
+            d = widths[3],
+            e = widths[4],
+        );
+    };
+    row(&head, "what");
+    for (c, t) in cells.iter().zip(targets) {
+        row(c, &t.description);
+    }
+    out
+}

@@ -1,0 +1,115 @@
+//! `wheeleg tune`: one cylinder with a user's own parameters.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use super::print;
+use wheeleg_studies::StudyError;
+use wheeleg_studies::bench::grain::COARSE;
+use wheeleg_studies::compare::number;
+use wheeleg_studies::tune::{Section, Tuned};
+
+/// Arguments of `wheeleg tune`.
+#[derive(Debug, Args)]
+pub(super) struct TuneArgs {
+    /// Built-in axis or path of an axis file.
+    axis: String,
+    /// Folder for report, figures and parameters [default: runs/tune-<axis>]. Results
+    /// of an earlier run in it move to its folder `previous`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of the converter's noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Section of the robot file that the parameters are for.
+    #[arg(long, value_name = "SECTION", default_value = "joint", value_parser = sections())]
+    section: Section,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads a section by its name.
+fn sections() -> impl TypedValueParser<Value = Section> {
+    let values = Section::ALL.map(|section| PossibleValue::new(section.name()).help(section.doc()));
+    PossibleValuesParser::new(values).map(|name| {
+        let mut all = Section::ALL.into_iter();
+        all.find(|s| s.name() == name).unwrap_or(Section::Joint)
+    })
+}
+
+/// Tunes, writes and prints.
+pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
+    let tuned = Tuned::new(&args.axis, args.seed, args.section)?;
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("runs").join(format!("tune-{}", tuned.config.name)));
+    let finished = tuned.write(&out)?;
+    let tuned = &finished.tuned;
+    if args.json {
+        return print(&tuned.to_json());
+    }
+    let mut text = format!(
+        "{:<15}{:>20}{:>20}{:>20}{:>20}\n{:<15}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
+        "",
+        "error [mm]",
+        "overshoot [mm]",
+        "settled [s]",
+        "worst error [mm]",
+        "",
+        "before",
+        "after",
+        "before",
+        "after",
+        "before",
+        "after",
+        "before",
+        "after"
+    );
+    for test in &tuned.tests {
+        let both = |f: fn(&wheeleg_studies::compare::Figures) -> Option<f64>, digits: usize| {
+            [&test.before, &test.after].map(|figures| number(f(figures), digits))
+        };
+        let cells = [
+            both(|f| f.steady_error_mm.map(f64::abs), 2),
+            both(|f| f.overshoot_mm, 2),
+            both(|f| f.settle_s, 3),
+            both(|f| f.worst_mm, 2),
+        ];
+        let _ = write!(text, "{:<15}", test.motion.name());
+        for cell in cells.iter().flatten() {
+            let _ = write!(text, "{cell:>10}");
+        }
+        text.push('\n');
+    }
+    for (when, names) in [
+        ("before", tuned.stopped(|test| &test.before)),
+        ("after", tuned.stopped(|test| &test.after)),
+    ] {
+        if !names.is_empty() {
+            let _ = writeln!(text, "stopped by supervision {when}: {}", names.join(", "));
+        }
+    }
+    if let Some(advice) = tuned.grain.advice() {
+        let _ = writeln!(text, "{advice}");
+    }
+    let valve = &tuned.config.axis.cylinder.fill_valve;
+    let found = tuned.delays.map_or_else(
+        || "not found".to_owned(),
+        |d| format!("{:.2} ms", d.t_on_s * 1e3),
+    );
+    let _ = writeln!(
+        text,
+        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})\nparameters     {}\nreport         {}",
+        valve.t_on_s * 1e3,
+        tuned.grain.ratio,
+        finished.parameters.display(),
+        finished.report.display()
+    );
+    print(&text)
+}
