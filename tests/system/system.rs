@@ -20,5 +20,8 @@ mod off_data;
 mod precharge;
 mod restart;
 mod safe_states;
+mod schema;
 mod service;
+#[cfg(unix)]
+mod stop;
 mod workspace;

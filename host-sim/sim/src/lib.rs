@@ -89,6 +89,15 @@ impl<'a> Onlookers<'a> {
         }
     }
 
+    /// One more, who sees every joint board in every tick.
+    #[must_use]
+    pub fn watching(self, watcher: JointWatcher<'a>) -> Self {
+        Self {
+            watcher: Some(watcher),
+            ..self
+        }
+    }
+
     fn tick(&mut self, world: &World) {
         let Some(watcher) = &mut self.watcher else {
             return;
