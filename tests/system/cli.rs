@@ -42,7 +42,7 @@ fn with_line(text: &str, key: &str, line: &str) -> String {
 }
 
 /// The three-step scenario, cut to `duration_s`, in a file of its own.
-fn scenario_file(folder: &Path, duration_s: f64) -> PathBuf {
+pub(crate) fn scenario_file(folder: &Path, duration_s: f64) -> PathBuf {
     let text = source("scenarios/three-step.toml");
     let duration = format!("duration = {{ value = {duration_s:?}, unit = \"s\" }}");
     let text = with_line(&text, "duration", &duration);
@@ -64,7 +64,10 @@ fn summary(scenario: &Path, out: &Path, seed: &str) -> Value {
         .assert()
         .success();
     let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
-    serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"))
+    let summary = serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"));
+    crate::schema::assert_valid(&summary, "run");
+    assert!(summary["stopped"].is_null(), "{summary}");
+    summary
 }
 
 /// The one MCAP log of a run.

@@ -21,6 +21,9 @@ mod precharge;
 mod reference;
 mod restart;
 mod safe_states;
+mod schema;
 mod service;
 mod session;
+#[cfg(unix)]
+mod stop;
 mod workspace;

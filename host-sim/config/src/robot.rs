@@ -174,7 +174,7 @@ impl RobotConfig {
             known.extend(plant::pneumatics::SECTIONS);
             r.reject_unknown(top, &known);
         }
-        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let name = top.as_ref().and_then(|t| r.name(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let bus = r.section::<BusParams>("bus");
         let homing = r.section::<HomingParams>("homing");

@@ -188,7 +188,7 @@ impl Scenario {
 fn read(r: &mut Reader) -> Option<Scenario> {
     let top = r.table("")?;
     r.reject_unknown(&top, &TOP);
-    let name = r.text(&top, "name");
+    let name = r.name(&top, "name");
     let description = r.text(&top, "description");
     let robot = r.text(&top, "robot");
     let duration = required(

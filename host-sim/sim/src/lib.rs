@@ -87,6 +87,15 @@ impl<'a> Onlookers<'a> {
             watcher: None,
         }
     }
+
+    /// One more, who sees every joint board in every tick.
+    #[must_use]
+    pub fn watching(self, watcher: JointWatcher<'a>) -> Self {
+        Self {
+            watcher: Some(watcher),
+            ..self
+        }
+    }
 }
 
 /// Whether to go on, as the caller of [`run`] decides at every bus cycle.

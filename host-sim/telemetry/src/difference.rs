@@ -5,7 +5,7 @@ use std::path::Path;
 use mcap::MessageStream;
 use serde_json::{Map, Value};
 
-use super::registry::channels;
+use super::samples::channels;
 use crate::LogError;
 
 /// One message of a log.

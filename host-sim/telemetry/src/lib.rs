@@ -22,8 +22,8 @@ pub use error::LogError;
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder, Recording, Row};
-pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, channels, json_schema};
+pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, json_schema};
 pub use samples::{
     BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, StateSample, SupplySample, WheelSample,
+    MasterSample, StateSample, SupplySample, WheelSample, channels,
 };

@@ -9,10 +9,10 @@ use mcap::records::MessageHeader;
 
 use super::filter::LowPass2;
 use super::hash::TelemetryHash;
-use super::registry::{ChannelDef, Sample, channels, json_schema};
+use super::registry::{ChannelDef, Sample, json_schema};
 use super::samples::{
     BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, StateSample, SupplySample, WheelSample,
+    MasterSample, StateSample, SupplySample, WheelSample, channels,
 };
 use crate::LogError;
 

@@ -344,13 +344,19 @@ const fn channel<S: Sample>(topic: &'static str, rate_hz: u32, doc: &'static str
     }
 }
 
+/// All channels, in log order.
+#[must_use]
+pub fn channels() -> &'static [ChannelDef] {
+    &CHANNELS
+}
+
 /// Samples per second in the log for the fast channels. The recording in
 /// memory, which the analysis uses, has every 1 kHz sample.
 const FAST_HZ: u32 = 500;
 /// One sample per bus cycle.
 const CYCLE_HZ: u32 = 100;
 
-pub(super) static CHANNELS: [ChannelDef; 25] = [
+static CHANNELS: [ChannelDef; 25] = [
     channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
     channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),
     channel::<JointSample>("/joint/3", FAST_HZ, "Left vertical cylinder (b6)"),

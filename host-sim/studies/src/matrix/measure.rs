@@ -1,6 +1,7 @@
 //! What is measured of a row: latencies on commanded, sensed and physical signals,
 //! latching, deviation, and what the user can read.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::row::{Expect, Row, Since};
@@ -25,7 +26,7 @@ const HELD_S: f64 = 0.5;
 /// What was measured. Times in ms count from the row's instant; `None`: never. Those of the stop
 /// are `None`, too, where axes go on or none has driven: the last pulse of a motion that goes on
 /// is no latency.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Measured {
     /// Instant of the fault, s of scenario time.
     pub at_s: f64,

@@ -10,17 +10,14 @@ pub use summary::{RunInfo, Summary};
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-
-use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::StudyError;
 use crate::analysis;
+use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
-use wheeleg_report::output;
 use wheeleg_sim::faults;
 use wheeleg_sim::{self as sil, Boards, DownTimes};
 use wheeleg_telemetry::Recorder;
@@ -40,33 +37,30 @@ pub struct Options {
     pub faults: Vec<FaultSpec>,
     /// Folder for the results instead of `runs/<scenario>-seed<N>`.
     pub out: Option<PathBuf>,
+    /// Figures as PNG, too.
+    pub png: bool,
     /// The run is to equal one with all nodes in this program ([`repeat_natively`]).
     pub compared: bool,
 }
 
-/// A run with its files written.
+/// What came of a run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Finished {
+pub struct Run {
     /// Contents of `summary.json`.
     pub summary: Summary,
-    /// Path of the report.
-    pub report: PathBuf,
     /// When boards outside were down.
     pub down_times: DownTimes,
 }
 
-/// Set by Ctrl-C.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// Runs a scenario: log, tables, figures, summary, report. Ctrl-C stops it at
+/// Runs a scenario: log, tables, figures, summary, report. `stop` ends it at
 /// the next bus cycle and the files are finished all the same. Results of an
 /// earlier run in the same folder are set aside in its folders `previous`,
 /// `previous-2`, …
 ///
 /// # Errors
 /// Any [`StudyError`]. A log that was begun is closed and stays readable.
-pub fn run(options: &Options) -> Result<Finished, StudyError> {
-    run_on(options, None)
+pub fn run(options: &Options, stop: &Stop) -> Result<Finished<Run>, StudyError> {
+    run_on(options, stop, None)
 }
 
 /// Runs a scenario once more with all nodes in this program. Boards that a fault strikes
@@ -77,19 +71,24 @@ pub fn run(options: &Options) -> Result<Finished, StudyError> {
 /// As [`run`].
 pub fn repeat_natively(
     options: &Options,
-    before: &Finished,
+    stop: &Stop,
+    before: &Run,
     out: PathBuf,
-) -> Result<Finished, StudyError> {
+) -> Result<Finished<Run>, StudyError> {
     let options = Options {
         nodes: Nodes::default(),
         out: Some(out),
         compared: false,
         ..options.clone()
     };
-    run_on(&options, Some(&before.down_times))
+    run_on(&options, stop, Some(&before.down_times))
 }
 
-fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, StudyError> {
+fn run_on(
+    options: &Options,
+    stop: &Stop,
+    kept: Option<&DownTimes>,
+) -> Result<Finished<Run>, StudyError> {
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
     let robot = match &options.robot {
@@ -110,13 +109,19 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
         Some(kept) => Boards::native_with(kept.clone()),
         None => Boards::connect(&options.nodes, &robot)?,
     };
-    output::prepare(&folder)?;
-    let mut recorder = Recorder::create(&folder.join("log.mcap"))?;
+    let settings = Settings {
+        out: folder,
+        png: options.png,
+        stop: stop.clone(),
+    };
+    let job = Job::begin(&scenario.name, &settings)?;
+    let mut recorder = Recorder::create(&job.folder().join("log.mcap"))?;
     provenance(&mut recorder, &scenario, &robot, seed);
-
-    // Only one handler can be set in a process; a second run keeps the first.
-    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst));
-    let bar = progress_bar(&scenario);
+    let duration_ms = (scenario.duration_s * 1e3).round() as u64;
+    job.progress.begin(
+        format!("{:.0} s simulated", scenario.duration_s),
+        duration_ms,
+    );
     let begun = Instant::now();
     let outcome = sil::run_on(
         boards,
@@ -125,8 +130,8 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
         seed,
         &mut recorder,
         sil::Onlookers::new(&mut |t_s| {
-            bar.set_position((t_s * 1e3) as u64);
-            if INTERRUPTED.load(Ordering::SeqCst) {
+            job.progress.at((t_s * 1e3) as u64);
+            if job.progress.is_stopped() {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -135,7 +140,6 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
     );
     let closed = recorder.finish();
     let wall_s = begun.elapsed().as_secs_f64();
-    bar.finish_and_clear();
     let outcome = outcome?;
     let recording = closed?;
 
@@ -149,12 +153,16 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
     };
     let analysis = analysis::analyse(&scenario, &robot, &recording);
     let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
-    let report = report::write(&folder, &scenario, &robot, &recording, &analysis, &summary)?;
-    Ok(Finished {
+    let recorded_ms = (summary.recorded_s * 1e3).round() as u64;
+    let stopped = job
+        .progress
+        .stopped(recorded_ms, duration_ms, "ms of the scenario")
+        .filter(|_| !summary.complete);
+    let run = Run {
         summary,
-        report,
         down_times: outcome.down_times,
-    })
+    };
+    report::write(job, &scenario, &robot, &recording, &analysis, run, stopped)
 }
 
 /// What went into the run, as messages at time zero: part of the log and of
@@ -180,16 +188,6 @@ fn default_out(scenario: &str, seed: u64) -> PathBuf {
     Path::new("runs").join(format!("{scenario}-seed{seed}"))
 }
 
-fn progress_bar(scenario: &Scenario) -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal.
-    let bar = ProgressBar::new((scenario.duration_s * 1e3) as u64);
-    let style = ProgressStyle::with_template("{prefix} {wide_bar} {percent:>3} %  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_prefix(scenario.name.clone());
-    bar.set_message(format!("{:.0} s simulated", scenario.duration_s));
-    bar
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -210,9 +208,12 @@ mod tests {
             nodes,
             faults: Vec::new(),
             out: Some(folder.clone()),
+            png: false,
             compared: false,
         };
-        let error = run(&options).expect_err("no such port").to_string();
+        let error = run(&options, &Stop::default())
+            .expect_err("no such port")
+            .to_string();
         assert!(error.contains("no-port"), "{error}");
         let kept = std::fs::read_to_string(folder.join("summary.json"));
         assert_eq!(kept.expect("kept"), "earlier");

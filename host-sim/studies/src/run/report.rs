@@ -1,67 +1,72 @@
 //! What a run leaves behind: figures, tables, summary and one HTML page.
 
-use std::path::{Path, PathBuf};
-
-use super::Summary;
-use super::{figures, html};
+use super::{Run, figures, html};
 use crate::StudyError;
 use crate::analysis::Analysis;
+use crate::study::{Finished, Job, Stopped};
 use wheeleg_config::{RobotConfig, Scenario};
-use wheeleg_report::subfolder;
 use wheeleg_telemetry::{Recording, write_csv};
 
 /// Samples per second in the CSV files; every sample is in memory, 500 per
 /// second are in the MCAP log.
 const CSV_RATE_HZ: u32 = 100;
 
-/// Writes everything but the log into `folder`, which must exist; returns the
-/// path of the report.
+/// Writes everything but the log into the folder of the job.
 ///
 /// # Errors
-/// [`StudyError::Output`] if a file cannot be written, [`StudyError::Plot`] or
-/// [`StudyError::Report`] if a figure or the page cannot be made.
+/// [`StudyError::Report`] if a file cannot be written, or a figure or the page cannot be made.
 pub(super) fn write(
-    folder: &Path,
+    job: Job,
     scenario: &Scenario,
     robot: &RobotConfig,
     recording: &Recording,
     analysis: &Analysis,
-    summary: &Summary,
-) -> Result<PathBuf, StudyError> {
+    run: Run,
+    stopped: Option<Stopped>,
+) -> Result<Finished<Run>, StudyError> {
     let source = figures::Source {
         scenario,
         robot,
         recording,
         analysis,
     };
-    let tables = subfolder(folder, "csv")?;
-    write_csv(&tables, recording, CSV_RATE_HZ)?;
-    let plots = subfolder(folder, "figures")?;
-    let mut drawn = Vec::new();
-    for figure in figures::figures(&source) {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
-        let path = plots.join(format!("{}.svg", figure.id));
-        std::fs::write(&path, &svg)
-            .map_err(|e| StudyError::output("write the figure", &path, e))?;
-        drawn.push((figure, svg));
-    }
-    let json = summary.to_json();
-    let path = folder.join("summary.json");
-    std::fs::write(&path, json).map_err(|e| StudyError::output("write the summary", &path, e))?;
-    let page = html::render(&source, summary, &drawn)?;
-    let path = folder.join("report.html");
-    std::fs::write(&path, page).map_err(|e| StudyError::output("write the report", &path, e))?;
-    Ok(path)
+    write_csv(&job.subfolder("csv")?, recording, CSV_RATE_HZ)?;
+    let drawn = job.draw(figures::figures(&source))?;
+    let json = job.summary(&run.summary, stopped.as_ref())?;
+    let page = html::render(&source, &run.summary, &drawn)?;
+    job.finish(run, json, &page, stopped)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::analysis::{self, testing};
-    use crate::run::RunInfo;
+    use crate::run::{RunInfo, Summary};
+    use crate::study::Settings;
+    use std::path::Path;
     use wheeleg_config::builtin;
     use wheeleg_telemetry::{EventSample, Row};
+
+    /// Writes a run with this summary; figures as PNG, too.
+    fn written(
+        folder: &Path,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        recording: &Recording,
+        analysis: &Analysis,
+        summary: &Summary,
+    ) {
+        let settings = Settings {
+            png: true,
+            ..Settings::new(folder)
+        };
+        let job = Job::begin("test", &settings).expect("a folder");
+        let run = Run {
+            summary: summary.clone(),
+            down_times: wheeleg_sim::DownTimes::default(),
+        };
+        write(job, scenario, robot, recording, analysis, run, None).expect("written");
+    }
 
     /// Every file of a run, from a recording made of the reference model.
     fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
@@ -79,15 +84,14 @@ mod tests {
             pil: None,
         };
         let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
-        write(
+        written(
             folder.path(),
             &scenario,
             &robot,
             &recording,
             &analysis,
             &summary,
-        )
-        .expect("written");
+        );
         (folder, summary)
     }
 
@@ -121,7 +125,7 @@ mod tests {
         let mut page = |complete: bool| {
             summary.complete = complete;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(true), page(false));
@@ -151,7 +155,7 @@ mod tests {
         let mut page = |dropped: u64| {
             summary.dropped_messages = dropped;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(0), page(321));
@@ -205,7 +209,7 @@ mod tests {
                 }],
             });
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (equal, other) = (page(0), page(5));

@@ -2,9 +2,11 @@
 
 use std::collections::HashMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, Target};
+use crate::study;
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::PilSummary;
 use wheeleg_telemetry::{EventSample, Recording};
@@ -27,7 +29,7 @@ pub struct RunInfo {
 }
 
 /// Contents of `summary.json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Name of the scenario.
     pub scenario: String,
@@ -127,15 +129,10 @@ impl Summary {
             targets: analysis.targets.clone(),
         }
     }
+}
 
-    /// As indented JSON with a final newline.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        // A struct of numbers and texts always serialises.
-        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
-        text.push('\n');
-        text
-    }
+impl study::Summary for Summary {
+    const SCHEMA: &'static str = "wheeleg.run/1";
 }
 
 #[cfg(test)]
