@@ -13,9 +13,9 @@ use predicates::str::contains;
 use serde_json::Value;
 use wheeleg_config::faults::{FaultKind, KINDS};
 use wheeleg_config::{EventAction, LegChoice, builtin};
+use wheeleg_interface::{Side, archive, first_difference};
 use wheeleg_master::command::Command as UserCommand;
 use wheeleg_protocol::SCHEMA_HASH;
-use wheeleg_remote_host::interface::{Side, archive, first_difference};
 use wheeleg_studies::matrix::{self, Expect, ROWS, Verdict};
 use wheeleg_telemetry::Recorder;
 

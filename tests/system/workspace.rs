@@ -11,7 +11,7 @@ use wheeleg_identity::sources::{self, Images};
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 25] = [
+const ARROWS: [(&str, &[&str]); 26] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -70,12 +70,14 @@ const ARROWS: [(&str, &[&str]); 25] = [
             "wheeleg-units",
         ],
     ),
+    ("wheeleg-interface", &["wheeleg-protocol"]),
     ("wheeleg-telemetry", &["wheeleg-protocol"]),
     (
         "wheeleg-remote-host",
         &[
             "wheeleg-config",
             "wheeleg-identity",
+            "wheeleg-interface",
             "wheeleg-node",
             "wheeleg-protocol",
             "wheeleg-remote-link",
@@ -114,9 +116,10 @@ const ARROWS: [(&str, &[&str]); 25] = [
     ("insn-plugin", &[]),
 ];
 
-const SIM: [&str; 11] = [
+const SIM: [&str; 12] = [
     "wheeleg-config",
     "wheeleg-control",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
@@ -128,9 +131,10 @@ const SIM: [&str; 11] = [
     "wheeleg-units",
 ];
 
-const STUDIES: [&str; 12] = [
+const STUDIES: [&str; 13] = [
     "wheeleg-config",
     "wheeleg-control",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
@@ -143,8 +147,9 @@ const STUDIES: [&str; 12] = [
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 10] = [
+const PROGRAM: [&str; 11] = [
     "wheeleg-config",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-plant",
@@ -156,10 +161,11 @@ const PROGRAM: [&str; 10] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 15] = [
+const TESTED: [&str; 16] = [
     "wheeleg-config",
     "wheeleg-control",
     "wheeleg-identity",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",

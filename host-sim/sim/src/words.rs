@@ -10,7 +10,7 @@ use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord};
 
 use refusal::refusal;
 pub(super) use refusal::reject;
-use wheeleg_remote_host::interface::{Side, first_difference};
+use wheeleg_interface::{Side, first_difference};
 
 /// An event of the master in words.
 pub(crate) fn describe(event: &Event) -> String {
