@@ -71,7 +71,15 @@ const ARROWS: [(&str, &[&str]); 26] = [
         ],
     ),
     ("wheeleg-interface", &["wheeleg-protocol"]),
-    ("wheeleg-telemetry", &["wheeleg-protocol"]),
+    (
+        "wheeleg-telemetry",
+        &[
+            "wheeleg-config",
+            "wheeleg-interface",
+            "wheeleg-master",
+            "wheeleg-protocol",
+        ],
+    ),
     (
         "wheeleg-remote-host",
         &[

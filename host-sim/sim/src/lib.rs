@@ -22,7 +22,6 @@ mod setup;
 mod strangers;
 mod strike;
 mod traffic;
-mod words;
 mod world;
 
 use std::ops::ControlFlow;
@@ -40,7 +39,6 @@ pub use self::boards::{JointBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::error::SimError;
 pub use self::power::BOARD_START_UP_NS;
-pub use self::words::hex;
 
 use self::observe::Observer;
 use self::operator::Operator;
@@ -48,12 +46,11 @@ use self::world::{Happened, World};
 use crate::faults::Schedule;
 use wheeleg_config::{EventAction, RobotConfig, Scenario};
 use wheeleg_remote_host::{Nodes, Outside, PilSummary};
-use wheeleg_telemetry::{EventKind, Recorder};
+use wheeleg_telemetry::Recorder;
+use wheeleg_telemetry::event::{Act, Cause};
 
 /// Longest time from power-up to the end of commissioning, s.
 const COMMISSION_S: f64 = 2.0;
-/// Beginning of every event in the record that tells of the time before it.
-pub const START_UP: &str = "start-up, ";
 
 /// What a caller sees of one joint board and its cylinder after every tick, start-up
 /// included, when it asks to ([`run_watched`]).
@@ -257,11 +254,17 @@ pub fn run_on(
             onlookers.tick(&world);
         }
         match (happened, start_ns) {
-            (Happened::JointTick, None) if operator.prepare(&mut world)? => {
-                start_ns = Some(now_ns);
-                operator.report_start_up(recorder);
-                operator.begin(&mut world)?;
-                observer.tick(&world, 0, recorder);
+            (Happened::JointTick, None) => {
+                let ready = operator.prepare(&mut world);
+                if !matches!(ready, Ok(false)) {
+                    // Also of a robot that does not get ready: the record says why.
+                    operator.report_start_up(recorder);
+                }
+                if ready? {
+                    start_ns = Some(now_ns);
+                    operator.begin(&mut world)?;
+                    observer.tick(&world, 0, recorder);
+                }
             }
             (Happened::JointTick, Some(start_ns)) => {
                 let t_ns = now_ns - start_ns;
@@ -272,16 +275,19 @@ pub fn run_on(
                 for (fault, begin) in schedule.due(t_ns) {
                     world.strike(&fault, begin)?;
                     recorder.set_disk_full(!world.faults().can_record());
-                    let what = if begin { "begins" } else { "ends" };
-                    let text = format!("fault {fault} {what}");
-                    recorder.event(t_ns, EventKind::Scenario, text);
+                    let act = if begin {
+                        Act::FaultBegins(fault)
+                    } else {
+                        Act::FaultEnds(fault)
+                    };
+                    recorder.event(t_ns, Cause::Scenario(act));
                 }
                 for event in operator.due(t_ns) {
                     act(&event.action, &mut world, &operator, t_ns, recorder)?;
                 }
                 operator.listen(&mut world, t_ns, recorder);
                 for note in world.take_notes() {
-                    recorder.event(t_ns, EventKind::Command, format!("service: {note}"));
+                    recorder.event(t_ns, note);
                 }
             }
             (Happened::MasterCycle, started) => {
@@ -306,7 +312,7 @@ pub fn run_on(
     let link = observer.link();
     if link.errors() > 0 {
         let t_ns = now_ns - start_ns.unwrap_or(now_ns);
-        recorder.event(t_ns, EventKind::Info, link_text(&link));
+        recorder.event(t_ns, Cause::LineErrors(link));
     }
     Ok(RunOutcome {
         recorded_s: start_ns.map_or(0.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9),
@@ -360,7 +366,7 @@ pub fn commission(
                 }
                 Event::Done(ticket) if ticket.code == CommandCode::Commission => return Ok(ids),
                 Event::Link { .. } | Event::Log { .. } | Event::NodeReady(_) => {}
-                other => said.push(words::describe(&other)),
+                other => said.push(Cause::Master(other).to_string()),
             }
         }
     }
@@ -368,28 +374,6 @@ pub fn commission(
         format!("the boards cannot be commissioned: {}", said.join("; ")),
         "mend what the master names, and try again",
     ))
-}
-
-/// What the master counted on the line, in words.
-fn link_text(link: &LinkQuality) -> String {
-    let kinds = [
-        ("overflow", link.overflow),
-        ("truncated", link.truncated),
-        ("short", link.short),
-        ("crc", link.crc),
-        ("version", link.version),
-        ("length", link.length),
-        ("address", link.address),
-    ];
-    let kinds = kinds.iter().filter(|(_, count)| *count > 0);
-    let kinds: Vec<String> = kinds
-        .map(|(kind, count)| format!("{kind} {count}"))
-        .collect();
-    format!(
-        "master: {} sound frames heard, broken ones: {}",
-        link.frames,
-        kinds.join(", ")
-    )
 }
 
 /// Carries out one event of the scenario.
@@ -403,15 +387,11 @@ fn act(
     match action {
         EventAction::KillMaster => {
             world.kill_master();
-            recorder.event(
-                t_ns,
-                EventKind::Scenario,
-                "the master dies and stays silent",
-            );
+            recorder.event(t_ns, Cause::Scenario(Act::KillMaster));
             Ok(())
         }
         EventAction::EStop => {
-            recorder.event(t_ns, EventKind::Scenario, "E-stop pressed");
+            recorder.event(t_ns, Cause::Scenario(Act::EStop));
             operator.submit(world, Command::EmergencyStop, t_ns, recorder)
         }
         EventAction::ClearFault => operator.submit(world, Command::ClearFault, t_ns, recorder),

@@ -61,7 +61,8 @@ mod tests {
     use crate::analysis::{self, testing};
     use crate::run::RunInfo;
     use wheeleg_config::builtin;
-    use wheeleg_telemetry::{EventSample, Row};
+    use wheeleg_telemetry::Row;
+    use wheeleg_telemetry::event::{Act, Cause};
 
     /// Every file of a run, from a recording made of the reference model.
     fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
@@ -140,10 +141,7 @@ mod tests {
         let mut recording = testing::from_reference(&robot, 0.25, 0.0);
         recording.events.push(Row {
             t_ns: 3_000_000_000,
-            v: EventSample {
-                kind: "fault".to_owned(),
-                text: "a thing".to_owned(),
-            },
+            v: Cause::Scenario(Act::EStop).into(),
         });
         let mut analysis = analysis::analyse(&scenario, &robot, &recording);
         analysis.start_s = 0.25;
@@ -155,7 +153,7 @@ mod tests {
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(0), page(321));
-        assert!(whole.contains(">3.000</td><td>fault</td><td>a thing"));
+        assert!(whole.contains(">3.000</td><td>scenario</td><td>E-stop pressed"));
         assert!(whole.contains("0.250 s of scenario time"));
         let loss = "messages could not be written to the log";
         assert!(!whole.contains(loss) && part.contains(loss) && part.contains("321 of "));
