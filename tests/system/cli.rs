@@ -10,8 +10,8 @@ use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
+use wheeleg_interface::archive;
 use wheeleg_protocol::SCHEMA_HASH;
-use wheeleg_remote_host::interface::archive;
 
 /// Longest time that any one call may take before it counts as hung.
 const HUNG: Duration = Duration::from_secs(120);

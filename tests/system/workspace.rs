@@ -13,7 +13,7 @@ mod circles;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 25] = [
+const ARROWS: [(&str, &[&str]); 26] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -72,12 +72,22 @@ const ARROWS: [(&str, &[&str]); 25] = [
             "wheeleg-units",
         ],
     ),
-    ("wheeleg-telemetry", &["wheeleg-protocol"]),
+    ("wheeleg-interface", &["wheeleg-protocol"]),
+    (
+        "wheeleg-telemetry",
+        &[
+            "wheeleg-config",
+            "wheeleg-interface",
+            "wheeleg-master",
+            "wheeleg-protocol",
+        ],
+    ),
     (
         "wheeleg-remote-host",
         &[
             "wheeleg-config",
             "wheeleg-identity",
+            "wheeleg-interface",
             "wheeleg-node",
             "wheeleg-protocol",
             "wheeleg-remote-link",
@@ -116,9 +126,10 @@ const ARROWS: [(&str, &[&str]); 25] = [
     ("insn-plugin", &[]),
 ];
 
-const SIM: [&str; 11] = [
+const SIM: [&str; 12] = [
     "wheeleg-config",
     "wheeleg-control",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
@@ -130,9 +141,10 @@ const SIM: [&str; 11] = [
     "wheeleg-units",
 ];
 
-const STUDIES: [&str; 12] = [
+const STUDIES: [&str; 13] = [
     "wheeleg-config",
     "wheeleg-control",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
@@ -145,8 +157,9 @@ const STUDIES: [&str; 12] = [
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 10] = [
+const PROGRAM: [&str; 11] = [
     "wheeleg-config",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-plant",
@@ -158,10 +171,11 @@ const PROGRAM: [&str; 10] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 15] = [
+const TESTED: [&str; 16] = [
     "wheeleg-config",
     "wheeleg-control",
     "wheeleg-identity",
+    "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",

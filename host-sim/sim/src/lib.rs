@@ -23,7 +23,6 @@ mod operator;
 mod session;
 mod setup;
 mod strangers;
-mod words;
 mod world;
 
 use std::ops::ControlFlow;
@@ -41,18 +40,16 @@ pub use self::boards::{JointBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::error::SimError;
 pub use self::session::Session;
-pub use self::words::hex;
 pub use self::world::BOARD_START_UP_NS;
 
 use self::world::{Happened, World};
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::{Nodes, Outside, PilSummary};
 use wheeleg_telemetry::Recorder;
+use wheeleg_telemetry::event::Cause;
 
 /// Longest time from power-up to the end of commissioning, s.
 const COMMISSION_S: f64 = 2.0;
-/// Beginning of every event in the record that tells of the time before it.
-pub const START_UP: &str = "start-up, ";
 
 /// What a caller sees of one joint board and its cylinder after every tick, start-up
 /// included, when it asks to ([`run_watched`]).
@@ -283,7 +280,7 @@ pub fn commission(
                 }
                 Event::Done(ticket) if ticket.code == CommandCode::Commission => return Ok(ids),
                 Event::Link { .. } | Event::Log { .. } | Event::NodeReady(_) => {}
-                other => said.push(words::describe(&other)),
+                other => said.push(Cause::Master(other).to_string()),
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Samples of the running world for the recorder: what was commanded, what the
 //! boards sensed, what physically is.
 
+use wheeleg_master::contact::Side;
 use wheeleg_master::setpoint::Phase;
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
@@ -9,9 +10,10 @@ use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQualit
 
 use super::boards::WheelBoard;
 use super::world::World;
+use wheeleg_telemetry::event::{BoardChange, Cause};
 use wheeleg_telemetry::{
-    BodySample, BusSample, EventKind, FootSample, JointSample, MasterSample, Recorder,
-    SupplySample, WheelSample,
+    BodySample, BusSample, FootSample, JointSample, MasterSample, Recorder, SupplySample,
+    WheelSample,
 };
 
 const PA_PER_BAR: f64 = 1e5;
@@ -166,8 +168,8 @@ impl Observer {
         }
     }
 
-    /// Touchdowns and lifts as they physically are become events in words; what the
-    /// master made of its switches stands beside them.
+    /// Touchdowns and lifts as they physically are become events; what the master made of
+    /// its switches stands beside them.
     fn notice_contact(
         &mut self,
         foot: usize,
@@ -180,21 +182,11 @@ impl Observer {
         if before.is_none_or(|before| before == grounded) {
             return;
         }
-        let side = ["left", "right"][foot];
-        let text = if grounded {
-            let closed: Vec<&str> = ["front", "left", "back", "right"]
-                .into_iter()
-                .zip(switches)
-                .filter_map(|(name, closed)| closed.then_some(name))
-                .collect();
-            format!("ground: {side} foot touches, {}", closed.join(", "))
-        } else {
-            format!("ground: {side} foot free")
-        };
-        recorder.event(t_ns, EventKind::Contact, text);
+        let side = [Side::Left, Side::Right][foot];
+        recorder.event(t_ns, Cause::Contact { side, switches });
     }
 
-    /// Changes of mode and fault become events in words.
+    /// Changes of mode and fault become events; `index` is 0 to 7 for addresses 1 to 8.
     fn notice(
         &mut self,
         index: usize,
@@ -203,29 +195,22 @@ impl Observer {
         t_ns: u64,
         recorder: &mut Recorder,
     ) {
-        let name = if index < 6 {
-            format!("joint {}", index + 1)
-        } else {
-            format!("wheel {}", index + 1)
+        let Some(board) = Address::of_slot(index) else {
+            return;
         };
-        if self.modes[index] != Some(mode) {
-            if let Some(before) = self.modes[index] {
-                recorder.event(
-                    t_ns,
-                    EventKind::Mode,
-                    format!("{name}: {before:?} to {mode:?}"),
-                );
-            }
-            self.modes[index] = Some(mode);
+        let mut tell = |change| recorder.event(t_ns, Cause::Board { board, change });
+        let before = self.modes[index].replace(mode);
+        if let Some(from) = before.filter(|before| *before != mode) {
+            tell(BoardChange::Mode { from, to: mode });
         }
         let before = self.faults[index];
         if before != faults {
             self.faults[index] = faults;
             for fault in faults.iter().filter(|fault| !before.contains(*fault)) {
-                recorder.event(t_ns, EventKind::Fault, format!("{name}: {fault}"));
+                tell(BoardChange::FaultLatched(fault));
             }
             if faults.is_empty() {
-                recorder.event(t_ns, EventKind::Fault, format!("{name}: faults cleared"));
+                tell(BoardChange::FaultsCleared);
             }
         }
     }

@@ -6,15 +6,15 @@ use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::Reject;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
-use wheeleg_protocol::{LinkRecord, LogEvent};
+use wheeleg_protocol::LinkRecord;
 use wheeleg_units::PositionMm;
 
-use super::START_UP;
-use super::words::{describe, reject};
 use super::world::World;
 use crate::SimError;
 use wheeleg_config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
-use wheeleg_telemetry::{EventKind, LinkSample, Recorder};
+use wheeleg_telemetry::event::{Answer, Cause};
+use wheeleg_telemetry::messages::reject;
+use wheeleg_telemetry::{Event as Recorded, EventKind, LinkSample, Recorder};
 
 /// What to do about a robot that does not get ready, where no board is to blame.
 const HELP: &str = "check supply pressure, board gains and start pose in the robot file";
@@ -35,7 +35,8 @@ pub(super) struct Operator {
     rest_ns: u64,
     limit_ns: u64,
     stage: Stage,
-    notes: Vec<(u64, EventKind, String)>,
+    /// What the master reported during the start-up, µs after power-up.
+    start_up: Vec<(u64, Cause)>,
     next_event: usize,
     flood_refused: bool,
 }
@@ -58,7 +59,7 @@ impl Operator {
             rest_ns: ns(start_up.rest_s),
             limit_ns: ns(start_up.limit_s),
             stage: Stage::Enumerating,
-            notes: Vec::new(),
+            start_up: Vec::new(),
             next_event: 0,
             flood_refused: false,
         }
@@ -73,13 +74,11 @@ impl Operator {
         let now_ns = world.now_ns();
         let now_us = now_ns / 1000;
         while let Some((time_us, event)) = world.master().take_event() {
-            // Counters and logs are no part of the story.
-            if is_advice(&event) {
-                self.notes
-                    .push((time_us, EventKind::Fault, describe(&event)));
-            } else if !matches!(event, Event::Link { .. } | Event::Log { .. }) {
-                self.notes
-                    .push((time_us, EventKind::Info, describe(&event)));
+            let cause = Cause::Master(event);
+            // Counters and logs are no part of the story, but for what is to be mended.
+            let routine = matches!(event, Event::Link { .. } | Event::Log { .. });
+            if !routine || cause.kind() == EventKind::Fault {
+                self.start_up.push((time_us, cause));
             }
             match event {
                 Event::Homed if self.stage == Stage::Homing => {
@@ -120,12 +119,12 @@ impl Operator {
 
     fn not_ready(&self, now_ns: u64, help: &str) -> SimError {
         let story: Vec<String> = self
-            .notes
+            .start_up
             .iter()
             .rev()
             .take(6)
             .rev()
-            .map(|(us, _, text)| format!("{:.3} s: {text}", *us as f64 * 1e-6))
+            .map(|(us, cause)| format!("{:.3} s: {cause}", *us as f64 * 1e-6))
             .collect();
         SimError::simulation(
             format!(
@@ -140,13 +139,8 @@ impl Operator {
 
     /// Writes the story of the start-up into the record, at time 0.
     pub(super) fn report_start_up(&self, recorder: &mut Recorder) {
-        for (us, kind, text) in &self.notes {
-            let at_s = *us as f64 * 1e-6;
-            recorder.event(
-                0,
-                *kind,
-                format!("{START_UP}{at_s:.3} s after power-up: {text}"),
-            );
+        for (us, cause) in &self.start_up {
+            recorder.event(0, Recorded::of_start_up(cause.clone(), *us));
         }
     }
 
@@ -205,20 +199,15 @@ impl Operator {
         t_ns: u64,
         recorder: &mut Recorder,
     ) -> Result<(), SimError> {
-        let name = format!("{:?}", command.code());
-        if !world.master_alive() {
-            recorder.event(
-                t_ns,
-                EventKind::Command,
-                format!("{name}: nobody answers, the master is dead"),
-            );
-            return Ok(());
-        }
-        let text = match world.submit(command) {
-            Ok(_) => format!("{name}: accepted"),
-            Err(why) => format!("{name} refused: {}", reject(&why)),
+        let code = command.code();
+        let answer = if world.master_alive() {
+            world
+                .submit(command)
+                .map_or_else(Answer::Rejected, |_| Answer::Accepted)
+        } else {
+            Answer::Nothing
         };
-        recorder.event(t_ns, EventKind::Command, text);
+        recorder.event(t_ns, Cause::Command { code, answer });
         Ok(())
     }
 
@@ -230,10 +219,9 @@ impl Operator {
             let joint = (i % 6) as u8 + 1;
             let command = Command::TransmitPosition { joint };
             let answer = world.master().submit(command, now_us);
-            if let (Err(why), false) = (answer, self.flood_refused) {
+            if let (Err(reason), false) = (answer, self.flood_refused) {
                 self.flood_refused = true;
-                let text = format!("flood of commands: number {i} refused: {}", reject(&why));
-                recorder.event(t_ns, EventKind::Command, text);
+                recorder.event(t_ns, Cause::Flood { number: i, reason });
             }
         }
     }
@@ -241,40 +229,15 @@ impl Operator {
     /// Writes the master's events into the record.
     pub(super) fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
         while let Some((_, event)) = world.master().take_event() {
-            let kind = match event {
-                _ if is_advice(&event) => EventKind::Fault,
-                Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
-                Event::Hold(_)
-                | Event::FootSwitch { .. }
-                | Event::HomingFailed { .. }
-                | Event::SchemaMismatch { .. }
-                | Event::ForeignBoard { .. }
-                | Event::WrongRole(_)
-                | Event::NodeLost(_)
-                | Event::Found { .. }
-                | Event::Diagnosis { .. }
-                | Event::DuplicateAddress { .. } => EventKind::Fault,
-                Event::Log { .. } | Event::LogLost { .. } => EventKind::Log,
-                Event::Link { node, record } => {
-                    let node = usize::from(node) - 1;
-                    recorder.link(t_ns, node, link_sample(&record));
-                    continue;
-                }
-                Event::Done(_)
-                | Event::Refused { .. }
-                | Event::Position { .. }
-                | Event::Parameter { .. } => EventKind::Command,
-                Event::Armed | Event::Disarmed => EventKind::Mode,
-                _ => EventKind::Info,
-            };
-            recorder.event(t_ns, kind, describe(&event));
+            // Counters have channels of their own.
+            if let Event::Link { node, record } = event {
+                let node = usize::from(node) - 1;
+                recorder.link(t_ns, node, link_sample(&record));
+                continue;
+            }
+            recorder.event(t_ns, Cause::Master(event));
         }
     }
-}
-
-/// What a board logs and somebody should act on, so that it is told as a finding is.
-fn is_advice(event: &Event) -> bool {
-    matches!(event, Event::Log { entry, .. } if entry.event == LogEvent::PrechargeLate)
 }
 
 pub(super) fn refused(command: &Command, why: &Reject) -> SimError {

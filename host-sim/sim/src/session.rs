@@ -4,8 +4,8 @@
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, RobotConfig, Scenario};
 use wheeleg_master::command::Command;
-use wheeleg_protocol::LinkQuality;
-use wheeleg_telemetry::{EventKind, Recorder};
+use wheeleg_telemetry::Recorder;
+use wheeleg_telemetry::event::{Act, Cause};
 
 use crate::faults::Schedule;
 use crate::observe::Observer;
@@ -117,9 +117,12 @@ impl Session {
         let t_ns = self.scenario_ns().unwrap_or(0);
         self.world.strike(fault, begin)?;
         recorder.set_disk_full(!self.world.faults().can_record());
-        let what = if begin { "begins" } else { "ends" };
-        let text = format!("fault {fault} {what}");
-        recorder.event(t_ns, EventKind::Scenario, text);
+        let act = if begin {
+            Act::FaultBegins(*fault)
+        } else {
+            Act::FaultEnds(*fault)
+        };
+        recorder.event(t_ns, Cause::Scenario(act));
         Ok(())
     }
 
@@ -161,9 +164,13 @@ impl Session {
     }
 
     fn get_ready(&mut self, recorder: &mut Recorder) -> Result<(), SimError> {
-        if self.operator.prepare(&mut self.world)? {
-            self.start_ns = Some(self.now_ns());
+        let ready = self.operator.prepare(&mut self.world);
+        if !matches!(ready, Ok(false)) {
+            // Also of a robot that does not get ready: the record says why.
             self.operator.report_start_up(recorder);
+        }
+        if ready? {
+            self.start_ns = Some(self.now_ns());
             self.operator.begin(&mut self.world)?;
             self.observer.tick(&self.world, 0, recorder);
         }
@@ -184,7 +191,7 @@ impl Session {
         }
         self.operator.listen(&mut self.world, t_ns, recorder);
         for note in self.world.take_notes() {
-            recorder.event(t_ns, EventKind::Command, format!("service: {note}"));
+            recorder.event(t_ns, note);
         }
         Ok(())
     }
@@ -213,12 +220,11 @@ impl Session {
         let command = match action {
             EventAction::KillMaster => {
                 self.world.kill_master();
-                let text = "the master dies and stays silent";
-                recorder.event(t_ns, EventKind::Scenario, text);
+                recorder.event(t_ns, Cause::Scenario(Act::KillMaster));
                 return Ok(());
             }
             EventAction::EStop => {
-                recorder.event(t_ns, EventKind::Scenario, "E-stop pressed");
+                recorder.event(t_ns, Cause::Scenario(Act::EStop));
                 Command::EmergencyStop
             }
             EventAction::ClearFault => Command::ClearFault,
@@ -233,7 +239,7 @@ impl Session {
         let link = self.observer.link();
         if link.errors() > 0 {
             let t_ns = self.scenario_ns().unwrap_or(0);
-            recorder.event(t_ns, EventKind::Info, link_text(&link));
+            recorder.event(t_ns, Cause::LineErrors(link));
         }
         RunOutcome {
             recorded_s: self.scenario_s().unwrap_or(0.0),
@@ -245,26 +251,4 @@ impl Session {
             down_times: self.world.take_down_times(),
         }
     }
-}
-
-/// What the master counted on the line, in words.
-fn link_text(link: &LinkQuality) -> String {
-    let kinds = [
-        ("overflow", link.overflow),
-        ("truncated", link.truncated),
-        ("short", link.short),
-        ("crc", link.crc),
-        ("version", link.version),
-        ("length", link.length),
-        ("address", link.address),
-    ];
-    let kinds = kinds.iter().filter(|(_, count)| *count > 0);
-    let kinds: Vec<String> = kinds
-        .map(|(kind, count)| format!("{kind} {count}"))
-        .collect();
-    format!(
-        "master: {} sound frames heard, broken ones: {}",
-        link.frames,
-        kinds.join(", ")
-    )
 }

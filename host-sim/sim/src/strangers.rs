@@ -6,8 +6,8 @@ use wheeleg_node::Transmission;
 use wheeleg_protocol::frame::{VERSION, encode};
 use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{
-    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, NackReason, ParamGet,
-    ParamSet, ParamValue, ResetCause,
+    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, ParamGet, ParamSet,
+    ParamValue, ResetCause,
 };
 
 use super::board::{Application, BoardInputs};
@@ -17,6 +17,7 @@ use super::clock::{NS_PER_US, micros};
 use crate::SimError;
 use wheeleg_config::NodeParams;
 use wheeleg_config::timing::SERVICE_NS;
+use wheeleg_telemetry::event::{BadRequest, Cause, ServiceOutcome};
 
 /// A second board drives the line as this plus the address.
 const TWIN: Driver = 0x40;
@@ -45,7 +46,7 @@ pub(super) struct Strangers {
     /// Boards with the address of another one.
     boards: Vec<(Address, Application)>,
     service: Option<Service>,
-    notes: Vec<String>,
+    notes: Vec<Cause>,
 }
 
 impl Strangers {
@@ -127,8 +128,8 @@ impl Strangers {
         self.service.as_mut()?.request(now_us)
     }
 
-    /// What happened, in words; each once.
-    pub(super) fn take_notes(&mut self) -> Vec<String> {
+    /// What came of the service tool's requests; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<Cause> {
         std::mem::take(&mut self.notes)
     }
 }
@@ -226,7 +227,7 @@ impl Service {
         Some(encode(&header, &payload, &mut buffer).ok()?.to_vec())
     }
 
-    fn hear(&mut self, bytes: &[u8]) -> Vec<String> {
+    fn hear(&mut self, bytes: &[u8]) -> Vec<Cause> {
         let mut notes = Vec::new();
         for byte in bytes {
             let Some(Ok(frame)) = self.decoder.push(*byte) else {
@@ -246,29 +247,44 @@ impl Service {
         notes
     }
 
-    fn answer(&mut self, answer: &Message) -> Option<String> {
-        let (who, name) = (self.to, self.parameter.name);
-        let what = match *STEPS.get(self.step)? {
-            Write::Read => {
-                let Message::ParamValue(ParamValue { value, .. }) = answer else {
-                    return Some(format!("{who} does not tell its parameter {name}"));
-                };
-                let before = *self.value.get_or_insert(*value);
-                self.changed |= before != *value;
-                let last = self.step + 1 == STEPS.len();
-                let verdict = if self.changed { "CHANGED" } else { "unchanged" };
-                return last.then(|| format!("{who}: parameter {name} {verdict}, raw {value}"));
-            }
-            Write::TooLarge => format!("{name} above its limit"),
-            Write::Unknown => format!("parameter 0x{NO_PARAMETER:04X}"),
-            Write::OtherType => format!("{name} as a float, not a number"),
+    fn answer(&mut self, answer: &Message) -> Option<Cause> {
+        let request = match *STEPS.get(self.step)? {
+            Write::Read => return self.value_read(answer),
+            Write::TooLarge => BadRequest::AboveLimit,
+            Write::Unknown => BadRequest::UnknownParameter(NO_PARAMETER),
+            Write::OtherType => BadRequest::NotANumber,
         };
-        Some(match answer {
-            Message::Nack(nack) => {
-                let reason: NackReason = nack.reason;
-                format!("{who} refuses {what}: {}", reason.text())
-            }
-            _ => format!("{who} takes {what}: WRONG"),
+        Some(self.cause(match answer {
+            Message::Nack(nack) => ServiceOutcome::Refused {
+                request,
+                reason: nack.reason,
+            },
+            _ => ServiceOutcome::Taken(request),
+        }))
+    }
+
+    /// What the tool says of a value that it has read: after the last one, whether the
+    /// parameter has kept it.
+    fn value_read(&mut self, answer: &Message) -> Option<Cause> {
+        let Message::ParamValue(ParamValue { value: raw, .. }) = *answer else {
+            return Some(self.cause(ServiceOutcome::NotGiven));
+        };
+        self.changed |= *self.value.get_or_insert(raw) != raw;
+        let last = self.step + 1 == STEPS.len();
+        last.then(|| {
+            self.cause(if self.changed {
+                ServiceOutcome::Changed { raw }
+            } else {
+                ServiceOutcome::Unchanged { raw }
+            })
         })
+    }
+
+    fn cause(&self, outcome: ServiceOutcome) -> Cause {
+        Cause::Service {
+            board: self.to,
+            parameter: self.parameter.id,
+            outcome,
+        }
     }
 }

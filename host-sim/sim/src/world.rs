@@ -33,6 +33,7 @@ use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
 use wheeleg_remote_host::Outside;
+use wheeleg_telemetry::Cause;
 
 pub use power::BOARD_START_UP_NS;
 
@@ -382,8 +383,8 @@ impl World {
         self.strike_power(fault, begin)
     }
 
-    /// What happened on the line beside the boards' own doing, in words; each once.
-    pub(super) fn take_notes(&mut self) -> Vec<String> {
+    /// What happened on the line beside the boards' own doing; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<Cause> {
         self.strangers.take_notes()
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::recorder::{Recording, Row};
 use super::registry::Sample;
-use crate::LogError;
+use crate::{Event, EventSample, LogError};
 
 /// Writes `joint-1.csv` … `events.csv` into `folder`, which must exist. The
 /// fast channels are thinned to `rate_hz` (must divide 1000); pass 1000 for
@@ -29,7 +29,15 @@ pub fn write_csv(folder: &Path, recording: &Recording, rate_hz: u32) -> Result<(
     for (i, rows) in recording.links.iter().enumerate() {
         table(folder, &format!("link-{}", i + 1), rows, 0)?;
     }
-    table(folder, "events", &recording.events, 0)
+    let events: Vec<_> = recording.events.iter().map(sample_of).collect();
+    table(folder, "events", &events, 0)
+}
+
+fn sample_of(row: &Row<Event>) -> Row<EventSample> {
+    Row {
+        t_ns: row.t_ns,
+        v: row.v.sample(),
+    }
 }
 
 fn table<S: Sample>(

@@ -4,13 +4,17 @@
 //! layer, meaning). From that declaration come the sample structs, the MCAP
 //! channels with their JSON schemas, the CSV headers, the plots' labels and
 //! `wheeleg channels`.
+//!
+//! [`event`] says what happened as data, [`messages`] makes text of it.
 
 mod csv_out;
 mod difference;
 mod encode;
 mod error;
+pub mod event;
 mod filter;
 mod hash;
+pub mod messages;
 mod recorder;
 mod registry;
 pub mod samples;
@@ -19,11 +23,12 @@ pub use csv_out::write_csv;
 pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use error::LogError;
+pub use event::{Cause, Event, EventKind};
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder, Recording, Row};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, json_schema};
 pub use samples::{
-    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, StateSample, SupplySample, WheelSample, channels,
+    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
+    ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
 };

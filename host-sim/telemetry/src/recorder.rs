@@ -11,10 +11,10 @@ use super::filter::LowPass2;
 use super::hash::TelemetryHash;
 use super::registry::{ChannelDef, Sample, json_schema};
 use super::samples::{
-    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, StateSample, SupplySample, WheelSample, channels,
+    BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample, ProvenanceSample,
+    StateSample, SupplySample, WheelSample, channels,
 };
-use crate::LogError;
+use crate::{Event, LogError};
 
 /// Corner of the low-pass on force and acceleration signals, Hz
 /// (ARCHITECTURE.md, "Forces").
@@ -64,7 +64,7 @@ pub struct Recording {
     /// Bus as each board has heard it, addresses 1 to 8.
     pub links: [Vec<Row<LinkSample>>; 8],
     /// Events.
-    pub events: Vec<Row<EventSample>>,
+    pub events: Vec<Row<Event>>,
     /// Determinism hash of the log, 64 hexadecimal digits.
     pub hash: String,
     /// Messages recorded.
@@ -263,19 +263,16 @@ impl Recorder {
     }
 
     /// Records an event.
-    pub fn event(&mut self, t_ns: u64, kind: EventKind, text: impl Into<String>) {
-        let sample = EventSample {
-            kind: kind.name().to_owned(),
-            text: text.into(),
-        };
-        self.log(index::EVENTS, t_ns, &sample);
-        self.data.events.push(Row { t_ns, v: sample });
+    pub fn event(&mut self, t_ns: u64, event: impl Into<Event>) {
+        let event = event.into();
+        self.log(index::EVENTS, t_ns, &event.sample());
+        self.data.events.push(Row { t_ns, v: event });
     }
 
     /// Records one line of provenance (scenario, robot, seed, version) at time
     /// zero. Part of the hash, so it must not hold paths or wall-clock times.
     pub fn provenance(&mut self, kind: &str, text: impl Into<String>) {
-        let sample = EventSample {
+        let sample = ProvenanceSample {
             kind: kind.to_owned(),
             text: text.into(),
         };

@@ -45,7 +45,8 @@ mod tests {
     use crate::study::Settings;
     use std::path::Path;
     use wheeleg_config::builtin;
-    use wheeleg_telemetry::{EventSample, Row};
+    use wheeleg_telemetry::Row;
+    use wheeleg_telemetry::event::{Act, Cause};
 
     /// Writes a run with this summary; figures as PNG, too.
     fn written(
@@ -144,10 +145,7 @@ mod tests {
         let mut recording = testing::from_reference(&robot, 0.25, 0.0);
         recording.events.push(Row {
             t_ns: 3_000_000_000,
-            v: EventSample {
-                kind: "fault".to_owned(),
-                text: "a thing".to_owned(),
-            },
+            v: Cause::Scenario(Act::EStop).into(),
         });
         let mut analysis = analysis::analyse(&scenario, &robot, &recording);
         analysis.start_s = 0.25;
@@ -159,7 +157,7 @@ mod tests {
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(0), page(321));
-        assert!(whole.contains(">3.000</td><td>fault</td><td>a thing"));
+        assert!(whole.contains(">3.000</td><td>scenario</td><td>E-stop pressed"));
         assert!(whole.contains("0.250 s of scenario time"));
         let loss = "messages could not be written to the log";
         assert!(!whole.contains(loss) && part.contains(loss) && part.contains("321 of "));
