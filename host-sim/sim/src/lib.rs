@@ -135,8 +135,7 @@ pub struct RunOutcome {
 ///
 /// # Errors
 /// [`SimError::Simulation`] when a part refuses its parameters, the robot does
-/// not get ready, or the plant leaves the range of its model; I/O errors of the
-/// recorder.
+/// not get ready, or the plant leaves the range of its model.
 pub fn run(
     scenario: &Scenario,
     robot: &RobotConfig,
@@ -297,7 +296,6 @@ pub fn run_on(
                     stopped = true;
                     break;
                 }
-                recorder.status()?;
             }
             _ => {}
         }

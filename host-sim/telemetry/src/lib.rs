@@ -4,6 +4,9 @@
 //! layer, meaning). From that declaration come the sample structs, the MCAP
 //! channels with their JSON schemas, the CSV headers, the plots' labels and
 //! `wheeleg channels`.
+//!
+//! A [`Recorder`] takes the samples of a run and hands them to [`Sink`]s: a log file
+//! ([`LogFile`]), tables ([`Tables`]), the last seconds ([`Ring`]), and memory ([`Keep`]).
 
 mod csv_out;
 mod difference;
@@ -11,19 +14,29 @@ mod encode;
 mod error;
 mod filter;
 mod hash;
+mod log_file;
+mod memory;
 mod recorder;
+mod recover;
 mod registry;
+mod ring;
 pub mod samples;
+mod sink;
 
-pub use csv_out::write_csv;
+pub use csv_out::Tables;
 pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use error::LogError;
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;
-pub use recorder::{PLOT_CUTOFF_HZ, Recorder, Recording, Row};
+pub use log_file::LogFile;
+pub use memory::{Keep, Memory, Recording, Row};
+pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
+pub use recover::{Recovered, recover};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, channels, json_schema};
+pub use ring::{Message, Ring};
 pub use samples::{
     BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
     MasterSample, StateSample, SupplySample, WheelSample,
 };
+pub use sink::{SampleRef, Sink, Taken};

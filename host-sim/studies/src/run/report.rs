@@ -1,67 +1,116 @@
-//! What a run leaves behind: figures, tables, summary and one HTML page.
+//! What a run leaves behind beside log and tables: summary, one HTML page, figures.
 
 use std::path::{Path, PathBuf};
 
 use super::Summary;
-use super::{figures, html};
+use super::figures::{self, Source};
+use super::html;
 use crate::StudyError;
-use crate::analysis::Analysis;
-use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_report::plot::Figure;
 use wheeleg_report::subfolder;
-use wheeleg_telemetry::{Recording, write_csv};
 
-/// Samples per second in the CSV files; every sample is in memory, 500 per
-/// second are in the MCAP log.
-const CSV_RATE_HZ: u32 = 100;
-
-/// Writes everything but the log into `folder`, which must exist; returns the
-/// path of the report.
-///
-/// # Errors
-/// [`StudyError::Output`] if a file cannot be written, [`StudyError::Plot`] or
-/// [`StudyError::Report`] if a figure or the page cannot be made.
+/// Writes summary, page and figures into `folder`, which must exist, in this order: what is
+/// worth most goes first where room is short. A file that cannot be written is told in
+/// `unwritten`, leaves no part of it behind, and takes nothing with it. Gives the path of the
+/// report if it is there.
 pub(super) fn write(
     folder: &Path,
-    scenario: &Scenario,
-    robot: &RobotConfig,
-    recording: &Recording,
-    analysis: &Analysis,
+    source: &Source<'_>,
     summary: &Summary,
-) -> Result<PathBuf, StudyError> {
-    let source = figures::Source {
-        scenario,
-        robot,
-        recording,
-        analysis,
-    };
-    let tables = subfolder(folder, "csv")?;
-    write_csv(&tables, recording, CSV_RATE_HZ)?;
-    let plots = subfolder(folder, "figures")?;
-    let mut drawn = Vec::new();
-    for figure in figures::figures(&source) {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
-        let path = plots.join(format!("{}.svg", figure.id));
-        std::fs::write(&path, &svg)
-            .map_err(|e| StudyError::output("write the figure", &path, e))?;
-        drawn.push((figure, svg));
-    }
-    let json = summary.to_json();
+    unwritten: &mut Vec<StudyError>,
+) -> Option<PathBuf> {
     let path = folder.join("summary.json");
-    std::fs::write(&path, json).map_err(|e| StudyError::output("write the summary", &path, e))?;
-    let page = html::render(&source, summary, &drawn)?;
+    let written = write_whole("write the summary", &path, summary.to_json());
+    unwritten.extend(written.err());
+
+    let mut drawn = Vec::new();
+    for figure in figures::figures(source) {
+        match figure.svg() {
+            Ok(svg) => drawn.push((figure, svg)),
+            Err(e) => unwritten.push(e.into()),
+        }
+    }
     let path = folder.join("report.html");
-    std::fs::write(&path, page).map_err(|e| StudyError::output("write the report", &path, e))?;
-    Ok(path)
+    let page = html::render(source, summary, &drawn);
+    let page = page.and_then(|page| write_whole("write the report", &path, page));
+    let report = match page {
+        Ok(()) => Some(path),
+        Err(e) => {
+            unwritten.push(e);
+            None
+        }
+    };
+    unwritten.extend(write_figures(folder, &drawn).err());
+    report
+}
+
+/// Writes a file, or nothing of it.
+fn write_whole(action: &'static str, path: &Path, text: String) -> Result<(), StudyError> {
+    std::fs::write(path, text).map_err(|e| {
+        let _ = std::fs::remove_file(path);
+        StudyError::output(action, path, e)
+    })
+}
+
+/// Every figure as PNG and SVG; one error for all that fail.
+fn write_figures(folder: &Path, drawn: &[(Figure, String)]) -> Result<(), StudyError> {
+    let plots = subfolder(folder, "figures")?;
+    let mut failed = Vec::new();
+    for (figure, svg) in drawn {
+        let path = |extension: &str| plots.join(format!("{}.{extension}", figure.id));
+        let (png, vector) = (path("png"), path("svg"));
+        if let Err(e) = figure.png(&png) {
+            let _ = std::fs::remove_file(&png);
+            failed.push((png, e.into()));
+        }
+        if let Err(e) = write_whole("write the figure", &vector, svg.clone()) {
+            failed.push((vector, e));
+        }
+    }
+    let count = failed.len();
+    let Some((_, first)) = failed.into_iter().next() else {
+        return Ok(());
+    };
+    if count == 1 {
+        return Err(first);
+    }
+    Err(StudyError::refused(
+        format!(
+            "{count} of {} figures are missing: {first}",
+            2 * drawn.len()
+        ),
+        "the report has all figures in it, if it could be written",
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::{self, testing};
+    use crate::analysis::{self, Analysis, testing};
     use crate::run::RunInfo;
-    use wheeleg_config::builtin;
-    use wheeleg_telemetry::{EventSample, Row};
+    use wheeleg_config::{RobotConfig, Scenario, builtin};
+    use wheeleg_telemetry::{EventSample, Recording, Row};
+
+    /// [`super::write`] where everything can be written.
+    fn write(
+        folder: &Path,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        recording: &Recording,
+        analysis: &Analysis,
+        summary: &Summary,
+    ) -> PathBuf {
+        let source = Source {
+            scenario,
+            robot,
+            recording,
+            analysis,
+        };
+        let mut unwritten = Vec::new();
+        let path = super::write(folder, &source, summary, &mut unwritten);
+        assert!(unwritten.is_empty(), "{unwritten:?}");
+        path.expect("written")
+    }
 
     /// Every file of a run, from a recording made of the reference model.
     fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
@@ -86,8 +135,7 @@ mod tests {
             &recording,
             &analysis,
             &summary,
-        )
-        .expect("written");
+        );
         (folder, summary)
     }
 
@@ -121,7 +169,7 @@ mod tests {
         let mut page = |complete: bool| {
             summary.complete = complete;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            write(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(true), page(false));
@@ -151,7 +199,7 @@ mod tests {
         let mut page = |dropped: u64| {
             summary.dropped_messages = dropped;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            write(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(0), page(321));
@@ -205,7 +253,7 @@ mod tests {
                 }],
             });
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            write(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (equal, other) = (page(0), page(5));

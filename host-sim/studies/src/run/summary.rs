@@ -49,6 +49,9 @@ pub struct Summary {
     pub hash: String,
     /// Messages that could not be written to the log file.
     pub dropped_messages: u64,
+    /// Log and tables that could not be written to their end, and why; not there if all were.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unwritten: Vec<String>,
     /// Simulated time, start-up included, s.
     pub simulated_s: f64,
     /// Scenario time in the record, s.
@@ -94,7 +97,14 @@ fn messages(recording: &Recording) -> Vec<String> {
             n => Some(format!("{line} ({n} times)")),
         }
     });
-    told.collect()
+    let mut lines: Vec<String> = told.collect();
+    if recording.events_left_out > 0 {
+        lines.push(format!(
+            "{} later events are in the log and the tables alone",
+            recording.events_left_out
+        ));
+    }
+    lines
 }
 
 impl Summary {
@@ -117,6 +127,7 @@ impl Summary {
             messages: messages(recording),
             hash: recording.hash.clone(),
             dropped_messages: recording.dropped,
+            unwritten: Vec::new(),
             simulated_s: info.simulated_s,
             recorded_s: info.recorded_s,
             wall_s: info.wall_s,

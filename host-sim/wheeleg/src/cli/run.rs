@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{INTERRUPTED, TARGETS_MISSED, print};
+use super::{FAILED, INTERRUPTED, TARGETS_MISSED, print};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_report::output;
@@ -98,13 +98,24 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     } else {
         print(&run_text(&finished))?;
     }
-    Ok(if !finished.summary.complete {
+    let differs = differing_bits(&finished) > 0;
+    let Finished {
+        summary, unwritten, ..
+    } = finished;
+    let all_written = unwritten.is_empty();
+    for error in unwritten {
+        eprintln!("{:?}", miette::Report::new(error));
+    }
+    Ok(if !all_written {
+        eprintln!("the values above hold; of the files, those named here are missing or cut short");
+        ExitCode::from(FAILED)
+    } else if !summary.complete {
         eprintln!("interrupted; the files hold what was recorded until then");
         ExitCode::from(INTERRUPTED)
-    } else if differing_bits(&finished) > 0 {
+    } else if differs {
         eprintln!("boards differ from the native application beside them");
         ExitCode::from(TARGETS_MISSED)
-    } else if args.strict && !finished.summary.passed {
+    } else if args.strict && !summary.passed {
         ExitCode::from(TARGETS_MISSED)
     } else {
         ExitCode::SUCCESS
@@ -121,7 +132,7 @@ fn differing_bits(finished: &Finished) -> u64 {
 /// frame and internal at its time, so equal hashes mean equal runs. Boards here are down
 /// when those outside were; that time is the hardware's.
 fn compare_sil(options: &Options, finished: &Finished) -> Result<(), StudyError> {
-    let folder = finished.report.parent().unwrap_or(Path::new("."));
+    let folder = &finished.folder;
     let native = run::repeat_natively(options, finished, folder.join(output::NATIVE))?;
     if native.summary.hash == finished.summary.hash {
         eprintln!("the log is that of the native run, to the bit");
@@ -228,7 +239,10 @@ fn run_text(finished: &Finished) -> String {
         "time    {:.2} s simulated in {:.2} s, {:.1} times faster than real time",
         s.simulated_s, s.wall_s, s.realtime_factor
     );
-    let _ = writeln!(out, "report  {}", finished.report.display());
+    let _ = match &finished.report {
+        Some(report) => writeln!(out, "report  {}", report.display()),
+        None => writeln!(out, "results {}", finished.folder.display()),
+    };
     out
 }
 
