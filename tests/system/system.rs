@@ -16,6 +16,7 @@ mod delay;
 mod fault_matrix;
 mod figures;
 mod foot_sides;
+mod long_runs;
 mod off_data;
 mod precharge;
 mod reference;

@@ -151,8 +151,9 @@ const TARGETS: [(&str, TargetSet); 10] = [
 
 const LEGS: [(&str, LegChoice); 2] = [("left", LegChoice::Left), ("right", LegChoice::Right)];
 
-/// Longest run, s. An hour: memory holds about 2 MB per simulated second.
-const MAX_DURATION_S: f64 = 3600.0;
+/// Longest run, s: 104 days. Beyond it a time in seconds no longer tells nanoseconds apart (its
+/// 53 bits end at 9.007e15 ns).
+const MAX_DURATION_S: f64 = 9.0e6;
 
 const fn scalar(
     key: &'static str,

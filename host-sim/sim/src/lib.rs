@@ -124,8 +124,7 @@ pub struct RunOutcome {
 ///
 /// # Errors
 /// [`SimError::Simulation`] when a part refuses its parameters, the robot does
-/// not get ready, or the plant leaves the range of its model; I/O errors of the
-/// recorder.
+/// not get ready, or the plant leaves the range of its model.
 pub fn run(
     scenario: &Scenario,
     robot: &RobotConfig,
@@ -235,7 +234,6 @@ pub fn run_on(
         if happened == Happened::MasterCycle {
             let t_s = session.scenario_s().unwrap_or(-1.0);
             stopped = (onlookers.progress)(t_s).is_break();
-            recorder.status()?;
         }
     }
     Ok(session.finish(stopped, recorder))

@@ -8,19 +8,22 @@ mod summary;
 
 pub use summary::{RunInfo, Summary};
 
+use std::fs::File;
+use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use self::figures::Source;
 use crate::StudyError;
-use crate::analysis;
+use crate::analysis::Analyser;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_config::{RobotConfig, Scenario, builtin};
+use wheeleg_config::{EventAction, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
 use wheeleg_sim::{self as sil, Boards, DownTimes};
-use wheeleg_telemetry::Recorder;
+use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
 
 /// What to run.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,14 +46,27 @@ pub struct Options {
     pub compared: bool,
 }
 
-/// What came of a run.
-#[derive(Debug, Clone, PartialEq)]
+/// A run that was simulated and judged.
+#[derive(Debug)]
 pub struct Run {
     /// Contents of `summary.json`.
     pub summary: Summary,
+    /// What could not be written, in order; everything else is there.
+    pub unwritten: Vec<StudyError>,
     /// When boards outside were down.
     pub down_times: DownTimes,
 }
+
+/// Samples per second in the CSV files; 500 per second are in the MCAP log.
+const CSV_RATE_HZ: u32 = 100;
+/// Measured on the three-step test and rounded up: log, bytes per simulated second.
+const LOG_BYTES_PER_S: f64 = 400e3;
+/// The same of the tables.
+const TABLE_BYTES_PER_S: f64 = 110e3;
+/// From this duration on the program says how much disk a run takes, s.
+const LONG_S: f64 = 60.0;
+/// Room that is held for the summary while log and tables fill the disk, bytes.
+const RESERVE_BYTES: usize = 256 * 1024;
 
 /// Runs a scenario: log, tables, figures, summary, report. `stop` ends it at
 /// the next bus cycle and the files are finished all the same. Results of an
@@ -58,7 +74,9 @@ pub struct Run {
 /// `previous-2`, …
 ///
 /// # Errors
-/// Any [`StudyError`]. A log that was begun is closed and stays readable.
+/// Any [`StudyError`]. A log that was begun is closed and stays readable. A file that cannot be
+/// written once the run has begun is no error: the run is judged all the same, and
+/// [`Run::unwritten`] names the file.
 pub fn run(options: &Options, stop: &Stop) -> Result<Finished<Run>, StudyError> {
     run_on(options, stop, None)
 }
@@ -115,7 +133,13 @@ fn run_on(
         stop: stop.clone(),
     };
     let job = Job::begin(&scenario.name, &settings)?;
-    let mut recorder = Recorder::create(&job.folder().join("log.mcap"))?;
+    announce(scenario.duration_s);
+    let reserve = reserve(job.folder());
+    let mut analyser = Analyser::new(&scenario, &robot);
+    let mut recorder = Recorder::new(keep(&scenario))
+        .with(LogFile::create(&job.folder().join("log.mcap"))?)
+        .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?)
+        .with(&mut analyser);
     provenance(&mut recorder, &scenario, &robot, seed);
     let duration_ms = (scenario.duration_s * 1e3).round() as u64;
     job.progress.begin(
@@ -138,10 +162,10 @@ fn run_on(
             }
         }),
     );
-    let closed = recorder.finish();
+    let (recording, failed) = recorder.close();
     let wall_s = begun.elapsed().as_secs_f64();
     let outcome = outcome?;
-    let recording = closed?;
+    let unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
 
     let info = RunInfo {
         seed,
@@ -151,18 +175,57 @@ fn run_on(
         complete: !outcome.stopped,
         pil: outcome.pil,
     };
-    let analysis = analysis::analyse(&scenario, &robot, &recording);
-    let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
+    let analysis = analyser.finish();
+    let mut summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
+    summary.unwritten = unwritten.iter().map(ToString::to_string).collect();
+    drop(reserve);
     let recorded_ms = (summary.recorded_s * 1e3).round() as u64;
     let stopped = job
         .progress
         .stopped(recorded_ms, duration_ms, "ms of the scenario")
         .filter(|_| !summary.complete);
+    let source = Source {
+        scenario: &scenario,
+        robot: &robot,
+        recording: &recording,
+        analysis: &analysis,
+    };
     let run = Run {
         summary,
+        unwritten,
         down_times: outcome.down_times,
     };
-    report::write(job, &scenario, &robot, &recording, &analysis, run, stopped)
+    Ok(report::write(job, &source, run, stopped))
+}
+
+/// What figures and page are made from: the analysis sees every sample as it comes.
+fn keep(scenario: &Scenario) -> Keep {
+    let mut events = scenario.events.iter();
+    let shown = events.find(|e| !matches!(e.action, EventAction::Command(_)));
+    let near_s: Vec<f64> = shown.iter().map(|e| e.at_s).collect();
+    let all = Keep::bounded(scenario.duration_s, &near_s).without(&["/bus", "/master"]);
+    match shown {
+        Some(_) => all,
+        None => all.without(&["/wheel/7", "/wheel/8"]),
+    }
+}
+
+/// Tells of the disk that a long run takes.
+fn announce(duration_s: f64) {
+    if duration_s > LONG_S {
+        let bytes = |per_s: f64| per_s * duration_s * 1e-9;
+        let (log, tables) = (bytes(LOG_BYTES_PER_S), bytes(TABLE_BYTES_PER_S));
+        eprintln!(
+            "{duration_s:.0} s to simulate: about {log:.2} GB of log and {tables:.2} GB of tables"
+        );
+    }
+}
+
+/// Room on the disk for the summary, given back when it is dropped; `None` where there is none.
+fn reserve(folder: &Path) -> Option<File> {
+    let mut file = tempfile::tempfile_in(folder).ok()?;
+    file.write_all(&vec![0; RESERVE_BYTES]).ok()?;
+    Some(file)
 }
 
 /// What went into the run, as messages at time zero: part of the log and of

@@ -1,52 +1,71 @@
-//! What a run leaves behind: figures, tables, summary and one HTML page.
+//! What a run leaves behind beside log and tables: summary, one HTML page, figures.
 
-use super::{Run, figures, html};
+use super::figures::{self, Source};
+use super::{Run, html};
 use crate::StudyError;
-use crate::analysis::Analysis;
-use crate::study::{Finished, Job, Stopped};
-use wheeleg_config::{RobotConfig, Scenario};
-use wheeleg_telemetry::{Recording, write_csv};
+use crate::study::{Finished, Job, Stopped, schema};
+use wheeleg_report::plot::Figure;
 
-/// Samples per second in the CSV files; every sample is in memory, 500 per
-/// second are in the MCAP log.
-const CSV_RATE_HZ: u32 = 100;
-
-/// Writes everything but the log into the folder of the job.
-///
-/// # Errors
-/// [`StudyError::Report`] if a file cannot be written, or a figure or the page cannot be made.
+/// Writes summary, page and figures into the folder of the job, in this order: what is worth most
+/// goes first where room is short. A file that cannot be written is added to
+/// [`Run::unwritten`], leaves no part of it behind, and takes nothing with it.
 pub(super) fn write(
     job: Job,
-    scenario: &Scenario,
-    robot: &RobotConfig,
-    recording: &Recording,
-    analysis: &Analysis,
-    run: Run,
+    source: &Source<'_>,
+    mut run: Run,
     stopped: Option<Stopped>,
-) -> Result<Finished<Run>, StudyError> {
-    let source = figures::Source {
-        scenario,
-        robot,
-        recording,
-        analysis,
+) -> Finished<Run> {
+    let summary = schema::json(&run.summary, stopped.as_ref());
+    run.unwritten
+        .extend(job.save("summary.json", &summary).err());
+
+    let mut drawn = Vec::new();
+    for figure in figures::figures(source) {
+        match figure.svg() {
+            Ok(svg) => drawn.push((figure, svg)),
+            Err(e) => run.unwritten.push(e.into()),
+        }
+    }
+    let page = html::render(source, &run.summary, &drawn);
+    let page = page.and_then(|page| job.save("report.html", &page));
+    run.unwritten.extend(page.err());
+    run.unwritten.extend(write_figures(&job, &drawn).err());
+    job.end(run, summary, stopped)
+}
+
+/// Every figure as SVG, and as PNG where that was asked for; one error for all that fail.
+fn write_figures(job: &Job, drawn: &[(Figure, String)]) -> Result<(), StudyError> {
+    job.subfolder("figures")?;
+    let files = drawn
+        .iter()
+        .map(|(figure, svg)| job.save_figure(figure, svg));
+    let mut failed = files.filter_map(Result::err);
+    let Some(first) = failed.next() else {
+        return Ok(());
     };
-    write_csv(&job.subfolder("csv")?, recording, CSV_RATE_HZ)?;
-    let drawn = job.draw(figures::figures(&source))?;
-    let json = job.summary(&run.summary, stopped.as_ref())?;
-    let page = html::render(&source, &run.summary, &drawn)?;
-    job.finish(run, json, &page, stopped)
+    Err(match failed.count() {
+        0 => first,
+        more => StudyError::refused(
+            format!(
+                "{} of {} figures are missing: {first}",
+                more + 1,
+                drawn.len()
+            ),
+            "the report has all figures in it, if it could be written",
+        ),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::{self, testing};
+    use crate::analysis::{self, Analysis, testing};
     use crate::run::{RunInfo, Summary};
     use crate::study::Settings;
     use std::path::Path;
-    use wheeleg_config::builtin;
-    use wheeleg_telemetry::Row;
+    use wheeleg_config::{RobotConfig, Scenario, builtin};
     use wheeleg_telemetry::event::{Act, Cause};
+    use wheeleg_telemetry::{Recording, Row};
 
     /// Writes a run with this summary; figures as PNG, too.
     fn written(
@@ -64,9 +83,18 @@ mod tests {
         let job = Job::begin("test", &settings).expect("a folder");
         let run = Run {
             summary: summary.clone(),
+            unwritten: Vec::new(),
             down_times: wheeleg_sim::DownTimes::default(),
         };
-        write(job, scenario, robot, recording, analysis, run, None).expect("written");
+        let source = Source {
+            scenario,
+            robot,
+            recording,
+            analysis,
+        };
+        let finished = write(job, &source, run, None);
+        let unwritten = &finished.result.unwritten;
+        assert!(unwritten.is_empty(), "{unwritten:?}");
     }
 
     /// Every file of a run, from a recording made of the reference model.

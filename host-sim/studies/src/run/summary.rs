@@ -51,6 +51,9 @@ pub struct Summary {
     pub hash: String,
     /// Messages that could not be written to the log file.
     pub dropped_messages: u64,
+    /// Log and tables that could not be written to their end, and why; not there if all were.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unwritten: Vec<String>,
     /// Simulated time, start-up included, s.
     pub simulated_s: f64,
     /// Scenario time in the record, s.
@@ -110,6 +113,12 @@ fn messages(recording: &Recording) -> Vec<String> {
     for (_, place, count) in refusals.into_iter().filter(|(_, _, count)| *count > 1) {
         lines[place].push_str(&format!(" ({count} times)"));
     }
+    if recording.events_left_out > 0 {
+        lines.push(format!(
+            "{} later events are in the log and the tables alone",
+            recording.events_left_out
+        ));
+    }
     lines
 }
 
@@ -133,6 +142,7 @@ impl Summary {
             messages: messages(recording),
             hash: recording.hash.clone(),
             dropped_messages: recording.dropped,
+            unwritten: Vec::new(),
             simulated_s: info.simulated_s,
             recorded_s: info.recorded_s,
             wall_s: info.wall_s,

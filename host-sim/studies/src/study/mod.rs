@@ -130,8 +130,28 @@ impl Job {
     /// [`StudyError::Report`] if it cannot be written.
     pub fn save(&self, name: &str, text: &str) -> Result<PathBuf, StudyError> {
         let path = self.folder().join(name);
-        std::fs::write(&path, text).map_err(|e| StudyError::output("write", &path, e))?;
+        std::fs::write(&path, text).map_err(|e| {
+            // A part of a file would be taken for the whole.
+            let _ = std::fs::remove_file(&path);
+            StudyError::output("write", &path, e)
+        })?;
         Ok(path)
+    }
+
+    /// Writes a figure into the folder `figures`, which must exist: its SVG text, and a PNG where
+    /// that was asked for.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if one of them cannot be drawn or written.
+    pub fn save_figure(&self, figure: &Figure, svg: &str) -> Result<(), StudyError> {
+        if self.png {
+            let path = self.folder().join(format!("figures/{}.png", figure.id));
+            figure.png(&path).inspect_err(|_| {
+                let _ = std::fs::remove_file(&path);
+            })?;
+        }
+        self.save(&format!("figures/{}.svg", figure.id), svg)?;
+        Ok(())
     }
 
     /// Writes `summary.json`; returns its text.
@@ -154,16 +174,13 @@ impl Job {
     /// # Errors
     /// [`StudyError::Report`] if one cannot be drawn or written.
     pub fn draw(&self, figures: Vec<Figure>) -> Result<Vec<(Figure, String)>, StudyError> {
-        let folder = self.subfolder("figures")?;
+        self.subfolder("figures")?;
         self.progress.begin("drawing", figures.len() as u64);
         figures
             .into_par_iter()
             .map(|figure| {
-                if self.png {
-                    figure.png(&folder.join(format!("{}.png", figure.id)))?;
-                }
                 let svg = figure.svg()?;
-                self.save(&format!("figures/{}.svg", figure.id), &svg)?;
+                self.save_figure(&figure, &svg)?;
                 self.progress.step();
                 Ok((figure, svg))
             })
@@ -204,13 +221,18 @@ impl Job {
         page: &str,
         stopped: Option<Stopped>,
     ) -> Result<Finished<T>, StudyError> {
-        let report = self.save("report.html", page)?;
+        self.save("report.html", page)?;
+        Ok(self.end(result, summary, stopped))
+    }
+
+    /// Lets go of the folder.
+    pub fn end<T>(self, result: T, summary: String, stopped: Option<Stopped>) -> Finished<T> {
         self.progress.clear();
-        Ok(Finished {
+        Finished {
             result,
             summary,
-            report,
+            report: self.folder().join("report.html"),
             stopped,
-        })
+        }
     }
 }

@@ -10,6 +10,7 @@ mod faults;
 mod figures;
 mod interface;
 mod list;
+mod log;
 mod params;
 mod plant;
 mod run;
@@ -88,6 +89,8 @@ enum Command {
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
+    /// Recover the log of a run that was killed.
+    Log(log::LogArgs),
     /// Tell in what the bus interface of this program differs from another.
     Interface(interface::InterfaceArgs),
 }
@@ -112,6 +115,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Tune(args)) => tune::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
+        Some(Command::Log(args)) => log::command(&args),
         Some(Command::Interface(args)) => interface::command(&args),
     };
     result.unwrap_or_else(|error| {

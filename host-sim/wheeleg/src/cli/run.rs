@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Drawing, end, stop_on_signals, tell};
+use super::{Drawing, FAILED, end, stop_on_signals, tell};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_report::output;
@@ -105,7 +105,15 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     if differ && finished.stopped.is_none() {
         tell("boards differ from the native application beside them");
     }
-    Ok(code)
+    let unwritten = finished.result.unwritten;
+    if unwritten.is_empty() {
+        return Ok(code);
+    }
+    for error in unwritten {
+        tell(&format!("{:?}", miette::Report::new(error)));
+    }
+    tell("the values above hold; of the files, those named here are missing or cut short");
+    Ok(ExitCode::from(FAILED))
 }
 
 /// Bits in which boards outside differ from the application here.
@@ -230,7 +238,11 @@ fn run_text(finished: &Finished<Run>) -> String {
         "time    {:.2} s simulated in {:.2} s, {:.1} times faster than real time",
         s.simulated_s, s.wall_s, s.realtime_factor
     );
-    let _ = writeln!(out, "report  {}", finished.report.display());
+    // A full disk may have left none.
+    let _ = match (finished.report.exists(), finished.report.parent()) {
+        (false, Some(folder)) => writeln!(out, "results {}", folder.display()),
+        _ => writeln!(out, "report  {}", finished.report.display()),
+    };
     out
 }
 
