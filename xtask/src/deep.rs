@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 10] = [
+const CHECKS: [Check; 11] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -51,6 +51,12 @@ const CHECKS: [Check; 10] = [
         "the predictive law on 240 cylinders drawn at random",
         2,
         cylinders,
+    ),
+    Check(
+        "long-run",
+        "two hours of standing, longer than the 2^32 us of a counter, in bounded memory",
+        8,
+        long_run,
     ),
     Check(
         "state-flips",
@@ -159,6 +165,15 @@ fn cylinders() -> StepResult<String> {
         ["system", test],
         ("WHEELEG_CYLINDERS", 240),
         " cylinders from number ",
+    )
+}
+
+fn long_run() -> StepResult<String> {
+    let test = "long_runs::memory_does_not_grow_with_simulated_time";
+    measured(
+        ["system", test],
+        ("WHEELEG_LONG_RUN_S", 7_200),
+        " s simulated in ",
     )
 }
 

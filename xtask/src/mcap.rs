@@ -1,12 +1,13 @@
 //! The log of a run, opened by a reader that is not ours.
 
+use std::fs;
 use std::path::Path;
 
 use anyhow::anyhow;
 
-use crate::process::{command, run};
+use crate::process::{command, run, target_dir};
 use crate::report::Report;
-use crate::tools;
+use crate::{rust, tools};
 
 /// First the checker is checked (it must refuse broken logs), then the run's log.
 /// Without a run there is nothing to open, which is a failure, not a skipped step.
@@ -28,4 +29,27 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             .arg(run_dir))?;
         Ok(())
     });
+    report.step(
+        "MCAP log that was cut off, recovered, in the Python reader",
+        || {
+            let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
+            let folder = target_dir().join("xtask").join("recovered");
+            if folder.exists() {
+                fs::remove_dir_all(&folder)?;
+            }
+            fs::create_dir_all(&folder)?;
+            let log = fs::read(std::path::absolute(run_dir)?.join("log.mcap"))?;
+            fs::write(folder.join("cut.mcap"), &log[..log.len() * 3 / 5])?;
+            rust::build(&["--bin", "wheeleg"])?;
+            run(command(target_dir().join("release").join("wheeleg"))
+                .args(["log", "recover"])
+                .arg(folder.join("cut.mcap"))
+                .arg("--out")
+                .arg(folder.join("log.mcap")))?;
+            run(command(tools::python()?)
+                .arg("tests/python/check_mcap.py")
+                .arg(&folder))?;
+            Ok(())
+        },
+    );
 }

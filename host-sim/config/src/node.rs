@@ -18,6 +18,16 @@ pub struct NodeParams {
     pub wheels: [Vec<(u16, i32)>; 2],
 }
 
+impl NodeParams {
+    /// Parameters of the board at an address; none for an address that is no node's.
+    #[must_use]
+    pub fn of(&self, address: Address) -> &[(u16, i32)] {
+        let mut boards = self.joints.iter().chain(&self.wheels);
+        let of = address.slot().and_then(|slot| boards.nth(slot));
+        of.map_or(&[], Vec::as_slice)
+    }
+}
+
 /// Names of the sections, and the joints (index from 0) that each sets. Later
 /// sections replace what earlier ones set.
 const JOINT_SECTIONS: [(&str, &[usize]); 4] = [

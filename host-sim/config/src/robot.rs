@@ -112,6 +112,8 @@ params! {
         slide_mass_kg: f64, "slide_mass", Mass, 0.0, 100.0;
         /// Distance of the drawn-back foot ahead of the axle.
         load_arm_m: f64, "load_arm", Length, 0.01, 5.0;
+        /// Sampling of the positions from which the paper's velocities and accelerations are computed.
+        sample_period_s: f64, "sample_period", Time, 0.01, 0.2;
     }
 
     /// What only the robot with a floating chassis and its drawing need.
@@ -240,7 +242,7 @@ impl RobotConfig {
             known.extend(plant::pneumatics::SECTIONS);
             r.reject_unknown(top, &known);
         }
-        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let name = top.as_ref().and_then(|t| r.name(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let bus = r.section::<BusParams>("bus");
         let homing = r.section::<HomingParams>("homing");

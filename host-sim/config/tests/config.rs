@@ -1,6 +1,6 @@
 //! Robot and scenario files: what is wrong with them is said where it is wrong.
 
-use wheeleg_config::{ConfigError, RobotConfig, Scenario, builtin};
+use wheeleg_config::{AxisConfig, ConfigError, RobotConfig, Scenario, builtin};
 use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
@@ -449,7 +449,7 @@ fn scenario_mistakes() {
     assert_all(&text, &["`duration`", "10.0", "\"m\"", "\"s\""]);
 
     let text = scenario_with("value = 10.0, unit = \"s\"", "value = 0.0, unit = \"s\"");
-    assert_all(&text, &["`duration` = 0 s", "0.01 to 3600 s"]);
+    assert_all(&text, &["`duration` = 0 s", "0.01 to 9000000 s"]);
 
     let service = "targets = \"none\"\n[[events]]\nat = { value = 1.0, unit = \"s\" }\n\
                    action = \"command\"\ncommand = \"WriteParameter\"\nboard = 1\n\
@@ -576,4 +576,36 @@ fn gait_times_that_contradict_each_other() {
         &["`gait.reach`, `gait.lift`", "`gait.push`, `gait.lower`"],
     );
     assert_eq!(text.lines().count(), 2, "{text}");
+}
+
+/// Names become folders and files, and stand in files that are written.
+#[test]
+fn a_name_is_one_part_of_a_path_and_no_way_out_of_its_folder() {
+    const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
+    let named = |text: &str, name: &str| {
+        let line = text.lines().find(|line| line.starts_with("name "));
+        text.replacen(line.expect("a name"), &format!("name = {name:?}"), 1)
+    };
+    let long = "x".repeat(300);
+    for bad in [
+        "", ".", "..", "../../x", "a/b", "a\\b", ".x", "a b", "ä", "a\nb", &long,
+    ] {
+        let said = [
+            report(&RobotConfig::parse("my.toml", &named(ROBOT, bad)).expect_err(bad)),
+            report(&Scenario::parse("my.toml", &named(SCENARIO, bad)).expect_err(bad)),
+            report(&AxisConfig::parse("my.toml", &named(AXIS, bad)).expect_err(bad)),
+        ];
+        for said in said {
+            assert_all(
+                &said,
+                &["my.toml:", "`name` = ", "1 to 64", "not beginning"],
+            );
+            assert!(said.len() < 500, "{said}");
+        }
+    }
+    let longest = "x".repeat(64);
+    for good in ["a", "My_axis-2.b", "0", "-", &longest] {
+        let scenario = Scenario::parse("my.toml", &named(SCENARIO, good)).expect(good);
+        assert_eq!(scenario.name, good);
+    }
 }

@@ -309,16 +309,6 @@ impl WheelBoard {
         self.count_zero = edges;
     }
 
-    /// Bridge duty that becomes active at this sample edge, −1..=1.
-    pub(super) fn active_duty(&self) -> f64 {
-        let magnitude = f64::from(self.pulse.preloaded()) / f64::from(BRIDGE_COUNTS);
-        if self.sign.level() {
-            -magnitude
-        } else {
-            magnitude
-        }
-    }
-
     /// The outputs that become active at this sample edge, as boards outside
     /// of this process report them.
     pub(super) fn active_outputs(&self) -> wheeleg_remote_link::Outputs {

@@ -1,64 +1,98 @@
-//! CSV files from a recording: one per channel, units in the header.
+//! The sink that writes CSV files: one per channel, units in the header.
 
-use std::path::Path;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
-use super::recorder::{Recording, Row};
-use super::registry::Sample;
+use super::registry::ChannelDef;
+use super::samples::channels;
+use super::sink::{Sink, Taken};
 use crate::LogError;
 
-/// Writes `joint-1.csv` … `events.csv` into `folder`, which must exist. The
-/// fast channels are thinned to `rate_hz` (must divide 1000); pass 1000 for
-/// every sample.
-///
-/// # Errors
-/// [`LogError::Output`] if a file cannot be written.
-pub fn write_csv(folder: &Path, recording: &Recording, rate_hz: u32) -> Result<(), LogError> {
-    let period_ns = 1_000_000_000 / u64::from(rate_hz.max(1));
-    for (i, rows) in recording.joints.iter().enumerate() {
-        table(folder, &format!("joint-{}", i + 1), rows, period_ns)?;
-    }
-    for (i, rows) in recording.wheels.iter().enumerate() {
-        table(folder, &format!("wheel-{}", i + 7), rows, period_ns)?;
-    }
-    table(folder, "foot-left", &recording.feet[0], period_ns)?;
-    table(folder, "foot-right", &recording.feet[1], period_ns)?;
-    table(folder, "body", &recording.body, period_ns)?;
-    table(folder, "bus", &recording.bus, period_ns)?;
-    table(folder, "supply", &recording.supply, period_ns)?;
-    table(folder, "master", &recording.master, period_ns)?;
-    for (i, rows) in recording.links.iter().enumerate() {
-        table(folder, &format!("link-{}", i + 1), rows, 0)?;
-    }
-    table(folder, "events", &recording.events, 0)
+/// Channels without a table: what the log alone is asked for.
+const WITHOUT: [&str; 2] = ["/state", "/run"];
+
+struct Table {
+    path: PathBuf,
+    out: csv::Writer<File>,
+    /// 0: every row.
+    period_ns: u64,
+    next_ns: u64,
 }
 
-fn table<S: Sample>(
-    folder: &Path,
-    name: &str,
-    rows: &[Row<S>],
-    period_ns: u64,
-) -> Result<(), LogError> {
-    let path = folder.join(format!("{name}.csv"));
-    let failed = |e: csv::Error| LogError::output("write the table", &path, e.into());
-    let mut out = csv::Writer::from_path(&path).map_err(failed)?;
-    let mut header = vec!["time [s]".to_owned()];
-    header.extend(S::FIELDS.iter().map(|f| format!("{} [{}]", f.name, f.unit)));
-    out.write_record(&header).map_err(failed)?;
-    let mut next_ns = 0;
-    let mut record = csv::ByteRecord::new();
-    let mut time = Vec::new();
-    for row in rows {
-        if row.t_ns < next_ns {
-            continue;
+/// Writes `joint-1.csv` … `events.csv` while the run lasts.
+pub struct Tables {
+    /// One per channel of the registry.
+    tables: Vec<Option<Table>>,
+    failed: Option<LogError>,
+    record: csv::ByteRecord,
+    text: Vec<u8>,
+}
+
+impl Tables {
+    /// Creates the files, with their headers, in `folder`, which must exist. The fast channels
+    /// are thinned to `rate_hz` (must divide 1000).
+    ///
+    /// # Errors
+    /// [`LogError::Output`] if a file cannot be written.
+    pub fn create(folder: &Path, rate_hz: u32) -> Result<Self, LogError> {
+        let period_ns = 1_000_000_000 / u64::from(rate_hz.max(1));
+        let tables = channels().iter().map(|def| {
+            if WITHOUT.contains(&def.topic) {
+                return Ok(None);
+            }
+            // A channel that is written on change is not thinned.
+            let period_ns = if def.rate_hz == 0 { 0 } else { period_ns };
+            Table::create(folder, def, period_ns).map(Some)
+        });
+        Ok(Self {
+            tables: tables.collect::<Result<_, _>>()?,
+            failed: None,
+            record: csv::ByteRecord::new(),
+            text: Vec::new(),
+        })
+    }
+}
+
+impl Table {
+    fn create(folder: &Path, def: &ChannelDef, period_ns: u64) -> Result<Self, LogError> {
+        let name = def.topic.trim_start_matches('/').replace('/', "-");
+        let path = folder.join(format!("{name}.csv"));
+        let failed = |e: csv::Error| LogError::output("write the table", &path, e.into());
+        let mut out = csv::Writer::from_path(&path).map_err(failed)?;
+        let mut header = vec!["time [s]".to_owned()];
+        let fields = def.fields.iter();
+        header.extend(fields.map(|f| format!("{} [{}]", f.name, f.unit)));
+        out.write_record(&header).map_err(failed)?;
+        Ok(Self {
+            path,
+            out,
+            period_ns,
+            next_ns: 0,
+        })
+    }
+
+    fn failed(&self, reason: std::io::Error) -> LogError {
+        LogError::output("write the table", &self.path, reason)
+    }
+}
+
+impl Sink for Tables {
+    fn take(&mut self, taken: &Taken<'_>) {
+        let Some(table) = &mut self.tables[taken.channel] else {
+            return;
+        };
+        if self.failed.is_some() || taken.t_ns < table.next_ns {
+            return;
         }
         // A period of zero keeps every row.
-        let tick = row.t_ns.checked_div(period_ns);
-        next_ns = tick.map_or(0, |n| (n + 1) * period_ns);
+        let tick = taken.t_ns.checked_div(table.period_ns);
+        table.next_ns = tick.map_or(0, |n| (n + 1) * table.period_ns);
+        let record = &mut self.record;
         record.clear();
-        time.clear();
-        super::push_fixed(&mut time, row.t_s(), 6);
-        record.push_field(&time);
-        row.v.cells(&mut |cell| {
+        self.text.clear();
+        super::push_fixed(&mut self.text, taken.t_ns as f64 * 1e-9, 6);
+        record.push_field(&self.text);
+        taken.sample.cells(&mut |cell| {
             // Text arrives as JSON; CSV has its own quoting.
             match cell.first() {
                 Some(b'"') => {
@@ -69,8 +103,18 @@ fn table<S: Sample>(
                 _ => record.push_field(cell),
             }
         });
-        out.write_byte_record(&record).map_err(failed)?;
+        if let Err(e) = table.out.write_byte_record(record) {
+            self.failed = Some(table.failed(e.into()));
+        }
     }
-    out.flush()
-        .map_err(|e| LogError::output("write the table", &path, e))
+
+    fn finish(&mut self) -> Result<(), LogError> {
+        for table in self.tables.iter_mut().flatten() {
+            if let Err(e) = table.out.flush() {
+                let error = table.failed(e);
+                self.failed.get_or_insert(error);
+            }
+        }
+        self.failed.take().map_or(Ok(()), Err)
+    }
 }

@@ -27,9 +27,46 @@ pub enum LogError {
     #[error("cannot write the log: {0}")]
     #[diagnostic(
         code(wheeleg::log),
-        help("the disk may be full; what was flushed so far stays readable")
+        help("the disk may be full; `wheeleg log recover` makes a whole log of what was written")
     )]
     Log(#[from] mcap::McapError),
+
+    /// A file that is no MCAP log.
+    #[error("`{}` is not an MCAP log: it does not begin as one", path.display())]
+    #[diagnostic(
+        code(wheeleg::log),
+        help("the log of a run is the file log.mcap in its folder")
+    )]
+    NotALog {
+        /// The file.
+        path: PathBuf,
+    },
+
+    /// A log of which nothing can be read.
+    #[error("there is no message in `{}` that can be recovered", path.display())]
+    #[diagnostic(
+        code(wheeleg::log),
+        help("a log has its first messages after a quarter of a simulated second")
+    )]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+
+    /// A recovered log that does not hold what was written to it.
+    #[error("`{}` was written with {written} messages and has {found} when it is read back", path.display())]
+    #[diagnostic(
+        code(wheeleg::log),
+        help("the disk may be at fault; write to another one")
+    )]
+    Unsound {
+        /// The file.
+        path: PathBuf,
+        /// Messages written.
+        written: u64,
+        /// Messages found.
+        found: u64,
+    },
 }
 
 impl LogError {

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use mcap::read::Options;
+use wheeleg_master::contact::Side;
 use wheeleg_telemetry::{
-    BodySample, BusSample, EventKind, FootSample, JointSample, LinkSample, MasterSample, Recorder,
-    Recording, SupplySample, WheelSample, channels, write_csv,
+    BodySample, BusSample, Cause, FootSample, JointSample, LinkSample, LogFile, MasterSample,
+    Recorder, Recording, SupplySample, Tables, WheelSample, channels, recover,
 };
 
 /// Three seconds of made-up but lively samples on every channel.
-fn fill(recorder: &mut Recorder, amplitude: f64) {
+fn fill(recorder: &mut Recorder<'_>, amplitude: f64) {
     recorder.provenance("seed", "1");
     for ms in 0..3000_u64 {
         let t_ns = ms * 1_000_000;
@@ -41,7 +42,11 @@ fn fill(recorder: &mut Recorder, amplitude: f64) {
             recorder.state(t_ns, format!("{ms:064x}"));
         }
         if ms == 1234 {
-            recorder.event(t_ns, EventKind::Info, "a, \"quoted\" text");
+            let touches = Cause::Contact {
+                side: Side::Left,
+                switches: [true, false, true, false],
+            };
+            recorder.event(t_ns, touches);
             for node in 0..8 {
                 recorder.link(t_ns, node, LinkSample::default());
             }
@@ -160,6 +165,86 @@ fn cut_log_is_readable_up_to_the_last_chunk() {
     }
 }
 
+/// From whatever byte it was cut at, a log is made that the strict reader opens, with every
+/// message that the other reader finds in the cut one.
+#[test]
+fn a_cut_log_is_recovered_as_a_whole_one() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let whole = log_to(&path("log.mcap"), 10.0).messages;
+    let bytes = std::fs::read(path("log.mcap")).expect("written");
+    for tenth in 3..=10 {
+        let cut = (bytes.len() * tenth / 10 + 17 * tenth).min(bytes.len());
+        let (from, to) = (path("cut.mcap"), path(&format!("{tenth}.mcap")));
+        std::fs::write(&from, &bytes[..cut]).expect("written");
+        let recovered = recover(&from, &to).expect("a log");
+        assert_eq!(recovered.was_whole, tenth == 10);
+        let read = std::fs::read(&to).expect("written");
+        let strict = mcap::MessageStream::new(&read).expect("an MCAP file");
+        let found = strict.map(|m| m.expect("a readable message")).count() as u64;
+        assert_eq!(found, recovered.messages);
+        if tenth == 10 {
+            assert_eq!(found, whole);
+        }
+        assert_eq!(std::fs::read(&from).expect("kept"), bytes[..cut]);
+    }
+}
+
+#[test]
+fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    log_to(&path("log.mcap"), 10.0);
+    let bytes = std::fs::read(path("log.mcap")).expect("written");
+    let text = |from: &str, to: &str| {
+        let error = recover(&path(from), &path(to)).expect_err("refused");
+        error.to_string()
+    };
+    std::fs::write(path("notes.txt"), "notes").expect("written");
+    std::fs::write(path("nothing"), "").expect("written");
+    std::fs::write(path("head.mcap"), &bytes[..2000]).expect("written");
+    assert!(text("notes.txt", "new").contains("notes.txt` is not an MCAP log"));
+    assert!(text("nothing", "new").contains("not an MCAP log"));
+    assert!(text("head.mcap", "new").contains("no message"));
+    assert!(text("missing", "new").contains("missing"));
+    assert!(!path("new").exists());
+    for taken in ["log.mcap", "notes.txt"] {
+        let error = text("log.mcap", taken);
+        assert!(error.contains("create the recovered log"), "{error}");
+    }
+    assert_eq!(std::fs::read(path("log.mcap")).expect("kept"), bytes);
+    assert_eq!(std::fs::read(path("notes.txt")).expect("kept"), b"notes");
+}
+
+/// A sink that fails keeps its error; the others and the hash go on.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_takes_nothing_else_with_it() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let tables = Tables::create(folder.path(), 100).expect("writable");
+    let full = LogFile::create(Path::new("/dev/full"));
+    // The device takes nothing from the first byte on.
+    assert!(full.is_err());
+    let link = folder.path().join("joint-1.csv");
+    drop(tables);
+    std::fs::remove_file(&link).expect("removed");
+    std::os::unix::fs::symlink("/dev/full", &link).expect("linked");
+    let tables = Tables::create(folder.path(), 100).expect("writable");
+    let log = LogFile::create(&folder.path().join("log.mcap")).expect("writable");
+    let mut recorder = Recorder::in_memory().with(tables).with(log);
+    fill(&mut recorder, 10.0);
+    let (recording, failed) = recorder.close();
+    let failed: Vec<String> = failed.iter().map(ToString::to_string).collect();
+    assert!(
+        failed.len() == 1 && failed[0].contains("joint-1.csv"),
+        "{failed:?}"
+    );
+    let bytes = std::fs::read(folder.path().join("log.mcap")).expect("written");
+    let stream = mcap::MessageStream::new(&bytes).expect("an MCAP file");
+    assert_eq!(stream.count() as u64, recording.messages);
+    assert_eq!(recording.joints[0].len(), 3000);
+}
+
 /// What is on disk while the process still runs, without any clean-up.
 #[test]
 fn log_is_on_disk_before_the_recorder_is_closed() {
@@ -180,10 +265,10 @@ fn log_is_on_disk_before_the_recorder_is_closed() {
 #[test]
 fn csv_has_units_in_its_header_and_the_recorded_values() {
     let folder = tempfile::tempdir().expect("temporary folder");
-    let mut recorder = Recorder::in_memory();
+    let tables = Tables::create(folder.path(), 100).expect("writable");
+    let mut recorder = Recorder::in_memory().with(tables);
     fill(&mut recorder, 10.0);
-    let recording = recorder.finish().expect("no file");
-    write_csv(folder.path(), &recording, 100).expect("writable");
+    let recording = recorder.finish().expect("no I/O error");
     let mut table = csv::Reader::from_path(folder.path().join("joint-3.csv")).expect("written");
     let header = table.headers().expect("a header").clone();
     assert_eq!(&header[0], "time [s]");
@@ -199,7 +284,9 @@ fn csv_has_units_in_its_header_and_the_recorded_values() {
     assert!((value - truth).abs() <= 0.51e-4);
     let events = std::fs::read_to_string(folder.path().join("events.csv")).expect("written");
     assert!(
-        events.contains("1.234,info,\"a, \"\"quoted\"\" text\""),
+        events.contains(
+            "1.234,contact,ground_contact,left,0,0,0,0,\"ground: left foot touches, front, back\""
+        ),
         "{events}"
     );
 }

@@ -1,7 +1,7 @@
 //! Lifts and touchdowns, from the foot switches as the node sees them.
 
 use super::Target;
-use wheeleg_telemetry::{FootSample, Row};
+use wheeleg_telemetry::FootSample;
 
 /// A foot left the ground or met it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,33 +17,40 @@ pub struct Contact {
 /// Shortest time off or on the ground that counts, ns: bounces are not steps.
 const SETTLED_NS: u64 = 50_000_000;
 
-/// All lifts and touchdowns in order. A touchdown's switches are those closed
-/// at the first instant of contact.
-#[must_use]
-pub fn contacts(rows: &[Row<FootSample>]) -> Vec<Contact> {
-    let mut found = Vec::new();
-    let Some(first) = rows.first() else {
-        return found;
-    };
-    let mut grounded = first.v.switches != 0;
-    let mut changed: Option<(u64, u8)> = None;
-    for row in rows {
-        if (row.v.switches != 0) == grounded {
-            changed = None;
-            continue;
+/// Finds lifts and touchdowns while the samples of a foot come in.
+#[derive(Debug, Default)]
+pub(super) struct ContactMeter {
+    grounded: Option<bool>,
+    /// Since when, and with which switches, the foot is otherwise.
+    changed: Option<(u64, u8)>,
+    found: Vec<Contact>,
+}
+
+impl ContactMeter {
+    pub(super) fn foot(&mut self, t_ns: u64, foot: &FootSample) {
+        let closed = foot.switches != 0;
+        let grounded = *self.grounded.get_or_insert(closed);
+        if closed == grounded {
+            self.changed = None;
+            return;
         }
-        let (since, switches) = *changed.get_or_insert((row.t_ns, row.v.switches));
-        if row.t_ns - since >= SETTLED_NS {
-            grounded = !grounded;
-            changed = None;
-            found.push(Contact {
+        let (since, switches) = *self.changed.get_or_insert((t_ns, foot.switches));
+        if t_ns - since >= SETTLED_NS {
+            self.grounded = Some(!grounded);
+            self.changed = None;
+            self.found.push(Contact {
                 t_ns: since,
-                touchdown: grounded,
+                touchdown: !grounded,
                 switches,
             });
         }
     }
-    found
+
+    /// All lifts and touchdowns in order. A touchdown's switches are those closed at the first
+    /// instant of contact.
+    pub(super) fn into_contacts(self) -> Vec<Contact> {
+        self.found
+    }
 }
 
 /// The switch that closes first must be the one of the side that touches.
@@ -77,25 +84,25 @@ pub(super) fn side_targets(contacts: &[Contact], bit: u8) -> Vec<Target> {
 mod tests {
     use super::*;
 
-    fn rows(spans: &[(u64, u8)]) -> Vec<Row<FootSample>> {
+    fn contacts(spans: &[(u64, u8)]) -> Vec<Contact> {
         let mut t_ns = 0;
-        let mut rows = Vec::new();
+        let mut meter = ContactMeter::default();
         for &(ms, switches) in spans {
             for _ in 0..ms {
                 let v = FootSample {
                     switches,
                     ..FootSample::default()
                 };
-                rows.push(Row { t_ns, v });
+                meter.foot(t_ns, &v);
                 t_ns += 1_000_000;
             }
         }
-        rows
+        meter.into_contacts()
     }
 
     #[test]
     fn counts_steps_and_not_bounces() {
-        let found = contacts(&rows(&[
+        let found = contacts(&[
             (200, 15),
             (20, 0), // a bounce
             (100, 15),
@@ -104,7 +111,7 @@ mod tests {
             (90, 0),
             (60, 4),
             (300, 15),
-        ]));
+        ]);
         assert_eq!(found.len(), 2);
         assert_eq!((found[0].touchdown, found[0].t_ns), (false, 320_000_000));
         assert_eq!((found[1].touchdown, found[1].switches), (true, 4));

@@ -1,6 +1,6 @@
 //! Delay between reference model and simulated robot.
 
-use super::{Leg, ReferenceModel, window};
+use super::{ReferenceModel, within};
 use wheeleg_config::GaitParams;
 use wheeleg_telemetry::{JointSample, Row};
 
@@ -26,70 +26,178 @@ const BEFORE_S: f64 = 0.02;
 /// A step of the command is a jump of more than this, mm.
 const STEP_MM: f64 = 5.0;
 
-/// Delays of all square-wave moves. The clock starts when the node latches the
-/// commanded step, so bus and gait latency are not in it, and what the board's
-/// slew limit and controller make of the step is.
-pub(crate) fn start_delays(leg: &Leg<'_>, gait: &GaitParams, start_s: f64) -> Vec<StartDelay> {
-    let mut delays = Vec::new();
-    for step in 0..gait.steps {
-        let t = start_s + f64::from(step) * gait.period_s;
-        let moves = [
-            ("b6 retracts", leg.b6, gait.lift_s, gait.lower_s, -1.0),
-            ("b5 extends", leg.b5, gait.reach_s, gait.push_s, 1.0),
-            ("b6 extends", leg.b6, gait.lower_s, gait.push_s, 1.0),
-        ];
-        for (move_name, rows, from, to, sign) in moves {
-            let rows = window(rows, t + from - BEFORE_S, t + to);
-            if let Some((at_s, delay_s)) = one_delay(rows, sign) {
-                delays.push(StartDelay {
-                    step: step + 1,
-                    move_name,
-                    at_s,
-                    delay_s,
+/// One move whose delay is being measured.
+#[derive(Debug)]
+struct Move {
+    /// Place in the list of delays.
+    place: usize,
+    /// Whether it is b5 that moves.
+    is_b5: bool,
+    /// In which the command steps and the piston starts, s.
+    window_s: (f64, f64),
+    /// Direction, +1 extends.
+    sign: f64,
+    /// Command at the begin of the window, mm.
+    before_mm: Option<f64>,
+    /// Smallest way in the direction since the step, mm: the move before may still be ending.
+    turned_mm: f64,
+}
+
+/// Measures the delays of all square-wave moves while the samples come in. The clock starts
+/// when the node latches the commanded step, so bus and gait latency are not in it, and what
+/// the board's slew limit and controller make of the step is.
+#[derive(Debug)]
+pub(super) struct DelayMeter {
+    gait: GaitParams,
+    start_s: f64,
+    /// Steps whose moves have been set up.
+    steps: u16,
+    moves: Vec<Move>,
+    /// Three per step; `None` where the command does not jump.
+    delays: Vec<Option<StartDelay>>,
+}
+
+const MOVES: [&str; 3] = ["b6 retracts", "b5 extends", "b6 extends"];
+
+impl DelayMeter {
+    pub(super) fn new(gait: GaitParams, start_s: f64) -> Self {
+        Self {
+            gait,
+            start_s,
+            steps: 0,
+            moves: Vec::new(),
+            delays: Vec::new(),
+        }
+    }
+
+    fn set_up_steps(&mut self, t_s: f64) {
+        let gait = &self.gait;
+        while self.steps < gait.steps {
+            let t = self.start_s + f64::from(self.steps) * gait.period_s;
+            if t_s < t - 2.0 * BEFORE_S {
+                break;
+            }
+            self.steps += 1;
+            let windows = [
+                (gait.lift_s, gait.lower_s, -1.0),
+                (gait.reach_s, gait.push_s, 1.0),
+                (gait.lower_s, gait.push_s, 1.0),
+            ];
+            for (i, (from, to, sign)) in windows.into_iter().enumerate() {
+                self.moves.push(Move {
+                    place: self.delays.len(),
+                    is_b5: i == 1,
+                    window_s: (t + from - BEFORE_S, t + to),
+                    sign,
+                    before_mm: None,
+                    turned_mm: f64::INFINITY,
                 });
+                self.delays.push(None);
             }
         }
     }
-    delays
+
+    pub(super) fn joint(&mut self, is_b5: bool, row: &Row<JointSample>) {
+        self.set_up_steps(row.t_s());
+        let delays = &mut self.delays;
+        let over = |m: &Move| row.t_s() >= m.window_s.1;
+        self.moves
+            .retain_mut(|m| m.is_b5 != is_b5 || !(over(m) || m.starts(row, &mut delays[m.place])));
+    }
+
+    pub(super) fn into_delays(self) -> Vec<StartDelay> {
+        self.delays.into_iter().flatten().collect()
+    }
 }
 
-/// Time of the commanded step and delay to the first millimetre in the
-/// direction `sign`; `None` if the command does not jump in this window.
-fn one_delay(rows: &[Row<JointSample>], sign: f64) -> Option<(f64, Option<f64>)> {
-    let before = rows.first()?.v.commanded_mm;
-    let jump = rows
-        .iter()
-        .position(|r| sign * (r.v.commanded_mm - before) > STEP_MM)?;
-    let at_s = rows[jump].t_s();
-    // Measured from the turning point: the move before may still be ending.
-    let mut turned = f64::INFINITY;
-    let started = rows[jump..].iter().find(|r| {
-        let x = sign * r.v.position_mm;
-        turned = turned.min(x);
-        x - turned >= STARTED_MM
-    });
-    Some((at_s, started.map(|r| r.t_s() - at_s)))
+impl Move {
+    /// Takes a sample; true once the move has started.
+    fn starts(&mut self, row: &Row<JointSample>, delay: &mut Option<StartDelay>) -> bool {
+        if !within(row, self.window_s.0, self.window_s.1) {
+            return false;
+        }
+        let before_mm = *self.before_mm.get_or_insert(row.v.commanded_mm);
+        let jumps = self.sign * (row.v.commanded_mm - before_mm) > STEP_MM;
+        if delay.is_none() && !jumps {
+            return false;
+        }
+        let delay = delay.get_or_insert_with(|| StartDelay {
+            step: (self.place / MOVES.len()) as u16 + 1,
+            move_name: MOVES[self.place % MOVES.len()],
+            at_s: row.t_s(),
+            delay_s: None,
+        });
+        let x = self.sign * row.v.position_mm;
+        self.turned_mm = self.turned_mm.min(x);
+        if x - self.turned_mm < STARTED_MM {
+            return false;
+        }
+        delay.delay_s = Some(row.t_s() - delay.at_s);
+        true
+    }
 }
 
 /// Samples per bin of the correlation; one bin is 4 ms.
 const BIN: usize = 4;
 /// Largest shift looked at, s.
 const MAX_SHIFT_S: f64 = 1.0;
+/// Most bins of a joint: ten minutes, which is as much as the shift is looked for in.
+const MAX_BINS: usize = 150_000;
 
-/// Shift of the simulated velocities of b5 and b6 (together) against those of
-/// the reference model, by the maximum of their normalised cross-correlation;
-/// positive when the robot is late. `None` for records too short to compare.
-pub(crate) fn velocity_shift_s(leg: &Leg<'_>, model: &ReferenceModel, start_s: f64) -> Option<f64> {
-    let signals = [leg.b5, leg.b6].map(|rows| {
-        let rows = window(rows, start_s, f64::INFINITY);
-        rows.chunks_exact(BIN)
-            .map(|c| {
-                let v = c.iter().map(|r| r.v.velocity_mm_s).sum::<f64>() / BIN as f64;
-                let t = c.iter().map(Row::t_s).sum::<f64>() / BIN as f64;
-                (t - start_s, v)
-            })
-            .collect::<Vec<_>>()
-    });
+/// Speed of one joint in bins.
+#[derive(Debug, Default)]
+struct Bins {
+    /// Samples, speed and time of the bin that is being filled: sums.
+    filling: (usize, f64, f64),
+    /// Time since the start, s, and speed, mm/s.
+    means: Vec<(f64, f64)>,
+}
+
+impl Bins {
+    fn add(&mut self, row: &Row<JointSample>, start_s: f64) {
+        if self.means.len() == MAX_BINS || !within(row, start_s, f64::INFINITY) {
+            return;
+        }
+        let (n, v, t) = &mut self.filling;
+        *n += 1;
+        *v += row.v.velocity_mm_s;
+        *t += row.t_s();
+        if *n == BIN {
+            let count = BIN as f64;
+            self.means.push((*t / count - start_s, *v / count));
+            self.filling = (0, 0.0, 0.0);
+        }
+    }
+}
+
+/// Shift of the simulated velocities of b5 and b6 (together) against those of the reference
+/// model, from samples as they come in.
+#[derive(Debug)]
+pub(super) struct ShiftMeter {
+    start_s: f64,
+    bins: [Bins; 2],
+}
+
+impl ShiftMeter {
+    pub(super) fn new(start_s: f64) -> Self {
+        Self {
+            start_s,
+            bins: Default::default(),
+        }
+    }
+
+    pub(super) fn joint(&mut self, is_b5: bool, row: &Row<JointSample>) {
+        self.bins[usize::from(!is_b5)].add(row, self.start_s);
+    }
+
+    /// The shift, s, by the maximum of the normalised cross-correlation; positive when the
+    /// robot is late. `None` for records too short to compare.
+    pub(super) fn shift_s(self, model: &ReferenceModel) -> Option<f64> {
+        velocity_shift_s(self.bins.map(|bins| bins.means), model)
+    }
+}
+
+fn velocity_shift_s(signals: [Vec<(f64, f64)>; 2], model: &ReferenceModel) -> Option<f64> {
     let bin_s = signals[0].get(1)?.0 - signals[0].first()?.0;
     let modelled = [0, 1].map(|i| {
         signals[i]
@@ -147,7 +255,7 @@ pub(crate) fn velocity_shift_s(leg: &Leg<'_>, model: &ReferenceModel, start_s: f
 mod tests {
     use super::*;
     use crate::analysis::testing;
-    use wheeleg_config::{LegChoice, builtin};
+    use wheeleg_config::builtin;
 
     #[test]
     fn a_known_delay_is_found_again() {
@@ -155,8 +263,12 @@ mod tests {
         let model = ReferenceModel::new(robot.reference, robot.gait);
         for delay_s in [0.0, 0.0637, 0.25] {
             let recording = testing::from_reference(&robot, delay_s, 0.0);
-            let leg = super::super::leg(&recording, LegChoice::Left);
-            let shift = velocity_shift_s(&leg, &model, 0.0).expect("long enough");
+            let mut meter = ShiftMeter::new(0.0);
+            for (is_b5, joint) in [(true, 1), (false, 2)] {
+                let rows = recording.joints[joint].iter();
+                rows.for_each(|row| meter.joint(is_b5, row));
+            }
+            let shift = meter.shift_s(&model).expect("long enough");
             assert!((shift - delay_s).abs() < 2e-3, "{delay_s}: {shift}");
         }
     }
@@ -179,7 +291,17 @@ mod tests {
                 Row { t_ns, v }
             })
             .collect();
-        let (at_s, delay_s) = one_delay(&rows, 1.0).expect("a step");
+        let mut one = Move {
+            place: 1,
+            is_b5: true,
+            window_s: (0.0, f64::INFINITY),
+            sign: 1.0,
+            before_mm: None,
+            turned_mm: f64::INFINITY,
+        };
+        let mut found = None;
+        assert!(rows.iter().any(|row| one.starts(row, &mut found)));
+        let StartDelay { at_s, delay_s, .. } = found.expect("a step");
         assert!((at_s - 0.100).abs() < 1e-9, "{at_s}");
         let delay_s = delay_s.expect("it moves");
         assert!((delay_s - 0.082).abs() < 1e-9, "{delay_s}");
@@ -189,8 +311,12 @@ mod tests {
     fn start_delay_is_the_delay_plus_the_first_millimetre() {
         let robot = builtin::robot("wheeleg-2003").expect("built in");
         let recording = testing::from_reference(&robot, 0.25, 0.5);
-        let leg = super::super::leg(&recording, LegChoice::Left);
-        let delays = start_delays(&leg, &robot.gait, 0.5);
+        let mut meter = DelayMeter::new(robot.gait, 0.5);
+        for (b5, b6) in recording.joints[1].iter().zip(&recording.joints[2]) {
+            meter.joint(true, b5);
+            meter.joint(false, b6);
+        }
+        let delays = meter.into_delays();
         assert_eq!(delays.len(), 9);
         for d in &delays {
             // 1 mm from rest at S/tau^2 (4.5 to 5.9 m/s2) takes 19 to 22 ms; b6

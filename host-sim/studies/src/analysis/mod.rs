@@ -12,16 +12,24 @@ mod target;
 pub(crate) mod testing;
 mod three_step;
 
-pub use contact::{Contact, contacts};
+use std::collections::VecDeque;
+
+pub use contact::Contact;
+use contact::ContactMeter;
 pub use delay::StartDelay;
-use delay::{start_delays, velocity_shift_s};
+use delay::{DelayMeter, ShiftMeter};
 pub use reference::{ReferenceModel, ReferencePoint};
-pub use rest::{RestResult, rest_switching};
+use rest::StandMeter;
+use safe_state::SafeStateMeter;
 pub(crate) use safe_state::commanded_open;
+use sinusoid::SinusoidMeter;
 pub use target::Target;
+use three_step::ThreeStepMeter;
 
 use wheeleg_config::{EventAction, LegChoice, Motion, RobotConfig, Scenario, TargetSet};
-use wheeleg_telemetry::{JointSample, Recording, Row};
+use wheeleg_telemetry::{
+    FootSample, JointSample, MasterSample, Recording, Row, SampleRef, Sink, Taken,
+};
 
 /// What the analysis found.
 #[derive(Debug, Clone)]
@@ -51,78 +59,259 @@ impl Analysis {
     }
 }
 
-/// The joints of a leg in a recording.
-#[derive(Clone, Copy)]
-pub(crate) struct Leg<'a> {
-    pub(crate) b5: &'a [Row<JointSample>],
-    pub(crate) b6: &'a [Row<JointSample>],
-    pub(crate) foot: usize,
+/// The targets of a scenario, while samples come in.
+enum Meter {
+    ThreeStep(Box<ThreeStepMeter>),
+    Stand(Box<StandMeter>),
+    SafeState(Box<SafeStateMeter>),
+    Sinusoid(Box<SinusoidMeter>),
+    FootSide(u8),
+    None,
 }
 
-pub(crate) fn leg(recording: &Recording, choice: LegChoice) -> Leg<'_> {
-    let side = usize::from(choice == LegChoice::Right);
-    Leg {
-        b5: &recording.joints[3 * side + 1],
-        b6: &recording.joints[3 * side + 2],
-        foot: side,
+impl Meter {
+    fn new(scenario: &Scenario, robot: &RobotConfig, start_s: f64) -> Self {
+        let safe_state = |is: fn(&EventAction) -> bool, estop| {
+            let meter = SafeStateMeter::new(event_time(scenario, is), estop);
+            Self::SafeState(Box::new(meter))
+        };
+        match scenario.targets {
+            TargetSet::ThreeStep => {
+                let sample_s = robot.reference.sample_period_s;
+                Self::ThreeStep(Box::new(ThreeStepMeter::new(robot.gait, sample_s, start_s)))
+            }
+            TargetSet::Stand => Self::Stand(Box::default()),
+            TargetSet::MasterLost => safe_state(|a| matches!(a, EventAction::KillMaster), false),
+            TargetSet::EStop => safe_state(|a| matches!(a, EventAction::EStop), true),
+            TargetSet::Sinusoid => Self::Sinusoid(Box::default()),
+            TargetSet::FootSide { bit } => Self::FootSide(bit),
+            TargetSet::None => Self::None,
+        }
     }
 }
 
-/// Evaluates everything that the scenario asks for.
+/// Analyses a run while it lasts, in bounded memory: every sample counts, none is kept.
+pub struct Analyser<'a> {
+    scenario: &'a Scenario,
+    robot: &'a RobotConfig,
+    /// The moving leg.
+    moving: Option<LegChoice>,
+    /// When the motion began, s; the start of the record as long as it has not.
+    start_s: Option<f64>,
+    /// Last samples of the joints, for what counts from the start of the motion: the master
+    /// tells of it after it was.
+    recent: VecDeque<(usize, Row<JointSample>)>,
+    meter: Meter,
+    delays: Option<DelayMeter>,
+    shift: Option<ShiftMeter>,
+    contacts: Option<ContactMeter>,
+}
+
+/// How far the samples reach back that the analyser keeps, s, beside three bus cycles.
+const RECENT_S: f64 = 0.05;
+
+impl<'a> Analyser<'a> {
+    /// Evaluates everything that the scenario asks for.
+    #[must_use]
+    pub fn new(scenario: &'a Scenario, robot: &'a RobotConfig) -> Self {
+        let moving = match scenario.motion {
+            Motion::Stand => None,
+            Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => Some(leg),
+        };
+        let steps = matches!(scenario.motion, Motion::SquareWave { .. });
+        let mut analyser = Self {
+            scenario,
+            robot,
+            moving,
+            start_s: None,
+            recent: VecDeque::new(),
+            meter: Meter::None,
+            delays: None,
+            shift: None,
+            contacts: steps.then(ContactMeter::default),
+        };
+        analyser.meter = Meter::new(scenario, robot, 0.0);
+        analyser.count_from(0.0);
+        analyser
+    }
+
+    /// Begins anew what counts from the start of the motion.
+    fn count_from(&mut self, start_s: f64) {
+        if let Meter::ThreeStep(_) = self.meter {
+            self.meter = Meter::new(self.scenario, self.robot, start_s);
+        }
+        if self.contacts.is_some() {
+            self.delays = Some(DelayMeter::new(self.robot.gait, start_s));
+            // The model knows nothing of what a scenario does to the robot.
+            let undisturbed = self.scenario.events.is_empty();
+            self.shift = undisturbed.then(|| ShiftMeter::new(start_s));
+        }
+    }
+
+    /// The motion began when the master was in a step for the first time.
+    fn master(&mut self, t_s: f64, master: &MasterSample) {
+        if self.start_s.is_some() || master.step == 0 {
+            return;
+        }
+        self.start_s = Some(t_s);
+        self.count_from(t_s);
+        for (joint, row) in std::mem::take(&mut self.recent) {
+            self.count_joint(joint, &row);
+        }
+    }
+
+    fn joint(&mut self, joint: usize, row: &Row<JointSample>) {
+        match &mut self.meter {
+            Meter::Stand(meter) => meter.joint(joint, row),
+            Meter::SafeState(meter) => meter.joint(joint, row),
+            Meter::Sinusoid(meter) => {
+                let first = first_joint(self.moving);
+                if joint == first + 1 {
+                    meter.b5(&row.v);
+                } else if joint == first + 2 {
+                    meter.b6(&row.v);
+                }
+            }
+            Meter::ThreeStep(_) | Meter::FootSide(_) | Meter::None => {}
+        }
+        self.count_joint(joint, row);
+    }
+
+    /// Keeps a sample until it is known whether the motion had begun.
+    fn remember(&mut self, joint: usize, row: Row<JointSample>) {
+        if self.start_s.is_some() {
+            return;
+        }
+        let reach_s = RECENT_S + 3.0 * self.robot.bus.cycle_s;
+        let from_s = row.t_s() - reach_s;
+        while self.recent.front().is_some_and(|(_, r)| r.t_s() < from_s) {
+            self.recent.pop_front();
+        }
+        self.recent.push_back((joint, row));
+    }
+
+    /// What counts from the start of the motion.
+    fn count_joint(&mut self, joint: usize, row: &Row<JointSample>) {
+        let first = first_joint(self.moving);
+        let (is_b5, is_b6) = (joint == first + 1, joint == first + 2);
+        if let Meter::ThreeStep(meter) = &mut self.meter {
+            meter.joint(joint, row);
+            if is_b5 {
+                meter.b5(row);
+            } else if is_b6 {
+                meter.b6(row);
+            }
+        }
+        if is_b5 || is_b6 {
+            if let Some(delays) = &mut self.delays {
+                delays.joint(is_b5, row);
+            }
+            if let Some(shift) = &mut self.shift {
+                shift.joint(is_b5, row);
+            }
+        }
+    }
+
+    fn foot(&mut self, foot: usize, t_ns: u64, sample: &FootSample) {
+        let moving = usize::from(self.moving == Some(LegChoice::Right));
+        if let Some(contacts) = self.contacts.as_mut().filter(|_| foot == moving) {
+            contacts.foot(t_ns, sample);
+        }
+    }
+
+    /// What was found.
+    #[must_use]
+    pub fn finish(self) -> Analysis {
+        let reference = self
+            .contacts
+            .is_some()
+            .then(|| ReferenceModel::new(self.robot.reference, self.robot.gait));
+        let shift_s = match (self.shift, &reference) {
+            (Some(shift), Some(model)) => shift.shift_s(model),
+            _ => None,
+        };
+        let mut analysis = Analysis {
+            targets: Vec::new(),
+            start_s: self.start_s.unwrap_or(0.0),
+            leg: self.moving,
+            start_delays: self.delays.map_or(Vec::new(), DelayMeter::into_delays),
+            shift_s,
+            contacts: self
+                .contacts
+                .map_or(Vec::new(), ContactMeter::into_contacts),
+            reference,
+        };
+        analysis.targets = match self.meter {
+            Meter::ThreeStep(meter) => meter.targets(self.robot, &analysis),
+            Meter::Stand(meter) => meter.targets(),
+            Meter::SafeState(meter) => meter.targets(),
+            Meter::Sinusoid(meter) => meter.targets(self.robot),
+            Meter::FootSide(bit) => contact::side_targets(&analysis.contacts, bit),
+            Meter::None => Vec::new(),
+        };
+        analysis
+    }
+}
+
+impl Sink for Analyser<'_> {
+    fn take(&mut self, taken: &Taken<'_>) {
+        let Taken { number, t_ns, .. } = *taken;
+        match taken.sample {
+            SampleRef::Joint(v) => {
+                let row = row(t_ns, v);
+                self.joint(number, &row);
+                self.remember(number, row);
+            }
+            SampleRef::Foot(v) => self.foot(number, t_ns, v),
+            SampleRef::Master(v) => self.master(t_ns as f64 * 1e-9, v),
+            SampleRef::Wheel(v) => {
+                if let Meter::SafeState(meter) = &mut self.meter {
+                    meter.wheel(number, &row(t_ns, v));
+                }
+            }
+            SampleRef::Supply(v) => {
+                if let Meter::SafeState(meter) = &mut self.meter {
+                    meter.supply(&row(t_ns, v));
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn row<S: Clone>(t_ns: u64, sample: &S) -> Row<S> {
+    let v = sample.clone();
+    Row { t_ns, v }
+}
+
+/// Index of the first joint of a leg; the left one's if none moves.
+fn first_joint(leg: Option<LegChoice>) -> usize {
+    match leg {
+        Some(LegChoice::Right) => 3,
+        Some(LegChoice::Left) | None => 0,
+    }
+}
+
+/// The same from a whole recording.
 #[must_use]
 pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) -> Analysis {
-    let moving = match scenario.motion {
-        Motion::Stand => None,
-        Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => Some(leg),
-    };
-    let start_s = start_s(recording);
-    let mut analysis = Analysis {
-        targets: Vec::new(),
-        reference: None,
-        start_s,
-        leg: moving,
-        start_delays: Vec::new(),
-        shift_s: None,
-        contacts: Vec::new(),
-    };
-    if let (Motion::SquareWave { .. }, Some(choice)) = (scenario.motion, moving) {
-        let parts = leg(recording, choice);
-        let model = ReferenceModel::new(robot.reference, robot.gait);
-        analysis.start_delays = start_delays(&parts, &robot.gait, start_s);
-        // The model knows nothing of what a scenario does to the robot.
-        if scenario.events.is_empty() {
-            analysis.shift_s = velocity_shift_s(&parts, &model, start_s);
-        }
-        analysis.contacts = contacts(&recording.feet[parts.foot]);
-        analysis.reference = Some(model);
+    let mut analyser = Analyser::new(scenario, robot);
+    for r in &recording.master {
+        analyser.master(r.t_s(), &r.v);
     }
-    let targets = match scenario.targets {
-        TargetSet::ThreeStep => three_step::targets(robot, recording, &analysis),
-        TargetSet::Stand => rest::stand_targets(recording),
-        TargetSet::MasterLost => {
-            let at = event_time(scenario, |a| matches!(a, EventAction::KillMaster));
-            safe_state::targets(recording, at, false)
+    for (joint, rows) in recording.joints.iter().enumerate() {
+        rows.iter().for_each(|r| analyser.joint(joint, r));
+    }
+    for (foot, rows) in recording.feet.iter().enumerate() {
+        rows.iter().for_each(|r| analyser.foot(foot, r.t_ns, &r.v));
+    }
+    if let Meter::SafeState(meter) = &mut analyser.meter {
+        for (wheel, rows) in recording.wheels.iter().enumerate() {
+            rows.iter().for_each(|r| meter.wheel(wheel, r));
         }
-        TargetSet::EStop => {
-            let at = event_time(scenario, |a| matches!(a, EventAction::EStop));
-            safe_state::targets(recording, at, true)
-        }
-        TargetSet::Sinusoid => sinusoid::targets(robot, recording, moving),
-        TargetSet::FootSide { bit } => contact::side_targets(&analysis.contacts, bit),
-        TargetSet::None => Vec::new(),
-    };
-    analysis.targets = targets;
-    analysis
-}
-
-/// When the motion began: the first cycle in which the master was in a step;
-/// the start of the record if it never was.
-fn start_s(recording: &Recording) -> f64 {
-    recording
-        .master
-        .iter()
-        .find(|row| row.v.step > 0)
-        .map_or(0.0, Row::t_s)
+        recording.supply.iter().for_each(|r| meter.supply(r));
+    }
+    analyser.finish()
 }
 
 /// Time of the first event of a kind on the recording's clock, s.
@@ -134,12 +323,26 @@ fn event_time(scenario: &Scenario, is: impl Fn(&EventAction) -> bool) -> Option<
         .map(|e| e.at_s)
 }
 
-/// Smallest and largest value over rows; `None` when there are none.
-pub(crate) fn extremes<S>(rows: &[Row<S>], value: impl Fn(&S) -> f64) -> Option<(f64, f64)> {
-    rows.iter().map(|r| value(&r.v)).fold(None, |range, v| {
-        let (lo, hi) = range.unwrap_or((v, v));
-        Some((lo.min(v), hi.max(v)))
-    })
+/// Smallest and largest of the values so far; `None` before the first.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Extremes(pub(crate) Option<(f64, f64)>);
+
+impl Extremes {
+    pub(crate) fn add(&mut self, value: f64) {
+        let (lo, hi) = self.0.unwrap_or((value, value));
+        self.0 = Some((lo.min(value), hi.max(value)));
+    }
+
+    /// Largest less smallest.
+    pub(crate) fn span(self) -> Option<f64> {
+        self.0.map(|(lo, hi)| hi - lo)
+    }
+}
+
+/// Whether `from <= t < to`, in s.
+pub(crate) fn within<S>(row: &Row<S>, from_s: f64, to_s: f64) -> bool {
+    let t_s = row.t_s();
+    t_s >= from_s - 1e-9 && t_s < to_s - 1e-9
 }
 
 /// Rows with `from <= t < to`, in s.

@@ -1,17 +1,17 @@
 //! Rest: once a joint has settled, no valve may switch.
 
-use super::{Target, extremes, window};
-use wheeleg_telemetry::{JointSample, Recording, Row};
+use super::{Extremes, Target, within};
+use wheeleg_telemetry::{JointSample, Row};
 
 /// What the joints did while their references stood still.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RestResult {
+pub(super) struct RestResult {
     /// Commanded valve edges at rest, all joints.
-    pub edges: u32,
+    pub(super) edges: u32,
     /// Total time at rest, all joints, s.
-    pub rest_s: f64,
+    pub(super) rest_s: f64,
     /// Largest distance between reference and true stroke at the end of a rest, mm.
-    pub error_mm: f64,
+    pub(super) error_mm: f64,
 }
 
 /// A joint is at rest from this long after its reference last moved, s.
@@ -19,67 +19,105 @@ pub(crate) const SETTLING_S: f64 = 1.2;
 /// A reference that moves less than this stands still, mm.
 const STILL_MM: f64 = 0.01;
 
-/// Valve switching and error of the joints at rest between `from_s` and `to_s`.
-#[must_use]
-pub fn rest_switching(joints: &[&[Row<JointSample>]], from_s: f64, to_s: f64) -> RestResult {
-    let mut result = RestResult::default();
-    for rows in joints {
-        let rows = window(rows, from_s, to_s);
-        let Some(first) = rows.first() else { continue };
-        let mut reference = first.v.reference_mm;
-        let mut moved_s = first.t_s();
-        for pair in rows.windows(2) {
-            let (before, now) = (&pair[0], &pair[1]);
-            let ends = (now.v.reference_mm - reference).abs() > STILL_MM;
-            let at_rest = before.t_s() >= moved_s + SETTLING_S;
-            if ends {
+/// One joint, while its samples come in.
+#[derive(Debug, Clone, Default)]
+struct JointRest {
+    /// Reference that was last taken for a new one, mm, and when that was, s.
+    reference: Option<(f64, f64)>,
+    /// Time, s, valve edges and distance from the reference, mm, of the last sample.
+    last: Option<(f64, u32, f64)>,
+    result: RestResult,
+}
+
+impl JointRest {
+    fn joint(&mut self, row: &Row<JointSample>) {
+        let t_s = row.t_s();
+        let error_mm = (row.v.reference_mm - row.v.position_mm).abs();
+        let (reference, moved_s) = *self.reference.get_or_insert((row.v.reference_mm, t_s));
+        if let Some((before_s, edges, before_mm)) = self.last {
+            let at_rest = before_s >= moved_s + SETTLING_S;
+            if (row.v.reference_mm - reference).abs() > STILL_MM {
                 if at_rest {
-                    result.note_error(before);
+                    self.result.note_error(before_mm);
                 }
-                reference = now.v.reference_mm;
-                moved_s = now.t_s();
+                self.reference = Some((row.v.reference_mm, t_s));
             } else if at_rest {
-                result.rest_s += now.t_s() - before.t_s();
-                result.edges += now.v.valve_edges - before.v.valve_edges;
+                self.result.rest_s += t_s - before_s;
+                self.result.edges += row.v.valve_edges - edges;
             }
         }
-        if let Some(last) = rows.last().filter(|l| l.t_s() >= moved_s + SETTLING_S) {
-            result.note_error(last);
-        }
+        self.last = Some((t_s, row.v.valve_edges, error_mm));
     }
-    result
+
+    fn result(mut self) -> RestResult {
+        if let (Some((_, moved_s)), Some((t_s, _, error_mm))) = (self.reference, self.last) {
+            if t_s >= moved_s + SETTLING_S {
+                self.result.note_error(error_mm);
+            }
+        }
+        self.result
+    }
+}
+
+/// Valve switching and error of all joints at rest, while their samples come in.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RestMeter([JointRest; 6]);
+
+impl RestMeter {
+    pub(super) fn joint(&mut self, joint: usize, row: &Row<JointSample>) {
+        self.0[joint].joint(row);
+    }
+
+    pub(super) fn result(self) -> RestResult {
+        let mut all = RestResult::default();
+        for one in self.0.map(JointRest::result) {
+            all.edges += one.edges;
+            all.rest_s += one.rest_s;
+            all.note_error(one.error_mm);
+        }
+        all
+    }
 }
 
 impl RestResult {
-    fn note_error(&mut self, row: &Row<JointSample>) {
-        let error = (row.v.reference_mm - row.v.position_mm).abs();
-        self.error_mm = self.error_mm.max(error);
+    fn note_error(&mut self, error_mm: f64) {
+        self.error_mm = self.error_mm.max(error_mm);
     }
 }
 
-/// Targets of the scenario that only stands.
-pub(super) fn stand_targets(recording: &Recording) -> Vec<Target> {
-    let joints: Vec<&[Row<JointSample>]> = recording.joints.iter().map(Vec::as_slice).collect();
-    let rest = rest_switching(&joints, 0.0, f64::INFINITY);
-    let creep = recording
-        .joints
-        .iter()
-        .filter_map(|rows| {
-            let settled = rows.first()?.t_s() + SETTLING_S;
-            let (lo, hi) = extremes(window(rows, settled, f64::INFINITY), |s| s.position_mm)?;
-            Some(hi - lo)
-        })
-        .fold(0.0, f64::max);
-    let mut targets = rest_targets(&rest);
-    targets.push(Target::new(
-        "R3",
-        "largest movement of a joint while standing",
-        Some(creep),
-        "mm",
-        None,
-        Some(5.0),
-    ));
-    targets
+/// The scenario that only stands.
+#[derive(Debug, Default)]
+pub(super) struct StandMeter {
+    rest: RestMeter,
+    /// Per joint: when it has settled, s, and where it was since.
+    settled: [Option<(f64, Extremes)>; 6],
+}
+
+impl StandMeter {
+    pub(super) fn joint(&mut self, joint: usize, row: &Row<JointSample>) {
+        self.rest.joint(joint, row);
+        let since = || (row.t_s() + SETTLING_S, Extremes::default());
+        let (from_s, range) = self.settled[joint].get_or_insert_with(since);
+        if within(row, *from_s, f64::INFINITY) {
+            range.add(row.v.position_mm);
+        }
+    }
+
+    pub(super) fn targets(self) -> Vec<Target> {
+        let ranges = self.settled.iter().flatten();
+        let creep = ranges.filter_map(|(_, range)| range.span());
+        let creep = creep.fold(0.0, f64::max);
+        let mut targets = rest_targets(&self.rest.result());
+        targets.push(Target::new(
+            "R3",
+            "largest movement of a joint while standing",
+            Some(creep),
+            "mm",
+            None,
+            Some(5.0),
+        ));
+        targets
+    }
 }
 
 /// The targets on rest that every scenario shares.
@@ -127,23 +165,31 @@ mod tests {
             .collect()
     }
 
+    fn rest_switching(joints: &[Vec<Row<JointSample>>]) -> RestResult {
+        let mut meter = RestMeter::default();
+        for (joint, rows) in joints.iter().enumerate() {
+            rows.iter().for_each(|row| meter.joint(joint, row));
+        }
+        meter.result()
+    }
+
     #[test]
     fn switching_counts_only_at_rest() {
         // Busy for 1 s after the jump, then quiet.
         let quiet = joint(|ms| ms.clamp(1000, 2000) as u32, 89.0);
-        let result = rest_switching(&[&quiet], 0.0, 10.0);
+        let result = rest_switching(&[quiet]);
         assert_eq!(result.edges, 0);
         assert!((result.rest_s - 2.8).abs() < 0.01, "{}", result.rest_s);
         assert!((result.error_mm - 1.0).abs() < 1e-9);
         // A limit cycle: one edge every 10 ms, always.
         let cycling = joint(|ms| (ms / 10) as u32, 89.0);
-        let result = rest_switching(&[&cycling], 0.0, 10.0);
+        let result = rest_switching(&[cycling]);
         assert!((275..=285).contains(&result.edges), "{}", result.edges);
     }
 
     #[test]
     fn no_rest_is_not_a_pass() {
-        let rest = rest_switching(&[], 0.0, 10.0);
+        let rest = rest_switching(&[]);
         assert!(rest_targets(&rest).iter().all(|t| !t.pass));
     }
 }

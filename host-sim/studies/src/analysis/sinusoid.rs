@@ -1,17 +1,54 @@
 //! Targets of the paper's section 6 (Figs. 5–8): A8, A9, A11 and tracking.
 
-use super::{Target, extremes, leg};
-use wheeleg_config::{LegChoice, RobotConfig};
-use wheeleg_telemetry::{JointSample, Recording, Row};
+use super::{Extremes, Target};
+use wheeleg_config::RobotConfig;
+use wheeleg_telemetry::JointSample;
 
-pub(super) fn targets(
-    robot: &RobotConfig,
-    recording: &Recording,
-    moving: Option<LegChoice>,
-) -> Vec<Target> {
-    let parts = leg(recording, moving.unwrap_or(LegChoice::Left));
-    let stroke = |rows: &[Row<JointSample>]| extremes(rows, |s| s.position_mm);
-    let (b5, b6) = (stroke(parts.b5), stroke(parts.b6));
+/// What a joint did.
+#[derive(Debug, Default)]
+struct Track {
+    stroke_mm: Extremes,
+    speed_mm_s: Extremes,
+    samples: u64,
+    /// Sum of the squares of the tracking error, mm².
+    squares: f64,
+    peak_mm: f64,
+}
+
+impl Track {
+    fn joint(&mut self, v: &JointSample) {
+        self.stroke_mm.add(v.position_mm);
+        self.speed_mm_s.add(v.velocity_mm_s.abs());
+        let error = v.reference_mm - v.position_mm;
+        self.samples += 1;
+        self.squares += error * error;
+        self.peak_mm = self.peak_mm.max(error.abs());
+    }
+}
+
+/// The moving leg, while its samples come in.
+#[derive(Debug, Default)]
+pub(super) struct SinusoidMeter {
+    b5: Track,
+    b6: Track,
+}
+
+impl SinusoidMeter {
+    pub(super) fn b5(&mut self, v: &JointSample) {
+        self.b5.joint(v);
+    }
+
+    pub(super) fn b6(&mut self, v: &JointSample) {
+        self.b6.joint(v);
+    }
+
+    pub(super) fn targets(self, robot: &RobotConfig) -> Vec<Target> {
+        targets(robot, &self.b5, &self.b6)
+    }
+}
+
+fn targets(robot: &RobotConfig, b5_track: &Track, b6_track: &Track) -> Vec<Target> {
+    let (b5, b6) = (b5_track.stroke_mm.0, b6_track.stroke_mm.0);
     // The paper's axes are joint lengths.
     let zero_mm = robot.plant.stroke_zero_m.map(|m| m * 1e3);
     let mut targets = vec![
@@ -48,14 +85,10 @@ pub(super) fn targets(
             Some(200.0),
         ),
     ];
-    for (name, rows) in [("b5", parts.b5), ("b6", parts.b6)] {
-        let errors: Vec<f64> = rows
-            .iter()
-            .map(|r| r.v.reference_mm - r.v.position_mm)
-            .collect();
-        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt();
-        let peak = errors.iter().fold(0.0_f64, |p, e| p.max(e.abs()));
-        let measured = !errors.is_empty();
+    for (name, track) in [("b5", b5_track), ("b6", b6_track)] {
+        let rms = (track.squares / track.samples.max(1) as f64).sqrt();
+        let peak = track.peak_mm;
+        let measured = track.samples > 0;
         targets.push(
             Target::new(
                 format!("T-{name}-rms"),
@@ -79,7 +112,7 @@ pub(super) fn targets(
             .info(),
         );
         let axis = if name == "b5" { 10.0 } else { 40.0 };
-        let speed = extremes(rows, |s| s.velocity_mm_s.abs()).map(|r| r.1);
+        let speed = track.speed_mm_s.0.map(|r| r.1);
         targets.push(
             Target::new(
                 format!("A11-{name}"),

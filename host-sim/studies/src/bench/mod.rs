@@ -29,6 +29,7 @@
 
 pub mod commission;
 mod design;
+mod error;
 pub mod export;
 mod firmware;
 pub mod grain;

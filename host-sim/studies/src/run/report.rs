@@ -1,67 +1,101 @@
-//! What a run leaves behind: figures, tables, summary and one HTML page.
+//! What a run leaves behind beside log and tables: summary, one HTML page, figures.
 
-use std::path::{Path, PathBuf};
-
-use super::Summary;
-use super::{figures, html};
+use super::figures::{self, Source};
+use super::{Run, html};
 use crate::StudyError;
-use crate::analysis::Analysis;
-use wheeleg_config::{RobotConfig, Scenario};
-use wheeleg_report::subfolder;
-use wheeleg_telemetry::{Recording, write_csv};
+use crate::study::{Finished, Job, Stopped, schema};
+use wheeleg_report::plot::Figure;
 
-/// Samples per second in the CSV files; every sample is in memory, 500 per
-/// second are in the MCAP log.
-const CSV_RATE_HZ: u32 = 100;
-
-/// Writes everything but the log into `folder`, which must exist; returns the
-/// path of the report.
-///
-/// # Errors
-/// [`StudyError::Output`] if a file cannot be written, [`StudyError::Plot`] or
-/// [`StudyError::Report`] if a figure or the page cannot be made.
+/// Writes summary, page and figures into the folder of the job, in this order: what is worth most
+/// goes first where room is short. A file that cannot be written is added to
+/// [`Run::unwritten`], leaves no part of it behind, and takes nothing with it.
 pub(super) fn write(
-    folder: &Path,
-    scenario: &Scenario,
-    robot: &RobotConfig,
-    recording: &Recording,
-    analysis: &Analysis,
-    summary: &Summary,
-) -> Result<PathBuf, StudyError> {
-    let source = figures::Source {
-        scenario,
-        robot,
-        recording,
-        analysis,
-    };
-    let tables = subfolder(folder, "csv")?;
-    write_csv(&tables, recording, CSV_RATE_HZ)?;
-    let plots = subfolder(folder, "figures")?;
+    job: Job,
+    source: &Source<'_>,
+    mut run: Run,
+    stopped: Option<Stopped>,
+) -> Finished<Run> {
+    let summary = schema::json(&run.summary, stopped.as_ref());
+    run.unwritten
+        .extend(job.save("summary.json", &summary).err());
+
     let mut drawn = Vec::new();
-    for figure in figures::figures(&source) {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
-        let path = plots.join(format!("{}.svg", figure.id));
-        std::fs::write(&path, &svg)
-            .map_err(|e| StudyError::output("write the figure", &path, e))?;
-        drawn.push((figure, svg));
+    for figure in figures::figures(source) {
+        match figure.svg() {
+            Ok(svg) => drawn.push((figure, svg)),
+            Err(e) => run.unwritten.push(e.into()),
+        }
     }
-    let json = summary.to_json();
-    let path = folder.join("summary.json");
-    std::fs::write(&path, json).map_err(|e| StudyError::output("write the summary", &path, e))?;
-    let page = html::render(&source, summary, &drawn)?;
-    let path = folder.join("report.html");
-    std::fs::write(&path, page).map_err(|e| StudyError::output("write the report", &path, e))?;
-    Ok(path)
+    let page = html::render(source, &run.summary, &drawn);
+    let page = page.and_then(|page| job.save("report.html", &page));
+    run.unwritten.extend(page.err());
+    run.unwritten.extend(write_figures(&job, &drawn).err());
+    job.end(run, summary, stopped)
+}
+
+/// Every figure as SVG, and as PNG where that was asked for; one error for all that fail.
+fn write_figures(job: &Job, drawn: &[(Figure, String)]) -> Result<(), StudyError> {
+    job.subfolder("figures")?;
+    let files = drawn
+        .iter()
+        .map(|(figure, svg)| job.save_figure(figure, svg));
+    let mut failed = files.filter_map(Result::err);
+    let Some(first) = failed.next() else {
+        return Ok(());
+    };
+    Err(match failed.count() {
+        0 => first,
+        more => StudyError::refused(
+            format!(
+                "{} of {} figures are missing: {first}",
+                more + 1,
+                drawn.len()
+            ),
+            "the report has all figures in it, if it could be written",
+        ),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::{self, testing};
-    use crate::run::RunInfo;
-    use wheeleg_config::builtin;
-    use wheeleg_telemetry::{EventSample, Row};
+    use crate::analysis::{self, Analysis, testing};
+    use crate::run::{RunInfo, Summary};
+    use crate::study::Settings;
+    use std::path::Path;
+    use wheeleg_config::{RobotConfig, Scenario, builtin};
+    use wheeleg_telemetry::event::{Act, Cause};
+    use wheeleg_telemetry::{Recording, Row};
+
+    /// Writes a run with this summary; figures as PNG, too.
+    fn written(
+        folder: &Path,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        recording: &Recording,
+        analysis: &Analysis,
+        summary: &Summary,
+    ) {
+        let settings = Settings {
+            png: true,
+            ..Settings::new(folder)
+        };
+        let job = Job::begin("test", &settings).expect("a folder");
+        let run = Run {
+            summary: summary.clone(),
+            unwritten: Vec::new(),
+            down_times: wheeleg_sim::DownTimes::default(),
+        };
+        let source = Source {
+            scenario,
+            robot,
+            recording,
+            analysis,
+        };
+        let finished = write(job, &source, run, None);
+        let unwritten = &finished.result.unwritten;
+        assert!(unwritten.is_empty(), "{unwritten:?}");
+    }
 
     /// Every file of a run, from a recording made of the reference model.
     fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
@@ -79,15 +113,14 @@ mod tests {
             pil: None,
         };
         let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
-        write(
+        written(
             folder.path(),
             &scenario,
             &robot,
             &recording,
             &analysis,
             &summary,
-        )
-        .expect("written");
+        );
         (folder, summary)
     }
 
@@ -121,7 +154,7 @@ mod tests {
         let mut page = |complete: bool| {
             summary.complete = complete;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(true), page(false));
@@ -140,10 +173,7 @@ mod tests {
         let mut recording = testing::from_reference(&robot, 0.25, 0.0);
         recording.events.push(Row {
             t_ns: 3_000_000_000,
-            v: EventSample {
-                kind: "fault".to_owned(),
-                text: "a thing".to_owned(),
-            },
+            v: Cause::Scenario(Act::EStop).into(),
         });
         let mut analysis = analysis::analyse(&scenario, &robot, &recording);
         analysis.start_s = 0.25;
@@ -151,11 +181,11 @@ mod tests {
         let mut page = |dropped: u64| {
             summary.dropped_messages = dropped;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(0), page(321));
-        assert!(whole.contains(">3.000</td><td>fault</td><td>a thing"));
+        assert!(whole.contains(">3.000</td><td>scenario</td><td>E-stop pressed"));
         assert!(whole.contains("0.250 s of scenario time"));
         let loss = "messages could not be written to the log";
         assert!(!whole.contains(loss) && part.contains(loss) && part.contains("321 of "));
@@ -205,7 +235,7 @@ mod tests {
                 }],
             });
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary).expect("written");
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (equal, other) = (page(0), page(5));

@@ -180,6 +180,6 @@ pub(super) fn figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
                 .into(),
             panels,
         },
-        valves(s, window, "event-valves", "Valves around the event"),
+        valves(s, (window, 1e-3), "event-valves", "Valves around the event"),
     ]
 }

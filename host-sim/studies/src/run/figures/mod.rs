@@ -27,6 +27,9 @@ const JOINTS: [&str; 6] = [
     "6 R vert.",
 ];
 
+/// Most points of a curve of the reference model: two minutes at its 2 ms.
+const MODEL_POINTS: f64 = 60_000.0;
+
 /// The figures count as the paper's do; tables and messages are in scenario time.
 const MOTION_TIME: &str = "time since the start of the motion [s]";
 
@@ -60,13 +63,24 @@ impl Source<'_> {
             return Points::new();
         };
         let (from, to) = self.x_range();
-        let n = ((to - from) / 0.002).max(1.0) as usize;
+        let n = ((to - from) / 0.002).clamp(1.0, MODEL_POINTS) as usize;
         (0..=n)
             .map(|i| {
                 let t = from + (to - from) * i as f64 / n as f64;
                 (t, value(&model.at(t - delay_s)))
             })
             .collect()
+    }
+
+    /// Period of the rows over the whole run, s: all of them are kept of a short run.
+    fn period_s(&self) -> f64 {
+        self.recording.period_ms.max(1) as f64 * 1e-3
+    }
+
+    /// Whether a row stands on that period, rather than near an event, where all are kept.
+    fn regular<S>(&self, row: &Row<S>) -> bool {
+        let period_ms = self.recording.period_ms.max(1);
+        (row.t_ns / 1_000_000).is_multiple_of(period_ms)
     }
 
     fn marks(&self) -> Vec<f64> {
@@ -116,7 +130,8 @@ pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
         figures.extend(event::figures(s, *event));
     }
     figures.push(pressures(s, first));
-    figures.push(valves(s, s.x_range(), "valves", "Valves"));
+    let whole = (s.x_range(), s.period_s());
+    figures.push(valves(s, whole, "valves", "Valves"));
     figures.push(feet(s));
     figures.push(body(s));
     figures
@@ -315,12 +330,12 @@ fn pressures(s: &Source<'_>, first: usize) -> Figure {
     }
 }
 
-/// Valve raster of all joints over a window.
-fn valves(s: &Source<'_>, window: (f64, f64), id: &str, title: &str) -> Figure {
+/// Valve raster of all joints over a window, from rows of a period in s.
+fn valves(s: &Source<'_>, (window, period_s): ((f64, f64), f64), id: &str, title: &str) -> Figure {
     const VALVES: [&str; 4] = ["fill A", "vent A", "fill B", "vent B"];
     // Bins of whole PWM periods where a period is narrower than a pixel or so,
     // so that bins and pulses do not beat.
-    let bin = (((window.1 - window.0) / 450.0) / 1e-3).ceil().max(1.0) as usize;
+    let bin = (((window.1 - window.0) / 450.0) / period_s).ceil().max(1.0) as usize;
     let bin = if bin > 5 {
         bin.next_multiple_of(20)
     } else {
@@ -331,6 +346,7 @@ fn valves(s: &Source<'_>, window: (f64, f64), id: &str, title: &str) -> Figure {
         let samples: Vec<&Row<JointSample>> = s.recording.joints[joint]
             .iter()
             .filter(|r| (window.0..window.1).contains(&s.t(r.t_s())))
+            .filter(|r| period_s <= 1e-3 || s.regular(r))
             .collect();
         for (valve, name) in VALVES.iter().enumerate() {
             let commanded = samples.iter().map(|r| {
@@ -345,8 +361,8 @@ fn valves(s: &Source<'_>, window: (f64, f64), id: &str, title: &str) -> Figure {
             rows.push(RasterRow {
                 label: format!("{} {name}", joint + 1),
                 colour: colour::AXES[2 - valve / 2],
-                upper: runs(commanded, bin, 1e-3),
-                lower: Some(runs(open, bin, 1e-3)),
+                upper: runs(commanded, bin, period_s),
+                lower: Some(runs(open, bin, period_s)),
             });
         }
     }
@@ -392,6 +408,7 @@ fn feet(s: &Source<'_>) -> Figure {
         for (bit, side) in ["front", "back", "left", "right"].iter().enumerate() {
             let samples = feet[foot]
                 .iter()
+                .filter(|r| s.regular(r))
                 .map(|r| (s.t(r.t_s()), f64::from(r.v.switches >> bit & 1)));
             rows.push(RasterRow {
                 label: format!("{name} {side}"),
@@ -400,7 +417,7 @@ fn feet(s: &Source<'_>) -> Figure {
                 } else {
                     colour::SECOND
                 },
-                upper: runs(samples, 1, 1e-3),
+                upper: runs(samples, 1, s.period_s()),
                 lower: None,
             });
         }

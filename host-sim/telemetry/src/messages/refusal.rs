@@ -79,8 +79,9 @@ pub(super) fn refusal(reason: &Refusal) -> String {
     }
 }
 
-/// A command that was not accepted.
-pub(crate) fn reject(reason: &Reject) -> String {
+/// Why a command was refused at the door, with what to do about it.
+#[must_use]
+pub fn reject(reason: &Reject) -> String {
     match *reason {
         Reject::Expired { late_us } => format!("its deadline passed {late_us} µs ago"),
         Reject::DeadlineTooFar => {

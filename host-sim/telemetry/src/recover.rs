@@ -1,0 +1,119 @@
+//! A whole log from one whose writer was killed.
+
+use std::fs::{self, File};
+use std::io::{BufReader, BufWriter, Read as _, Seek as _};
+use std::path::Path;
+
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+use mcap::{MAGIC, McapError};
+
+use super::log_file::options;
+use crate::LogError;
+
+/// What [`recover`] made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Recovered {
+    /// Messages in the new file.
+    pub messages: u64,
+    /// Time of the last, ns.
+    pub last_ns: u64,
+    /// Whether the old file was whole already.
+    pub was_whole: bool,
+}
+
+/// Largest chunk that is believed, bytes: where a file breaks off, its lengths are anything.
+const MAX_CHUNK: usize = 1 << 30;
+
+/// Every chunk is checked before a message of it is given.
+fn checked() -> LinearReaderOptions {
+    LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(MAX_CHUNK)
+}
+
+/// Writes everything that can be read in `from`, a log that has no end because its writer was
+/// killed or its disk was full, to the new file `to`, and reads that once more with all checks.
+/// Memory is bounded by a chunk.
+///
+/// # Errors
+/// [`LogError::Output`] if `from` cannot be read, or `to` exists or cannot be written;
+/// [`LogError::NotALog`] if `from` is none, [`LogError::Empty`] if it has no whole chunk;
+/// [`LogError::Log`] and [`LogError::Unsound`] if the new file cannot be read back. `to` is not
+/// left behind then, and `from` is never changed.
+pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
+    let unreadable = |e| LogError::output("read the log", from, e);
+    let mut source = File::open(from).map_err(unreadable)?;
+    let mut magic = Vec::new();
+    let mut begin = source.by_ref().take(MAGIC.len() as u64);
+    begin.read_to_end(&mut magic).map_err(unreadable)?;
+    if magic != MAGIC {
+        return Err(LogError::NotALog { path: from.into() });
+    }
+    source.rewind().map_err(unreadable)?;
+    let target =
+        File::create_new(to).map_err(|e| LogError::output("create the recovered log", to, e))?;
+    let recovered = copy(source, target, from).and_then(|recovered| {
+        let found = count(to)?;
+        if found == recovered.messages {
+            Ok(recovered)
+        } else {
+            Err(LogError::Unsound {
+                path: to.into(),
+                written: recovered.messages,
+                found,
+            })
+        }
+    });
+    if recovered.is_err() {
+        let _ = fs::remove_file(to);
+    }
+    recovered
+}
+
+fn copy(source: File, target: File, from: &Path) -> Result<Recovered, LogError> {
+    let mut log = options().create(BufWriter::new(target))?;
+    let mut recovered = Recovered {
+        messages: 0,
+        last_ns: 0,
+        was_whole: true,
+    };
+    for message in MessageReader::new_with_options(BufReader::new(source), checked()) {
+        match message {
+            Ok(message) => {
+                log.write(&message)?;
+                recovered.messages += 1;
+                recovered.last_ns = recovered.last_ns.max(message.log_time);
+            }
+            Err(McapError::Io(e)) => return Err(LogError::output("read the log", from, e)),
+            // The place where it breaks off.
+            Err(_) => recovered.was_whole = false,
+        }
+    }
+    if recovered.messages == 0 {
+        return Err(LogError::Empty { path: from.into() });
+    }
+    log.finish()?;
+    let file = log
+        .into_inner()
+        .into_inner()
+        .map_err(|e| McapError::Io(e.into_error()))?;
+    file.sync_all().map_err(McapError::Io)?;
+    Ok(recovered)
+}
+
+/// Messages of a whole log; a log with any defect is an error.
+fn count(path: &Path) -> Result<u64, LogError> {
+    let file = File::open(path).map_err(|e| LogError::output("read the log", path, e))?;
+    let strict = checked()
+        .with_check_finishes_after_end_magic(true)
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true);
+    let messages = MessageReader::new_with_options(BufReader::new(file), strict);
+    let mut count = 0;
+    for message in messages {
+        message?;
+        count += 1;
+    }
+    Ok(count)
+}

@@ -1,0 +1,105 @@
+//! Where samples go.
+
+use super::registry::Sample;
+use super::samples::{
+    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
+    ProvenanceSample, StateSample, SupplySample, WheelSample,
+};
+use crate::LogError;
+
+/// Declares [`SampleRef`] over the types of samples.
+macro_rules! sample_ref {
+    ($($name:ident: $ty:ty),* $(,)?) => {
+        /// A sample of any channel.
+        #[derive(Debug, Clone, Copy)]
+        pub enum SampleRef<'a> {
+            $(
+                #[doc = concat!("A [`", stringify!($ty), "`].")]
+                $name(&'a $ty),
+            )*
+        }
+
+        $(
+            impl<'a> From<&'a $ty> for SampleRef<'a> {
+                fn from(sample: &'a $ty) -> Self {
+                    Self::$name(sample)
+                }
+            }
+        )*
+
+        impl SampleRef<'_> {
+            /// Appends the payload of the log, as [`Sample::encode_json`].
+            pub fn encode_json(self, out: &mut Vec<u8>) {
+                match self {
+                    $( Self::$name(sample) => sample.encode_json(out), )*
+                }
+            }
+
+            /// Gives the values as text, as [`Sample::cells`].
+            pub fn cells(self, cell: &mut dyn FnMut(&[u8])) {
+                match self {
+                    $( Self::$name(sample) => sample.cells(cell), )*
+                }
+            }
+        }
+    };
+}
+
+sample_ref! {
+    Joint: JointSample,
+    Wheel: WheelSample,
+    Body: BodySample,
+    Foot: FootSample,
+    Bus: BusSample,
+    Supply: SupplySample,
+    Master: MasterSample,
+    State: StateSample,
+    Event: EventSample,
+    Link: LinkSample,
+    Provenance: ProvenanceSample,
+}
+
+/// One sample on its way to the sinks.
+#[derive(Debug, Clone, Copy)]
+pub struct Taken<'a> {
+    /// Index of the channel in [`channels`](crate::channels).
+    pub channel: usize,
+    /// Which of the channels of its kind: joint 0 to 5, wheel, foot or board.
+    pub number: usize,
+    /// Simulated time, ns.
+    pub t_ns: u64,
+    /// The sample, with what the recorder computes.
+    pub sample: SampleRef<'a>,
+    /// Due in the log at the channel's declared rate.
+    pub due: bool,
+    /// Kept from the log by a fault of the run, a full disk.
+    pub lost: bool,
+}
+
+/// Takes every sample of every channel at full rate, in the order of the loop.
+///
+/// It cannot fail in the middle of a run: a sink that can no longer write keeps its first
+/// error for [`Sink::finish`] and ignores what follows, so that neither the loop nor another
+/// sink suffers.
+pub trait Sink {
+    /// Takes one sample.
+    fn take(&mut self, taken: &Taken<'_>);
+
+    /// The run is over.
+    ///
+    /// # Errors
+    /// The first error since the sink was made.
+    fn finish(&mut self) -> Result<(), LogError> {
+        Ok(())
+    }
+}
+
+impl<S: Sink + ?Sized> Sink for &mut S {
+    fn take(&mut self, taken: &Taken<'_>) {
+        (**self).take(taken);
+    }
+
+    fn finish(&mut self) -> Result<(), LogError> {
+        (**self).finish()
+    }
+}

@@ -1,0 +1,52 @@
+//! `wheeleg log`: work on logs of runs.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+
+use super::print;
+use wheeleg_studies::StudyError;
+use wheeleg_telemetry::recover;
+
+/// Arguments of `wheeleg log`.
+#[derive(Debug, Args)]
+pub(super) struct LogArgs {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Make a whole log of one that has no end: its run was killed, or its disk was full.
+    Recover {
+        /// The log, which stays as it is.
+        log: PathBuf,
+        /// The new file, which must not exist [default: beside the log, NAME-recovered.mcap].
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+}
+
+/// Recovers a log and says how much of it.
+pub(super) fn command(args: &LogArgs) -> Result<ExitCode, StudyError> {
+    let Action::Recover { log, out } = &args.action;
+    let out = out.clone().unwrap_or_else(|| beside(log));
+    let recovered = recover(log, &out)?;
+    let note = if recovered.was_whole {
+        "; the log was whole already"
+    } else {
+        ""
+    };
+    print(&format!(
+        "{} messages recovered, up to {:.3} s, and read back from {}{note}\n",
+        recovered.messages,
+        recovered.last_ns as f64 * 1e-9,
+        out.display()
+    ))
+}
+
+fn beside(log: &Path) -> PathBuf {
+    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
+    log.with_file_name(format!("{stem}-recovered.mcap"))
+}

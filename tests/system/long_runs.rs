@@ -1,0 +1,210 @@
+//! Long runs, and runs that end before their time: bounded memory, a log that can be recovered,
+//! and a verdict that needs no disk.
+
+use crate::program;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use mcap::read::Options;
+use serde_json::Value;
+
+/// Longest wait for a file or a number.
+const HUNG: Duration = Duration::from_secs(300);
+
+fn wheeleg() -> Command {
+    let mut command = Command::new(program::path());
+    command.env("NO_COLOR", "1").stdin(Stdio::null());
+    command
+}
+
+/// A robot that stands for `duration_s`, in a file of its own.
+fn stand(folder: &Path, duration_s: u32) -> PathBuf {
+    let path = folder.join(format!("stand-{duration_s}.toml"));
+    let text = format!(
+        "name = \"stand-{duration_s}\"\n\
+         description = \"Rest at home: no valve may switch\"\n\
+         robot = \"wheeleg-2003\"\n\
+         duration = {{ value = {duration_s}.0, unit = \"s\" }}\n\
+         seed = 1\n\
+         targets = \"stand\"\n\
+         [motion]\n\
+         kind = \"stand\"\n"
+    );
+    fs::write(&path, text).expect("written");
+    path
+}
+
+/// A run of `scenario` into `out`, just begun.
+fn begin(scenario: &Path, out: &Path) -> Child {
+    wheeleg()
+        .args(["run", "--json", "--out"])
+        .args([out, scenario])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("start")
+}
+
+fn json(output: &Output) -> Value {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {stderr}"))
+}
+
+/// `VmHWM` of a process: the most memory that it has had, MB.
+#[cfg(target_os = "linux")]
+fn peak_mb(id: u32) -> Option<f64> {
+    let status = fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kb = line.split_whitespace().nth(1)?.parse::<f64>().ok()?;
+    Some(kb / 1e3)
+}
+
+/// Runs to the end; gives the most memory, MB, and the summary.
+#[cfg(target_os = "linux")]
+fn measured(scenario: &Path, out: &Path) -> (f64, Value) {
+    let mut child = begin(scenario, out);
+    let mut peak: f64 = 0.0;
+    while child.try_wait().expect("status").is_none() {
+        peak = peak_mb(child.id()).map_or(peak, |mb| mb.max(peak));
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let output = child.wait_with_output().expect("output");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
+    assert!(stderr.contains("GB of log"), "the disk is told: {stderr}");
+    (peak, json(&output))
+}
+
+/// `cargo xtask deep long-run` has it longer than the 2^32 us of a counter.
+#[test]
+#[cfg(target_os = "linux")]
+fn memory_does_not_grow_with_simulated_time() {
+    let long_s = std::env::var("WHEELEG_LONG_RUN_S")
+        .map_or(300, |text| text.parse().expect("WHEELEG_LONG_RUN_S"));
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let run = |duration_s: u32| {
+        let out = dir.path().join(duration_s.to_string());
+        let (peak, summary) = measured(&stand(dir.path(), duration_s), &out);
+        assert_eq!(summary["passed"], true, "{summary}");
+        let log = fs::metadata(out.join("log.mcap")).expect("a log").len();
+        let page = fs::read_to_string(out.join("report.html")).expect("a page");
+        assert!(page.contains("A long run: the figures draw one sample every"));
+        fs::remove_dir_all(out).expect("removed");
+        (peak, log as f64, summary)
+    };
+    let short_s = 75;
+    let (short, _, _) = run(short_s);
+    let (long, log, summary) = run(long_s);
+    let slope_kb_s = (long - short) * 1e3 / f64::from(long_s - short_s);
+    println!(
+        "{long_s} s simulated in {:.0} s: {long:.0} MB of memory at most, {short:.0} MB for {short_s} s \
+         ({slope_kb_s:.1} kB/s); log {:.0} kB/s; {} targets met",
+        summary["wall_s"].as_f64().expect("a number"),
+        log * 1e-3 / f64::from(long_s),
+        summary["targets"].as_array().map_or(0, Vec::len),
+    );
+    assert!(long < 300.0, "{long} MB");
+    // The index of the log, which is written at its end, has 4 kB per second.
+    assert!(slope_kb_s < 12.0, "{short} MB, then {long} MB");
+}
+
+#[test]
+fn the_log_of_a_killed_run_is_recovered() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let out = dir.path().join("out");
+    let log = out.join("log.mcap");
+    let mut child = begin(&stand(dir.path(), 7200), &out);
+    let asked = Instant::now();
+    while !fs::metadata(&log).is_ok_and(|m| m.len() > 300_000) {
+        assert!(child.try_wait().expect("status").is_none(), "it ended");
+        assert!(asked.elapsed() < HUNG, "no log appeared");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // SIGKILL: nothing can be finished.
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+
+    let cut = fs::read(&log).expect("a log");
+    let output = wheeleg()
+        .args(["log", "recover"])
+        .arg(&log)
+        .output()
+        .expect("start");
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(fs::read(&log).expect("kept"), cut);
+    let whole = fs::read(out.join("log-recovered.mcap")).expect("a new log");
+    let index = mcap::Summary::read(&whole).expect("summary section");
+    let statistics = index.and_then(|s| s.stats).expect("statistics");
+    let strict = mcap::MessageStream::new(&whole).expect("an MCAP file");
+    let times: Vec<u64> = strict.map(|m| m.expect("message").log_time).collect();
+    assert_eq!(statistics.message_count, times.len() as u64);
+    let told = format!("{} messages recovered, up to ", times.len());
+    assert!(text.starts_with(&told), "{text}");
+    // All that a reader finds in the cut log, whose chunks are whole, is in the new one.
+    let tolerant = mcap::MessageStream::new_with_options(&cut, Options::IgnoreEndMagic.into());
+    let found = tolerant.expect("an MCAP file").map_while(Result::ok);
+    let found: Vec<u64> = found.map(|m| m.log_time).collect();
+    assert_eq!(times, found);
+    assert!(times.len() > 1000);
+
+    // Once more: the file is there.
+    let again = wheeleg().args(["log", "recover"]).arg(&log).output();
+    let again = again.expect("start");
+    assert_eq!(again.status.code(), Some(2), "{again:?}");
+    assert!(String::from_utf8_lossy(&again.stderr).contains("log-recovered.mcap"));
+    assert_eq!(
+        fs::read(out.join("log-recovered.mcap")).expect("kept"),
+        whole
+    );
+}
+
+/// A limit on the size of a file stands for the full disk: log and page do not fit, the summary
+/// does.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_costs_neither_verdict_nor_summary() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let out = dir.path().join("out");
+    let output = Command::new("bash")
+        .args([
+            "-c",
+            "trap '' XFSZ; ulimit -f 500; exec \"$0\" run three-step --json --out \"$1\"",
+        ])
+        .arg(program::path())
+        .arg(&out)
+        .env("NO_COLOR", "1")
+        .output()
+        .expect("bash");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    let told = json(&output);
+    assert_eq!(told["complete"], true);
+    assert!(told["targets"].as_array().is_some_and(|t| t.len() > 10));
+    assert!(
+        told["unwritten"]
+            .to_string()
+            .contains("cannot write the log")
+    );
+    let summary = fs::read(out.join("summary.json")).expect("a summary");
+    let summary: Value = serde_json::from_slice(&summary).expect("JSON");
+    assert_eq!(summary, told);
+    assert!(
+        stderr.contains("cannot write the log") && stderr.contains("report.html"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("wheeleg log recover"), "{stderr}");
+    // What does not fit is not there in part, what fits is.
+    assert!(!out.join("report.html").exists());
+    for figure in ["fig12-b5", "fig16-f6", "body"] {
+        let path = out.join("figures").join(format!("{figure}.png"));
+        assert!(path.exists(), "{figure}");
+    }
+    let recovered = wheeleg()
+        .args(["log", "recover"])
+        .arg(out.join("log.mcap"))
+        .output();
+    assert!(recovered.expect("start").status.success());
+}
