@@ -205,42 +205,12 @@ impl Comparison {
             .map(|(config, bound_s)| ComparedAxis { config, bound_s })
             .collect();
 
-        let scenes = progress.each("start-up", &planned, |&(i, variation, seed)| {
-            let axis = &axes[i].config;
-            let scene = Scene::new(&axis.name, &axis.axis, variation, seed);
-            scene.map_err(|e| axis_error(&axis.name, &e))
+        progress.begin("cases", of as u64);
+        let played = progress.map(&planned, |&(i, variation, seed)| {
+            play_scene(options, &axes[i], variation, seed, progress)
         })?;
-        let cases: Vec<(usize, &Scene, Kind, Move)> = planned
-            .iter()
-            .zip(&scenes)
-            .filter_map(|((i, ..), scene)| Some((*i, scene.as_ref()?)))
-            .flat_map(|(i, scene)| {
-                let moves = moves_of(options, scene.variation);
-                options.kinds.iter().flat_map(move |kind| {
-                    let moves = moves.clone().into_iter();
-                    moves.map(move |motion| (i, scene, *kind, motion))
-                })
-            })
-            .collect();
-        let played = progress.each("cases", &cases, |&(i, scene, kind, motion)| {
-            let played = scene
-                .play(kind, motion)
-                .map_err(|e| axis_error(&scene.axis, &e))?;
-            let nominal = scene.variation == Variation::Nominal;
-            let bound_s = match motion {
-                Move::Step100 if nominal => axes[i].bound_s[0],
-                Move::Step20 if nominal => axes[i].bound_s[1],
-                _ => None,
-            };
-            let row = scene.row(kind, motion, played.as_ref(), bound_s);
-            let shown = nominal && scene.seed == options.seed;
-            let overlay = played
-                .filter(|_| shown)
-                .map(|p| Overlay::of(scene, kind, motion, &p));
-            Ok::<_, StudyError>((row, overlay))
-        })?;
-        let (rows, overlays): (Vec<Row>, Vec<Option<Overlay>>) =
-            played.into_iter().flatten().unzip();
+        let played = played.into_iter().flatten().flatten();
+        let (rows, overlays): (Vec<Row>, Vec<Option<Overlay>>) = played.unzip();
         Ok(Self {
             options: options.clone(),
             axes,
@@ -262,6 +232,44 @@ impl Comparison {
         let page = page::render(&self, &drawn)?;
         job.finish(self, summary, &page, stopped)
     }
+}
+
+/// Plays the cases of a scene, as far as the comparison is not stopped. One is played after
+/// its start-up rather than after those of all scenes, so that there are rows from the
+/// beginning on.
+fn play_scene(
+    options: &Options,
+    axis: &ComparedAxis,
+    variation: Variation,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Vec<(Row, Option<Overlay>)>, StudyError> {
+    let failed = |e: BenchError| axis_error(&axis.config.name, &e);
+    let scene = Scene::new(&axis.config.name, &axis.config.axis, variation, seed);
+    let scene = scene.map_err(failed)?;
+    let moves = moves_of(options, variation);
+    let cases: Vec<(Kind, Move)> = options
+        .kinds
+        .iter()
+        .flat_map(|kind| moves.iter().map(move |motion| (*kind, *motion)))
+        .collect();
+    let nominal = variation == Variation::Nominal;
+    let rows = progress.map(&cases, |&(kind, motion)| {
+        let played = scene.play(kind, motion).map_err(failed)?;
+        let bound_s = match motion {
+            Move::Step100 if nominal => axis.bound_s[0],
+            Move::Step20 if nominal => axis.bound_s[1],
+            _ => None,
+        };
+        let row = scene.row(kind, motion, played.as_ref(), bound_s);
+        let shown = nominal && seed == options.seed;
+        let overlay = played
+            .filter(|_| shown)
+            .map(|p| Overlay::of(&scene, kind, motion, &p));
+        progress.step();
+        Ok::<_, StudyError>((row, overlay))
+    })?;
+    Ok(rows.into_iter().flatten().collect())
 }
 
 impl Overlay {

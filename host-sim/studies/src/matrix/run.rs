@@ -45,8 +45,6 @@ pub(super) struct Ran {
     pub(super) outputs: Outputs,
     /// The run ended before its time, and why.
     pub(super) error: Option<String>,
-    /// The study was stopped in it.
-    stopped: bool,
 }
 
 /// What the joint boards had on their outputs from power-up on, in the time of the start-up, too.
@@ -120,6 +118,7 @@ impl Robots {
             let scenario = self.scenario(stands, SOUND_S);
             // Short, and of use to other rows: it is not stopped.
             let run = simulate(&scenario, self.robot(row.variant), self.seed, &|| false);
+            let run = run.ok_or_else(|| "stopped".to_owned())?;
             run.error.map_or(Ok(run.recording), Err)
         });
         run.as_ref()
@@ -158,15 +157,16 @@ impl Robots {
         }
         check(&scenario, robot, &Nodes::default())?;
         let arming_asked = stops && faults.iter().all(|fault| fault.over_s() < arm_s);
+        let ran = simulate(&scenario, robot, self.seed, &|| progress.is_stopped());
+        let Some(ran) = ran else {
+            return Ok(None);
+        };
         let ran = Ran {
             at_s,
             faults,
             arming_asked,
-            ..simulate(&scenario, robot, self.seed, &|| progress.is_stopped())
+            ..ran
         };
-        if ran.stopped {
-            return Ok(None);
-        }
         let measured: Measured = measure(row, &ran, self.sound(row)?);
         Ok(Some(judge(*row, robot, &ran, measured)))
     }
@@ -200,13 +200,13 @@ fn stands(phase: Phase) -> bool {
     matches!(phase, Phase::Stand | Phase::PowerUp)
 }
 
-/// A run in memory; an error ends it and is told.
+/// A run in memory; an error ends it and is told. None if it was stopped.
 fn simulate(
     scenario: &Scenario,
     robot: &RobotConfig,
     seed: u64,
     is_stopped: &dyn Fn() -> bool,
-) -> Ran {
+) -> Option<Ran> {
     let mut recorder = Recorder::in_memory();
     let mut outputs = Outputs::default();
     let mut look = |joint: &WatchedJoint<'_>| {
@@ -226,15 +226,16 @@ fn simulate(
         &mut recorder,
         Onlookers::new(&mut progress).watching(&mut look),
     );
-    let (line, error, stopped) = match run {
-        Ok(outcome) => (outcome.line, None, outcome.stopped),
-        Err(e) => (LineAudit::default(), Some(e.to_string()), false),
+    let (line, error) = match run {
+        Ok(outcome) if outcome.stopped => return None,
+        Ok(outcome) => (outcome.line, None),
+        Err(e) => (LineAudit::default(), Some(e.to_string())),
     };
     let (recording, error) = match recorder.finish() {
         Ok(recording) => (recording, error),
         Err(e) => (Recording::default(), error.or(Some(e.to_string()))),
     };
-    Ran {
+    Some(Ran {
         at_s: 0.0,
         faults: Vec::new(),
         recording,
@@ -242,8 +243,7 @@ fn simulate(
         arming_asked: false,
         outputs,
         error,
-        stopped,
-    }
+    })
 }
 
 /// The instant of a row, s: somewhere in its phase, by the seed, on a whole tick.

@@ -108,7 +108,25 @@ impl Progress {
     /// begun before the study was asked to stop has none.
     ///
     /// # Errors
-    /// The first error, in the order of the items.
+    /// That of an item; no further one is begun then.
+    pub fn map<T: Sync, R: Send, E: Send>(
+        &self,
+        items: &[T],
+        work: impl Fn(&T) -> Result<R, E> + Sync,
+    ) -> Result<Vec<Option<R>>, E> {
+        items
+            .par_iter()
+            .map(|item| match self.is_stopped() {
+                true => Ok(None),
+                false => work(item).map(Some),
+            })
+            .collect()
+    }
+
+    /// The same as a phase, with a step for each item.
+    ///
+    /// # Errors
+    /// As [`Progress::map`].
     pub fn each<T: Sync, R: Send, E: Send>(
         &self,
         what: &str,
@@ -116,23 +134,17 @@ impl Progress {
         work: impl Fn(&T) -> Result<R, E> + Sync,
     ) -> Result<Vec<Option<R>>, E> {
         self.begin(what, items.len() as u64);
-        items
-            .par_iter()
-            .map(|item| {
-                if self.is_stopped() {
-                    return Ok(None);
-                }
-                let result = work(item)?;
-                self.step();
-                Ok(Some(result))
-            })
-            .collect()
+        self.map(items, |item| {
+            let result = work(item)?;
+            self.step();
+            Ok(result)
+        })
     }
 
-    /// The same of items all of which are needed.
+    /// The same where all results are needed.
     ///
     /// # Errors
-    /// As [`Progress::each`], or that the study was asked to stop.
+    /// As [`Progress::map`], or that the study was asked to stop.
     pub fn all<T: Sync, R: Send, E: Send + Into<StudyError>>(
         &self,
         what: &str,
@@ -178,13 +190,14 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_that_of_the_first_item() {
+    fn an_error_of_an_item_is_that_of_all() {
         let items: Vec<u32> = (0..100).collect();
         let work = |item: &u32| match item {
             30.. => Err(StudyError::refused(item.to_string(), "")),
             _ => Ok(()),
         };
         let error = Progress::silent().each("items", &items, work);
-        assert!(error.is_err());
+        let said = error.expect_err("an item fails").to_string();
+        assert!(said.parse().is_ok_and(|item: u32| item >= 30), "{said}");
     }
 }

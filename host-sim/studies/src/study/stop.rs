@@ -5,8 +5,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+#[cfg(unix)]
+use signal_hook::consts::SIGHUP;
+use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+
+/// Windows has no hang-up, and sends none.
+#[cfg(not(unix))]
+const SIGHUP: i32 = 1;
 
 /// A signal that asks the program to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -70,7 +76,7 @@ impl Stop {
         for signal in Signal::ALL {
             let number = signal.number();
             if signal == Signal::HangUp {
-                if is_ignored(number) {
+                if !cfg!(unix) || is_ignored(number) {
                     continue;
                 }
             } else {

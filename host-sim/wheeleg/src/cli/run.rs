@@ -14,7 +14,7 @@ use wheeleg_report::output;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
 use wheeleg_studies::run::{self, Options, Run, Summary};
-use wheeleg_studies::study::{Finished, Stop};
+use wheeleg_studies::study::{Finished, Stop, Stopped};
 use wheeleg_telemetry as telemetry;
 
 /// Arguments of `wheeleg run`.
@@ -94,9 +94,10 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     }
     let stop = stop_on_signals()?;
     let finished = run::run(&options, &stop)?;
+    let mut native = None;
     // A part of a run equals no whole one.
     if args.compare_sil && finished.result.summary.complete {
-        compare_sil(&options, &stop, &finished)?;
+        native = compare_sil(&options, &stop, &finished)?;
     }
     let summary = &finished.result.summary;
     let differ = differing_bits(summary) > 0;
@@ -107,7 +108,7 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     }
     let unwritten = finished.result.unwritten;
     if unwritten.is_empty() {
-        return Ok(code);
+        return Ok(native.map_or(code, |stopped| ExitCode::from(stopped.signal.exit_code())));
     }
     for error in unwritten {
         tell(&format!("{:?}", miette::Report::new(error)));
@@ -124,19 +125,26 @@ fn differing_bits(summary: &Summary) -> u64 {
 
 /// Repeats a run with all nodes here. The logs hold every input, output,
 /// frame and internal at its time, so equal hashes mean equal runs. Boards here are down
-/// when those outside were; that time is the hardware's.
-fn compare_sil(options: &Options, stop: &Stop, finished: &Finished<Run>) -> Result<(), StudyError> {
+/// when those outside were; that time is the hardware's. What stopped the native run, if
+/// anything did.
+fn compare_sil(
+    options: &Options,
+    stop: &Stop,
+    finished: &Finished<Run>,
+) -> Result<Option<Stopped>, StudyError> {
     let folder = finished.report.parent().unwrap_or(Path::new("."));
     let run = &finished.result;
     let native = run::repeat_natively(options, stop, run, folder.join(output::NATIVE))?;
-    if native.stopped.is_some() {
-        tell("the native run was stopped: the logs are not compared");
-        return Ok(());
+    if let Some(stopped) = native.stopped {
+        tell(&format!(
+            "the logs are not compared: the native run was {stopped}"
+        ));
+        return Ok(Some(stopped));
     }
     let (here_hash, there_hash) = (&native.result.summary.hash, &run.summary.hash);
     if here_hash == there_hash {
         tell("the log is that of the native run, to the bit");
-        return Ok(());
+        return Ok(None);
     }
     let here = folder.join(output::NATIVE).join("log.mcap");
     let first = telemetry::first_difference(&here, &folder.join("log.mcap"))?;
