@@ -90,7 +90,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         assert!(names.iter().any(|n| *n == expected), "{names:?}");
     }
     assert!(
-        names.iter().filter(|n| n.ends_with(".png")).count() >= 2,
+        names.iter().filter(|n| n.ends_with(".svg")).count() >= 2,
         "{names:?}"
     );
     assert_eq!(names, written[1].keys().collect::<Vec<_>>());
@@ -213,7 +213,7 @@ fn a_case_can_be_played_alone_and_gives_its_row_again() {
         "summary.json",
         "csv/first.csv",
         "csv/measured-1.csv",
-        "figures/measured-1.png",
+        "figures/measured-1.svg",
     ] {
         assert!(names.iter().any(|n| n == expected), "{names:?}");
     }

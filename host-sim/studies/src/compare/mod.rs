@@ -22,7 +22,6 @@ use wheeleg_plant::axis::AxisParams;
 pub use case::{BadCaseId, CaseFacts, CaseId, Figures, MARGIN, Row, Scene};
 pub(crate) use charts::panel;
 pub use moves::{CONTACT_S, Move, Played, RECOVERY_S, REST_S, STEP_S, Sizes};
-pub use page::number;
 pub use single::{Single, play};
 pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 
@@ -367,7 +366,7 @@ fn record<T: serde::Serialize>(value: &T) -> Result<[csv::StringRecord; 2], Stud
     Ok([next().map_err(failed)?, next().map_err(failed)?])
 }
 
-/// Draws figures as PNG and SVG; gives them back with their SVG text.
+/// Draws figures as SVG; gives them back with their SVG text.
 pub(crate) fn draw(
     folder: &Path,
     figures: Vec<wheeleg_report::plot::Figure>,
@@ -375,8 +374,7 @@ pub(crate) fn draw(
     figures
         .into_par_iter()
         .map(|figure| {
-            figure.png(&folder.join(format!("{}.png", figure.id)))?;
-            let svg = figure.svg()?;
+            let svg = figure.svg();
             save(&folder.join(format!("{}.svg", figure.id)), &svg)?;
             Ok((figure, svg))
         })

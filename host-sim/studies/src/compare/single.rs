@@ -75,7 +75,7 @@ impl Single {
         let drawn = draw(&plots, figures)?;
         Ok(drawn
             .into_iter()
-            .map(|(f, _)| plots.join(format!("{}.png", f.id)))
+            .map(|(f, _)| plots.join(format!("{}.svg", f.id)))
             .collect())
     }
 }

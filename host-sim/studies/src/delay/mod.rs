@@ -247,8 +247,7 @@ pub fn write(
     let plots = subfolder(folder, "figures")?;
     let mut drawn = Vec::new();
     for figure in charts::figures(&study) {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
+        let svg = figure.svg();
         save(&plots.join(format!("{}.svg", figure.id)), &svg)?;
         drawn.push((figure, svg));
     }

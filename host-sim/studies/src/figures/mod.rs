@@ -137,8 +137,7 @@ pub fn write(folder: &Path) -> Result<Finished, StudyError> {
     let mut drawn = Vec::with_capacity(figures.len());
     bar.set_message("drawing");
     for (i, figure) in figures.into_iter().enumerate() {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
+        let svg = figure.svg();
         let path = plots.join(format!("{}.svg", figure.id));
         save(&path, &svg)?;
         drawn.push((figure, svg));

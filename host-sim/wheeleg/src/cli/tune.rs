@@ -8,9 +8,9 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::print;
+use wheeleg_report::number::or_dash;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::bench::grain::COARSE;
-use wheeleg_studies::compare::number;
 use wheeleg_studies::tune::{Section, Tuned};
 
 /// Arguments of `wheeleg tune`.
@@ -73,7 +73,7 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
     );
     for test in &tuned.tests {
         let both = |f: fn(&wheeleg_studies::compare::Figures) -> Option<f64>, digits: usize| {
-            [&test.before, &test.after].map(|figures| number(f(figures), digits))
+            [&test.before, &test.after].map(|figures| or_dash(f(figures), digits))
         };
         let cells = [
             both(|f| f.steady_error_mm.map(f64::abs), 2),
