@@ -98,7 +98,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         assert!(names.iter().any(|n| *n == expected), "{names:?}");
     }
     assert!(
-        names.iter().filter(|n| n.ends_with(".png")).count() >= 2,
+        names.iter().filter(|n| n.ends_with(".svg")).count() >= 2,
         "{names:?}"
     );
     assert_eq!(names, written[1].keys().collect::<Vec<_>>());

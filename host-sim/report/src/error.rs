@@ -47,8 +47,19 @@ pub enum ReportError {
     Plot {
         /// Name of the figure.
         figure: String,
-        /// What the plotting library said.
+        /// What the library said.
         reason: String,
+    },
+
+    /// A picture was asked for in a format that this program cannot write.
+    #[error("cannot write `{}`: this program was built without PNG", path.display())]
+    #[diagnostic(
+        code(wheeleg::png),
+        help("build it with `--features png`; every figure is also there as SVG")
+    )]
+    NoPng {
+        /// The file.
+        path: PathBuf,
     },
 
     /// The report template failed.

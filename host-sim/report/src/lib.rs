@@ -2,6 +2,7 @@
 //! pictures, the folder that they go to ([`output`]), and statistics ([`stats`]).
 
 mod error;
+pub mod number;
 pub mod output;
 mod page;
 pub mod plot;
@@ -11,7 +12,7 @@ mod table;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
-pub use page::{page, pictures};
+pub use page::{Picture, page, pictures};
 pub use table::table;
 
 /// Creates a folder in the folder of the results.

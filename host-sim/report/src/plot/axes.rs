@@ -1,12 +1,8 @@
-//! Axes, grid and marks, which lines, rasters and maps have in common.
+//! From values to pixels, and what lines, rasters and maps have in common: frame,
+//! grid, numbers and marks.
 
-use plotters::coord::Shift;
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
-
-use super::{FONT, LEFT, Panel, colour, text};
-
-pub(super) type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+use super::svg::{Anchor, SMALL, Stroke, Svg};
+use super::{LEFT, Panel, WIDTH, colour};
 
 /// Lines behind the content, and numbers at its left.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -19,80 +15,123 @@ pub(super) enum Grid {
     Covered,
 }
 
-impl Panel {
-    /// A chart over the panel's abscissa.
-    pub(super) fn chart<'a, B: DrawingBackend>(
-        &self,
-        body: &'a DrawingArea<B, Shift>,
-        scale: u32,
-        axis_px: u32,
-        (y0, y1): (f64, f64),
-    ) -> Result<Chart<'a, B>, String> {
-        let (x0, x1) = self.x_range;
-        ChartBuilder::on(body)
-            .margin_right(14 * scale)
-            .margin_top(3 * scale)
-            .margin_bottom(5 * scale)
-            .set_label_area_size(LabelAreaPosition::Left, LEFT * scale)
-            .set_label_area_size(LabelAreaPosition::Bottom, axis_px)
-            .build_cartesian_2d(x0..x1, y0..y1)
-            .map_err(text)
-    }
+/// Where a panel draws.
+pub(super) struct Axes {
+    x: Scale,
+    y: Scale,
+    /// Height of numbers and label below, pixels; zero without them.
+    below: u32,
+}
 
-    /// Marks the panel's times from `y0` to `y1`.
-    pub(super) fn draw_marks<B: DrawingBackend>(
-        &self,
-        chart: &mut Chart<'_, B>,
-        scale: u32,
-        (y0, y1): (f64, f64),
-    ) -> Result<(), String> {
-        let (x0, x1) = self.x_range;
-        for mark in self.marks.iter().filter(|m| (x0..=x1).contains(*m)) {
-            let stroke = colour::LIMIT.stroke_width(scale);
-            let line = PathElement::new(vec![(*mark, y0), (*mark, y1)], stroke);
-            chart.draw_series(std::iter::once(line)).map_err(text)?;
-        }
-        Ok(())
-    }
+/// An axis: values to pixels.
+struct Scale {
+    values: (f64, f64),
+    pixels: (f64, f64),
+}
 
-    /// Draws the grid and the numbers of the axes; below the last panel
-    /// (`axis_px` above zero) also `x_label`.
-    pub(super) fn draw_axes<B: DrawingBackend>(
-        &self,
-        chart: &mut Chart<'_, B>,
-        scale: u32,
-        axis_px: u32,
-        x_label: &str,
-        grid: Grid,
-    ) -> Result<(), String> {
-        let font = (FONT, 13 * scale).into_font().color(&colour::INK);
-        let y_labels = match grid {
-            Grid::Both | Grid::Covered => (self.height / 28).clamp(3, 11) as usize,
-            Grid::Upright => 0,
+impl Scale {
+    fn at(&self, value: f64) -> f64 {
+        let ((v0, v1), (p0, p1)) = (self.values, self.pixels);
+        // A range without length has everything in its middle.
+        let share = if v1 > v0 {
+            (value - v0) / (v1 - v0)
+        } else {
+            0.5
         };
-        let mut mesh = chart.configure_mesh();
-        mesh.bold_line_style(colour::GRID.stroke_width(scale))
-            .light_line_style(TRANSPARENT)
-            .axis_style(colour::INK.stroke_width(scale))
-            .label_style(font.clone())
-            .axis_desc_style(font)
-            .x_labels(11)
-            .y_labels(y_labels)
-            .y_label_formatter(&|v| tick(*v))
-            .x_label_formatter(&|v| tick(*v));
-        match grid {
-            Grid::Both => {}
-            Grid::Upright => {
-                mesh.disable_y_mesh();
-            }
-            Grid::Covered => {
-                mesh.disable_mesh();
+        p0 + share * (p1 - p0)
+    }
+
+    /// Values that get a number: at most `most` multiples of 1, 2 or 5 times a power of ten.
+    fn ticks(&self, most: usize) -> Vec<f64> {
+        let (lo, hi) = self.values;
+        if hi <= lo {
+            return Vec::new();
+        }
+        let count = |step: f64| ((hi / step).floor() - (lo / step).ceil()) as i64 + 1;
+        let decade = (hi - lo).log10().floor() as i32;
+        let decades = (decade - 2..=decade + 1).map(|k| 10_f64.powi(k));
+        let steps = decades.flat_map(|ten| [1.0, 2.0, 5.0].map(|m| m * ten));
+        let mut fitting = steps.filter(|step| count(*step) <= most as i64);
+        fitting.next().map_or_else(Vec::new, |step| {
+            let first = (lo / step).ceil();
+            (0..count(step))
+                .map(|k| (first + k as f64) * step)
+                .collect()
+        })
+    }
+}
+
+impl Axes {
+    /// Axes of a panel whose content begins at `top` and is `height` high, with the
+    /// axis of the abscissa `below` it.
+    pub(super) fn new(panel: &Panel, y_range: (f64, f64), top: u32, below: u32) -> Self {
+        let bottom = top + panel.height;
+        Self {
+            x: Scale {
+                values: panel.x_range,
+                pixels: (f64::from(LEFT), f64::from(WIDTH - 15)),
+            },
+            y: Scale {
+                values: y_range,
+                pixels: (f64::from(bottom - 5), f64::from(top + 3)),
+            },
+            below,
+        }
+    }
+
+    /// The pixel of a point.
+    pub(super) fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (self.x.at(x), self.y.at(y))
+    }
+
+    /// A line from left to right.
+    pub(super) fn level(&self, svg: &mut Svg, y: f64, stroke: Stroke) {
+        let (x0, x1) = self.x.values;
+        svg.line(&[self.at((x0, y)), self.at((x1, y))], stroke);
+    }
+
+    fn upright(&self, svg: &mut Svg, x: f64, stroke: Stroke) {
+        let (y0, y1) = self.y.values;
+        svg.line(&[self.at((x, y0)), self.at((x, y1))], stroke);
+    }
+
+    /// Marks the panel's times.
+    pub(super) fn marks(&self, svg: &mut Svg, marks: &[f64]) {
+        let (x0, x1) = self.x.values;
+        for mark in marks.iter().filter(|m| (x0..=x1).contains(*m)) {
+            self.upright(svg, *mark, Stroke::new(colour::LIMIT, 1));
+        }
+    }
+
+    /// Draws the grid and the numbers of the axes; below the last panel also `x_label`.
+    pub(super) fn draw(&self, svg: &mut Svg, x_label: &str, grid: Grid) {
+        let (left, right) = self.x.pixels;
+        let (bottom, top) = self.y.pixels;
+        let grey = Stroke::new(colour::GRID, 1);
+        let ink = Stroke::new(colour::INK, 1);
+        let numbers = ((bottom - top) / 28.0).clamp(3.0, 11.0) as usize;
+        if grid != Grid::Upright {
+            for y in self.y.ticks(numbers) {
+                if grid == Grid::Both {
+                    self.level(svg, y, grey);
+                }
+                svg.text((left - 6.0, self.y.at(y)), SMALL, Anchor::End, &tick(y));
             }
         }
-        if axis_px > 0 {
-            mesh.x_desc(x_label);
+        for x in self.x.ticks(11) {
+            if grid != Grid::Covered {
+                self.upright(svg, x, grey);
+            }
+            if self.below > 0 {
+                let at = (self.x.at(x), bottom + 11.0);
+                svg.text(at, SMALL, Anchor::Middle, &tick(x));
+            }
         }
-        mesh.draw().map_err(text)
+        svg.line(&[(left, top), (left, bottom), (right, bottom)], ink);
+        if self.below > 0 {
+            let at = (0.5 * (left + right), bottom + 30.0);
+            svg.text(at, SMALL, Anchor::Middle, x_label);
+        }
     }
 }
 
@@ -100,4 +139,47 @@ fn tick(v: f64) -> String {
     let rounded = (v * 1e6).round() / 1e6;
     // No minus sign on zero.
     format!("{}", rounded + 0.0).replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ticks(values: (f64, f64), most: usize) -> Vec<String> {
+        let pixels = (0.0, 100.0);
+        let all = Scale { values, pixels }.ticks(most);
+        all.into_iter().map(tick).collect()
+    }
+
+    #[test]
+    fn numbers_are_round_few_and_inside() {
+        assert_eq!(ticks((0.0, 10.0), 11).len(), 11);
+        assert_eq!(
+            ticks((-0.05, 1.5), 11),
+            ["0", "0.2", "0.4", "0.6", "0.8", "1", "1.2", "1.4"]
+        );
+        assert_eq!(
+            ticks((-60.0, 60.0), 10),
+            ["−60", "−40", "−20", "0", "20", "40", "60"]
+        );
+        assert_eq!(ticks((3.31, 3.37), 3), ["3.32", "3.34", "3.36"]);
+        assert_eq!(ticks((1e-7, 2.0), 3), ["1", "2"]);
+    }
+
+    #[test]
+    fn a_range_without_length_has_no_numbers() {
+        assert!(ticks((1.0, 1.0), 5).is_empty());
+    }
+
+    #[test]
+    fn values_grow_upwards_from_the_lower_left() {
+        let scale = Scale {
+            values: (10.0, 20.0),
+            pixels: (200.0, 100.0),
+        };
+        assert_eq!(
+            [scale.at(10.0), scale.at(15.0), scale.at(20.0)],
+            [200.0, 150.0, 100.0]
+        );
+    }
 }

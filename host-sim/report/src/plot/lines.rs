@@ -1,25 +1,23 @@
 //! Lines over time, or over anything else.
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
-
-use super::axes::Grid;
-use super::{LEFT, Panel, WIDTH, colour, text};
+use super::axes::{Axes, Grid};
+use super::svg::{Stroke, Svg};
+use super::{Colour, LEFT, WIDTH, colour};
 
 /// One line.
 pub struct Series {
     /// Text in the legend.
     pub label: String,
     /// Colour of the line.
-    pub colour: RGBColor,
-    /// Width of the line, pixels at scale 1.
+    pub colour: Colour,
+    /// Width of the line, pixels.
     pub width: u32,
     /// Abscissa and ordinate of each point.
     pub points: Vec<(f64, f64)>,
 }
 
 /// A line; without a label it is not in the legend.
-pub fn line(label: &str, colour: RGBColor, width: u32, points: Vec<(f64, f64)>) -> Series {
+pub fn line(label: &str, colour: Colour, width: u32, points: Vec<(f64, f64)>) -> Series {
     Series {
         label: label.to_owned(),
         colour,
@@ -39,48 +37,31 @@ pub struct Lines {
     pub(super) y_range: (f64, f64),
 }
 
-impl Panel {
-    pub(super) fn draw_lines<B: DrawingBackend>(
-        &self,
-        body: &DrawingArea<B, Shift>,
-        scale: u32,
-        axis_px: u32,
-        lines: &Lines,
-    ) -> Result<(), String> {
-        let ((x0, x1), (y0, y1)) = (self.x_range, lines.y_range);
-        let mut chart = self.chart(body, scale, axis_px, (y0, y1))?;
-        self.draw_axes(&mut chart, scale, axis_px, &lines.x_label, Grid::Both)?;
-        let clamp = |y: f64| y.clamp(y0, y1);
-        for limit in &lines.limits {
-            let stroke = colour::LIMIT.mix(0.7).stroke_width(scale);
-            chart
-                .draw_series(std::iter::once(PathElement::new(
-                    vec![(x0, clamp(*limit)), (x1, clamp(*limit))],
-                    stroke,
-                )))
-                .map_err(text)?;
+impl Lines {
+    pub(super) fn draw(&self, svg: &mut Svg, axes: &Axes, x_range: (f64, f64), marks: &[f64]) {
+        let (y0, y1) = self.y_range;
+        axes.draw(svg, &self.x_label, Grid::Both);
+        for limit in &self.limits {
+            let opacity = 0.7;
+            let stroke = Stroke {
+                opacity,
+                ..Stroke::new(colour::LIMIT, 1)
+            };
+            axes.level(svg, limit.clamp(y0, y1), stroke);
         }
-        self.draw_marks(&mut chart, scale, (y0, y1))?;
-        for line in &lines.series {
-            let columns = 2 * (WIDTH - LEFT) as usize;
-            let points: Vec<(f64, f64)> = thin(&line.points, self.x_range, columns)
-                .into_iter()
-                .map(|(x, y)| (x, clamp(y)))
-                .collect();
-            let stroke = line.colour.stroke_width(line.width * scale);
-            if scale == 1 {
-                chart
-                    .draw_series(LineSeries::new(points, stroke))
-                    .map_err(text)?;
-            } else {
-                // The bitmap backend's joints shoot far out at sharp turns.
-                let segments = points.windows(2);
-                chart
-                    .draw_series(segments.map(|p| PathElement::new(p.to_vec(), stroke)))
-                    .map_err(text)?;
+        axes.marks(svg, marks);
+        for line in &self.series {
+            let stroke = Stroke::new(line.colour, line.width);
+            let points = thin(&line.points, x_range, 2 * (WIDTH - LEFT) as usize);
+            // A value that does not exist is a gap.
+            for piece in points.split(|(_, y)| y.is_nan()) {
+                let pixels = piece.iter().map(|(x, y)| axes.at((*x, y.clamp(y0, y1))));
+                let pixels: Vec<(f64, f64)> = pixels.collect();
+                if !pixels.is_empty() {
+                    svg.line(&pixels, stroke);
+                }
             }
         }
-        Ok(())
     }
 }
 

@@ -1,24 +1,24 @@
-//! Drawing of figures: stacked panels of lines, rasters, maps and bars, to PNG and SVG.
+//! Drawing of figures: stacked panels of lines, rasters, maps and bars, as SVG.
 
 mod axes;
 mod bars;
 pub mod colour;
 mod heat;
 mod lines;
+#[cfg(feature = "png")]
+mod png;
 mod raster;
+mod svg;
 
 use std::path::Path;
-use std::sync::Once;
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use plotters::style::{FontStyle, register_font};
-
+use axes::Axes;
 pub use bars::{Bars, Column};
+pub use colour::Colour;
 pub use heat::Heat;
 pub use lines::{Lines, Series, line};
-pub use plotters::style::RGBColor;
 pub use raster::{RasterRow, runs};
+use svg::{Stroke, Svg};
 
 use crate::ReportError;
 
@@ -73,7 +73,7 @@ pub struct Panel {
     pub marks: Vec<f64>,
     /// What is drawn.
     pub content: Content,
-    /// Height in pixels at scale 1.
+    /// Height in pixels.
     pub height: u32,
     /// Label of the abscissa of a raster; lines have their own.
     raster_x: &'static str,
@@ -92,26 +92,12 @@ pub struct Figure {
     pub panels: Vec<Panel>,
 }
 
-/// Width in pixels at scale 1.
+/// Width in pixels.
 const WIDTH: u32 = 940;
-/// PNG files are drawn at this multiple.
-const PNG_SCALE: u32 = 2;
-const FONT: &str = "sans-serif";
 const TITLE_HEIGHT: u32 = 26;
 const AXIS_HEIGHT: u32 = 40;
 const LEFT: u32 = 72;
 const TIME: &str = "time [s]";
-
-/// Makes the built-in font known to the drawing library, so that figures need
-/// no font of the machine.
-fn fonts() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        // A font that the crate ships and that parses; failure would show as
-        // an error of every text drawn.
-        let _ = register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
-    });
-}
 
 impl Figure {
     /// Height of the axis below panel `i`: bars have none.
@@ -132,62 +118,34 @@ impl Figure {
     }
 
     /// The figure as SVG text.
-    pub fn svg(&self) -> Result<String, ReportError> {
-        fonts();
-        let mut text = String::new();
-        {
-            let root = SVGBackend::with_string(&mut text, self.size()).into_drawing_area();
-            self.draw(&root, 1).map_err(|e| self.failed(&e))?;
-        }
-        Ok(text)
-    }
-
-    /// Writes the figure as PNG. Lines of the bitmap backend have hard edges,
-    /// so it is drawn at twice the size and averaged down.
-    pub fn png(&self, path: &Path) -> Result<(), ReportError> {
-        fonts();
-        let (w, h) = self.size();
-        let (w, h) = (w * PNG_SCALE, h * PNG_SCALE);
-        let mut fine = vec![0; (2 * w * 2 * h * 3) as usize];
-        {
-            let root = BitMapBackend::with_buffer(&mut fine, (2 * w, 2 * h)).into_drawing_area();
-            self.draw(&root, 2 * PNG_SCALE)
-                .map_err(|e| self.failed(&e))?;
-        }
-        let smooth = halve(&fine, w as usize, h as usize);
-        let mut file = BitMapBackend::new(path, (w, h));
-        file.blit_bitmap((0, 0), (w, h), &smooth)
-            .and_then(|()| file.present())
-            .map_err(|e| self.failed(&text(e)))
-    }
-
-    fn failed(&self, error: &str) -> ReportError {
-        ReportError::Plot {
-            figure: self.title.clone(),
-            reason: error.to_owned(),
-        }
-    }
-
-    fn draw<B: DrawingBackend>(
-        &self,
-        root: &DrawingArea<B, Shift>,
-        scale: u32,
-    ) -> Result<(), String> {
-        root.fill(&colour::PAPER).map_err(text)?;
-        let mut rest = root.clone();
+    pub fn svg(&self) -> String {
+        let (width, height) = self.size();
+        let mut svg = Svg::new(width, height);
+        let mut top = 0;
         for (i, panel) in self.panels.iter().enumerate() {
             let axis = self.axis(i);
-            let height = (panel.height + TITLE_HEIGHT + axis) * scale;
-            let (area, below) = rest.split_vertically(height);
-            panel.draw(&area, scale, axis * scale)?;
-            rest = below;
+            panel.draw(&mut svg, top, axis);
+            top += TITLE_HEIGHT + panel.height + axis;
         }
-        root.present().map_err(text)
+        svg.finish()
     }
-}
 
-fn text<E: std::fmt::Display>(error: E) -> String {
-    error.to_string()
+    /// Writes the figure as PNG, at twice the size.
+    ///
+    /// # Errors
+    /// [`ReportError::NoPng`] in a program that was built without the feature `png`;
+    /// [`ReportError::Plot`] if the file cannot be written.
+    pub fn png(&self, path: &Path) -> Result<(), ReportError> {
+        #[cfg(feature = "png")]
+        return png::write(&self.svg(), path).map_err(|reason| ReportError::Plot {
+            figure: self.title.clone(),
+            reason,
+        });
+        #[cfg(not(feature = "png"))]
+        Err(ReportError::NoPng {
+            path: path.to_owned(),
+        })
+    }
 }
 
 impl Panel {
@@ -227,85 +185,158 @@ impl Panel {
         }
     }
 
-    fn draw<B: DrawingBackend>(
-        &self,
-        area: &DrawingArea<B, Shift>,
-        scale: u32,
-        axis_px: u32,
-    ) -> Result<(), String> {
-        let (head, body) = area.split_vertically(TITLE_HEIGHT * scale);
-        self.head(&head, scale)?;
+    /// Draws the panel below `top`, with `axis` pixels for the abscissa's numbers.
+    fn draw(&self, svg: &mut Svg, top: u32, axis: u32) {
+        self.head(svg, top);
+        let top = top + TITLE_HEIGHT;
+        let axes = |y_range| Axes::new(self, y_range, top, axis);
         match &self.content {
-            Content::Lines(lines) => self.draw_lines(&body, scale, axis_px, lines),
-            Content::Raster(rows) => self.draw_raster(&body, scale, axis_px, rows),
-            Content::Heat(heat) => self.draw_heat(&body, scale, axis_px, heat),
-            Content::Bars(bars) => bars.draw(&body, scale, self.height),
+            Content::Lines(lines) => {
+                lines.draw(svg, &axes(lines.y_range), self.x_range, &self.marks);
+            }
+            Content::Raster(rows) => {
+                raster::draw(rows, svg, &axes((0.0, rows.len().max(1) as f64)), self);
+            }
+            Content::Heat(heat) => heat.draw(svg, &axes(heat.y_range), self.x_range),
+            Content::Bars(bars) => bars.draw(svg, top, self.height),
         }
     }
 
     /// Title at the left, legend after it.
-    fn head<B: DrawingBackend>(
-        &self,
-        head: &DrawingArea<B, Shift>,
-        scale: u32,
-    ) -> Result<(), String> {
-        let s = scale as i32;
-        let style = |size: u32| (FONT, size * scale).into_font().color(&colour::INK);
-        let title = style(15);
-        let y = 6 * s;
-        let words = match &self.content {
+    fn head(&self, svg: &mut Svg, top: u32) {
+        let at = (f64::from(LEFT), f64::from(top) + 14.0);
+        let series: &[Series] = match &self.content {
+            Content::Lines(lines) => &lines.series,
+            _ => &[],
+        };
+        let title = match &self.content {
             Content::Lines(lines) => format!("{} {}", self.title, lines.y_label),
             Content::Raster(_) | Content::Bars(_) => self.title.clone(),
             Content::Heat(heat) => format!("{}: {}", self.title, heat.legend),
         };
-        head.draw_text(&words, &title, (LEFT as i32 * s, y))
-            .map_err(text)?;
-        let Content::Lines(Lines { series, .. }) = &self.content else {
-            return Ok(());
-        };
-        let (width, _) = head.estimate_text_size(&words, &title).map_err(text)?;
-        let mut x = LEFT as i32 * s + width as i32 + 24 * s;
-        let label = style(13);
-        for line in series.iter().filter(|l| !l.label.is_empty()) {
-            let stroke = line.colour.stroke_width((line.width + 1) * scale);
-            let mid = y + 7 * s;
-            head.draw(&PathElement::new(vec![(x, mid), (x + 18 * s, mid)], stroke))
-                .map_err(text)?;
-            x += 23 * s;
-            head.draw_text(&line.label, &label, (x, y + s))
-                .map_err(text)?;
-            let (w, _) = head.estimate_text_size(&line.label, &label).map_err(text)?;
-            x += w as i32 + 16 * s;
-        }
-        Ok(())
+        let named = series.iter().filter(|l| !l.label.is_empty());
+        let named = named.map(|l| (l.label.as_str(), Stroke::new(l.colour, l.width)));
+        svg.legend(at, &title, named);
     }
-}
-
-/// Averages blocks of two by two pixels; `w` and `h` are those of the result.
-fn halve(fine: &[u8], w: usize, h: usize) -> Vec<u8> {
-    let mut out = Vec::with_capacity(w * h * 3);
-    for rows in fine.chunks_exact(2 * w * 6).take(h) {
-        let (upper, lower) = rows.split_at(w * 6);
-        for (a, b) in upper.chunks_exact(6).zip(lower.chunks_exact(6)) {
-            for c in 0..3 {
-                let sum =
-                    u16::from(a[c]) + u16::from(a[c + 3]) + u16::from(b[c]) + u16::from(b[c + 3]);
-                out.push((sum / 4) as u8);
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn figure() -> Figure {
+        let wave = (0..500).map(|i| f64::from(i) * 0.02);
+        let wave = wave.map(|t| (t, 3.0 * t.sin())).collect();
+        let lines = vec![line("a < b", colour::MODEL, 2, wave)];
+        let row = RasterRow {
+            label: "fill".to_owned(),
+            colour: colour::ROBOT,
+            upper: vec![(-1.0, 4.0, 1.0)],
+            lower: Some(vec![(5.0, 99.0, 0.5)]),
+        };
+        let heat = Heat {
+            columns: 2,
+            values: vec![0.0, 1.0, 2.0, 3.0],
+            y_range: (0.0, 1.0),
+            x_label: "x".to_owned(),
+            legend: "dark is more".to_owned(),
+        };
+        let column = Column {
+            title: "time [s]".to_owned(),
+            values: vec![Some(9.0), None],
+            texts: vec!["9.0".to_owned(), "never".to_owned()],
+            full: 5.0,
+            limit: Some(2.0),
+        };
+        let names = ["one", "two"].map(|n| (n.to_owned(), colour::THIRD));
+        let bars = Bars {
+            rows: names.into(),
+            columns: vec![column],
+        };
+        let height = bars.height();
+        let contents = [
+            (
+                Content::lines(("[mm]", (-2.0, 2.0)), lines).limited(&[9.0]),
+                100,
+            ),
+            (Content::Raster(vec![row]), 40),
+            (Content::Heat(heat), 80),
+            (Content::Bars(bars), height),
+        ];
+        let panels = contents.map(|(content, height)| {
+            let mut panel = Panel::new("panel", (0.0, 10.0), height, content);
+            panel.marks = vec![3.0, 11.0];
+            panel
+        });
+        Figure {
+            id: "all".to_owned(),
+            title: "All kinds".to_owned(),
+            caption: String::new(),
+            panels: panels.into(),
+        }
+    }
+
+    /// Every number of every attribute `name`.
+    fn numbers<'a>(svg: &'a str, name: &str) -> impl Iterator<Item = f64> + 'a {
+        let start = format!(" {name}=\"");
+        let texts: Vec<&str> = svg.split(&start).skip(1).collect();
+        let values = texts.into_iter().filter_map(|t| t.split('"').next());
+        let numbers = values.flat_map(|v| v.split([',', ' ']));
+        numbers.map(|n| n.parse().expect("a number"))
+    }
+
     #[test]
-    fn halving_averages_each_block() {
-        // Two by two pixels become one.
-        let fine = [0, 10, 20, 40, 10, 20, 80, 10, 20, 120, 10, 20];
-        assert_eq!(halve(&fine, 1, 1), [60, 10, 20]);
-        assert_eq!(halve(&[7; 4 * 6 * 3], 3, 2), [7; 18]);
+    fn every_kind_of_panel_is_drawn_on_the_sheet() {
+        let (figure, mut drawn) = (figure(), 0);
+        let svg = figure.svg();
+        let (width, height) = figure.size();
+        let most = f64::from(width.max(height));
+        for name in ["x", "y", "width", "height", "points"] {
+            for number in numbers(&svg, name) {
+                assert!((0.0..=most).contains(&number), "{name} {number}");
+                drawn += 1;
+            }
+        }
+        assert!(drawn > 1000, "{drawn}");
+        for text in [
+            "a &lt; b",
+            "panel [mm]",
+            "fill",
+            "dark is more",
+            "never",
+            TIME,
+        ] {
+            assert_eq!(svg.matches(&format!("{text}<")).count(), 1, "{text}");
+        }
+        // One of the two marks is outside, and bars have none; the limit of the bars.
+        let mark = format!(
+            "stroke=\"{}\" stroke-width=\"1\" stroke-linejoin=\"round\" points",
+            colour::LIMIT
+        );
+        assert_eq!(svg.matches(&mark).count(), 3);
+    }
+
+    #[test]
+    #[cfg(feature = "png")]
+    fn a_picture_is_twice_the_size_of_the_figure_and_not_blank() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("all.png");
+        figure().png(&path).expect("written");
+        let bytes = std::fs::read(&path).expect("written");
+        assert_eq!(&bytes[1..4], b"PNG");
+        let size = [&bytes[16..20], &bytes[20..24]]
+            .map(|b| u32::from_be_bytes(b.try_into().expect("four")));
+        let (width, height) = figure().size();
+        assert_eq!(size, [2 * width, 2 * height]);
+        assert!(bytes.len() > 10_000, "{}", bytes.len());
+    }
+
+    #[test]
+    #[cfg(not(feature = "png"))]
+    fn a_program_without_png_says_how_to_get_it() {
+        let error = figure().png(Path::new("a.png")).expect_err("not built in");
+        let help = miette::Diagnostic::help(&error).expect("help").to_string();
+        assert!(help.contains("--features png"), "{help}");
+        assert!(error.to_string().contains("`a.png`"), "{error}");
     }
 }

@@ -1,17 +1,15 @@
 //! Rasters: one row per signal that is on or off, paler for a smaller share.
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
-
-use super::axes::Grid;
-use super::{FONT, LEFT, Panel, colour, text};
+use super::axes::{Axes, Grid};
+use super::svg::{Anchor, SMALL, Svg};
+use super::{Colour, LEFT, Panel, colour};
 
 /// One row of a raster: runs of (from, to, intensity 0..1).
 pub struct RasterRow {
     /// Text beside the row.
     pub label: String,
     /// Colour of what is on.
-    pub colour: RGBColor,
+    pub colour: Colour,
     /// Drawn in the upper half of the row.
     pub upper: Vec<(f64, f64, f64)>,
     /// Drawn in the lower half of the row; empty rows use the full height for
@@ -19,52 +17,36 @@ pub struct RasterRow {
     pub lower: Option<Vec<(f64, f64, f64)>>,
 }
 
-impl Panel {
-    pub(super) fn draw_raster<B: DrawingBackend>(
-        &self,
-        body: &DrawingArea<B, Shift>,
-        scale: u32,
-        axis_px: u32,
-        rows: &[RasterRow],
-    ) -> Result<(), String> {
-        let (x0, x1) = self.x_range;
-        let n = rows.len().max(1) as f64;
-        let mut chart = self.chart(body, scale, axis_px, (0.0, n))?;
-        let font = (FONT, 13 * scale).into_font().color(&colour::INK);
-        self.draw_axes(&mut chart, scale, axis_px, self.raster_x, Grid::Upright)?;
-        for (i, row) in rows.iter().enumerate() {
-            let top = n - i as f64 - 0.08;
-            let bottom = n - i as f64 - 0.92;
-            let middle = 0.5 * (top + bottom);
-            let halves = match &row.lower {
-                Some(lower) => vec![(&row.upper, middle, top), (lower, bottom, middle - 0.04)],
-                None => vec![(&row.upper, bottom, top)],
-            };
-            for (k, (runs, low, high)) in halves.into_iter().enumerate() {
-                for (from, to, level) in runs {
-                    // The physical half is drawn in ink, the commanded in colour.
-                    let base = if k == 0 { row.colour } else { colour::INK };
-                    let fill = base.mix(0.15 + 0.85 * level.clamp(0.0, 1.0)).filled();
-                    let corners = [(from.max(x0), low), (to.min(x1), high)];
-                    if corners[0].0 < corners[1].0 {
-                        chart
-                            .draw_series(std::iter::once(Rectangle::new(corners, fill)))
-                            .map_err(text)?;
-                    }
+/// Draws the rows from top to bottom; the ordinate of `axes` counts them.
+pub(super) fn draw(rows: &[RasterRow], svg: &mut Svg, axes: &Axes, panel: &Panel) {
+    let (x0, x1) = panel.x_range;
+    axes.draw(svg, panel.raster_x, Grid::Upright);
+    for (i, row) in rows.iter().enumerate() {
+        let below = (rows.len() - i) as f64;
+        let (top, bottom) = (below - 0.08, below - 0.92);
+        let middle = 0.5 * (top + bottom);
+        // The physical half is drawn in ink, the commanded in colour.
+        let halves = match &row.lower {
+            Some(lower) => vec![
+                (&row.upper, middle, top, row.colour),
+                (lower, bottom, middle - 0.04, colour::INK),
+            ],
+            None => vec![(&row.upper, bottom, top, row.colour)],
+        };
+        for (runs, low, high, colour) in halves {
+            for (from, to, level) in runs {
+                let (from, to) = (from.max(x0), to.min(x1));
+                if from < to {
+                    let opacity = 0.15 + 0.85 * level.clamp(0.0, 1.0);
+                    svg.rectangle(axes.at((from, low)), axes.at((to, high)), colour, opacity);
                 }
             }
-            let (_, y) = chart.backend_coord(&(x0, middle));
-            let (_, by) = body.get_base_pixel();
-            let (w, h) = body.estimate_text_size(&row.label, &font).map_err(text)?;
-            let at = (
-                LEFT as i32 * scale as i32 - w as i32 - 8 * scale as i32,
-                y - by - h as i32 / 2 - scale as i32,
-            );
-            body.draw_text(&row.label, &font, at).map_err(text)?;
         }
-        self.draw_marks(&mut chart, scale, (0.0, n))?;
-        Ok(())
+        let (_, y) = axes.at((x0, middle));
+        let at = (f64::from(LEFT) - 8.0, y);
+        svg.text(at, SMALL, Anchor::End, &row.label);
     }
+    axes.marks(svg, &panel.marks);
 }
 
 /// Runs of equal level from a sampled signal, in bins of `bin` samples; levels

@@ -1,11 +1,13 @@
 //! Delay between reference model and simulated robot.
 
+use serde::Serialize;
+
 use super::{ReferenceModel, within};
 use wheeleg_config::GaitParams;
 use wheeleg_telemetry::{JointSample, Row};
 
 /// Delay of one move.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StartDelay {
     /// Step, from 1.
     pub step: u16,

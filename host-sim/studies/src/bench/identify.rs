@@ -35,7 +35,7 @@ impl Board for Probe {
 }
 
 /// Delays found at start-up.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Delays {
     /// Opening delay \[s\].
     pub t_on_s: f64,

@@ -1,6 +1,6 @@
 //! The pictures of a comparison.
 
-use wheeleg_report::plot::RGBColor;
+use wheeleg_report::plot::Colour;
 
 use super::single::range;
 use super::{ComparedAxis, Comparison, Move, Row};
@@ -10,7 +10,7 @@ use wheeleg_report::plot::{Bars, Column, Content, Figure, Panel, Series, colour,
 type Points = Vec<(f64, f64)>;
 
 /// One colour per controller.
-pub(crate) fn colour_of(kind: Kind) -> RGBColor {
+pub(crate) fn colour_of(kind: Kind) -> Colour {
     match kind {
         Kind::OnOff => colour::COMMAND,
         Kind::PwmP => colour::DELAYED,

@@ -22,7 +22,6 @@ use wheeleg_plant::axis::AxisParams;
 pub use case::{BadCaseId, CaseFacts, CaseId, Figures, MARGIN, Row, Scene};
 pub(crate) use charts::panel;
 pub use moves::{CONTACT_S, Move, Played, RECOVERY_S, REST_S, STEP_S, Sizes};
-pub use page::number;
 pub use single::{Single, play};
 pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 

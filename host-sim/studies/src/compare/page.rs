@@ -1,12 +1,13 @@
 //! The page: one self-contained file in the style of a run's report.
 
-use minijinja::{Value, context};
+use serde::Serialize;
 
 use super::case::MARGIN;
 use super::{Comparison, Move, Row, Variation};
 use crate::StudyError;
 use crate::bench::Kind;
-use wheeleg_report::{page, pictures, plot::Figure, stats};
+use wheeleg_report::number::{DASH, or_dash, signed};
+use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -15,26 +16,6 @@ const TEMPLATE: &str = include_str!("page.html");
 const ERROR_MM: f64 = 0.5;
 const OVERSHOOT_MM: f64 = 3.0;
 const COMBINED_OVERSHOOT_MM: f64 = 6.0;
-
-/// A number, or a dash.
-pub fn number(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(
-        || "–".to_owned(),
-        |v| {
-            let text = format!("{v:.digits$}");
-            // No minus sign on zero.
-            if text
-                .trim_start_matches('-')
-                .chars()
-                .all(|c| c == '0' || c == '.')
-            {
-                text.trim_start_matches('-').to_owned()
-            } else {
-                text.replace('-', "−")
-            }
-        },
-    )
-}
 
 /// The largest of the values; `None` if one is missing or there is none.
 fn largest<'a>(
@@ -64,7 +45,7 @@ impl Comparison {
                 let rows = |motion| self.nominal(axis, *kind, motion);
                 let error = |r: &Row| r.figures.steady_error_mm.map(f64::abs);
                 let of = |motion, digits, value: fn(&Row) -> Option<f64>| {
-                    number(largest(rows(motion), value), digits)
+                    or_dash(largest(rows(motion), value), digits)
                 };
                 let cycles = self.rows.iter().filter(|r| {
                     r.case.axis == axis
@@ -75,13 +56,13 @@ impl Comparison {
                 let large = Move::Step100;
                 let settle = |r: &Row| r.figures.settle_s;
                 let cells = vec![
-                    number(largest(rows(large), error), 2),
-                    number(largest(rows(Move::Step20), error), 2),
+                    or_dash(largest(rows(large), error), 2),
+                    or_dash(largest(rows(Move::Step20), error), 2),
                     of(large, 2, |r| r.figures.overshoot_mm),
                     of(large, 3, |r| r.figures.rise_s),
-                    number(median(rows(large), settle), 3),
-                    number(largest(rows(large), settle), 3),
-                    number(median(rows(large), |r| r.figures.ratio_to_bound), 2),
+                    or_dash(median(rows(large), settle), 3),
+                    or_dash(largest(rows(large), settle), 3),
+                    or_dash(median(rows(large), |r| r.figures.ratio_to_bound), 2),
                     of(Move::SCurve, 2, |r| r.figures.worst_mm),
                     of(Move::SCurve, 2, |r| r.figures.rms_mm),
                     of(Move::Sine, 2, |r| r.figures.worst_mm),
@@ -141,14 +122,91 @@ pub(super) const COLUMNS: [&str; 16] = [
     "limit cycles",
 ];
 
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    /// What stopped the comparison.
+    stopped: Option<String>,
+    version: &'static str,
+    verdict: String,
+    kinds: Vec<&'static str>,
+    columns: [&'static str; COLUMNS.len()],
+    axes: Vec<Axis<'a>>,
+    figures: Vec<Picture<'a>>,
+    cases: usize,
+    played: usize,
+    alarms: Vec<Alarm<'a>>,
+    infeasible: Vec<Infeasible<'a>>,
+    margin: f64,
+    seed: u64,
+    last_seed: u64,
+    combinations: u64,
+}
+
+#[derive(Serialize)]
+struct Axis<'a> {
+    name: &'a str,
+    description: &'a str,
+    bound_large: String,
+    bound_small: String,
+    table: Vec<(&'static str, Vec<String>)>,
+    factors: Vec<Factor>,
+    combined: Vec<Combined>,
+    hash: String,
+}
+
+#[derive(Serialize)]
+struct Alarm<'a> {
+    id: &'a str,
+    faults: &'a str,
+}
+
+#[derive(Serialize)]
+struct Infeasible<'a> {
+    axis: &'a str,
+    variation: &'a str,
+    margin: f64,
+}
+
+/// A line of the factor table.
+#[derive(Serialize)]
+struct Factor {
+    variation: String,
+    motion: &'static str,
+    cells: Vec<Cell>,
+}
+
+#[derive(Serialize)]
+struct Cell {
+    text: String,
+    class: &'static str,
+}
+
+/// A controller in the table of combinations; the worst of each \[mm\].
+#[derive(Serialize)]
+struct Combined {
+    name: &'static str,
+    kept: usize,
+    count: usize,
+    error_mm: Option<f64>,
+    overshoot_mm: Option<f64>,
+    first_mm: Option<f64>,
+    cycles: usize,
+    stopped: usize,
+}
+
 /// A cell of the factor table: error and overshoot of a step, coloured by the bars.
-fn cell(row: Option<&Row>, motion: Move) -> Value {
+fn cell(row: Option<&Row>, motion: Move) -> Cell {
+    let cell = |text: &str, class| Cell {
+        text: text.to_owned(),
+        class,
+    };
     let Some(row) = row else {
-        return context! { text => "–", class => "" };
+        return cell(DASH, "");
     };
     let f = &row.figures;
     if !row.case.feasible {
-        return context! { text => "infeasible", class => "info" };
+        return cell("infeasible", "info");
     }
     let cycle = f.limit_cycle == Some(true) || f.stopped == Some(true);
     let note = match (f.stopped, f.limit_cycle) {
@@ -158,20 +216,18 @@ fn cell(row: Option<&Row>, motion: Move) -> Value {
     };
     let (text, good) = if motion == Move::SCurve {
         let good = f.worst_mm.is_some_and(|w| w <= 1.5);
-        (number(f.worst_mm, 1), good)
+        (or_dash(f.worst_mm, 1), good)
     } else {
         let error = f.steady_error_mm.map(f64::abs);
         let good = error.is_some_and(|e| e <= ERROR_MM)
             && f.overshoot_mm.is_some_and(|o| o <= OVERSHOOT_MM);
         (
-            format!("{} / {}", number(error, 2), number(f.overshoot_mm, 1)),
+            format!("{} / {}", or_dash(error, 2), or_dash(f.overshoot_mm, 1)),
             good,
         )
     };
-    context! {
-        text => format!("{text}{note}"),
-        class => if good && !cycle { "pass" } else { "fail" },
-    }
+    let class = if good && !cycle { "pass" } else { "fail" };
+    cell(&format!("{text}{note}"), class)
 }
 
 pub(super) fn render(
@@ -179,64 +235,65 @@ pub(super) fn render(
     figures: &[(Figure, String)],
 ) -> Result<String, StudyError> {
     let options = &comparison.options;
-    let kinds: Vec<&str> = options.kinds.iter().map(|k| k.name()).collect();
-    let axes: Vec<Value> = comparison
-        .axes
-        .iter()
-        .map(|axis| {
-            let name = axis.config.name.as_str();
-            let bound = |b: Option<[f64; 2]>| {
-                b.map_or_else(
-                    || "not searched".to_owned(),
-                    |[back, out]| format!("{back:.3} s retracting, {out:.3} s extending"),
-                )
-            };
-            let table: Vec<Value> = comparison
-                .table(name)
-                .into_iter()
-                .map(|(kind, cells)| context! { name => kind.name(), cells => cells })
-                .collect();
-            context! {
-                name => name,
-                description => &*axis.config.description,
-                bound_large => bound(axis.bound_s[0]),
-                bound_small => bound(axis.bound_s[1]),
-                table => table,
-                factors => factors(comparison, name),
-                combined => combined(comparison, name),
-                hash => hash(axis),
-            }
-        })
-        .collect();
-    let alarms: Vec<Value> = comparison
-        .false_alarms()
-        .map(|r| context! { id => &*r.case.id, faults => &*r.figures.faults })
-        .collect();
-    let infeasible: Vec<Value> = comparison
-        .infeasible()
-        .into_iter()
-        .map(|(axis, variation, margin)| {
-            context! { axis => axis, variation => variation, margin => format!("{margin:.2}") }
-        })
-        .collect();
-    let values = context! {
-        stopped => comparison.stopped.as_ref().map(ToString::to_string),
-        version => env!("CARGO_PKG_VERSION"),
-        kinds => kinds,
-        columns => COLUMNS,
-        axes => axes,
-        figures => pictures(figures),
-        cases => comparison.rows.len(),
-        played => comparison.rows.iter().filter(|r| r.case.feasible).count(),
-        alarms => alarms,
-        infeasible => infeasible,
-        margin => MARGIN,
-        seeds => options.seeds,
-        seed => options.seed,
-        last_seed => options.seed + options.seeds - 1,
-        combinations => options.combinations,
+    let bound = |b: Option<[f64; 2]>| {
+        b.map_or_else(
+            || "not searched".to_owned(),
+            |[back, out]| format!("{back:.3} s retracting, {out:.3} s extending"),
+        )
+    };
+    let axes = comparison.axes.iter().map(|axis| {
+        let name = axis.config.name.as_str();
+        let table = comparison.table(name).into_iter();
+        Axis {
+            name,
+            description: &axis.config.description,
+            bound_large: bound(axis.bound_s[0]),
+            bound_small: bound(axis.bound_s[1]),
+            table: table.map(|(kind, cells)| (kind.name(), cells)).collect(),
+            factors: factors(comparison, name),
+            combined: combined(comparison, name),
+            hash: hash(axis),
+        }
+    });
+    let alarms = comparison.false_alarms().map(|r| Alarm {
+        id: &r.case.id,
+        faults: &r.figures.faults,
+    });
+    let infeasible = comparison.infeasible().into_iter();
+    let infeasible = infeasible.map(|(axis, variation, margin)| Infeasible {
+        axis,
+        variation,
+        margin,
+    });
+    let played = comparison.rows.iter().filter(|r| r.case.feasible).count();
+    let values = Page {
+        stopped: comparison.stopped.as_ref().map(ToString::to_string),
+        version: env!("CARGO_PKG_VERSION"),
+        verdict: verdict(comparison, played),
+        kinds: options.kinds.iter().map(|k| k.name()).collect(),
+        columns: COLUMNS,
+        axes: axes.collect(),
+        figures: pictures(figures),
+        cases: comparison.rows.len(),
+        played,
+        alarms: alarms.collect(),
+        infeasible: infeasible.collect(),
+        margin: MARGIN,
+        seed: options.seed,
+        last_seed: options.seed + options.seeds - 1,
+        combinations: options.combinations,
     };
     Ok(page(TEMPLATE, values)?)
+}
+
+/// The page's first sentence.
+fn verdict(comparison: &Comparison, played: usize) -> String {
+    let (controllers, axes) = (comparison.options.kinds.len(), comparison.axes.len());
+    let what = format!("{played} cases of {controllers} controllers on {axes} axes");
+    match comparison.false_alarms().count() {
+        0 => format!("In {what} the supervision raised no false alarm."),
+        n => format!("In {what} the supervision raised {n} false alarms."),
+    }
 }
 
 /// Fingerprint of an axis: name and parameters.
@@ -246,7 +303,7 @@ fn hash(axis: &super::ComparedAxis) -> String {
 }
 
 /// One line per factor and move that was played, one cell per controller.
-fn factors(comparison: &Comparison, axis: &str) -> Vec<Value> {
+fn factors(comparison: &Comparison, axis: &str) -> Vec<Factor> {
     let mut lines: Vec<(&str, Move)> = Vec::new();
     for row in comparison.rows.iter().filter(|r| r.case.axis == axis) {
         let c = &row.case;
@@ -270,10 +327,10 @@ fn factors(comparison: &Comparison, axis: &str) -> Vec<Value> {
                 });
                 cell(row, motion)
             });
-            context! {
-                variation => with_unit(variation),
-                motion => motion.name(),
-                cells => cells.collect::<Vec<_>>(),
+            Factor {
+                variation: with_unit(variation),
+                motion: motion.name(),
+                cells: cells.collect(),
             }
         })
         .collect()
@@ -281,7 +338,7 @@ fn factors(comparison: &Comparison, axis: &str) -> Vec<Value> {
 
 fn with_unit(variation: &str) -> String {
     match variation.parse() {
-        Ok(Variation::Load(x)) => format!("load {:+.0} %", 100.0 * x).replace('-', "−"),
+        Ok(Variation::Load(x)) => format!("load {} %", signed(100.0 * x, 0)),
         Ok(Variation::Mass(x)) => format!("mass {x} kg"),
         Ok(Variation::Supply(x)) => format!("supply {x} bar"),
         Ok(Variation::Friction(x)) => format!("friction × {x}"),
@@ -293,7 +350,7 @@ fn with_unit(variation: &str) -> String {
 }
 
 /// One line per controller: how many combinations keep the bars, and the worst.
-fn combined(comparison: &Comparison, axis: &str) -> Vec<Value> {
+fn combined(comparison: &Comparison, axis: &str) -> Vec<Combined> {
     comparison
         .options
         .kinds
@@ -301,20 +358,19 @@ fn combined(comparison: &Comparison, axis: &str) -> Vec<Value> {
         .filter_map(|kind| {
             let rows = || comparison.combined(axis, *kind);
             let count = rows().count();
-            let cycles = rows().filter(|r| r.figures.limit_cycle == Some(true)).count();
+            let cycles = rows()
+                .filter(|r| r.figures.limit_cycle == Some(true))
+                .count();
             let kept = rows().filter(|r| keeps(r)).count();
-            (count > 0).then(|| {
-                context! {
-                    name => kind.name(),
-                    kept => kept,
-                    count => count,
-                    class => if kept == count { "pass" } else { "fail" },
-                    error => number(largest(rows(), |r| r.figures.steady_error_mm.map(f64::abs)), 2),
-                    overshoot => number(largest(rows(), |r| r.figures.overshoot_mm), 1),
-                    first => number(largest(rows(), |r| r.figures.first_overshoot_mm), 1),
-                    cycles => cycles,
-                    stopped => rows().filter(|r| r.figures.stopped == Some(true)).count(),
-                }
+            (count > 0).then(|| Combined {
+                name: kind.name(),
+                kept,
+                count,
+                error_mm: largest(rows(), |r| r.figures.steady_error_mm.map(f64::abs)),
+                overshoot_mm: largest(rows(), |r| r.figures.overshoot_mm),
+                first_mm: largest(rows(), |r| r.figures.first_overshoot_mm),
+                cycles,
+                stopped: rows().filter(|r| r.figures.stopped == Some(true)).count(),
             })
         })
         .collect()

@@ -1,6 +1,6 @@
 //! The pictures.
 
-use wheeleg_report::plot::RGBColor;
+use wheeleg_report::plot::Colour;
 
 use super::notice::Noticed;
 use super::trial::{LEAD_S, Law, Outcome, Start};
@@ -21,7 +21,7 @@ fn curves(
 }
 
 /// One colour per kind of start.
-fn colours(start: Start) -> RGBColor {
+fn colours(start: Start) -> Colour {
     match start {
         Start::HomeHeld => colour::ROBOT,
         Start::HomeRest => colour::RAW,

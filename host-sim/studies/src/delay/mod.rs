@@ -69,7 +69,7 @@ impl Default for Options {
 }
 
 /// Everything that was measured.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
 pub struct Study {
     /// Name of the robot.
     pub robot: String,

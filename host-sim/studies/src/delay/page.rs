@@ -1,26 +1,23 @@
 //! The page: one self-contained file in the style of a run's report.
 
-use minijinja::{Value, context};
+use serde::Serialize;
 
+use super::notice::Noticed;
+use super::predictions::Prediction;
+use super::starts::Distribution;
 use super::trial::{Law, Start};
 use super::{PAPER_BAND_S, PAPER_DELAY_S, Study};
 use crate::StudyError;
-use wheeleg_report::{page, pictures, plot::Figure};
+use wheeleg_report::number::fixed;
+use wheeleg_report::{Picture, page, pictures, plot::Figure};
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// Seconds in milliseconds.
+/// Seconds to the millisecond.
 const DIGITS: usize = 3;
 
 fn seconds(value: f64) -> String {
-    let text = format!("{value:.DIGITS$}");
-    // No minus sign on zero.
-    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
-        text.trim_start_matches('-').to_owned()
-    } else {
-        text
-    };
-    text.replace('-', "−")
+    fixed(value, DIGITS)
 }
 
 fn maybe(value: Option<f64>) -> String {
@@ -87,144 +84,107 @@ pub(super) fn findings(study: &Study) -> Vec<String> {
     list
 }
 
-pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<String, StudyError> {
-    let starts: Vec<Value> = Start::ALL
-        .into_iter()
-        .map(|start| {
-            let cells: Vec<Value> = Law::ALL
-                .into_iter()
-                .filter_map(|law| study.starts.of(law, start))
-                .map(|d| {
-                    context! {
-                        min => seconds(d.min_s),
-                        median => seconds(d.median_s),
-                        p90 => seconds(d.p90_s),
-                        max => seconds(d.max_s),
-                        never => d.never,
-                        a => format!("{:.1}", d.pressure_pa[0] * 1e-5),
-                        b => format!("{:.1}", d.pressure_pa[1] * 1e-5),
-                    }
-                })
-                .collect();
-            context! { name => start.name(), text => start.text(), cells => cells }
-        })
-        .collect();
-    let a = &study.ablation;
-    let rows: Vec<Value> = a
-        .rows
-        .iter()
-        .map(|r| {
-            context! {
-                id => r.id,
-                text => r.text,
-                alone => seconds(r.alone_s),
-                contribution => seconds(r.contribution_s),
-                series => seconds(r.series_s),
-                step => seconds(r.step_s),
-            }
-        })
-        .collect();
-    let variations: Vec<Value> = a
-        .variations
-        .iter()
-        .map(|v| {
-            context! {
-                id => v.id,
-                text => v.text,
-                delay => maybe(v.delay_s),
-                difference => v.difference_s.map_or_else(String::new, seconds),
-            }
-        })
-        .collect();
-    let predictions: Vec<Value> = study
-        .predictions
-        .list
-        .iter()
-        .map(|p| {
-            let rival = p.id.starts_with("rival");
-            context! {
-                id => p.id,
-                statement => &*p.statement,
-                measured => p.measured.replace('-', "−"),
-                verdict => match (rival, p.holds) {
-                    (false, true) => "holds",
-                    (false, false) => "does not hold",
-                    (true, false) => "ruled out",
-                    (true, true) => "not ruled out",
-                },
-                class => if p.holds == rival { "fail" } else { "pass" },
-            }
-        })
-        .collect();
-    let notices: Vec<Value> = study
-        .notice
-        .rows
-        .iter()
-        .map(|r| {
-            context! {
-                law => r.law.name(),
-                start => r.start.name(),
-                load => format!("{:+.0}", r.load_n).replace('-', "−"),
-                notice => r.notice_s,
-                median => maybe(r.median_s),
-                delay => maybe(r.delay_s),
-                early => format!("{:.2}", r.early_mm),
-                meets => r.meets(),
-            }
-        })
-        .collect();
-    let home = |law| {
-        study
-            .starts
-            .of(law, Start::HomeHeld)
-            .map_or(f64::NAN, |d| d.median_s)
-    };
-    let announced = |start| study.notice.of(Law::Default, start).last().cloned();
-    let (noticed, noticed_rest) = (announced(Start::HomeHeld), announced(Start::HomeRest));
-    let band = PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S;
-    let values = context! {
-        version => env!("CARGO_PKG_VERSION"),
-        robot => &*study.robot,
-        hash => &*study.robot_hash,
-        seeds => study.seeds,
-        mass => study.mass_kg,
-        load => study.load_n,
-        figures => pictures(figures),
-        findings => findings(study),
-        starts => starts,
-        base => seconds(a.base_s),
-        ablation_seeds => a.seeds,
-        rows => rows,
-        residual => seconds(a.residual_s),
-        sum => seconds(a.sum_s),
-        whole => seconds(a.base_s - a.residual_s),
-        interaction => seconds(a.interaction_s),
-        without_swap => seconds(a.without_swap_s),
-        swap => format!("{:.0}", 1e2 * a.swap_share),
-        variations => variations,
-        predictions => predictions,
-        notices => notices,
-        paper_home => seconds(home(Law::Paper)),
-        paper_reached => band.contains(&home(Law::Paper)),
-        default_home => seconds(home(Law::Default)),
-        noticed => maybe(noticed.as_ref().and_then(|n| n.delay_s)),
-        noticed_meets => noticed.is_some_and(|n| n.meets()),
-        noticed_rest => maybe(noticed_rest.as_ref().and_then(|n| n.delay_s)),
-        noticed_rest_meets => noticed_rest.is_some_and(|n| n.meets()),
-        cycle_ms => 1e3 * study.bus.cycle_s,
-        frame_ms => format!("{:.2}", 1e3 * study.bus.frame_s),
-    };
-    Ok(page(TEMPLATE, values)?)
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    version: &'static str,
+    verdict: String,
+    study: &'a Study,
+    figures: Vec<Picture<'a>>,
+    findings: Vec<String>,
+    kinds: Vec<Kind<'a>>,
+    predictions: Vec<Predicted<'a>>,
+    notices: Vec<Announced<'a>>,
+    /// Medians \[s\].
+    paper_home: Option<f64>,
+    paper_reached: bool,
+    default_home: Option<f64>,
+    /// The longest notice.
+    noticed: Option<Announced<'a>>,
+    noticed_rest: Option<Announced<'a>>,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::seconds;
+/// A kind of move, with its distributions under the two laws.
+#[derive(Serialize)]
+struct Kind<'a> {
+    name: &'static str,
+    text: &'static str,
+    laws: Vec<&'a Distribution>,
+}
 
-    #[test]
-    fn small_numbers_have_no_sign_and_large_ones_have_the_right_one() {
-        assert_eq!(seconds(-0.0001), "0.000");
-        assert_eq!(seconds(-0.0123), "−0.012");
-        assert_eq!(seconds(0.2018), "0.202");
+#[derive(Serialize)]
+struct Predicted<'a> {
+    /// What another cause would do: right if it does not hold.
+    rival: bool,
+    prediction: &'a Prediction,
+}
+
+#[derive(Serialize)]
+struct Announced<'a> {
+    law: &'static str,
+    start: &'static str,
+    meets: bool,
+    row: &'a Noticed,
+}
+
+impl<'a> Announced<'a> {
+    fn new(row: &'a Noticed) -> Self {
+        Self {
+            law: row.law.name(),
+            start: row.start.name(),
+            meets: row.meets(),
+            row,
+        }
     }
+}
+
+/// The page's first sentence.
+fn verdict(study: &Study) -> String {
+    let home = study.starts.of(Law::Paper, Start::HomeHeld);
+    format!(
+        "The paper's law starts {} s after its command from the held home (the paper reports 0.25 s), and the swap of the chambers' pressures makes {:.0} % of that.",
+        maybe(home.map(|d| d.median_s)),
+        1e2 * study.ablation.swap_share
+    )
+}
+
+pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<String, StudyError> {
+    let kinds = Start::ALL.map(|start| Kind {
+        name: start.name(),
+        text: start.text(),
+        laws: Law::ALL
+            .into_iter()
+            .filter_map(|law| study.starts.of(law, start))
+            .collect(),
+    });
+    let predictions = study.predictions.list.iter().map(|prediction| Predicted {
+        rival: prediction.id.starts_with("rival"),
+        prediction,
+    });
+    let notices = study.notice.rows.iter().map(Announced::new);
+    let home = |law| study.starts.of(law, Start::HomeHeld).map(|d| d.median_s);
+    let announced = |start| {
+        study
+            .notice
+            .of(Law::Default, start)
+            .last()
+            .map(Announced::new)
+    };
+    let band = PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S;
+    let values = Page {
+        version: env!("CARGO_PKG_VERSION"),
+        verdict: verdict(study),
+        study,
+        figures: pictures(figures),
+        findings: findings(study),
+        kinds: kinds.into(),
+        predictions: predictions.collect(),
+        notices: notices.collect(),
+        paper_home: home(Law::Paper),
+        paper_reached: home(Law::Paper).is_some_and(|s| band.contains(&s)),
+        default_home: home(Law::Default),
+        noticed: announced(Start::HomeHeld),
+        noticed_rest: announced(Start::HomeRest),
+    };
+    Ok(page(TEMPLATE, values)?)
 }

@@ -2,6 +2,7 @@
 
 use super::Results;
 use super::section6::{AxisCheck, Instant, Reading};
+use wheeleg_report::number::short;
 use wheeleg_report::plot::{Axis, Content, Figure, Heat, Panel, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;
@@ -50,24 +51,6 @@ fn compared(checks: &[AxisCheck], figure: u8, reading: &str) -> String {
         })
         .collect();
     parts.join("; ")
-}
-
-/// A number in at most four significant digits, without a minus sign on zero.
-pub(super) fn short(value: f64) -> String {
-    let text = if value == 0.0 || value.abs() < 1e-12 {
-        "0".to_owned()
-    } else if (1e-3..1e5).contains(&value.abs()) {
-        let digits = (3 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            text
-        }
-    } else {
-        format!("{value:.2e}")
-    };
-    text.replace('-', "−")
 }
 
 fn reading_figures(reading: &Reading, motion: &[Instant], checks: &[AxisCheck]) -> Vec<Figure> {
@@ -248,24 +231,3 @@ pub(super) fn figures(results: &Results) -> Vec<Figure> {
 
 /// Cells of a map along one side.
 const CELLS: usize = 61;
-
-#[cfg(test)]
-mod tests {
-    use super::short;
-
-    #[test]
-    fn numbers_are_short_and_right() {
-        for (value, text) in [
-            (0.0, "0"),
-            (-0.0, "0"),
-            (22.5, "22.5"),
-            (-5.625, "−5.625"),
-            (240.0, "240"),
-            (9.549_296_6, "9.549"),
-            (2.0e-7, "2.00e−7"),
-            (12345.6, "12346"),
-        ] {
-            assert_eq!(short(value), text);
-        }
-    }
-}

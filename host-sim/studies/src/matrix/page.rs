@@ -1,12 +1,14 @@
 //! The report of the matrix.
 
-use minijinja::{Value, context};
+use serde::Serialize;
 
 use super::count;
 use super::judge::{AfterAll, DEGRADED_MM, Outcome, REACTION_MS, Verdict};
+use super::measure::Measured;
 use super::row::{Expect, Row, Since};
 use crate::StudyError;
 use crate::study::Stopped;
+use wheeleg_report::number::minus;
 use wheeleg_report::page;
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -68,12 +70,11 @@ fn limits(outcome: &Outcome) -> String {
                 String::new()
             };
             let held = row.held_mm.map(|mm| format!(", held within {mm} mm"));
-            format!(
+            minus(&format!(
                 "detected {from} to {to}{own}, {}{dump}{}",
                 after(stop.all_ms),
                 held.unwrap_or_default()
-            )
-            .replace('-', "−")
+            ))
         }
         Expect::GoesOn { deviation_mm } => format!("deviation {deviation_mm} mm"),
         Expect::Degrades => format!(
@@ -110,59 +111,86 @@ fn quoted(outcome: &Outcome) -> Vec<String> {
     lines
 }
 
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    /// What stopped the matrix.
+    stopped: Option<String>,
+    version: &'static str,
+    verdict: String,
+    seed: u64,
+    rows: Vec<Shown<'a>>,
+    passed: usize,
+    failed: usize,
+    /// Not implemented.
+    missing: usize,
+    /// Frames accepted that nobody sent.
+    wrong: u64,
+}
+
+#[derive(Serialize)]
+struct Shown<'a> {
+    id: &'a str,
+    faults: String,
+    phase: &'static str,
+    reaction: String,
+    limits: String,
+    /// Whether it was run.
+    run: bool,
+    measured: &'a Measured,
+    verdict: &'static str,
+    class: &'static str,
+    failures: &'a [String],
+    quoted: Vec<String>,
+    note: &'a str,
+}
+
+impl<'a> Shown<'a> {
+    fn new(o: &'a Outcome) -> Self {
+        Self {
+            id: o.row.id,
+            faults: what_goes_wrong(o),
+            phase: o.row.phase.words(),
+            reaction: reaction(&o.row),
+            limits: limits(o),
+            run: o.verdict != Verdict::NotImplemented,
+            measured: &o.measured,
+            verdict: o.verdict.words(),
+            class: match o.verdict {
+                Verdict::Pass => "pass",
+                Verdict::Fail => "fail",
+                Verdict::NotImplemented => "info",
+            },
+            failures: &o.failures,
+            quoted: quoted(o),
+            note: o.row.note,
+        }
+    }
+}
+
 pub(super) fn render(
     outcomes: &[Outcome],
     seed: u64,
     stopped: Option<&Stopped>,
 ) -> Result<String, StudyError> {
-    let ms = |value: Option<f64>| {
-        // Without the sign of a zero.
-        let shown = |v: f64| if v.abs() < 0.05 { 0.0 } else { v };
-        value.map_or_else(
-            || "–".to_owned(),
-            |v| format!("{:.1}", shown(v)).replace('-', "−"),
-        )
-    };
-    let rows: Vec<Value> = outcomes
-        .iter()
-        .map(|o| {
-            let m = &o.measured;
-            let run = o.verdict != Verdict::NotImplemented;
-            context! {
-                id => o.row.id,
-                faults => what_goes_wrong(o),
-                phase => if run { o.row.phase.words() } else { "" },
-                reaction => reaction(&o.row),
-                limits => limits(o),
-                detected => ms(m.detected_ms),
-                own => ms(m.own_commanded_ms),
-                commanded => ms(m.commanded_ms),
-                sensed => ms(m.sensed_ms),
-                physical => ms(m.physical_ms),
-                wheels => ms(m.wheels_stand_ms),
-                deviation => ms(m.deviation_mm),
-                latched => if m.latched { "yes" } else if run { "no" } else { "" },
-                verdict => o.verdict.words(),
-                class => match o.verdict {
-                    Verdict::Pass => "pass",
-                    Verdict::Fail => "fail",
-                    Verdict::NotImplemented => "info",
-                },
-                failures => if run { o.failures.clone() } else { Vec::new() },
-                quoted => quoted(o),
-                note => o.row.note,
-            }
-        })
-        .collect();
-    let values = context! {
-        stopped => stopped.map(ToString::to_string),
-        version => env!("CARGO_PKG_VERSION"),
-        seed => seed,
-        rows => rows,
-        passed => count(outcomes, Verdict::Pass),
-        failed => count(outcomes, Verdict::Fail),
-        missing => count(outcomes, Verdict::NotImplemented),
-        wrong => outcomes.iter().map(|o| o.measured.wrong_frames).sum::<u64>(),
+    let [passed, failed, missing] = [Verdict::Pass, Verdict::Fail, Verdict::NotImplemented]
+        .map(|verdict| count(outcomes, verdict));
+    let values = Page {
+        stopped: stopped.map(ToString::to_string),
+        version: env!("CARGO_PKG_VERSION"),
+        verdict: match failed {
+            0 => format!("Passed: the robot reacts as it must in all {passed} rows that were run."),
+            _ => format!(
+                "Failed: the robot does not react as it must in {failed} of {} rows.",
+                passed + failed
+            ),
+        },
+        seed,
+        rows: outcomes.iter().map(Shown::new).collect(),
+        passed,
+        failed,
+        missing,
+        wrong: outcomes.iter().map(|o| o.measured.wrong_frames).sum(),
     };
     Ok(page(TEMPLATE, values)?)
 }

@@ -1,13 +1,16 @@
 //! The self-contained HTML page.
 
 use minijinja::{Value, context};
+use serde::Serialize;
 
 use super::Summary;
+use super::boards::Boards;
 use super::figures::Source;
 use crate::StudyError;
+use crate::analysis::StartDelay;
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_report::plot::Figure;
-use wheeleg_report::{page, pictures};
+use wheeleg_report::{Picture, page, pictures};
 use wheeleg_telemetry::event::BoardChange;
 use wheeleg_telemetry::messages::after_power_up;
 use wheeleg_telemetry::{Cause, Event, EventKind, LinkSample, Row};
@@ -59,11 +62,81 @@ fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
             node => *name,
             frames => v.frames,
             counts => [v.overflow, v.truncated, v.short, v.crc, v.version, v.length, v.address, v.unsent],
-            drift => v.drift_ppm.to_string().replace('-', "−"),
+            drift => v.drift_ppm,
             parameters => format!("{:08x}", v.parameters),
         }
     })
     .collect()
+}
+
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    summary: &'a Summary,
+    verdict: String,
+    scenario_text: &'a str,
+    robot_text: &'a str,
+    pil: Option<Boards<'a>>,
+    required: usize,
+    met: usize,
+    shift_s: Option<f64>,
+    messages: u64,
+    /// Period of the rows of fast channels in the figures, ms.
+    period_ms: u64,
+    /// Events that are in the log alone.
+    left_out: u64,
+    start_s: f64,
+    targets: Vec<Judged<'a>>,
+    figures: Vec<Picture<'a>>,
+    delays: &'a [StartDelay],
+    events: Vec<Value>,
+    links: Vec<Value>,
+    start_up: Vec<String>,
+    parameters: Vec<Parameter<'a>>,
+}
+
+/// A target as the page shows it.
+#[derive(Serialize)]
+struct Judged<'a> {
+    id: &'a str,
+    description: &'a str,
+    value: String,
+    unit: &'a str,
+    band: String,
+    verdict: &'static str,
+}
+
+/// A parameter of the robot as the page shows it.
+#[derive(Serialize)]
+struct Parameter<'a> {
+    path: &'a str,
+    value: String,
+    unit: &'a str,
+    source: &'a str,
+    doc: &'a str,
+}
+
+/// The page's first sentence.
+fn verdict(summary: &Summary) -> String {
+    let required = summary.targets.iter().filter(|t| t.required);
+    let (count, missed) = (required.clone().count(), required.filter(|t| !t.pass));
+    let missed: Vec<&str> = missed.map(|t| t.id.as_str()).collect();
+    let differing = summary.pil.as_ref().map_or(0, |pil| pil.differing_bits);
+    if !summary.complete {
+        "Stopped before its end: nothing is judged.".to_owned()
+    } else if differing > 0 {
+        format!("Boards differ from the native application in {differing} bits.")
+    } else if count == 0 {
+        "Ran to its end; the scenario has no required target.".to_owned()
+    } else if missed.is_empty() {
+        format!("Passed: all {count} required targets are met.")
+    } else {
+        format!(
+            "Failed: {} of {count} required targets missed ({}).",
+            missed.len(),
+            missed.join(", ")
+        )
+    }
 }
 
 /// Renders the page: no scripts, no links to anywhere else.
@@ -72,40 +145,14 @@ pub(super) fn render(
     summary: &Summary,
     figures: &[(Figure, String)],
 ) -> Result<String, StudyError> {
-    let targets: Vec<Value> = summary
-        .targets
-        .iter()
-        .map(|t| {
-            let verdict = t.verdict();
-            context! {
-                id => &*t.id,
-                description => &*t.description,
-                value => t.value_text().replace('-', "−"),
-                unit => t.unit,
-                band => t.band_text().replace('-', "−"),
-                verdict => verdict,
-                class => match verdict {
-                    "PASS" => "pass",
-                    "FAIL" => "fail",
-                    _ => "info",
-                },
-            }
-        })
-        .collect();
-    let figures = pictures(figures);
-    let delays: Vec<Value> = source
-        .analysis
-        .start_delays
-        .iter()
-        .map(|d| {
-            context! {
-                step => d.step,
-                name => d.move_name,
-                at => format!("{:.3}", d.at_s),
-                delay => d.delay_s.map_or_else(|| "did not move".to_owned(), |v| format!("{:.0}", v * 1e3)),
-            }
-        })
-        .collect();
+    let targets = summary.targets.iter().map(|target| Judged {
+        id: &target.id,
+        description: &target.description,
+        value: target.value_text(),
+        unit: target.unit,
+        band: target.band_text(),
+        verdict: target.verdict(),
+    });
     // The start-up is a story of its own, told at time zero.
     let all = &source.recording.events;
     let start_up: Vec<String> = all
@@ -129,54 +176,35 @@ pub(super) fn render(
             }
         })
         .collect();
-    let parameters: Vec<Value> = source
-        .robot
-        .parameters
-        .iter()
-        .map(|p| {
-            context! {
-                path => &*p.path,
-                value => p.value_text(),
-                unit => &*p.unit,
-                source => &*p.source,
-                doc => p.doc,
-            }
-        })
-        .collect();
+    let parameters = source.robot.parameters.iter().map(|p| Parameter {
+        path: &p.path,
+        value: p.value_text(),
+        unit: &p.unit,
+        source: &p.source,
+        doc: p.doc,
+    });
     let required = summary.targets.iter().filter(|t| t.required);
     let met = required.clone().filter(|t| t.pass).count();
-    let values = context! {
-        summary => context! {
-            scenario => &*summary.scenario,
-            robot => &*summary.robot,
-            version => summary.version,
-            seed => summary.seed,
-            hash => &*summary.hash,
-            complete => summary.complete,
-            dropped => summary.dropped_messages,
-            faults => &summary.faults,
-        },
-        scenario_text => &*source.scenario.description,
-        robot_text => &*source.robot.description,
-        pil => summary.pil.as_ref().map(super::boards::context),
-        factor => format!("{:.1}", summary.realtime_factor),
-        simulated => format!("{:.2}", summary.simulated_s),
-        wall => format!("{:.2}", summary.wall_s),
-        required => required.count(),
-        met => met,
-        shift => source.analysis.shift_s.map(|s| format!("{:.0}", s * 1e3)),
-        messages => source.recording.messages,
-        unwritten => &summary.unwritten,
-        period_ms => source.recording.period_ms,
-        left_out => source.recording.events_left_out,
-        start => format!("{:.3}", source.analysis.start_s),
-        targets => targets,
-        figures => figures,
-        delays => delays,
-        events => events,
-        links => links(&source.recording.links),
-        start_up => start_up,
-        parameters => parameters,
+    let values = Page {
+        summary,
+        verdict: verdict(summary),
+        scenario_text: &source.scenario.description,
+        robot_text: &source.robot.description,
+        pil: summary.pil.as_ref().map(Boards::new),
+        required: required.count(),
+        met,
+        shift_s: source.analysis.shift_s,
+        messages: source.recording.messages,
+        period_ms: source.recording.period_ms,
+        left_out: source.recording.events_left_out,
+        start_s: source.analysis.start_s,
+        targets: targets.collect(),
+        figures: pictures(figures),
+        delays: &source.analysis.start_delays,
+        events,
+        links: links(&source.recording.links),
+        start_up,
+        parameters: parameters.collect(),
     };
     Ok(page(TEMPLATE, values)?)
 }

@@ -179,7 +179,7 @@ impl Job {
         figures
             .into_par_iter()
             .map(|figure| {
-                let svg = figure.svg()?;
+                let svg = figure.svg();
                 self.save_figure(&figure, &svg)?;
                 self.progress.step();
                 Ok((figure, svg))

@@ -1,13 +1,15 @@
 //! The page of a tuned axis: before and after.
 
-use minijinja::{Value, context};
+use serde::Serialize;
 
-use super::{Test, Tuned};
+use super::{Parameter, Test, Tuned};
 use crate::StudyError;
+use crate::bench::Delays;
 use crate::bench::Trace;
-use crate::compare::{Figures, MARGIN, Move, number, panel};
+use crate::compare::{Figures, MARGIN, Move, panel};
+use wheeleg_report::number::or_dash;
 use wheeleg_report::plot::{Figure, Series, colour, line};
-use wheeleg_report::{page, pictures};
+use wheeleg_report::{Picture, page, pictures};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -96,7 +98,57 @@ const LINES: [(&str, usize, Cell); 12] = [
     ("first move: settled [s]", 3, |f| f.first_settle_s),
 ];
 
-fn lines(test: &Test) -> Vec<Value> {
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    /// What stopped the tuning.
+    stopped: Option<String>,
+    version: &'static str,
+    verdict: String,
+    name: &'a str,
+    description: &'a str,
+    seed: u64,
+    /// Force of the shortest opening over what friction holds, and what is coarse.
+    grain: f64,
+    coarse: f64,
+    advice: Option<String>,
+    /// None without a load.
+    margin: Option<f64>,
+    least: f64,
+    /// Delays of the sheet and those found \[s\].
+    sheet_on_s: f64,
+    sheet_off_s: f64,
+    found: Option<Delays>,
+    /// Settling time of the large step \[s\].
+    before_s: Option<f64>,
+    after_s: Option<f64>,
+    tests: Vec<Shown>,
+    parameters: Vec<Described<'a>>,
+    toml: &'a str,
+    figures: Vec<Picture<'a>>,
+}
+
+#[derive(Serialize)]
+struct Shown {
+    name: &'static str,
+    lines: Vec<Line>,
+}
+
+/// One figure of a test.
+#[derive(Serialize)]
+struct Line {
+    name: &'static str,
+    before: String,
+    after: String,
+}
+
+#[derive(Serialize)]
+struct Described<'a> {
+    parameter: &'a Parameter,
+    text: &'static str,
+}
+
+fn lines(test: &Test) -> Vec<Line> {
     let step = matches!(test.motion, Move::Step20 | Move::Step100) || test.motion.loses_contact();
     let shown = |name: &str| match name {
         "settled within ±1 mm [s]" | "rise [s]" => step,
@@ -112,71 +164,68 @@ fn lines(test: &Test) -> Vec<Value> {
         (_, Some(true)) => "limit cycle",
         _ => "stable",
     };
-    let mut list: Vec<Value> = LINES
+    let mut list: Vec<Line> = LINES
         .iter()
         .filter(|(name, ..)| shown(name))
         .map(|(name, digits, value)| {
-            context! {
-                name => *name,
-                before => number(value(&test.before), *digits),
-                after => number(value(&test.after), *digits),
+            let shown = |figures| or_dash(value(figures), *digits);
+            Line {
+                name,
+                before: shown(&test.before),
+                after: shown(&test.after),
             }
         })
         .collect();
-    list.push(context! {
-        name => "behaviour", before => note(&test.before), after => note(&test.after),
+    list.push(Line {
+        name: "behaviour",
+        before: note(&test.before).to_owned(),
+        after: note(&test.after).to_owned(),
     });
     list
 }
 
 pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<String, StudyError> {
-    let ms = |s: f64| format!("{:.2}", s * 1e3);
-    let short = |v: f64| {
-        let text = format!("{v:.6}");
-        let text = text.trim_end_matches('0').trim_end_matches('.');
-        text.replace('-', "−")
-    };
-    let tests: Vec<Value> = tuned
-        .tests
-        .iter()
-        .map(|t| context! { name => t.motion.name(), lines => lines(t) })
-        .collect();
-    let parameters: Vec<Value> = tuned
-        .parameters
-        .iter()
-        .map(|p| {
-            context! {
-                name => p.name,
-                before => short(p.before),
-                after => short(p.after),
-                unit => p.unit,
-                text => p.text,
-            }
-        })
-        .collect();
+    let tests = tuned.tests.iter().map(|t| Shown {
+        name: t.motion.name(),
+        lines: lines(t),
+    });
+    let parameters = tuned.parameters.iter().map(|parameter| Described {
+        parameter,
+        text: parameter.text,
+    });
     let valve = &tuned.config.axis.cylinder.fill_valve;
     let large = tuned.tests.iter().find(|t| t.motion == Move::Step100);
-    let settle = |f: fn(&Test) -> Option<f64>| number(large.and_then(f), 3);
-    let values = context! {
-        stopped => tuned.stopped.as_ref().map(ToString::to_string),
-        version => env!("CARGO_PKG_VERSION"),
-        name => &*tuned.config.name,
-        description => &*tuned.config.description,
-        seed => tuned.seed,
-        grain => format!("{:.2}", tuned.grain.ratio),
-        coarse => crate::bench::grain::COARSE,
-        advice => tuned.grain.advice(),
-        margin => if tuned.margin >= 1e3 { "no load".to_owned() } else { format!("{:.2}", tuned.margin) },
-        least => MARGIN,
-        sheet_on => ms(valve.t_on_s),
-        sheet_off => ms(valve.t_off_s),
-        found => tuned.delays.map(|d| context! { on => ms(d.t_on_s), off => ms(d.t_off_s) }),
-        before => settle(|t| t.before.settle_s),
-        after => settle(|t| t.after.settle_s),
-        tests => tests,
-        parameters => parameters,
-        toml => &*tuned.toml,
-        figures => pictures(figures),
+    let settle = |f: fn(&Test) -> Option<f64>| large.and_then(f);
+    let (before_s, after_s) = (settle(|t| t.before.settle_s), settle(|t| t.after.settle_s));
+    let values = Page {
+        stopped: tuned.stopped.as_ref().map(ToString::to_string),
+        version: env!("CARGO_PKG_VERSION"),
+        verdict: match (before_s, after_s) {
+            (Some(before), Some(after)) => format!(
+                "Tuned, the large step settles in {after:.3} s, with the board's defaults in {before:.3} s."
+            ),
+            (None, Some(after)) => format!(
+                "Tuned, the large step settles in {after:.3} s; with the board's defaults it never does."
+            ),
+            (_, None) => "Tuned, the large step does not settle.".to_owned(),
+        },
+        name: &tuned.config.name,
+        description: &tuned.config.description,
+        seed: tuned.seed,
+        grain: tuned.grain.ratio,
+        coarse: crate::bench::grain::COARSE,
+        advice: tuned.grain.advice(),
+        margin: (tuned.margin < 1e3).then_some(tuned.margin),
+        least: MARGIN,
+        sheet_on_s: valve.t_on_s,
+        sheet_off_s: valve.t_off_s,
+        found: tuned.delays,
+        before_s,
+        after_s,
+        tests: tests.collect(),
+        parameters: parameters.collect(),
+        toml: &tuned.toml,
+        figures: pictures(figures),
     };
     Ok(page(TEMPLATE, values)?)
 }

@@ -8,9 +8,9 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::{Drawing, end, stop_on_signals};
+use wheeleg_report::number::or_dash;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::bench::grain::COARSE;
-use wheeleg_studies::compare::number;
 use wheeleg_studies::study::Settings;
 use wheeleg_studies::tune::{self, PARAMETERS, Section, Tuned};
 
@@ -79,7 +79,7 @@ fn text(tuned: &Tuned, whole: bool, report: &Path) -> String {
     );
     for test in &tuned.tests {
         let both = |f: fn(&wheeleg_studies::compare::Figures) -> Option<f64>, digits: usize| {
-            [&test.before, &test.after].map(|figures| number(f(figures), digits))
+            [&test.before, &test.after].map(|figures| or_dash(f(figures), digits))
         };
         let cells = [
             both(|f| f.steady_error_mm.map(f64::abs), 2),
