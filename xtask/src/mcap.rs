@@ -41,7 +41,7 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             let log = fs::read(std::path::absolute(run_dir)?.join("log.mcap"))?;
             fs::write(folder.join("cut.mcap"), &log[..log.len() * 3 / 5])?;
             rust::build(&["--bin", "wheeleg"])?;
-        run(command(target_dir().join("release").join("wheeleg"))
+            run(command(target_dir().join("release").join("wheeleg"))
                 .args(["log", "recover"])
                 .arg(folder.join("cut.mcap"))
                 .arg("--out")
