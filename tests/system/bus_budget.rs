@@ -3,9 +3,11 @@
 
 use crate::sil::{gait, range, robot, run, stand, window};
 use wheeleg_config::{EventAction, LegChoice};
-use wheeleg_master::command::Command;
+use wheeleg_master::command::{Command, CommandCode};
+use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_protocol::link::{BAUD, CYCLE_US, CYCLIC_SHARE_PERMILLE, GAP_US, TURNAROUND_US};
 use wheeleg_protocol::{Message, MessageType, NODES};
+use wheeleg_telemetry::event::{Answer, Cause};
 use wheeleg_telemetry::{BusSample, Recording, Row};
 
 /// Per mille of the cycle in which the line is silent between the cyclic frames,
@@ -116,12 +118,17 @@ fn requests_leave_thirty_per_cent_free() {
     );
     let most = range(busy, |s| s.load).1 + silent_permille() / 1000.0;
     assert!(most < 0.70, "busiest cycle {most}");
-    let count = |text: &str| {
+    let count = |is: fn(&Cause) -> bool| {
         let events = recording.events.iter();
-        events.filter(|r| r.v.text.contains(text)).count()
+        events.filter(|r| is(&r.v.cause)).count()
     };
     // Every request is answered, once.
-    assert_eq!(count("TransmitPosition: accepted"), events.len());
-    assert_eq!(count(" stands at "), events.len());
-    assert_eq!(count("refused"), 0);
+    let accepted = count(|cause| {
+        let (code, answer) = (CommandCode::TransmitPosition, Answer::Accepted);
+        *cause == Cause::Command { code, answer }
+    });
+    assert_eq!(accepted, events.len());
+    let told = count(|cause| matches!(cause, Cause::Master(MasterEvent::Position { .. })));
+    assert_eq!(told, events.len());
+    assert_eq!(count(Cause::is_refusal), 0);
 }

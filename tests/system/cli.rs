@@ -10,8 +10,8 @@ use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use tempfile::TempDir;
+use wheeleg_interface::archive;
 use wheeleg_protocol::SCHEMA_HASH;
-use wheeleg_remote_host::interface::archive;
 
 /// Longest time that any one call may take before it counts as hung.
 const HUNG: Duration = Duration::from_secs(120);
@@ -42,7 +42,7 @@ fn with_line(text: &str, key: &str, line: &str) -> String {
 }
 
 /// The three-step scenario, cut to `duration_s`, in a file of its own.
-fn scenario_file(folder: &Path, duration_s: f64) -> PathBuf {
+pub(crate) fn scenario_file(folder: &Path, duration_s: f64) -> PathBuf {
     let text = source("scenarios/three-step.toml");
     let duration = format!("duration = {{ value = {duration_s:?}, unit = \"s\" }}");
     let text = with_line(&text, "duration", &duration);
@@ -64,7 +64,10 @@ fn summary(scenario: &Path, out: &Path, seed: &str) -> Value {
         .assert()
         .success();
     let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
-    serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"))
+    let summary = serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"));
+    crate::schema::assert_valid(&summary, "run");
+    assert!(summary["stopped"].is_null(), "{summary}");
+    summary
 }
 
 /// The one MCAP log of a run.
@@ -76,6 +79,15 @@ fn log_of(out: &Path) -> PathBuf {
         .collect();
     assert_eq!(logs.len(), 1, "{logs:?}");
     logs.remove(0)
+}
+
+/// What the program says, word for word; `TRYCMD=overwrite` writes it anew.
+#[test]
+fn texts_are_those_of_the_files() {
+    trycmd::TestCases::new()
+        .register_bin("wheeleg", program::path())
+        .env("NO_COLOR", "1")
+        .case("system/cli/*.md");
 }
 
 #[test]
@@ -158,23 +170,6 @@ fn the_seed_and_only_the_seed_changes_the_hash() {
 }
 
 #[test]
-fn list_and_params_tell_what_there_is() {
-    let mut list = wheeleg();
-    list.arg("list").assert().success().stdout(
-        contains("three-step")
-            .and(contains("master-lost"))
-            .and(contains("stand")),
-    );
-    // Parameters come with their units.
-    let mut params = wheeleg();
-    params.arg("params").assert().success().stdout(
-        contains("pwm_period")
-            .and(contains("slew_rate"))
-            .and(contains("mm/s")),
-    );
-}
-
-#[test]
 fn an_unknown_scenario_is_named_with_what_there_is() {
     let dir = folder();
     let out = dir.path().join("out");
@@ -224,19 +219,6 @@ fn parameters_that_contradict_each_other_are_named_with_their_place() {
             );
         assert!(!out.exists(), "a run that never began leaves nothing");
     }
-}
-
-#[test]
-fn a_missing_file_is_named() {
-    let dir = folder();
-    let missing = dir.path().join("nowhere.toml");
-    let mut command = wheeleg();
-    command
-        .args(["run", "--out"])
-        .args([&dir.path().join("out"), &missing])
-        .assert()
-        .failure()
-        .stderr(contains("nowhere.toml").and(contains("cannot read")));
 }
 
 #[test]
@@ -343,39 +325,6 @@ fn every_mistake_of_a_file_is_told_once_with_the_name_of_the_file_above() {
     }
 }
 
-#[test]
-fn a_fault_with_a_wrong_value_and_no_time_is_told_both() {
-    let mut command = wheeleg();
-    command
-        .args(["run", "stand", "--fault", "bit-errors=0"])
-        .assert()
-        .code(2)
-        .stderr(
-            contains("the value `0` is out of range: allowed 1e-9 to 0.1")
-                .and(contains("the time is missing")),
-        );
-}
-
-#[test]
-fn rows_of_the_fault_matrix_must_be_chosen() {
-    let mut command = wheeleg();
-    command.args(["faults", "run"]).assert().code(2).stderr(
-        contains("--row ID")
-            .and(contains("--all"))
-            .and(contains("wheeleg faults rows")),
-    );
-}
-
-#[test]
-fn an_option_of_another_command_is_told_with_that_command() {
-    let mut command = wheeleg();
-    command
-        .args(["tune", "--quick"])
-        .assert()
-        .code(2)
-        .stderr(contains("`--quick` is an option of `wheeleg compare`"));
-}
-
 /// Below a regular file nothing can be made, so that no run begins.
 #[test]
 fn options_without_a_command_are_those_of_a_run() {
@@ -388,20 +337,6 @@ fn options_without_a_command_are_those_of_a_run() {
         .assert()
         .code(2)
         .stderr(contains("cannot create the folder"));
-}
-
-#[test]
-fn a_bad_seed_is_refused() {
-    for seed in ["-1", "abc", "1.5", "99999999999999999999999999"] {
-        let mut command = wheeleg();
-        command
-            .arg("run")
-            .arg(format!("--seed={seed}"))
-            .assert()
-            .failure()
-            .code(2)
-            .stderr(contains("--seed").and(contains(seed)));
-    }
 }
 
 #[test]

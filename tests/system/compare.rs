@@ -2,6 +2,7 @@
 //! a row is what the same moves give without them.
 
 use crate::program;
+use crate::schema::assert_valid;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -14,7 +15,8 @@ use serde_json::Value;
 use wheeleg_config::{AxisConfig, RobotConfig};
 use wheeleg_studies::bench::suite::{self, Factors, StartUp};
 use wheeleg_studies::bench::{Kind, Metrics};
-use wheeleg_studies::compare::{Comparison, Move, Options, Scene, Variation};
+use wheeleg_studies::compare::{self, Comparison, Move, Options, Scene, Variation};
+use wheeleg_studies::study::{Progress, Settings};
 
 const AXIS: &str = "bench-vq110u";
 /// Longest time that any one call may take before it counts as hung.
@@ -80,9 +82,15 @@ fn any_number_of_threads_writes_the_same_bytes() {
         .into_iter()
         .map(|threads| {
             let out = folder.path().join(threads.to_string());
-            let comparison = Comparison::run(&small(threads)).expect("runs");
-            comparison.write(&out).expect("written");
-            files(&out)
+            let settings = Settings {
+                png: true,
+                ..Settings::new(&out)
+            };
+            compare::compare(&small(threads), &settings).expect("written");
+            let mut files = files(&out);
+            // It names the process.
+            files.remove(".lock").expect("a lock");
+            files
         })
         .collect();
     let names: Vec<&String> = written[0].keys().collect();
@@ -100,7 +108,8 @@ fn any_number_of_threads_writes_the_same_bytes() {
 
     // The tables say the same, one row per case.
     let json: Value = serde_json::from_slice(&written[0]["summary.json"]).expect("JSON");
-    let rows = json.as_array().expect("a list");
+    assert_valid(&json, "compare");
+    let rows = json["cases"].as_array().expect("a list");
     // (2 seeds + 12 factors + 2 combinations) × 2 controllers × 2 moves.
     assert_eq!(rows.len(), 64);
     let csv = String::from_utf8(written[0]["csv/cases.csv"].clone()).expect("UTF-8");
@@ -193,7 +202,7 @@ fn a_row_is_what_the_moves_give_without_the_comparison() {
 #[test]
 fn a_case_can_be_played_alone_and_gives_its_row_again() {
     let folder = tempfile::tempdir().expect("temporary folder");
-    let comparison = Comparison::run(&small(2)).expect("runs");
+    let comparison = Comparison::run(&small(2), &Progress::silent()).expect("runs");
     let row = &comparison.rows[comparison.rows.len() - 1];
     assert!(
         row.case.variation.starts_with("combination="),
@@ -206,14 +215,17 @@ fn a_case_can_be_played_alone_and_gives_its_row_again() {
         .assert()
         .success();
     let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
-    let alone: Value = serde_json::from_str(&stdout).expect("JSON");
+    let mut alone: Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_valid(&alone, "case");
+    let object = alone.as_object_mut().expect("an object");
+    object.retain(|key, _| key != "schema" && key != "stopped");
     assert_eq!(alone, serde_json::to_value(row).expect("serialises"));
     let names: Vec<String> = files(&out).into_keys().collect();
     for expected in [
         "summary.json",
         "csv/first.csv",
         "csv/measured-1.csv",
-        "figures/measured-1.png",
+        "figures/measured-1.svg",
     ] {
         assert!(names.iter().any(|n| n == expected), "{names:?}");
     }
@@ -328,6 +340,7 @@ fn tuning_gives_a_section_that_a_run_accepts() {
         .success();
     let stdout = String::from_utf8(assert.get_output().stdout.clone()).expect("UTF-8");
     let summary: Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_valid(&summary, "tune");
     let tests = summary["tests"].as_array().expect("a list");
     let large = tests
         .iter()
@@ -397,7 +410,7 @@ fn an_axis_that_cannot_hold_its_load_is_refused() {
         combinations: 0,
         ..small(2)
     };
-    let comparison = Comparison::run(&options);
+    let comparison = Comparison::run(&options, &Progress::silent());
     let comparison = comparison.expect("runs");
     assert!(comparison.rows.iter().any(|r| !r.case.feasible));
     let listed = comparison.infeasible();

@@ -245,7 +245,7 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
         let out = dir.path().join(name);
         let assert = Command::new(program::path())
             .env("NO_COLOR", "1")
-            .args(["delay", "--json", "--seeds", "1", "--out"])
+            .args(["delay", "--json", "--png", "--seeds", "1", "--out"])
             .arg(&out)
             .assert()
             .success();
@@ -254,6 +254,7 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
     let ((out, first), (_, second)) = (run("a"), run("b"));
     assert_eq!(first, second);
     let json: serde_json::Value = serde_json::from_slice(&first).expect("JSON");
+    crate::schema::assert_valid(&json, "delay");
     assert_eq!(json["robot"], "wheeleg-2003");
     assert_eq!(json["starts"]["list"].as_array().map(Vec::len), Some(14));
     let page = fs::read_to_string(out.join("report.html")).expect("page");

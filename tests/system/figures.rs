@@ -10,7 +10,7 @@ use serde_json::Value;
 fn figures(out: &Path) -> Value {
     let assert = Command::new(program::path())
         .env("NO_COLOR", "1")
-        .args(["figures", "--json", "--out"])
+        .args(["figures", "--json", "--png", "--out"])
         .arg(out)
         .assert()
         .success();
@@ -24,6 +24,7 @@ fn page_pictures_and_tables_are_written_and_earlier_ones_kept() {
     fs::create_dir_all(&out).expect("created");
     fs::write(out.join("report.html"), "earlier").expect("written");
     let json = figures(&out);
+    crate::schema::assert_valid(&json, "figures");
     let kept = fs::read_to_string(out.join("previous/report.html")).expect("kept");
     assert_eq!(kept, "earlier");
 

@@ -3,15 +3,20 @@
 use std::ops::ControlFlow;
 
 use wheeleg_config::{Scenario, builtin};
+use wheeleg_master::contact::{Sector, Side};
+use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_sim as sil;
-use wheeleg_telemetry::{Recorder, Recording};
+use wheeleg_telemetry::{Cause, Recorder, Recording};
 
-/// Sides with their bit in the log and the master's name for them.
-const SIDES: [(&str, u8, &str); 4] = [
-    ("front", 1, "front"),
-    ("back", 2, "rear"),
-    ("left", 4, "left"),
-    ("right", 8, "right"),
+/// A side of a foot: its name in scenarios, its bit in the log, and what the master calls it.
+type FootSide = (&'static str, u8, Sector);
+
+/// All sides, in the order of their bits.
+const SIDES: [FootSide; 4] = [
+    ("front", 1, Sector::Front),
+    ("back", 2, Sector::Rear),
+    ("left", 4, Sector::Left),
+    ("right", 8, Sector::Right),
 ];
 
 /// A foot that is longer off the ground than this has been lifted, not shaken.
@@ -50,40 +55,51 @@ fn touchdown(recording: &Recording, foot: usize) -> (u64, u8) {
     panic!("the foot is not lifted and put down");
 }
 
-/// Text and time of the first contact event from a source at or after a time.
-fn event<'a>(recording: &'a Recording, source: &str, words: &str, from_ns: u64) -> (u64, &'a str) {
-    let mut contacts = recording.events.iter().filter(|e| {
-        let text = &e.v.text;
-        e.t_ns >= from_ns
-            && e.v.kind == "contact"
-            && text.starts_with(source)
-            && text.to_lowercase().contains(words)
+/// The first touch of a foot at or after a time as the ground makes it: time and switches closed,
+/// in the order front, left, back, right.
+fn ground_touch(recording: &Recording, foot: Side, from_ns: u64) -> (u64, [bool; 4]) {
+    let later = recording.events.iter().filter(|e| e.t_ns >= from_ns);
+    let mut touches = later.filter_map(|e| match e.v.cause {
+        Cause::Contact { side, switches } if side == foot && switches.contains(&true) => {
+            Some((e.t_ns, switches))
+        }
+        _ => None,
     });
-    let first = contacts.next();
-    let first = first.unwrap_or_else(|| panic!("no {source} event `{words}` in the log"));
-    (first.t_ns, &first.v.text)
+    touches.next().expect("the foot touches the ground")
+}
+
+/// The first touch of a foot at or after a time as the master reports it.
+fn reported_touch(recording: &Recording, foot: Side, from_ns: u64) -> (u64, Option<Sector>) {
+    let later = recording.events.iter().filter(|e| e.t_ns >= from_ns);
+    let mut touches = later.filter_map(|e| match e.v.cause {
+        Cause::Master(MasterEvent::TouchDown { side, sector }) if side == foot => {
+            Some((e.t_ns, sector))
+        }
+        _ => None,
+    });
+    touches.next().expect("the master reports a touch")
 }
 
 /// Holds one run against the side on which its foot must touch.
-fn assert_side(recording: &Recording, foot: usize, (side, bit, reported): (&str, u8, &str)) {
-    let leg = ["left", "right"][foot];
-    let touches = format!("{leg} foot touches");
+fn assert_side(recording: &Recording, foot: usize, (side, bit, sector): FootSide) {
+    let leg = [Side::Left, Side::Right][foot];
     let (sensed_ns, switches) = touchdown(recording, foot);
-    assert_eq!(switches, bit, "{leg} foot, {side}: sensed at first contact");
+    assert_eq!(
+        switches, bit,
+        "{leg:?} foot, {side}: sensed at first contact"
+    );
 
     // What physically is: the node follows when the level has stood for its debounce, the
     // last of whose samples is the one that counts.
-    let (ground_ns, text) = event(recording, "ground:", &touches, sensed_ns - 5_000_000);
-    assert_eq!(text, format!("ground: {leg} foot touches, {side}"));
+    let (ground_ns, closed) = ground_touch(recording, leg, sensed_ns - 5_000_000);
+    let alone = ["front", "left", "back", "right"].map(|name| name == side);
+    assert_eq!(closed, alone, "{leg:?} foot, {side}");
     let lag_ns = sensed_ns.abs_diff(ground_ns);
-    assert_eq!(lag_ns, DEBOUNCE_NS, "{leg} foot, {side}");
+    assert_eq!(lag_ns, DEBOUNCE_NS, "{leg:?} foot, {side}");
 
     // What the master makes of the replies of the next cycles.
-    let (master_ns, text) = event(recording, "master:", &touches, sensed_ns);
-    assert!(
-        text.to_lowercase().contains(&format!("{reported} side")),
-        "{leg} foot, {side}: {text}"
-    );
+    let (master_ns, reported) = reported_touch(recording, leg, sensed_ns);
+    assert_eq!(reported, Some(sector), "{leg:?} foot, {side}");
     let late_ns = master_ns - sensed_ns;
     assert!(late_ns <= 30_000_000, "{side}: reported {late_ns} ns late");
 

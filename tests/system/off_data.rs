@@ -146,8 +146,8 @@ fn walk(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Walk {
     walk.stopped = match outcome {
         Err(error) => Some(error.to_string()),
         Ok(_) => events
-            .find(|e| e.v.text.contains("all axes hold"))
-            .map(|e| format!("{:.3} s: {}", e.t_s(), e.v.text)),
+            .find(|e| e.v.cause.is_hold())
+            .map(|e| format!("{:.3} s: {}", e.t_s(), e.v)),
     };
     walk
 }

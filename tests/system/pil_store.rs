@@ -9,6 +9,7 @@ use crate::sil;
 use crate::sil::{run_with, stand};
 use wheeleg_config::EventAction;
 use wheeleg_master::command::Command;
+use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_protocol::param::{JointParam, WheelParam};
 use wheeleg_protocol::{
     Address, Decoder, FaultRecord, FaultReport, Message, NackReason, ParamGet, ParamSave, ParamSet,
@@ -17,6 +18,7 @@ use wheeleg_protocol::{
 use wheeleg_remote_host::unicorn::image;
 use wheeleg_remote_host::{NodeKind, Nodes};
 use wheeleg_remote_link::{Hook, Power, Ran, Reply, Request};
+use wheeleg_telemetry::{Cause, Recording};
 
 const ADDRESS: u8 = 2;
 const MS: u64 = 1_000_000;
@@ -190,6 +192,17 @@ fn save(node: u8) -> EventAction {
     EventAction::Command(Command::SaveParameters { node })
 }
 
+/// Parameters that the master was told in a run: board, number, raw value.
+fn parameters(recording: &Recording) -> Vec<(u8, u16, i32)> {
+    let events = recording.events.iter();
+    events
+        .filter_map(|row| match row.v.cause {
+            Cause::Master(MasterEvent::Parameter { node, id, raw }) => Some((node, id, raw)),
+            _ => None,
+        })
+        .collect()
+}
+
 #[test]
 fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
     // The law that takes longest to set up, and one value of a wheel.
@@ -208,16 +221,18 @@ fn in_a_whole_run_parameters_are_set_and_saved_as_on_the_host() {
     let nodes = Nodes::new(&NodeKind::Pil, &[]).expect("one each");
     let (recording, pil) = run_with(&scenario, &nodes);
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
-    let events = recording.events.iter().map(|row| row.v.text.as_str());
-    let said: Vec<&str> = events.filter(|text| text.contains("parameter ")).collect();
-    let values: Vec<&str> = said
-        .iter()
-        .filter_map(|text| text.split(" is ").nth(1))
-        .collect();
+    let expected = [
+        (3, law, 5),
+        (8, error, 12_345),
+        (3, law, 1),
+        (3, law, 1),
+        (8, error, 12_345),
+    ];
     assert_eq!(
-        values,
-        ["5 1", "12345 counts", "1 1", "1 1", "12345 counts"],
-        "{said:?}"
+        parameters(&recording),
+        expected,
+        "{}",
+        sil::story(&recording)
     );
 }
 
@@ -248,27 +263,19 @@ fn in_a_whole_run_a_board_without_power_goes_on_with_what_it_had_saved_as_on_the
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     let resets: Vec<u16> = pil.boards.iter().map(|board| board.resets).collect();
     assert_eq!(resets, [0, 0, 1, 0, 0, 0, 0, 0]);
-    let events = recording.events.iter().map(|row| row.v.text.as_str());
-    let values: Vec<&str> = events
-        .filter_map(|text| {
-            text.split_once("following_error of ")?
-                .1
-                .split(" is ")
-                .nth(1)
-        })
-        .collect();
+    let expected = [
+        (3, own, mm(55.0)),
+        (8, error, 12_345),
+        (3, own, mm(70.0)),
+        (8, error, 777),
+        (3, own, mm(70.0)),
+        (8, error, 777),
+        (3, own, mm(55.0)),
+        (8, error, 777),
+    ];
     assert_eq!(
-        values,
-        [
-            "55 mm",
-            "12345 counts",
-            "70 mm",
-            "777 counts",
-            "70 mm",
-            "777 counts",
-            "55 mm",
-            "777 counts"
-        ],
+        parameters(&recording),
+        expected,
         "{}",
         sil::story(&recording)
     );

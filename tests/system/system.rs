@@ -19,7 +19,12 @@ mod foot_sides;
 mod long_runs;
 mod off_data;
 mod precharge;
+mod reference;
 mod restart;
 mod safe_states;
+mod schema;
 mod service;
+mod session;
+#[cfg(unix)]
+mod stop;
 mod workspace;

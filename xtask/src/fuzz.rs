@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
@@ -69,10 +69,14 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
             let all: Vec<&str> = names().collect();
             Err(anyhow::anyhow!("the targets are {}", all.join(", ")).into())
         });
+        return;
     }
+    let Some(fuzzers) = report.step("fuzz: build", || Ok(Fuzzers::build(root(), &chosen)?)) else {
+        return;
+    };
     for name in chosen {
         report.step(format!("fuzz: {name}"), || {
-            let result = explore(name, options.seconds);
+            let result = fuzzers.explore(name, options.seconds);
             if options.note {
                 record::note(&format!("fuzz {name}"), &result)?;
             }
@@ -96,9 +100,10 @@ pub(crate) fn short_steps(report: &mut Report) {
 
 /// Every target for `seconds`; a sentence about the result.
 pub(crate) fn all_targets(seconds: u64) -> StepResult<String> {
+    let fuzzers = Fuzzers::build(root(), &names().collect::<Vec<_>>())?;
     let mut texts = Vec::new();
     for name in names() {
-        texts.push(format!("{name}: {}", explore(name, seconds)?));
+        texts.push(format!("{name}: {}", fuzzers.explore(name, seconds)?));
     }
     Ok(texts.join("; "))
 }
@@ -107,73 +112,78 @@ fn names() -> impl Iterator<Item = &'static str> {
     TARGETS.iter().map(|(name, _)| *name)
 }
 
-/// `cargo fuzz` of a target of the sources in `tree`.
-fn cargo_fuzz(sub: &str, tree: &Path, name: &str) -> Command {
-    let mut command = cargo();
-    command
-        .current_dir(tree)
-        .args(["fuzz", sub, "--fuzz-dir", FOLDER])
-        .args(["--sanitizer=none", "--codegen-units=4", "--target-dir"])
-        .arg(work_folder().join("build"));
-    if OF_THE_SIMULATOR.contains(&name) {
-        command.arg("--features=sim");
-    }
-    command.arg(name);
-    command
+/// The libFuzzer programs of one tree of sources.
+struct Fuzzers {
+    tree: PathBuf,
+    /// Whether they are built with the simulator.
+    sim: bool,
 }
 
-/// Builds the fuzzer of a target and gives it inputs, or folders of them of which the first
-/// takes new ones. What it says, and how long it took.
-fn fuzzer(
-    tree: &Path,
-    name: &str,
-    inputs: &[PathBuf],
-    options: &[String],
-) -> Result<(Output, Duration)> {
-    let longest = TARGETS.iter().find(|(other, _)| *other == name);
-    let (_, longest) = longest.with_context(|| format!("no target `{name}`"))?;
-    run(&mut cargo_fuzz("build", tree, name))?;
-    let begin = Instant::now();
-    let output = cargo_fuzz("run", tree, name)
-        .args(inputs)
-        .args(["--", "-timeout=20", "-print_final_stats=1"])
-        .arg(format!("-max_len={longest}"))
-        .args(options)
-        .output()
-        .context("cannot start cargo fuzz")?;
-    Ok((output, begin.elapsed()))
+impl Fuzzers {
+    /// Builds what the named targets need.
+    fn build(tree: PathBuf, names: &[&str]) -> Result<Self> {
+        let sim = names.iter().any(|name| OF_THE_SIMULATOR.contains(name));
+        let fuzzers = Self { tree, sim };
+        let mut build = fuzzers.cargo_fuzz("build");
+        if let [name] = names {
+            build.arg(name);
+        }
+        run(&mut build)?;
+        Ok(fuzzers)
+    }
+
+    fn cargo_fuzz(&self, sub: &str) -> Command {
+        let mut command = cargo();
+        command
+            .current_dir(&self.tree)
+            .args(["fuzz", sub, "--fuzz-dir", FOLDER])
+            .args(["--sanitizer=none", "--codegen-units=4", "--target-dir"])
+            .arg(work_folder().join("build"))
+            .args(self.sim.then_some("--features=sim"));
+        command
+    }
+
+    /// Gives a target inputs, or folders of them of which the first takes new ones.
+    fn run(&self, name: &str, inputs: &[PathBuf], options: &[String]) -> Result<Output> {
+        let longest = TARGETS.iter().find(|(other, _)| *other == name);
+        let (_, longest) = longest.with_context(|| format!("no target `{name}`"))?;
+        self.cargo_fuzz("run")
+            .arg(name)
+            .args(inputs)
+            .args(["--", "-timeout=20", "-print_final_stats=1"])
+            .arg(format!("-max_len={longest}"))
+            .args(options)
+            .output()
+            .context("cannot start cargo fuzz")
+    }
+
+    /// Runs a target from the stored corpus for a time; a sentence about the result. New
+    /// inputs go below the target folder; an input that breaks a property ends the run and
+    /// is named.
+    fn explore(&self, name: &str, seconds: u64) -> Result<String> {
+        let found = work_folder().join("corpus").join(name);
+        fs::create_dir_all(&found).with_context(|| found.display().to_string())?;
+        let stored = |kind: &str| self.tree.join(FOLDER).join(kind).join(name);
+        let mut inputs = vec![found, stored("corpus"), stored("regressions")];
+        inputs.retain(|folder| folder.is_dir());
+        let result = self.run(name, &inputs, &[format!("-max_total_time={seconds}")])?;
+        let log = String::from_utf8_lossy(&result.stderr);
+        if !result.status.success() {
+            println!("{log}");
+            bail!(
+                "{name} broke a property; see above for the input. Mend the cause, give the \
+                 input a name that says what was wrong, and keep it in \
+                 {FOLDER}/regressions/{name}"
+            );
+        }
+        let text = summary(&log, seconds);
+        println!("    {name:<10} {text}");
+        Ok(text)
+    }
 }
 
 fn work_folder() -> PathBuf {
     target_dir().join("fuzz")
-}
-
-/// A folder below the target folder.
-fn folder(kind: &str, name: &str) -> Result<PathBuf> {
-    let folder = work_folder().join(kind).join(name);
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    Ok(folder)
-}
-
-/// Runs a target from the stored corpus for a time; a sentence about the result. New inputs
-/// go below the target folder; an input that breaks a property ends the run and is named.
-fn explore(name: &str, seconds: u64) -> Result<String> {
-    let stored = ["corpus", "regressions"].map(|kind| root().join(FOLDER).join(kind).join(name));
-    let inputs = [vec![folder("corpus", name)?], stored.to_vec()].concat();
-    let inputs: Vec<PathBuf> = inputs.into_iter().filter(|path| path.is_dir()).collect();
-    let limit = format!("-max_total_time={seconds}");
-    let (result, _) = fuzzer(&root(), name, &inputs, &[limit])?;
-    let log = String::from_utf8_lossy(&result.stderr);
-    if !result.status.success() {
-        println!("{log}");
-        bail!(
-            "{name} broke a property; see above for the input. Mend the cause, give the input \
-             a name that says what was wrong, and keep it in {FOLDER}/regressions/{name}"
-        );
-    }
-    let text = summary(&log, seconds);
-    println!("    {name:<10} {text}");
-    Ok(text)
 }
 
 /// Seconds, inputs and coverage from a fuzzer's log. Edges are those of all code
@@ -277,7 +287,10 @@ fn find(copy: &Path, target: &str) -> Result<()> {
         format!("-max_total_time={SEEDED_SECONDS}"),
         "-seed=1".to_owned(),
     ];
-    let (result, took) = fuzzer(copy, target, &[empty], &limit)?;
+    let wrong = Fuzzers::build(copy.to_path_buf(), &[target])?;
+    let begin = Instant::now();
+    let result = wrong.run(target, &[empty], &limit)?;
+    let took = begin.elapsed();
     ensure!(
         !result.status.success(),
         "{target} did not find it within {SEEDED_SECONDS} s"
@@ -286,7 +299,7 @@ fn find(copy: &Path, target: &str) -> Result<()> {
         .ok()
         .and_then(|mut inputs| inputs.next())
         .context("the fuzzer failed without an input")??;
-    let (without, _) = fuzzer(&root(), target, &[input.path()], &[])?;
+    let without = Fuzzers::build(root(), &[target])?.run(target, &[input.path()], &[])?;
     ensure!(
         without.status.success(),
         "{target} fails without the bug, too"

@@ -8,6 +8,7 @@
 mod bench;
 mod conformance;
 mod deep;
+mod docs;
 mod firmware;
 mod fuzz;
 mod machine;
@@ -81,6 +82,8 @@ enum Command {
     Plant,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
+    /// Make a book of `docs`, if mdbook is there.
+    Docs,
     /// The long checks; results are appended to docs/records/deep.md.
     Deep(deep::Options),
     /// Open the MCAP log of a run with the Python reader and check every channel.
@@ -115,6 +118,7 @@ fn main() -> ExitCode {
         Command::RigidBody => rigid_body::steps(&mut report),
         Command::Plant => plant::steps(&mut report),
         Command::Mutants(options) => mutants::steps(&mut report, &options),
+        Command::Docs => docs::steps(&mut report),
         Command::Deep(options) => deep::steps(&mut report, &options),
         Command::McapCheck { run_dir } => mcap::steps(&mut report, Some(&run_dir)),
     }

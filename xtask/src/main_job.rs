@@ -10,14 +10,6 @@ use crate::process::{command, output, target_dir};
 use crate::report::Report;
 use crate::rust;
 
-/// Required targets that the simulated robot is known to miss, and why. They
-/// stay FAIL in every report; here they only do not stop the suite. One that is
-/// met again must leave this list, or the suite fails.
-const KNOWN_SHORTFALLS: [(&str, &str); 1] = [(
-    "A23-max",
-    "b6 breaks away from a stop: static less Coulomb friction alone, (15 - 10) N on 0.8 kg, is 6.3 m/s2",
-)];
-
 const SEED: &str = "1";
 
 /// Builds, runs twice, compares. Returns the folder of the first run.
@@ -70,8 +62,7 @@ fn check_file(folder: &Path, json: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Every required target is met but the known shortfalls, and none of the
-/// paper's list is left out.
+/// Every required target is met, and none of the paper's list is left out.
 fn check_targets(json: &Value) -> Result<()> {
     let targets = json["targets"].as_array().context("no `targets`")?;
     for id in ["A19", "A20", "A21", "A22", "A23", "A25", "A26", "A27"] {
@@ -97,12 +88,8 @@ fn check_targets(json: &Value) -> Result<()> {
             continue;
         }
         let id = target["id"].as_str().context("a target without `id`")?;
-        let known = KNOWN_SHORTFALLS.iter().find(|(known, _)| *known == id);
-        match (target["pass"] == Value::Bool(true), known) {
-            (true, Some(_)) => bail!("{id} is met again: take it off the known shortfalls"),
-            (false, Some((_, why))) => println!("      known shortfall {id}: {why}"),
-            (false, None) => missed.push(id.to_owned()),
-            (true, None) => {}
+        if target["pass"] != Value::Bool(true) {
+            missed.push(id.to_owned());
         }
     }
     if !missed.is_empty() {
@@ -138,13 +125,6 @@ mod tests {
         assert!(check_targets(&summary(true)).is_ok());
         let error = check_targets(&summary(false)).unwrap_err().to_string();
         assert!(error.contains("A27"), "{error}");
-        let known = |pass: bool| {
-            let mut summary = summary(true);
-            let targets = summary["targets"].as_array_mut().unwrap();
-            targets.push(json!({"id": KNOWN_SHORTFALLS[0].0, "required": true, "pass": pass}));
-            check_targets(&summary)
-        };
-        assert!(known(false).is_ok() && known(true).is_err());
         let mut short = summary(true);
         short["targets"].as_array_mut().unwrap().remove(0);
         let error = check_targets(&short).unwrap_err().to_string();

@@ -35,24 +35,49 @@ pub trait Application {
     fn save(&mut self, store: &mut impl ParameterStore, at: Micros);
     /// The board's transmitter was cut off by its time limit.
     fn driver_cut_off(&mut self, at: Micros);
+    /// A frame that was taken was not sent: its slot had passed.
+    fn missed_slot(&mut self);
+}
+
+/// What both kinds of node have by the same names.
+macro_rules! of_the_node {
+    () => {
+        fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+            self.on_bus_bytes(bytes, t_end);
+        }
+
+        fn tick(&mut self, now: Micros) -> TickReport {
+            self.tick(now)
+        }
+
+        fn tick_done(&mut self, end: Micros) {
+            self.tick_done(end);
+        }
+
+        fn take_transmission(&mut self) -> Option<Transmission> {
+            self.take_transmission()
+        }
+
+        fn save_is_due(&self) -> bool {
+            self.save_is_due()
+        }
+
+        fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
+            self.save(store, at);
+        }
+
+        fn driver_cut_off(&mut self, at: Micros) {
+            self.driver_cut_off(at);
+        }
+
+        fn missed_slot(&mut self) {
+            self.missed_slot();
+        }
+    };
 }
 
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V, S, W> {
-    fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        self.on_bus_bytes(bytes, t_end);
-    }
-
-    fn tick(&mut self, now: Micros) -> TickReport {
-        self.tick(now)
-    }
-
-    fn tick_done(&mut self, end: Micros) {
-        self.tick_done(end);
-    }
-
-    fn take_transmission(&mut self) -> Option<Transmission> {
-        self.take_transmission()
-    }
+    of_the_node!();
 
     fn period(&self) -> Micros {
         JOINT_TICK
@@ -61,36 +86,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     fn period_is_sound(&self) -> bool {
         true
     }
-
-    fn save_is_due(&self) -> bool {
-        self.save_is_due()
-    }
-
-    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
-        self.save(store, at);
-    }
-
-    fn driver_cut_off(&mut self, at: Micros) {
-        self.driver_cut_off(at);
-    }
 }
 
 impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for WheelNode<M, E, P, D> {
-    fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        self.on_bus_bytes(bytes, t_end);
-    }
-
-    fn tick(&mut self, now: Micros) -> TickReport {
-        self.tick(now)
-    }
-
-    fn tick_done(&mut self, end: Micros) {
-        self.tick_done(end);
-    }
-
-    fn take_transmission(&mut self) -> Option<Transmission> {
-        self.take_transmission()
-    }
+    of_the_node!();
 
     fn period(&self) -> Micros {
         Micros(self.tick_period_us())
@@ -98,18 +97,6 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
 
     fn period_is_sound(&self) -> bool {
         self.is_intact()
-    }
-
-    fn save_is_due(&self) -> bool {
-        self.save_is_due()
-    }
-
-    fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
-        self.save(store, at);
-    }
-
-    fn driver_cut_off(&mut self, at: Micros) {
-        self.driver_cut_off(at);
     }
 }
 
@@ -147,7 +134,8 @@ pub trait Board {
     /// Whether a transmission may be handed over.
     fn transmitter_is_free(&self) -> bool;
 
-    /// Schedules a transmission. A start that is past becomes as soon as possible.
+    /// Schedules a transmission. A start that is past becomes as soon as possible: one of a
+    /// slot is not handed over then.
     fn transmit(&mut self, transmission: &Transmission);
 
     /// Whether the driver's time limit has cut the transmission off that is under way;
@@ -219,16 +207,26 @@ pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
     }
 }
 
-/// Sends the next frame if there is one and the transmitter is free; whether it did.
+/// Sends the next frame if there is one and the transmitter is free; whether it did. A slot
+/// whose start has passed stays empty: its reply would fall into the slots of other boards.
 fn send<A: Application, B: Board>(application: &mut A, board: &mut B) -> bool {
     if !board.transmitter_is_free() {
         return false;
     }
-    let Some(transmission) = application.take_transmission() else {
-        return false;
-    };
-    board.transmit(&transmission);
-    true
+    while let Some(transmission) = application.take_transmission() {
+        if transmission.in_slot && is_past(transmission.start_at, board.now()) {
+            application.missed_slot();
+        } else {
+            board.transmit(&transmission);
+            return true;
+        }
+    }
+    false
+}
+
+/// Whether `time` is over; compared modulo 2^32.
+const fn is_past(time: Micros, now: Micros) -> bool {
+    time.get().wrapping_sub(now.get()).cast_signed() < 0
 }
 
 /// Runs a board for ever.
@@ -257,6 +255,7 @@ mod tests {
         Idle,
         Cut(u32),
         Saved(u32),
+        Missed,
     }
 
     /// A memory that takes everything.
@@ -332,6 +331,7 @@ mod tests {
     struct Echo {
         did: Vec<Did>,
         frames: VecDeque<u32>,
+        in_slots: bool,
         save: bool,
     }
 
@@ -356,6 +356,7 @@ mod tests {
         fn take_transmission(&mut self) -> Option<Transmission> {
             self.frames.pop_front().map(|start| Transmission {
                 start_at: Micros(start),
+                in_slot: self.in_slots,
                 bytes: Default::default(),
             })
         }
@@ -380,6 +381,10 @@ mod tests {
 
         fn driver_cut_off(&mut self, at: Micros) {
             self.did.push(Did::Cut(at.get()));
+        }
+
+        fn missed_slot(&mut self) {
+            self.did.push(Did::Missed);
         }
     }
 
@@ -449,6 +454,31 @@ mod tests {
             board.did,
             [Did::Finished(520), Did::Finished(520), Did::Idle]
         );
+    }
+
+    /// The clock stands at 777.
+    #[test]
+    fn a_slot_that_has_passed_stays_empty_and_an_answer_is_late_rather_than_lost() {
+        let play = |in_slots, frames: &[u32]| {
+            let mut board = Rig::default();
+            let mut application = Echo {
+                in_slots,
+                frames: frames.iter().copied().collect(),
+                ..Echo::default()
+            };
+            step(&mut application, &mut board);
+            (board.did, application.did)
+        };
+        for late in [776, 700, 777_u32.wrapping_sub(30_000)] {
+            let empty = play(true, &[late]);
+            assert_eq!(empty, (vec![Did::Idle], vec![Did::Missed]));
+            let next = play(true, &[late, 900]);
+            assert_eq!(next, (vec![Did::Sent(900)], vec![Did::Missed]));
+            assert_eq!(play(false, &[late]), (vec![Did::Sent(late)], vec![]));
+        }
+        for in_time in [777, 778, 3_000] {
+            assert_eq!(play(true, &[in_time]), (vec![Did::Sent(in_time)], vec![]));
+        }
     }
 
     #[test]

@@ -15,6 +15,16 @@ pub enum Cylinder {
     Vertical,
 }
 
+impl fmt::Display for Cylinder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Yaw => "yaw",
+            Self::Horizontal => "horizontal",
+            Self::Vertical => "vertical",
+        })
+    }
+}
+
 /// The quantity in which a non-finite or out-of-range value was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
@@ -34,6 +44,21 @@ pub enum Quantity {
     Parameter,
     /// A result: finite arguments so large that the arithmetic overflowed.
     Result,
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Coordinate => "joint coordinate",
+            Self::Rate => "joint rate",
+            Self::Acceleration => "joint acceleration",
+            Self::FootPosition => "foot position",
+            Self::FootVelocity => "foot velocity",
+            Self::FootAcceleration => "foot acceleration",
+            Self::Parameter => "geometry parameter",
+            Self::Result => "result",
+        })
+    }
 }
 
 /// Refusals of the kinematics. Each carries the value that was refused.
@@ -91,7 +116,7 @@ pub enum KinematicsError<T> {
 impl<T: Scalar> fmt::Display for KinematicsError<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NonFinite { quantity, value } => write!(f, "{quantity:?} is not finite: {value}"),
+            Self::NonFinite { quantity, value } => write!(f, "{quantity} is not finite: {value}"),
             Self::FootOnYawAxis {
                 radius_m,
                 minimum_m,
@@ -117,7 +142,7 @@ impl<T: Scalar> fmt::Display for KinematicsError<T> {
                 max_m,
             } => write!(
                 f,
-                "{cylinder:?} cylinder length {length_m} m outside {min_m} to {max_m} m"
+                "{cylinder} cylinder length {length_m} m outside {min_m} to {max_m} m"
             ),
             Self::BadParameter { value } => write!(f, "geometry parameter {value} makes no leg"),
         }

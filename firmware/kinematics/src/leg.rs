@@ -4,31 +4,7 @@ use nalgebra::{Matrix3, Matrix6x3, Vector3, Vector6};
 
 use crate::error::all_finite;
 use crate::r2p::R2p;
-use crate::{KinematicsError, LegGeometry, Phi, Quantity, Scalar, Theta3, wrap_two_pi};
-
-/// Cylinder lengths of one leg (m). Rates and accelerations of the lengths are plain vectors in
-/// the same order [b2, b5, b6].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LegLengths<T> {
-    /// Yaw cylinder.
-    pub b2_m: T,
-    /// Horizontal cylinder.
-    pub b5_m: T,
-    /// Vertical cylinder.
-    pub b6_m: T,
-}
-
-impl<T: Scalar> LegLengths<T> {
-    /// Lengths in metres.
-    pub fn new(b2_m: T, b5_m: T, b6_m: T) -> Self {
-        Self { b2_m, b5_m, b6_m }
-    }
-
-    /// [b2, b5, b6].
-    pub fn to_array(&self) -> [T; 3] {
-        [self.b2_m, self.b5_m, self.b6_m]
-    }
-}
+use crate::{KinematicsError, LegGeometry, LegLengths, Phi, Quantity, Scalar, Theta3, wrap_two_pi};
 
 /// The six joint coordinates of the leg's tree.
 #[derive(Clone, Copy, Debug, PartialEq)]

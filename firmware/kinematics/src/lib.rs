@@ -51,6 +51,7 @@ mod angle;
 mod error;
 mod geometry;
 mod leg;
+mod lengths;
 pub mod printed;
 pub mod r2p;
 pub mod rpr;
@@ -58,7 +59,8 @@ pub mod rpr;
 pub use angle::{Phi, Theta3, wrap_pi, wrap_two_pi};
 pub use error::{Cylinder, KinematicsError, Quantity};
 pub use geometry::{Closure, LegGeometry, LegParameters};
-pub use leg::{FootState, JointAngles, LegLengths, LegPosture, LegRates};
+pub use leg::{FootState, JointAngles, LegPosture, LegRates};
+pub use lengths::LegLengths;
 
 /// The scalar of the kinematics: any real field that is `Copy`, in practice `f32` and `f64`.
 pub trait Scalar: nalgebra::RealField + Copy {}

@@ -1,14 +1,28 @@
 //! User commands and their codes. The high byte of a code names the layer that
 //! carries the command out: 0x01xx layer 0 (physical level), 0x02xx layer 1
-//! (gait level). [`TABLE`] is the single source of `COMMANDS.md`.
+//! (gait level). [`TABLE`] is the one list of commands; the ranges of their
+//! arguments are in [`crate::argument`]. `docs/reference/commands.md` is written
+//! from both.
+
+mod build;
+mod reference;
 
 use core::fmt;
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use crate::argument::{
+    ACCELERATION, Argument, BOARD, CORRECTION, FORWARD, GAIN, HEIGHT, HELD_LEG_S5, HELD_LEG_S6,
+    JOINT, LEFT, LEG, LIFT, LOWER, PARAMETER, PATTERN, PERIOD, POLE, PUSH, PUSH_ACCELERATION,
+    PUSH_SPEED, RATE, REACH, SIDE, SPEED, STEP_STROKE, STEPPING_LEG, STEPS, STROKE,
+    TOUCHDOWN_REFLEX, TRAVEL, VALUE, YAW_S2, ZERO,
+};
 use crate::contact::Side;
 use crate::layer1::foot::FootShape;
 use crate::layer1::params::GaitParams;
+
+pub use build::{ArgumentError, Given};
+pub use reference::write_markdown;
 
 /// Layer that carries a command out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +64,7 @@ pub enum Command {
     JointReference {
         /// 1..=6.
         joint: JointNumber,
-        /// Stroke, mm, 0..=180.
+        /// Stroke, mm ([`crate::argument::STROKE`]).
         stroke_mm: PositionMm,
     },
     /// Ask one joint's board for its position, acknowledged with the value in an event.
@@ -83,23 +97,23 @@ pub enum Command {
     /// Drive both wheels by a distance from the last reference sent to them, or
     /// from where they are if there was none since the last stop.
     WheelReference {
-        /// Distance, mm, positive forward, at most 32 000 either way and at most
+        /// Distance, mm, positive forward ([`crate::argument::TRAVEL`]), and at most
         /// 2^22 − 1 encoder counts from where the wheels are: the 24-bit
         /// counter tells no more apart.
         travel_mm: PositionMm,
     },
-    /// Highest speed of a wheel move, mm/s, 1..=400.
+    /// Highest speed of a wheel move.
     WheelSpeed {
         /// Which wheel.
         side: Side,
-        /// Speed at the rim, mm/s.
+        /// Speed at the rim, mm/s ([`crate::argument::SPEED`]).
         speed_mm_s: VelocityMmS,
     },
     /// Acceleration of a wheel move.
     WheelAcceleration {
         /// Which wheel.
         side: Side,
-        /// Acceleration at the rim, mm/s², 10..=5000.
+        /// Acceleration at the rim, mm/s² ([`crate::argument::ACCELERATION`]).
         acceleration_mm_s2: fixed::types::I16F16,
     },
     /// Coefficients of the wheel's lead filter D(z) = K(z − A/256)/(4(z + B/256)).
@@ -167,7 +181,7 @@ pub enum Command {
 }
 
 macro_rules! commands {
-    ($($name:ident = $code:literal, $arguments:literal, $effect:literal, $pattern:pat => )*) => {
+    ($($name:ident = $code:literal, [$($argument:expr),*], $effect:literal, $pattern:pat => )*) => {
         /// Numbers of the commands.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u16)]
@@ -175,10 +189,23 @@ macro_rules! commands {
             $(#[doc = $effect] $name = $code,)*
         }
 
+        impl CommandCode {
+            /// Row of the table.
+            #[must_use]
+            pub const fn info(self) -> CommandInfo {
+                match self {
+                    $(Self::$name => CommandInfo {
+                        code: Self::$name,
+                        name: stringify!($name),
+                        arguments: &[$($argument),*],
+                        effect: $effect,
+                    },)*
+                }
+            }
+        }
+
         /// Every command: code, arguments, effect.
-        pub const TABLE: &[CommandInfo] = &[
-            $(CommandInfo { code: CommandCode::$name, name: stringify!($name), arguments: $arguments, effect: $effect },)*
-        ];
+        pub const TABLE: &[CommandInfo] = &[$(CommandCode::$name.info(),)*];
 
         impl Command {
             /// Code of this command.
@@ -197,37 +224,61 @@ pub struct CommandInfo {
     pub code: CommandCode,
     /// Name.
     pub name: &'static str,
-    /// Arguments with units.
-    pub arguments: &'static str,
+    /// Arguments, each with its range.
+    pub arguments: &'static [Argument],
     /// What it does.
     pub effect: &'static str,
 }
 
+impl CommandInfo {
+    /// Its argument of this name.
+    #[must_use]
+    pub fn argument(&self, name: &str) -> Option<&'static Argument> {
+        self.arguments.iter().find(|argument| argument.name == name)
+    }
+
+    /// Writes the names of its arguments in code quotes, or `none`.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_names(&self, out: &mut dyn fmt::Write) -> fmt::Result {
+        let mut separator = "";
+        for argument in self.arguments {
+            write!(out, "{separator}`{}`", argument.name)?;
+            separator = ", ";
+        }
+        if self.arguments.is_empty() {
+            out.write_str("none")?;
+        }
+        Ok(())
+    }
+}
+
 commands! {
-    JointReference = 0x0101, "joint 1-6, stroke mm", "Reference of one joint; refused while layer 1 moves the robot.", Self::JointReference { .. } =>
-    TransmitPosition = 0x0102, "joint 1-6", "Asks one joint's board for its position.", Self::TransmitPosition { .. } =>
-    OpenAllValves = 0x0103, "joint 1-6", "Exhaust: inlets shut, outlets open. Layer 1 is stopped first.", Self::OpenAllValves { .. } =>
-    EmergencyBrake = 0x0104, "joint 1-6", "HOLD of one joint: all four valves shut. Layer 1 is stopped first.", Self::EmergencyBrake { .. } =>
-    SelectCorrection = 0x0105, "joint 1-6, PD or ID", "Fuzzy correction of one joint.", Self::SelectCorrection { .. } =>
-    BlowThrough = 0x0106, "joint 1-6", "Maintenance: all four valves open, supply blows through. Refused unless disarmed.", Self::BlowThrough { .. } =>
-    WheelReference = 0x0110, "travel mm", "Drives both wheels by a distance; refused while layer 1 moves the robot.", Self::WheelReference { .. } =>
-    WheelSpeed = 0x0111, "side, mm/s", "Highest speed of the wheel's own profile.", Self::WheelSpeed { .. } =>
-    WheelAcceleration = 0x0112, "side, mm/s^2", "Acceleration of the wheel's own profile.", Self::WheelAcceleration { .. } =>
-    WheelFilter = 0x0113, "side, A, B, K", "Coefficients of the wheel's lead filter.", Self::WheelFilter { .. } =>
-    Arm = 0x0120, "none", "Energises all axes where they stand; needs every node enumerated, compatible and free of faults, and supply pressure.", Self::Arm =>
-    Disarm = 0x0121, "none", "Valves and motors off.", Self::Disarm =>
-    ClearFault = 0x0122, "none", "Clears latched faults of all nodes and the E-stop of the master.", Self::ClearFault =>
-    EmergencyStop = 0x0123, "none", "E-stop bit in every SYNC from the next on: HOLD and supply dump. Never queued, never refused for lateness.", Self::EmergencyStop =>
-    Commission = 0x0124, "none", "Takes the boards as they are for the commissioned ones; refused unless disarmed and every board is identified.", Self::Commission =>
-    ReadParameter = 0x0130, "board 1-8, number", "Reads a parameter of a board.", Self::ReadParameter { .. } =>
-    WriteParameter = 0x0131, "board 1-8, number, raw value", "Sets a parameter of a board, which checks it against its limits.", Self::WriteParameter { .. } =>
-    SaveParameters = 0x0132, "board 1-8", "Stores a board's parameters in its memory; refused unless disarmed.", Self::SaveParameters { .. } =>
-    Stand = 0x0201, "none", "Slews all joints to the start pose of the gait.", Self::Stand =>
-    Hold = 0x0202, "none", "Freezes every joint at its measured stroke and stops the wheels.", Self::Hold =>
-    StartGait = 0x0203, "none", "Starts the gait from the start pose.", Self::StartGait =>
-    StopGait = 0x0204, "none", "Ends the gait with the step under way.", Self::StopGait =>
-    SetGait = 0x0205, "gait parameters", "Replaces the gait parameters; refused while a gait runs.", Self::SetGait(_) =>
-    FootTrajectory = 0x0206, "side, shape", "Moves one foot along a sinusoid through inverse kinematics.", Self::FootTrajectory { .. } =>
+    JointReference = 0x0101, [JOINT, STROKE], "Reference of one joint; refused while layer 1 moves the robot.", Self::JointReference { .. } =>
+    TransmitPosition = 0x0102, [JOINT], "Asks one joint's board for its position.", Self::TransmitPosition { .. } =>
+    OpenAllValves = 0x0103, [JOINT], "Exhaust: inlets shut, outlets open. Layer 1 is stopped first.", Self::OpenAllValves { .. } =>
+    EmergencyBrake = 0x0104, [JOINT], "HOLD of one joint: all four valves shut. Layer 1 is stopped first.", Self::EmergencyBrake { .. } =>
+    SelectCorrection = 0x0105, [JOINT, CORRECTION], "Fuzzy correction of one joint.", Self::SelectCorrection { .. } =>
+    BlowThrough = 0x0106, [JOINT], "Maintenance: all four valves open, supply blows through. Refused unless disarmed.", Self::BlowThrough { .. } =>
+    WheelReference = 0x0110, [TRAVEL], "Drives both wheels by a distance; refused while layer 1 moves the robot.", Self::WheelReference { .. } =>
+    WheelSpeed = 0x0111, [SIDE, SPEED], "Highest speed of the wheel's own profile.", Self::WheelSpeed { .. } =>
+    WheelAcceleration = 0x0112, [SIDE, ACCELERATION], "Acceleration of the wheel's own profile.", Self::WheelAcceleration { .. } =>
+    WheelFilter = 0x0113, [SIDE, ZERO, POLE, GAIN], "Coefficients of the wheel's lead filter.", Self::WheelFilter { .. } =>
+    Arm = 0x0120, [], "Energises all axes where they stand; needs every node enumerated, compatible and free of faults, and supply pressure.", Self::Arm =>
+    Disarm = 0x0121, [], "Valves and motors off.", Self::Disarm =>
+    ClearFault = 0x0122, [], "Clears latched faults of all nodes and the E-stop of the master.", Self::ClearFault =>
+    EmergencyStop = 0x0123, [], "E-stop bit in every SYNC from the next on: HOLD and supply dump. Never queued, never refused for lateness.", Self::EmergencyStop =>
+    Commission = 0x0124, [], "Takes the boards as they are for the commissioned ones; refused unless disarmed and every board is identified.", Self::Commission =>
+    ReadParameter = 0x0130, [BOARD, PARAMETER], "Reads a parameter of a board.", Self::ReadParameter { .. } =>
+    WriteParameter = 0x0131, [BOARD, PARAMETER, VALUE], "Sets a parameter of a board, which checks it against its limits.", Self::WriteParameter { .. } =>
+    SaveParameters = 0x0132, [BOARD], "Stores a board's parameters in its memory; refused unless disarmed.", Self::SaveParameters { .. } =>
+    Stand = 0x0201, [], "Slews all joints to the start pose of the gait.", Self::Stand =>
+    Hold = 0x0202, [], "Freezes every joint at its measured stroke and stops the wheels.", Self::Hold =>
+    StartGait = 0x0203, [], "Starts the gait from the start pose.", Self::StartGait =>
+    StopGait = 0x0204, [], "Ends the gait with the step under way.", Self::StopGait =>
+    SetGait = 0x0205, [STEPS, PERIOD, LIFT, REACH, LOWER, PUSH, STEP_STROKE, HELD_LEG_S5, HELD_LEG_S6, YAW_S2, PUSH_SPEED, PUSH_ACCELERATION, PATTERN, STEPPING_LEG, TOUCHDOWN_REFLEX], "Replaces the gait parameters; refused while a gait runs.", Self::SetGait(_) =>
+    FootTrajectory = 0x0206, [LEG, FORWARD, LEFT, HEIGHT, RATE], "Moves one foot along a sinusoid through inverse kinematics.", Self::FootTrajectory { .. } =>
 }
 
 impl CommandCode {
@@ -239,6 +290,19 @@ impl CommandCode {
             // Excluded by the assertion below.
             None => Layer::Zero,
         }
+    }
+
+    /// Name of the command.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.info().name
+    }
+
+    /// The command of this name.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        let row = TABLE.iter().find(|row| row.name == name);
+        row.map(|row| row.code)
     }
 }
 
@@ -254,24 +318,3 @@ const _: () = {
         table = rest;
     }
 };
-
-/// Writes the table of commands as Markdown (the generated part of `COMMANDS.md`).
-///
-/// # Errors
-/// Those of the writer.
-pub fn write_markdown(out: &mut dyn fmt::Write) -> fmt::Result {
-    writeln!(out, "| code | layer | command | arguments | effect |")?;
-    writeln!(out, "|---|---|---|---|---|")?;
-    for row in TABLE {
-        let layer = match row.code.layer() {
-            Layer::Zero => 0,
-            Layer::One => 1,
-        };
-        writeln!(
-            out,
-            "| 0x{:04X} | {layer} | {} | {} | {} |",
-            row.code as u16, row.name, row.arguments, row.effect
-        )?;
-    }
-    Ok(())
-}

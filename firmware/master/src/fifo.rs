@@ -95,8 +95,6 @@ pub const POLICIES: [FifoPolicy; 5] = [
 /// Losses of the queues that drop instead of refusing. Counters wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FifoLosses {
-    /// Set-point sets that layer 1 produced and layer 0 did not take.
-    pub setpoints: u32,
     /// Feedback sets that layer 1 did not take.
     pub feedback: u32,
     /// Telemetry records that layer 2 did not take.

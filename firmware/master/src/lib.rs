@@ -16,6 +16,7 @@
     )
 )]
 
+pub mod argument;
 pub mod command;
 pub mod config;
 pub mod contact;

@@ -93,7 +93,7 @@ impl BusPort {
         };
         let replaced = self.slot_reply.is_some();
         self.unsent = self.unsent.saturating_add(u32::from(replaced));
-        encode(&mut self.slot_reply, message, envelope, start_at);
+        encode(&mut self.slot_reply, message, envelope, start_at, true);
     }
 
     /// Queues the answer to a request; the bus has one requester, so an unsent
@@ -102,7 +102,7 @@ impl BusPort {
         let replaced = self.answer.is_some();
         self.unsent = self.unsent.saturating_add(u32::from(replaced));
         let envelope = request.reply(self.address);
-        encode(&mut self.answer, message, envelope, start_at);
+        encode(&mut self.answer, message, envelope, start_at, false);
     }
 
     /// The next frame to send: an answer before a slot reply, because it is due
@@ -121,6 +121,11 @@ impl BusPort {
         self.answer.take().or_else(|| self.slot_reply.take())
     }
 
+    /// A frame was taken and not sent, because its time had passed.
+    pub(crate) fn missed(&mut self) {
+        self.unsent = self.unsent.saturating_add(1);
+    }
+
     /// Own address.
     pub const fn address(&self) -> Address {
         self.address
@@ -131,7 +136,7 @@ impl BusPort {
         self.decoder.quality()
     }
 
-    /// Frames that were replaced before the board took them.
+    /// Frames that were replaced before the board took them, or taken too late to be sent.
     pub const fn unsent(&self) -> u32 {
         self.unsent
     }
@@ -143,9 +148,13 @@ fn encode(
     message: &Message,
     envelope: Envelope,
     start_at: Micros,
+    in_slot: bool,
 ) {
-    let bytes = Vec::new();
-    let transmission = place.insert(Transmission { start_at, bytes });
+    let transmission = place.insert(Transmission {
+        start_at,
+        in_slot,
+        bytes: Vec::new(),
+    });
     let bytes = &mut transmission.bytes;
     let room = bytes.resize_default(MAX_ENCODED);
     match (

@@ -113,7 +113,7 @@ impl AxisConfig {
         if let Some(top) = &top {
             r.reject_unknown(top, &[&OWN[..], &pneumatics::SECTIONS].concat());
         }
-        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let name = top.as_ref().and_then(|t| r.name(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let axis = read(&mut r);
         let config = (|| {

@@ -6,6 +6,12 @@ use std::sync::Arc;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
+/// Line of a byte of a file, from 1.
+pub(crate) fn line_of(text: &str, at: usize) -> usize {
+    let before = &text.as_bytes()[..at.min(text.len())];
+    before.iter().filter(|b| **b == b'\n').count() + 1
+}
+
 /// One thing that is wrong at one place of a file.
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -28,12 +34,7 @@ impl Problem {
         label: impl Into<String>,
         help: Option<String>,
     ) -> Self {
-        let start = span.start.min(text.len());
-        let line = text.as_bytes()[..start]
-            .iter()
-            .filter(|b| **b == b'\n')
-            .count()
-            + 1;
+        let line = line_of(text, span.start);
         Self {
             source: Some(NamedSource::new(file, text.clone()).with_language("TOML")),
             file: file.to_owned(),

@@ -31,24 +31,3 @@ pub use scenario::{
     EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet,
 };
 pub use suggest::closest;
-
-/// Commands that a scenario can give, by the names of the master's table.
-pub const COMMAND_NAMES: [&str; 17] = [
-    "JointReference",
-    "TransmitPosition",
-    "OpenAllValves",
-    "EmergencyBrake",
-    "WheelReference",
-    "Arm",
-    "Disarm",
-    "ClearFault",
-    "EmergencyStop",
-    "Stand",
-    "Hold",
-    "StartGait",
-    "StopGait",
-    "Commission",
-    "ReadParameter",
-    "WriteParameter",
-    "SaveParameters",
-];

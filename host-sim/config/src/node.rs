@@ -4,7 +4,6 @@ use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Address;
 use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
-use super::command::ParameterChoice;
 use super::params::ParameterInfo;
 use super::quantity::{pretty, suffix};
 use super::reader::{Entry, Reader, range};
@@ -17,6 +16,16 @@ pub struct NodeParams {
     pub joints: [Vec<(u16, i32)>; 6],
     /// Per wheel 7, 8.
     pub wheels: [Vec<(u16, i32)>; 2],
+}
+
+impl NodeParams {
+    /// Parameters of the board at an address; none for an address that is no node's.
+    #[must_use]
+    pub fn of(&self, address: Address) -> &[(u16, i32)] {
+        let mut boards = self.joints.iter().chain(&self.wheels);
+        let of = address.slot().and_then(|slot| boards.nth(slot));
+        of.map_or(&[], Vec::as_slice)
+    }
 }
 
 /// Names of the sections, and the joints (index from 0) that each sets. Later
@@ -114,31 +123,43 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
     }
 }
 
-/// Reads `parameter`, by its name in the table of `board`, and `value`, a number in
-/// the parameter's unit.
-pub(super) fn choice(r: &mut Reader, entry: &Entry, board: Option<u8>) -> Option<ParameterChoice> {
-    entry.get("parameter")?;
-    let table = params_at(board.unwrap_or(1)).iter();
+/// The board that an event names, if there is one of this number.
+fn board(entry: &Entry) -> Option<u8> {
+    let number = entry.get("board")?.1.as_integer()?;
+    let address = Address::new(u8::try_from(number).ok()?)?;
+    address.is_node().then_some(address.raw())
+}
+
+/// Reads `parameter`, by its name in the table of the entry's `board`; nothing where there is
+/// no such board, which is a problem of its own.
+pub(super) fn parameter(r: &mut Reader, entry: &Entry) -> Option<&'static ParamInfo> {
+    let table = params_at(board(entry)?).iter();
     let names: Vec<(&str, &'static ParamInfo)> = table.map(|p| (p.name, p)).collect();
-    let info = r.choice(entry, "parameter", &names)?;
-    let raw = entry.get("value").and_then(|(span, item)| {
-        let value = item.as_float().or(item.as_integer().map(|n| n as f64));
-        let Some(value) = value.filter(|v| v.is_finite()) else {
-            let scale = scale(info.format);
-            let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
-            let message = format!(
-                "`{}` = {} must be a number from {}",
-                entry.field_path("value"),
-                item.to_string().trim(),
-                range(min, max, info.unit)
-            );
-            r.problem(Some(span), message, "not a number", None);
-            return None;
-        };
-        // What is beyond its limits is refused by the board, which is there to do it.
-        Some(raw_of(info, value))
-    });
-    Some(ParameterChoice { id: info.id, raw })
+    r.choice(entry, "parameter", &names)
+}
+
+/// Reads `value`, a number in the unit of the entry's `parameter`, as the raw number of its
+/// format. What is beyond its limits is refused by the board, which is there to do it.
+pub(super) fn value(r: &mut Reader, entry: &Entry) -> Option<i32> {
+    let name = entry.get("parameter")?.1;
+    let info = params_at(board(entry)?)
+        .iter()
+        .find(|p| name.as_str() == Some(p.name))?;
+    let (span, item) = entry.get("value")?;
+    let value = item.as_float().or(item.as_integer().map(|n| n as f64));
+    let Some(value) = value.filter(|v| v.is_finite()) else {
+        let scale = scale(info.format);
+        let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+        let message = format!(
+            "`{}` = {} must be a number from {}",
+            entry.field_path("value"),
+            item.to_string().trim(),
+            range(min, max, info.unit)
+        );
+        r.problem(Some(span), message, "not a number", None);
+        return None;
+    };
+    Some(raw_of(info, value))
 }
 
 /// A value in the parameter's unit as the raw number of its format.

@@ -1,16 +1,31 @@
 //! A robot: everything about the machine that a run needs, in SI units.
 
+use fixed::types::I16F16;
+use wheeleg_master::argument;
 use wheeleg_master::config::UniqueId;
+use wheeleg_master::contact::Side;
+use wheeleg_master::layer1::params::{GaitParams as MasterGait, Pattern};
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::dynamics::floating::FloatingParams;
 use wheeleg_protocol::link::{BAUD, CYCLE_US};
+use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::command::bounds;
 use super::commissioned;
 use super::error::ConfigError;
 use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
 use super::plant;
 use super::reader::Reader;
+
+// Ranges of the gait are those of the master, SI.
+const STEPS: [f64; 2] = bounds(&argument::STEPS);
+const PERIOD: [f64; 2] = bounds(&argument::PERIOD);
+const INSTANT: [f64; 2] = bounds(&argument::PUSH);
+const STEP_STROKE: [f64; 2] = bounds(&argument::STEP_STROKE);
+const STROKE: [f64; 2] = bounds(&argument::HELD_LEG_S5);
+const PUSH_SPEED: [f64; 2] = bounds(&argument::PUSH_SPEED);
+const PUSH_ACCELERATION: [f64; 2] = bounds(&argument::PUSH_ACCELERATION);
 
 params! {
     /// Serial bus. The reply slots of the boards are built for one rate and one cycle.
@@ -44,29 +59,29 @@ params! {
     /// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
     GaitParams {
         /// Number of steps.
-        steps: u16, "steps", Count, 1.0, 10_000.0;
+        steps: u16, "steps", Count, STEPS[0], STEPS[1];
         /// Duration of one step.
-        period_s: f64, "period", Time, 0.5, 60.0;
+        period_s: f64, "period", Time, PERIOD[0], PERIOD[1];
         /// Start of the lift: the reference of b6 jumps to 0.
-        lift_s: f64, "lift", Time, 0.0, 60.0;
+        lift_s: f64, "lift", Time, INSTANT[0], INSTANT[1];
         /// Start of the reach: the reference of b5 jumps to the full stroke.
-        reach_s: f64, "reach", Time, 0.0, 60.0;
+        reach_s: f64, "reach", Time, INSTANT[0], INSTANT[1];
         /// Start of the lowering: the reference of b6 jumps to the full stroke.
-        lower_s: f64, "lower", Time, 0.0, 60.0;
+        lower_s: f64, "lower", Time, INSTANT[0], INSTANT[1];
         /// Start of the push: the wheels drive, b5 gives way.
-        push_s: f64, "push", Time, 0.0, 60.0;
+        push_s: f64, "push", Time, INSTANT[0], INSTANT[1];
         /// Stroke of b5 and b6 used by a step.
-        stroke_m: f64, "stroke", Length, 1e-3, 0.18;
+        stroke_m: f64, "stroke", Length, STEP_STROKE[0], STEP_STROKE[1];
         /// Stroke of b5 at which the held leg stands.
-        held_leg_s5_m: f64, "held_leg_s5", Length, 0.0, 0.18;
+        held_leg_s5_m: f64, "held_leg_s5", Length, STROKE[0], STROKE[1];
         /// Stroke of b6 at which the held leg stands.
-        held_leg_s6_m: f64, "held_leg_s6", Length, 0.0, 0.18;
+        held_leg_s6_m: f64, "held_leg_s6", Length, STROKE[0], STROKE[1];
         /// Stroke of both yaw cylinders; half is straight ahead.
-        yaw_s2_m: f64, "yaw_s2", Length, 0.0, 0.18;
+        yaw_s2_m: f64, "yaw_s2", Length, STROKE[0], STROKE[1];
         /// Speed of the push.
-        push_speed_m_s: f64, "push_speed", Velocity, 1e-3, 0.4;
+        push_speed_m_s: f64, "push_speed", Velocity, PUSH_SPEED[0], PUSH_SPEED[1];
         /// Acceleration of the push.
-        push_acceleration_m_s2: f64, "push_acceleration", Acceleration, 0.01, 5.0;
+        push_acceleration_m_s2: f64, "push_acceleration", Acceleration, PUSH_ACCELERATION[0], PUSH_ACCELERATION[1];
         /// Stop the lowering of a foot where its switches close.
         touchdown_reflex: bool, "touchdown_reflex", Flag, 0.0, 1.0;
     }
@@ -97,6 +112,8 @@ params! {
         slide_mass_kg: f64, "slide_mass", Mass, 0.0, 100.0;
         /// Distance of the drawn-back foot ahead of the axle.
         load_arm_m: f64, "load_arm", Length, 0.01, 5.0;
+        /// Sampling of the positions from which the paper's velocities and accelerations are computed.
+        sample_period_s: f64, "sample_period", Time, 0.01, 0.2;
     }
 
     /// What only the robot with a floating chassis and its drawing need.
@@ -113,6 +130,59 @@ params! {
         chassis_size_m: [f64; 3], "chassis_size", Length, 0.01, 5.0;
         /// Width of a wheel. For the drawing.
         wheel_width_m: f64, "wheel_width", Length, 1e-3, 1.0;
+    }
+}
+
+impl GaitParams {
+    /// The same in the master's units.
+    #[must_use]
+    pub fn of_master(&self, pattern: Pattern) -> MasterGait {
+        let millimetres = |m: f64| PositionMm::from_f64(m * 1e3);
+        let microseconds = |s: f64| (s * 1e6).round() as u32;
+        MasterGait {
+            steps: self.steps,
+            period_us: microseconds(self.period_s),
+            lift_us: microseconds(self.lift_s),
+            reach_us: microseconds(self.reach_s),
+            lower_us: microseconds(self.lower_s),
+            push_us: microseconds(self.push_s),
+            stroke_mm: millimetres(self.stroke_m),
+            held_leg_s5_mm: millimetres(self.held_leg_s5_m),
+            held_leg_s6_mm: millimetres(self.held_leg_s6_m),
+            yaw_s2_mm: millimetres(self.yaw_s2_m),
+            push_speed_mm_s: VelocityMmS::from_f64(self.push_speed_m_s * 1e3),
+            push_acceleration_mm_s2: I16F16::from_num(self.push_acceleration_m_s2 * 1e3),
+            pattern,
+            touchdown_reflex: self.touchdown_reflex,
+        }
+    }
+}
+
+/// What the master refuses of a gait though every value is within its own range: an order of
+/// instants, or a push that does not end within its step.
+fn relations(r: &mut Reader, gait: &GaitParams) {
+    let Some(entry) = r.table("gait") else { return };
+    // The longest push; which leg steps does not matter.
+    let pattern = Pattern::Single(Side::Left);
+    for error in gait.of_master(pattern).violations() {
+        let names: Vec<&str> = error.arguments().map(|argument| argument.name).collect();
+        let fields: Vec<String> = names.iter().map(|name| format!("`gait.{name}`")).collect();
+        let span = names
+            .first()
+            .and_then(|name| entry.get(name))
+            .map(|(key, _)| key);
+        let mut places = Vec::new();
+        for name in names.iter().skip(1) {
+            if let Some((key, _)) = entry.get(name) {
+                places.push(format!("`{name}` in line {}", r.line_of(&key)));
+            }
+        }
+        r.problem(
+            span,
+            format!("{} contradict each other: {error}", fields.join(", ")),
+            "not with the others",
+            Some(format!("change this, or {}", places.join(", "))),
+        );
     }
 }
 
@@ -172,12 +242,15 @@ impl RobotConfig {
             known.extend(plant::pneumatics::SECTIONS);
             r.reject_unknown(top, &known);
         }
-        let name = top.as_ref().and_then(|t| r.text(t, "name"));
+        let name = top.as_ref().and_then(|t| r.name(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let bus = r.section::<BusParams>("bus");
         let homing = r.section::<HomingParams>("homing");
         let start_up = r.section::<StartUpParams>("start_up");
         let gait = r.section::<GaitParams>("gait");
+        if let Some(gait) = &gait {
+            relations(&mut r, gait);
+        }
         let reference = r.section::<ReferenceParams>("reference");
         let plant = plant::read(&mut r);
         let spatial = r.section::<SpatialParams>("spatial");

@@ -1,8 +1,9 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
+use wheeleg_master::argument;
 use wheeleg_master::command::Command;
 
-use super::command::{Arguments, command};
+use super::command;
 use super::error::ConfigError;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
@@ -189,7 +190,7 @@ impl Scenario {
 fn read(r: &mut Reader) -> Option<Scenario> {
     let top = r.table("")?;
     r.reject_unknown(&top, &TOP);
-    let name = r.text(&top, "name");
+    let name = r.name(&top, "name");
     let description = r.text(&top, "description");
     let robot = r.text(&top, "robot");
     let duration = required(
@@ -259,23 +260,15 @@ fn required(r: &mut Reader, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
         } else {
             format!("in [{}]", entry.path)
         };
-        let unit = spec.dimension.units()[0].0;
+        let example = r.example(spec.key, spec.dimension);
         r.problem(
             Some(entry.span.clone()),
             format!("`{}` is missing {place}", spec.key),
             "expected here",
-            Some(format!(
-                "write `{} = {{ value = …, unit = \"{unit}\" }}`",
-                spec.key
-            )),
+            Some(example),
         );
         return None;
     }
-    optional(r, entry, spec)
-}
-
-fn optional(r: &mut Reader, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
-    entry.get(spec.key)?;
     r.quantity(entry, spec).and_then(|v| v.first().copied())
 }
 
@@ -318,21 +311,13 @@ fn motion(r: &mut Reader) -> Option<Motion> {
             let known = ["kind", "leg", "length", "height", "rate"];
             r.reject_misplaced(&entry, &known, &TOP);
             let leg = r.choice(&entry, "leg", &LEGS);
-            let length = scalar(
-                "length",
-                Dimension::Length,
-                0.0,
-                0.25,
-                "forward travel of the foot",
-            );
-            let height = scalar("height", Dimension::Length, 0.0, 0.2, "height of the arch");
-            let rate = scalar(
-                "rate",
-                Dimension::AngularVelocity,
-                0.01,
-                10.0,
-                "rate of the sine's argument",
-            );
+            // The master's own ranges, under the names of this section.
+            let length = FieldSpec {
+                key: "length",
+                ..command::spec(&argument::FORWARD)
+            };
+            let height = command::spec(&argument::HEIGHT);
+            let rate = command::spec(&argument::RATE);
             let length = required(r, &entry, &length);
             let height = required(r, &entry, &height);
             let rate = required(r, &entry, &rate);
@@ -363,7 +348,6 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         latest,
         "time of the event, within the duration of the scenario",
     );
-    let before = r.problem_count();
     let at_s = required(r, entry, &at);
     let actions = [
         ("kill-master", ActionKind::KillMaster),
@@ -373,69 +357,7 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
     ];
     let kind = r.choice(entry, "action", &actions)?;
     let action = if matches!(kind, ActionKind::Command) {
-        r.reject_misplaced(
-            entry,
-            &[
-                "at",
-                "action",
-                "command",
-                "joint",
-                "stroke",
-                "travel",
-                "board",
-                "parameter",
-                "value",
-            ],
-            &TOP,
-        );
-        let commands: Vec<(&str, &str)> = super::COMMAND_NAMES.iter().map(|n| (*n, *n)).collect();
-        let name = r.choice(entry, "command", &commands);
-        let joint = r.whole(entry, "joint", 1..=6);
-        let stroke = scalar(
-            "stroke",
-            Dimension::Length,
-            0.0,
-            0.18,
-            "stroke of the joint",
-        );
-        let travel = scalar(
-            "travel",
-            Dimension::Length,
-            -32.0,
-            32.0,
-            "travel of the wheels",
-        );
-        let stroke_m = optional(r, entry, &stroke);
-        let travel_m = optional(r, entry, &travel);
-        let board = r.whole(entry, "board", 1..=8);
-        let board = board.map(|number| number as u8);
-        let parameter = super::node::choice(r, entry, board);
-        let given = Arguments {
-            joint: joint.map(|j| j as u8),
-            stroke_m,
-            travel_m,
-            board,
-            parameter,
-        };
-        let name = name?;
-        match command(name, &given) {
-            Ok(command) => EventAction::Command(command),
-            Err(missing) => {
-                // Of a field that is there and wrong, the reader has said what is wrong.
-                if r.problem_count() == before {
-                    r.problem(
-                        Some(entry.span.clone()),
-                        format!(
-                            "`{}`: the command {name} of the scenario needs `{missing}`",
-                            entry.path
-                        ),
-                        "in this event",
-                        Some(format!("add `{missing}` to the event")),
-                    );
-                }
-                return None;
-            }
-        }
+        EventAction::Command(command::read(r, entry, &TOP)?)
     } else {
         r.reject_misplaced(entry, &["at", "action"], &TOP);
         match kind {

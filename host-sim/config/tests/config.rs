@@ -1,6 +1,6 @@
 //! Robot and scenario files: what is wrong with them is said where it is wrong.
 
-use wheeleg_config::{ConfigError, RobotConfig, Scenario, builtin};
+use wheeleg_config::{AxisConfig, ConfigError, RobotConfig, Scenario, builtin};
 use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
@@ -460,48 +460,6 @@ fn scenario_mistakes() {
         &["`events[0].value` = nan must be a number from 0 to 4 1/mm"],
     );
 
-    // Joints and boards count from 1: nothing may be left to be refused in the run.
-    for (line, allowed) in [
-        (
-            "joint = 0",
-            "`events[0].joint` = 0 must be a whole number from 1 to 6",
-        ),
-        (
-            "joint = 9",
-            "`events[0].joint` = 9 must be a whole number from 1 to 6",
-        ),
-        (
-            "board = 0",
-            "`events[0].board` = 0 must be a whole number from 1 to 8",
-        ),
-        (
-            "board = 9",
-            "`events[0].board` = 9 must be a whole number from 1 to 8",
-        ),
-    ] {
-        let event = format!(
-            "targets = \"none\"\n[[events]]\nat = {{ value = 1.0, unit = \"s\" }}\n\
-             action = \"command\"\ncommand = \"TransmitPosition\"\n{line}\n"
-        );
-        let text = scenario_with("targets = \"three-step\"\n", &event);
-        assert_all(&text, &["my.toml:", allowed]);
-        assert_eq!(text.lines().count(), 1, "{text}");
-    }
-
-    let bare = "\n[[events]]\nat = { value = 1.0, unit = \"s\" }\naction = \"command\"\n\
-                command = \"JointReference\"\njoint = 1\n";
-    let error = Scenario::parse("my.toml", &(SCENARIO.to_owned() + bare)).expect_err("no stroke");
-    let line = SCENARIO.lines().count() + 2;
-    assert_all(
-        &report(&error),
-        &[
-            &format!("my.toml:{line}: `events[0]`: "),
-            "JointReference",
-            "needs `stroke`",
-            "add `stroke` to the event",
-        ],
-    );
-
     let late = "targets = \"none\"\nfaults = [\"master-silent@3s\", \"pot-open:joint3@12s\"]\n";
     let text = scenario_with("targets = \"three-step\"\n", late);
     assert_all(
@@ -557,4 +515,97 @@ fn unknown_names_and_missing_files() {
         &report(&error),
         &["no/such/robot.toml", "cannot read the robot file"],
     );
+}
+
+/// Relations between the times of a gait are answered like single fields.
+#[test]
+fn gait_times_that_contradict_each_other() {
+    let told = |changes: &[(&str, &str)]| {
+        let mut text = ROBOT.to_owned();
+        for (from, to) in changes {
+            assert_eq!(text.matches(from).count(), 1, "{from} must occur once");
+            text = text.replace(from, to);
+        }
+        let error = RobotConfig::parse("my.toml", &text).expect_err("must be rejected");
+        report(&error)
+    };
+    let line = |field: &str| {
+        let line = line_of(field);
+        line.trim_start_matches("my.toml:")
+            .trim_end_matches(':')
+            .to_owned()
+    };
+    let (period, push) = ("period            = {", "push              = {");
+    let gait = &ROBOT[ROBOT.find(period).expect("present")..];
+    let value = &gait[..gait.find(',').expect("present")];
+    let text = told(&[(value, "period            = { value = 1.0")]);
+    assert_all(
+        &text,
+        &[
+            &line_of(period),
+            "`gait.period`, `gait.push` contradict each other: `push` is 2 s and must be less than \
+             `period`, which is 1 s; allowed: lift before reach",
+            &format!("change this, or `push` in line {}", line(push)),
+        ],
+    );
+    assert_eq!(text.lines().count(), 1, "{text}");
+    let speed = "push_speed        = { value = 0.18";
+    let text = told(&[(speed, "push_speed        = { value = 0.1")]);
+    assert_all(
+        &text,
+        &[
+            &line_of(period),
+            "`gait.period`, `gait.push`, `gait.stroke`, `gait.push_speed`, `gait.push_acceleration`",
+            "the push takes 1.96666",
+            &format!("`push_speed` in line {}", line(speed)),
+        ],
+    );
+    // All that is wrong at once.
+    let text = told(&[
+        (
+            "lift              = { value = 0.0",
+            "lift              = { value = 0.5",
+        ),
+        (
+            "lower             = { value = 1.0",
+            "lower             = { value = 2.0",
+        ),
+    ]);
+    assert_all(
+        &text,
+        &["`gait.reach`, `gait.lift`", "`gait.push`, `gait.lower`"],
+    );
+    assert_eq!(text.lines().count(), 2, "{text}");
+}
+
+/// Names become folders and files, and stand in files that are written.
+#[test]
+fn a_name_is_one_part_of_a_path_and_no_way_out_of_its_folder() {
+    const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
+    let named = |text: &str, name: &str| {
+        let line = text.lines().find(|line| line.starts_with("name "));
+        text.replacen(line.expect("a name"), &format!("name = {name:?}"), 1)
+    };
+    let long = "x".repeat(300);
+    for bad in [
+        "", ".", "..", "../../x", "a/b", "a\\b", ".x", "a b", "ä", "a\nb", &long,
+    ] {
+        let said = [
+            report(&RobotConfig::parse("my.toml", &named(ROBOT, bad)).expect_err(bad)),
+            report(&Scenario::parse("my.toml", &named(SCENARIO, bad)).expect_err(bad)),
+            report(&AxisConfig::parse("my.toml", &named(AXIS, bad)).expect_err(bad)),
+        ];
+        for said in said {
+            assert_all(
+                &said,
+                &["my.toml:", "`name` = ", "1 to 64", "not beginning"],
+            );
+            assert!(said.len() < 500, "{said}");
+        }
+    }
+    let longest = "x".repeat(64);
+    for good in ["a", "My_axis-2.b", "0", "-", &longest] {
+        let scenario = Scenario::parse("my.toml", &named(SCENARIO, good)).expect(good);
+        assert_eq!(scenario.name, good);
+    }
 }

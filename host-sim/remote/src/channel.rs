@@ -1,5 +1,6 @@
 //! What is compared between a board outside and the application in this process.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 macro_rules! channels {
@@ -94,7 +95,7 @@ impl Counts {
 }
 
 /// One channel, for summary and report.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ChannelFigures {
     /// [`Channel::name`].
     pub channel: &'static str,

@@ -1,5 +1,6 @@
 //! Figures of the boards outside, for summary and report.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_remote_link::{Figures, Hello};
 
@@ -7,7 +8,7 @@ use super::channel::{ChannelFigures, Count};
 use wheeleg_protocol::NODE_NAMES;
 
 /// Figures of one board.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct BoardFigures {
     /// `joint1` … `wheel8`.
     pub node: String,
@@ -96,7 +97,7 @@ impl BoardFigures {
 }
 
 /// What a run with boards outside adds to the summary.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct PilSummary {
     /// Where each node ran, addresses 1 to 8.
     pub nodes: Vec<String>,

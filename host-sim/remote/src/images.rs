@@ -9,7 +9,7 @@ use wheeleg_remote_link::image::{Digest, Identity, Kind, identify};
 use super::choice::{NodeKind, Nodes};
 use super::unicorn::{self, IMAGES_VARIABLE};
 use crate::RemoteError;
-use crate::interface::{Side, first_difference};
+use wheeleg_interface::{Side, first_difference};
 
 /// Sources that the images would have if they were built from what this program was.
 const SOURCES_G431: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources-g431"));

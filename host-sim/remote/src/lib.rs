@@ -1,7 +1,7 @@
 //! Boards elsewhere: the flashed images on an emulated STM32G431 ([`unicorn`]), the same
 //! applications on QEMU ([`qemu`]), or on a bench board behind a serial port ([`serial`]).
 //! Every board elsewhere has a native twin beside it, with which it is compared at every tick
-//! and frame. [`interface`] says in what two bus interfaces differ.
+//! and frame.
 
 mod channel;
 pub mod choice;
@@ -10,7 +10,6 @@ mod cores;
 mod error;
 mod figures;
 mod images;
-pub mod interface;
 mod line;
 mod outside;
 mod partner;

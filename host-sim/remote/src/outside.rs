@@ -64,6 +64,8 @@ struct Board {
 
 /// All boards outside.
 pub struct Outside {
+    /// Where each node runs.
+    nodes: Nodes,
     lines: Vec<Box<dyn Line>>,
     boards: Vec<Board>,
     /// Board of each address from 1, as an index.
@@ -103,6 +105,7 @@ impl Outside {
             return Ok(None);
         }
         let mut outside = Self {
+            nodes: nodes.clone(),
             lines: Vec::new(),
             boards: Vec::new(),
             by_address: [None; 8],
@@ -512,7 +515,7 @@ impl Outside {
     }
 
     /// Comparison and figures, at the end of a run.
-    pub fn summary(&mut self, nodes: &Nodes, now_ns: u64) -> PilSummary {
+    pub fn summary(&mut self, now_ns: u64) -> PilSummary {
         self.finish(now_ns);
         let compared = &mut self.comparison;
         let mut figures = |b: &Board| {
@@ -529,7 +532,7 @@ impl Outside {
         let boards = in_order.map(|n| figures(&self.boards[*n])).collect();
         let total = self.comparison.total();
         PilSummary {
-            nodes: nodes.0.iter().map(ToString::to_string).collect(),
+            nodes: self.nodes.0.iter().map(ToString::to_string).collect(),
             compared_bits: total.bits,
             differing_bits: total.differing,
             channels: self.comparison.by_channel().figures(),

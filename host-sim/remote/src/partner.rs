@@ -204,8 +204,8 @@ pub(super) fn unexpected(name: &str, reply: &Reply) -> RemoteError {
             ),
             "what was logged up to here is complete",
         ),
-        other => (
-            format!("answers out of turn: {other:?}"),
+        Reply::Hello(_) | Reply::Done | Reply::Ran(_) | Reply::Nonvolatile(_) => (
+            "answers out of turn, as to another request".to_owned(),
             "build image and program from the same sources: cargo xtask pil --build",
         ),
     };

@@ -23,6 +23,21 @@ pub enum ReportError {
         reason: std::io::Error,
     },
 
+    /// Another run writes into the folder.
+    #[error("the folder `{}` is in use: `{}` is held by {holder}", folder.display(), lock.display())]
+    #[diagnostic(
+        code(wheeleg::output),
+        help("wait until that run is done, or choose another folder with --out DIR")
+    )]
+    InUse {
+        /// The folder.
+        folder: PathBuf,
+        /// Its lock file.
+        lock: PathBuf,
+        /// What the lock file says of who holds it.
+        holder: String,
+    },
+
     /// Drawing a figure failed.
     #[error("cannot draw {figure}: {reason}")]
     #[diagnostic(

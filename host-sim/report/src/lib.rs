@@ -1,10 +1,11 @@
 //! What every result page is made of: charts ([`plot`]), the page's frame, tables beside the
-//! pictures, and the folder that they go to ([`output`]).
+//! pictures, the folder that they go to ([`output`]), and statistics ([`stats`]).
 
 mod error;
 pub mod output;
 mod page;
 pub mod plot;
+pub mod stats;
 mod table;
 
 use std::path::{Path, PathBuf};

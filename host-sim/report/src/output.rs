@@ -3,20 +3,29 @@
 //! New results never mix with old ones: what stands where they go is set aside
 //! in `previous`, or `previous-2` and so on where that is taken. Nothing is
 //! deleted, and files with other names stay untouched.
+//!
+//! A run holds its folder ([`Folder`]) until it is done, so that a second run at the same
+//! time cannot move the results of the first from under it. The lock is the operating
+//! system's, on the file `.lock`: it ends with the process, however that ends.
 
+use std::fs::{File, OpenOptions};
+use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::ReportError;
 
 /// Everything that a run writes.
-const RESULTS: [&str; 6] = [
+const RESULTS: [&str; 7] = [
     "log.mcap",
     "summary.json",
     "report.html",
+    "node-parameters.toml",
     "csv",
     "figures",
     NATIVE,
 ];
+/// The file that a run holds while it writes into a folder.
+const LOCK: &str = ".lock";
 /// Folder below of the native run that a run was compared with (`--compare-sil`).
 pub const NATIVE: &str = "sil";
 /// Where the results of the run before stay.
@@ -32,13 +41,103 @@ fn free_place(folder: &Path) -> PathBuf {
         .unwrap_or_else(|| folder.join(PREVIOUS))
 }
 
-/// Creates the folder, or sets aside the results in it.
-///
-/// # Errors
-/// [`ReportError::Output`] if a folder cannot be created or a result not moved.
-pub fn prepare(folder: &Path) -> Result<(), ReportError> {
-    std::fs::create_dir_all(folder)
-        .map_err(|e| ReportError::output("create the folder", folder, e))?;
+/// The folder of the results of a run that is under way. Nobody else gets it until this is
+/// dropped.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    /// Locked while it is open. The file stays: to remove it would take the lock from under
+    /// a run that has just opened it.
+    _lock: File,
+}
+
+impl Folder {
+    /// Creates the folder, or sets aside the results in it, and holds it.
+    ///
+    /// # Errors
+    /// [`ReportError::InUse`] if another run holds it, [`ReportError::Output`] if a folder or
+    /// its lock cannot be created or a result not moved.
+    pub fn prepare(path: &Path) -> Result<Self, ReportError> {
+        std::fs::create_dir_all(path)
+            .map_err(|e| ReportError::output("create the folder", path, e))?;
+        let lock = lock(&path.join(LOCK))?;
+        set_aside(path)?;
+        Ok(Self {
+            path: path.to_owned(),
+            _lock: lock,
+        })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// Opens the lock file and locks it; who holds it stands in it, for the message to others.
+fn lock(path: &Path) -> Result<File, ReportError> {
+    let failed = |e: std::io::Error| ReportError::output("lock", path, e);
+    let mut file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .read(true)
+        .write(true)
+        .open(path)
+        .map_err(failed)?;
+    match take(&file) {
+        Ok(true) => {}
+        Ok(false) => {
+            return Err(ReportError::InUse {
+                folder: path.parent().unwrap_or(path).to_owned(),
+                lock: path.to_owned(),
+                holder: holder(&mut file),
+            });
+        }
+        Err(e) => return Err(failed(e)),
+    }
+    // Written in any case: the time of the file is the start of the run.
+    file.set_len(0).map_err(failed)?;
+    file.rewind().map_err(failed)?;
+    writeln!(file, "process {}", std::process::id()).map_err(failed)?;
+    Ok(file)
+}
+
+/// Who holds a lock, and for how long, in words.
+fn holder(lock: &mut File) -> String {
+    let mut text = String::new();
+    let name = match lock.read_to_string(&mut text) {
+        Ok(_) if !text.trim().is_empty() => text.trim(),
+        _ => "another run",
+    };
+    let since = lock.metadata().and_then(|m| m.modified());
+    match since.map(|since| since.elapsed()) {
+        Ok(Ok(time)) => format!("{name}, for {} s", time.as_secs()),
+        _ => name.to_owned(),
+    }
+}
+
+/// Locks a file for this process alone; false if another holds it.
+#[cfg(unix)]
+fn take(file: &File) -> std::io::Result<bool> {
+    use rustix::fs::{FlockOperation, flock};
+    use rustix::io::Errno;
+    match flock(file, FlockOperation::NonBlockingLockExclusive) {
+        // A file system without locks is written to as before there were any.
+        Ok(()) | Err(Errno::NOTSUP | Errno::NOLCK | Errno::NOSYS) => Ok(true),
+        Err(Errno::WOULDBLOCK) => Ok(false),
+        Err(e) => Err(e.into()),
+    }
+}
+
+/// Only Unix has the lock that this program uses.
+#[cfg(not(unix))]
+fn take(_: &File) -> std::io::Result<bool> {
+    Ok(true)
+}
+
+/// Moves the results in a folder to the next free `previous`.
+fn set_aside(folder: &Path) -> Result<(), ReportError> {
     let old = RESULTS.map(|name| folder.join(name));
     if !old.iter().any(|path| path.exists()) {
         return Ok(());
@@ -69,7 +168,8 @@ mod tests {
     fn results_of_two_runs_never_mix_and_other_files_stay() {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let folder = temporary.path().join("a/b");
-        prepare(&folder).expect("created");
+        let prepare = || Folder::prepare(&folder).map(drop);
+        prepare().expect("created");
         assert!(folder.is_dir() && !folder.join("previous").exists());
 
         let run = |n: u8, figure: &str| {
@@ -81,7 +181,7 @@ mod tests {
         };
         run(1, "event.png");
         fs::write(folder.join("notes.txt"), "mine").expect("written");
-        prepare(&folder).expect("set aside");
+        prepare().expect("set aside");
         let previous = folder.join("previous");
         assert!(!folder.join("log.mcap").exists() && !folder.join("figures").exists());
         assert_eq!(fs::read(previous.join("log.mcap")).expect("kept"), [1]);
@@ -90,7 +190,7 @@ mod tests {
 
         // Every run is kept, each in a place of its own.
         run(2, "other.png");
-        prepare(&folder).expect("set aside");
+        prepare().expect("set aside");
         let second = folder.join("previous-2");
         assert_eq!(fs::read(previous.join("log.mcap")).expect("kept"), [1]);
         assert_eq!(fs::read(second.join("log.mcap")).expect("kept"), [2]);
@@ -106,7 +206,28 @@ mod tests {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let file = temporary.path().join("taken");
         fs::write(&file, "x").expect("written");
-        let error = prepare(&file).expect_err("not a folder");
+        let error = Folder::prepare(&file).expect_err("not a folder");
         assert!(error.to_string().contains("taken"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_that_is_held_is_refused_by_name_of_its_lock_and_nothing_is_moved() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path();
+        let first = Folder::prepare(folder).expect("prepared");
+        fs::write(folder.join("log.mcap"), "the first's").expect("written");
+        let refused = Folder::prepare(folder).expect_err("held");
+        let said = refused.to_string();
+        assert!(said.contains(".lock"), "{said}");
+        assert!(
+            said.contains(&format!("process {}", std::process::id())),
+            "{said}"
+        );
+        assert!(!folder.join("previous").exists());
+        // A lock that nobody holds any more is none, whatever the file says.
+        drop(first);
+        assert!(folder.join(LOCK).exists());
+        let _second = Folder::prepare(folder).expect("free again");
+        assert!(folder.join("previous/log.mcap").exists());
     }
 }

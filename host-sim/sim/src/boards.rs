@@ -74,8 +74,12 @@ const fn is_refused(faults: FaultBits) -> bool {
 }
 
 fn rejected(address: Address, error: ConfigError) -> SimError {
+    let why = match error {
+        ConfigError::Address => "its address straps name a board of another kind",
+        ConfigError::Parameters => "its parameters contradict each other",
+    };
     SimError::simulation(
-        format!("the board of {address} refuses its configuration: {error:?}"),
+        format!("the board of {address} refuses its configuration: {why}"),
         "see the sections [node.…] of the robot file",
     )
 }
@@ -303,16 +307,6 @@ impl WheelBoard {
     /// The counter of the board has just been started, with the wheel at `edges`.
     pub(super) fn counts_from(&mut self, edges: i64) {
         self.count_zero = edges;
-    }
-
-    /// Bridge duty that becomes active at this sample edge, −1..=1.
-    pub(super) fn active_duty(&self) -> f64 {
-        let magnitude = f64::from(self.pulse.preloaded()) / f64::from(BRIDGE_COUNTS);
-        if self.sign.level() {
-            -magnitude
-        } else {
-            magnitude
-        }
     }
 
     /// The outputs that become active at this sample edge, as boards outside

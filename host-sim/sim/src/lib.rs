@@ -7,22 +7,22 @@
 //! instant at which the robot stands at rest in that pose.
 
 mod audit;
+mod board;
 mod boards;
 mod bus;
+mod client;
+mod clock;
+mod down;
 mod downtime;
-mod edges;
 mod error;
 pub mod faults;
 mod hal;
 mod memory;
 mod observe;
 mod operator;
-mod power;
+mod session;
 mod setup;
 mod strangers;
-mod strike;
-mod traffic;
-mod words;
 mod world;
 
 use std::ops::ControlFlow;
@@ -39,21 +39,17 @@ pub use self::audit::LineAudit;
 pub use self::boards::{JointBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::error::SimError;
-pub use self::power::BOARD_START_UP_NS;
-pub use self::words::hex;
+pub use self::session::Session;
+pub use self::world::BOARD_START_UP_NS;
 
-use self::observe::Observer;
-use self::operator::Operator;
 use self::world::{Happened, World};
-use crate::faults::Schedule;
-use wheeleg_config::{EventAction, RobotConfig, Scenario};
+use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::{Nodes, Outside, PilSummary};
-use wheeleg_telemetry::{EventKind, Recorder};
+use wheeleg_telemetry::Recorder;
+use wheeleg_telemetry::event::Cause;
 
 /// Longest time from power-up to the end of commissioning, s.
 const COMMISSION_S: f64 = 2.0;
-/// Beginning of every event in the record that tells of the time before it.
-pub const START_UP: &str = "start-up, ";
 
 /// What a caller sees of one joint board and its cylinder after every tick, start-up
 /// included, when it asks to ([`run_watched`]).
@@ -89,19 +85,12 @@ impl<'a> Onlookers<'a> {
         }
     }
 
-    fn tick(&mut self, world: &World) {
-        let Some(watcher) = &mut self.watcher else {
-            return;
-        };
-        for ((joint, board), cylinder) in (1..).zip(world.joints()).zip(&world.outputs().cylinders)
-        {
-            watcher(&WatchedJoint {
-                now_s: world.now_ns() as f64 * 1e-9,
-                joint,
-                board: board.snapshot(),
-                account: board.motion_account(),
-                cylinder,
-            });
+    /// One more, who sees every joint board in every tick.
+    #[must_use]
+    pub fn watching(self, watcher: JointWatcher<'a>) -> Self {
+        Self {
+            watcher: Some(watcher),
+            ..self
         }
     }
 }
@@ -161,7 +150,7 @@ pub fn run_with(
 ) -> Result<RunOutcome, SimError> {
     let boards = Boards::connect(nodes, robot)?;
     let onlookers = Onlookers::new(progress);
-    run_on(boards, scenario, robot, seed, nodes, recorder, onlookers)
+    run_on(boards, scenario, robot, seed, recorder, onlookers)
 }
 
 /// As [`run`], with `watcher` called for every joint after every tick, in the time of
@@ -176,7 +165,6 @@ pub fn run_watched(
     recorder: &mut Recorder,
     watcher: JointWatcher<'_>,
 ) -> Result<RunOutcome, SimError> {
-    let native = Nodes::default();
     let onlookers = Onlookers {
         progress: &mut |_| Control::Continue(()),
         watcher: Some(watcher),
@@ -186,7 +174,6 @@ pub fn run_watched(
         scenario,
         robot,
         seed,
-        &native,
         recorder,
         onlookers,
     )
@@ -231,92 +218,25 @@ pub fn run_on(
     scenario: &Scenario,
     robot: &RobotConfig,
     seed: u64,
-    nodes: &Nodes,
     recorder: &mut Recorder,
     mut onlookers: Onlookers<'_>,
 ) -> Result<RunOutcome, SimError> {
-    let plant = setup::plant(scenario, robot);
-    let master = setup::master(scenario, robot);
-    let mut world = World::new(robot, &plant, master, seed, boards)?;
-    let mut operator = Operator::new(scenario, &robot.start_up);
-    let mut observer = Observer::default();
-    let mut schedule = Schedule::new(&scenario.faults);
-    for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
-        world.strike(fault, true)?;
-    }
-    let cycle_ns = (robot.bus.cycle_s * 1e9).round() as u64;
-    let duration_ns = (scenario.duration_s * 1e9).round() as u64;
-    let mut start_ns: Option<u64> = None;
+    let mut session = Session::new(boards, scenario, robot, seed)?;
     let mut stopped = false;
-
-    loop {
-        let happened = world.step()?;
-        let now_ns = world.now_ns();
-        if matches!(happened, Happened::JointTick) {
-            onlookers.tick(&world);
+    while !session.is_over() && !stopped {
+        let happened = session.advance()?;
+        if happened == Happened::JointTick
+            && let Some(watcher) = &mut onlookers.watcher
+        {
+            session.show(watcher);
         }
-        match (happened, start_ns) {
-            (Happened::JointTick, None) if operator.prepare(&mut world)? => {
-                start_ns = Some(now_ns);
-                operator.report_start_up(recorder);
-                operator.begin(&mut world)?;
-                observer.tick(&world, 0, recorder);
-            }
-            (Happened::JointTick, Some(start_ns)) => {
-                let t_ns = now_ns - start_ns;
-                observer.tick(&world, t_ns, recorder);
-                if t_ns >= duration_ns {
-                    break;
-                }
-                for (fault, begin) in schedule.due(t_ns) {
-                    world.strike(&fault, begin)?;
-                    recorder.set_disk_full(!world.faults().can_record());
-                    let what = if begin { "begins" } else { "ends" };
-                    let text = format!("fault {fault} {what}");
-                    recorder.event(t_ns, EventKind::Scenario, text);
-                }
-                for event in operator.due(t_ns) {
-                    act(&event.action, &mut world, &operator, t_ns, recorder)?;
-                }
-                operator.listen(&mut world, t_ns, recorder);
-                for note in world.take_notes() {
-                    recorder.event(t_ns, EventKind::Command, format!("service: {note}"));
-                }
-            }
-            (Happened::MasterCycle, started) => {
-                let record = world.master().take_telemetry();
-                if let Some(start_ns) = started {
-                    operator.flood(&mut world, now_ns - start_ns, recorder);
-                    observer.cycle(&world, record, (start_ns, now_ns), cycle_ns, recorder);
-                } else {
-                    observer.pass(&world);
-                }
-                let t_s = started.map_or(-1.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9);
-                if (onlookers.progress)(t_s).is_break() {
-                    stopped = true;
-                    break;
-                }
-            }
-            _ => {}
+        session.handle(happened, recorder)?;
+        if happened == Happened::MasterCycle {
+            let t_s = session.scenario_s().unwrap_or(-1.0);
+            stopped = (onlookers.progress)(t_s).is_break();
         }
     }
-    let now_ns = world.now_ns();
-    let link = observer.link();
-    if link.errors() > 0 {
-        let t_ns = now_ns - start_ns.unwrap_or(now_ns);
-        recorder.event(t_ns, EventKind::Info, link_text(&link));
-    }
-    Ok(RunOutcome {
-        recorded_s: start_ns.map_or(0.0, |start_ns| (now_ns - start_ns) as f64 * 1e-9),
-        simulated_s: now_ns as f64 * 1e-9,
-        stopped,
-        pil: world
-            .outside()
-            .map(|outside| outside.summary(nodes, now_ns)),
-        line: world.audit(),
-        link,
-        down_times: world.take_down_times(),
-    })
+    Ok(session.finish(stopped, recorder))
 }
 
 /// Powers the robot up and takes its boards over for the commissioned ones; gives
@@ -358,7 +278,7 @@ pub fn commission(
                 }
                 Event::Done(ticket) if ticket.code == CommandCode::Commission => return Ok(ids),
                 Event::Link { .. } | Event::Log { .. } | Event::NodeReady(_) => {}
-                other => said.push(words::describe(&other)),
+                other => said.push(Cause::Master(other).to_string()),
             }
         }
     }
@@ -366,53 +286,4 @@ pub fn commission(
         format!("the boards cannot be commissioned: {}", said.join("; ")),
         "mend what the master names, and try again",
     ))
-}
-
-/// What the master counted on the line, in words.
-fn link_text(link: &LinkQuality) -> String {
-    let kinds = [
-        ("overflow", link.overflow),
-        ("truncated", link.truncated),
-        ("short", link.short),
-        ("crc", link.crc),
-        ("version", link.version),
-        ("length", link.length),
-        ("address", link.address),
-    ];
-    let kinds = kinds.iter().filter(|(_, count)| *count > 0);
-    let kinds: Vec<String> = kinds
-        .map(|(kind, count)| format!("{kind} {count}"))
-        .collect();
-    format!(
-        "master: {} sound frames heard, broken ones: {}",
-        link.frames,
-        kinds.join(", ")
-    )
-}
-
-/// Carries out one event of the scenario.
-fn act(
-    action: &EventAction,
-    world: &mut World,
-    operator: &Operator<'_>,
-    t_ns: u64,
-    recorder: &mut Recorder,
-) -> Result<(), SimError> {
-    match action {
-        EventAction::KillMaster => {
-            world.kill_master();
-            recorder.event(
-                t_ns,
-                EventKind::Scenario,
-                "the master dies and stays silent",
-            );
-            Ok(())
-        }
-        EventAction::EStop => {
-            recorder.event(t_ns, EventKind::Scenario, "E-stop pressed");
-            operator.submit(world, Command::EmergencyStop, t_ns, recorder)
-        }
-        EventAction::ClearFault => operator.submit(world, Command::ClearFault, t_ns, recorder),
-        EventAction::Command(command) => operator.submit(world, *command, t_ns, recorder),
-    }
 }

@@ -1,16 +1,19 @@
 //! Samples of the running world for the recorder: what was commanded, what the
 //! boards sensed, what physically is.
 
+use wheeleg_master::contact::Side;
 use wheeleg_master::setpoint::Phase;
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
 use wheeleg_plant::robot::Outputs;
 use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality};
 
+use super::boards::WheelBoard;
 use super::world::World;
+use wheeleg_telemetry::event::{BoardChange, Cause};
 use wheeleg_telemetry::{
-    BodySample, BusSample, EventKind, FootSample, JointSample, MasterSample, Recorder,
-    SupplySample, WheelSample,
+    BodySample, BusSample, FootSample, JointSample, MasterSample, Recorder, SupplySample,
+    WheelSample,
 };
 
 const PA_PER_BAR: f64 = 1e5;
@@ -55,7 +58,7 @@ impl Observer {
         self.joints(world, out, t_ns, recorder);
         self.wheels(world, out, t_ns, recorder);
         for foot in 0..2 {
-            let vertical = world.joints()[3 * foot + 2].snapshot();
+            let vertical = world.joints().nth(3 * foot + 2);
             recorder.foot(
                 t_ns,
                 foot,
@@ -63,7 +66,7 @@ impl Observer {
                     normal_force_n: out.foot_force_n[foot][2],
                     friction_force_n: out.foot_force_n[foot][0],
                     clearance_mm: out.foot_clearance_m[foot] * 1e3,
-                    switches: switch_bits(vertical.switches),
+                    switches: vertical.map_or(0, |board| switch_bits(board.snapshot().switches)),
                 },
             );
             self.notice_contact(foot, out.foot_switches[foot], t_ns, recorder);
@@ -78,14 +81,15 @@ impl Observer {
             },
         );
         let gas = &world.plant().params().gas;
+        let left_wheel = world.wheels().next();
         recorder.supply(
             t_ns,
             SupplySample {
                 pressure_bar: out.supply_pressure_pa / PA_PER_BAR,
                 air_used_dm3: out.air_used_kg / gas.reference_density_kg_m3 * 1e3,
-                dump_commanded: world.wheels()[0].dumps(),
+                dump_commanded: left_wheel.is_some_and(WheelBoard::dumps),
                 dump_open: out.dumping,
-                pressure_switch: world.wheels()[0].snapshot().supply_present,
+                pressure_switch: left_wheel.is_some_and(|board| board.snapshot().supply_present),
             },
         );
         if recorder.wants_state(t_ns) {
@@ -98,7 +102,7 @@ impl Observer {
 
     fn joints(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
         let inputs = world.tick_inputs();
-        for (i, board) in world.joints().iter().enumerate() {
+        for (i, board) in world.joints().enumerate() {
             let node = board.snapshot();
             let c = &out.cylinders[i];
             let [fill_a_us, vent_a_us, fill_b_us, vent_b_us] = inputs.on_us[i];
@@ -138,7 +142,7 @@ impl Observer {
     fn wheels(&mut self, world: &World, out: &Outputs, t_ns: u64, recorder: &mut Recorder) {
         let params = world.plant().params();
         let radius_mm = params.body.wheel_radius_m * 1e3;
-        for (i, board) in world.wheels().iter().enumerate() {
+        for (i, board) in world.wheels().enumerate() {
             let node = board.snapshot();
             let motor = &params.motors[i];
             let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
@@ -164,8 +168,8 @@ impl Observer {
         }
     }
 
-    /// Touchdowns and lifts as they physically are become events in words; what the
-    /// master made of its switches stands beside them.
+    /// Touchdowns and lifts as they physically are become events; what the master made of
+    /// its switches stands beside them.
     fn notice_contact(
         &mut self,
         foot: usize,
@@ -178,21 +182,11 @@ impl Observer {
         if before.is_none_or(|before| before == grounded) {
             return;
         }
-        let side = ["left", "right"][foot];
-        let text = if grounded {
-            let closed: Vec<&str> = ["front", "left", "back", "right"]
-                .into_iter()
-                .zip(switches)
-                .filter_map(|(name, closed)| closed.then_some(name))
-                .collect();
-            format!("ground: {side} foot touches, {}", closed.join(", "))
-        } else {
-            format!("ground: {side} foot free")
-        };
-        recorder.event(t_ns, EventKind::Contact, text);
+        let side = [Side::Left, Side::Right][foot];
+        recorder.event(t_ns, Cause::Contact { side, switches });
     }
 
-    /// Changes of mode and fault become events in words.
+    /// Changes of mode and fault become events; `index` is 0 to 7 for addresses 1 to 8.
     fn notice(
         &mut self,
         index: usize,
@@ -201,29 +195,22 @@ impl Observer {
         t_ns: u64,
         recorder: &mut Recorder,
     ) {
-        let name = if index < 6 {
-            format!("joint {}", index + 1)
-        } else {
-            format!("wheel {}", index + 1)
+        let Some(board) = Address::of_slot(index) else {
+            return;
         };
-        if self.modes[index] != Some(mode) {
-            if let Some(before) = self.modes[index] {
-                recorder.event(
-                    t_ns,
-                    EventKind::Mode,
-                    format!("{name}: {before:?} to {mode:?}"),
-                );
-            }
-            self.modes[index] = Some(mode);
+        let mut tell = |change| recorder.event(t_ns, Cause::Board { board, change });
+        let before = self.modes[index].replace(mode);
+        if let Some(from) = before.filter(|before| *before != mode) {
+            tell(BoardChange::Mode { from, to: mode });
         }
         let before = self.faults[index];
         if before != faults {
             self.faults[index] = faults;
             for fault in faults.iter().filter(|fault| !before.contains(*fault)) {
-                recorder.event(t_ns, EventKind::Fault, format!("{name}: {fault}"));
+                tell(BoardChange::FaultLatched(fault));
             }
             if faults.is_empty() {
-                recorder.event(t_ns, EventKind::Fault, format!("{name}: faults cleared"));
+                tell(BoardChange::FaultsCleared);
             }
         }
     }

@@ -6,15 +6,15 @@ use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::Reject;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
-use wheeleg_protocol::{LinkRecord, LogEvent};
+use wheeleg_protocol::LinkRecord;
 use wheeleg_units::PositionMm;
 
-use super::START_UP;
-use super::words::{describe, reject};
 use super::world::World;
 use crate::SimError;
 use wheeleg_config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
-use wheeleg_telemetry::{EventKind, LinkSample, Recorder};
+use wheeleg_telemetry::event::{Answer, Cause};
+use wheeleg_telemetry::messages::reject;
+use wheeleg_telemetry::{Event as Recorded, EventKind, LinkSample, Recorder};
 
 /// What to do about a robot that does not get ready, where no board is to blame.
 const HELP: &str = "check supply pressure, board gains and start pose in the robot file";
@@ -28,13 +28,27 @@ enum Stage {
     Settling { until_ns: u64 },
 }
 
+impl Stage {
+    /// Name, for messages.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Enumerating => "finding the boards",
+            Self::Arming => "arming",
+            Self::Homing => "moving to the start pose",
+            Self::Settling { .. } => "settling in the start pose",
+        }
+    }
+}
+
 /// The operator of one run.
-pub(super) struct Operator<'a> {
-    scenario: &'a Scenario,
+pub(super) struct Operator {
+    motion: Motion,
+    events: Vec<ScenarioEvent>,
     rest_ns: u64,
     limit_ns: u64,
     stage: Stage,
-    notes: Vec<(u64, EventKind, String)>,
+    /// What the master reported during the start-up, µs after power-up.
+    start_up: Vec<(u64, Cause)>,
     next_event: usize,
     flood_refused: bool,
 }
@@ -47,16 +61,17 @@ pub(super) fn side(leg: LegChoice) -> Side {
     }
 }
 
-impl<'a> Operator<'a> {
+impl Operator {
     /// An operator at a robot that is just being switched on.
-    pub(super) fn new(scenario: &'a Scenario, start_up: &StartUpParams) -> Self {
+    pub(super) fn new(scenario: &Scenario, start_up: &StartUpParams) -> Self {
         let ns = |s: f64| (s * 1e9).round() as u64;
         Self {
-            scenario,
+            motion: scenario.motion,
+            events: scenario.events.clone(),
             rest_ns: ns(start_up.rest_s),
             limit_ns: ns(start_up.limit_s),
             stage: Stage::Enumerating,
-            notes: Vec::new(),
+            start_up: Vec::new(),
             next_event: 0,
             flood_refused: false,
         }
@@ -71,13 +86,11 @@ impl<'a> Operator<'a> {
         let now_ns = world.now_ns();
         let now_us = now_ns / 1000;
         while let Some((time_us, event)) = world.master().take_event() {
-            // Counters and logs are no part of the story.
-            if is_advice(&event) {
-                self.notes
-                    .push((time_us, EventKind::Fault, describe(&event)));
-            } else if !matches!(event, Event::Link { .. } | Event::Log { .. }) {
-                self.notes
-                    .push((time_us, EventKind::Info, describe(&event)));
+            let cause = Cause::Master(event);
+            // Counters and logs are no part of the story, but for what is to be mended.
+            let routine = matches!(event, Event::Link { .. } | Event::Log { .. });
+            if !routine || cause.kind() == EventKind::Fault {
+                self.start_up.push((time_us, cause));
             }
             match event {
                 Event::Homed if self.stage == Stage::Homing => {
@@ -118,18 +131,18 @@ impl<'a> Operator<'a> {
 
     fn not_ready(&self, now_ns: u64, help: &str) -> SimError {
         let story: Vec<String> = self
-            .notes
+            .start_up
             .iter()
             .rev()
             .take(6)
             .rev()
-            .map(|(us, _, text)| format!("{:.3} s: {text}", *us as f64 * 1e-6))
+            .map(|(us, cause)| format!("{:.3} s: {cause}", *us as f64 * 1e-6))
             .collect();
         SimError::simulation(
             format!(
-                "the robot did not get ready in {:.2} s of simulated time (stage {:?}); last events: {}",
+                "the robot did not get ready in {:.2} s of simulated time (stage: {}); last events: {}",
                 now_ns as f64 * 1e-9,
-                self.stage,
+                self.stage.name(),
                 story.join("; ")
             ),
             help,
@@ -138,13 +151,8 @@ impl<'a> Operator<'a> {
 
     /// Writes the story of the start-up into the record, at time 0.
     pub(super) fn report_start_up(&self, recorder: &mut Recorder) {
-        for (us, kind, text) in &self.notes {
-            let at_s = *us as f64 * 1e-6;
-            recorder.event(
-                0,
-                *kind,
-                format!("{START_UP}{at_s:.3} s after power-up: {text}"),
-            );
+        for (us, cause) in &self.start_up {
+            recorder.event(0, Recorded::of_start_up(cause.clone(), *us));
         }
     }
 
@@ -153,7 +161,7 @@ impl<'a> Operator<'a> {
     /// # Errors
     /// [`SimError::Simulation`] if the dispatcher refuses it.
     pub(super) fn begin(&self, world: &mut World) -> Result<(), SimError> {
-        let command = match self.scenario.motion {
+        let command = match self.motion {
             Motion::Stand => return Ok(()),
             Motion::SquareWave { .. } => Command::StartGait,
             Motion::Sinusoid {
@@ -182,7 +190,7 @@ impl<'a> Operator<'a> {
     /// The events of the scenario that are due at `t_ns`, each once.
     pub(super) fn due(&mut self, t_ns: u64) -> Vec<ScenarioEvent> {
         let t_s = t_ns as f64 * 1e-9;
-        let rest = &self.scenario.events[self.next_event..];
+        let rest = &self.events[self.next_event..];
         let due: Vec<ScenarioEvent> = rest
             .iter()
             .take_while(|e| e.at_s <= t_s + 1e-9)
@@ -203,20 +211,15 @@ impl<'a> Operator<'a> {
         t_ns: u64,
         recorder: &mut Recorder,
     ) -> Result<(), SimError> {
-        let name = format!("{:?}", command.code());
-        if !world.master_alive() {
-            recorder.event(
-                t_ns,
-                EventKind::Command,
-                format!("{name}: nobody answers, the master is dead"),
-            );
-            return Ok(());
-        }
-        let text = match world.submit(command) {
-            Ok(_) => format!("{name}: accepted"),
-            Err(why) => format!("{name} refused: {}", reject(&why)),
+        let code = command.code();
+        let answer = if world.master_alive() {
+            world
+                .submit(command)
+                .map_or_else(Answer::Rejected, |_| Answer::Accepted)
+        } else {
+            Answer::Nothing
         };
-        recorder.event(t_ns, EventKind::Command, text);
+        recorder.event(t_ns, Cause::Command { code, answer });
         Ok(())
     }
 
@@ -228,10 +231,9 @@ impl<'a> Operator<'a> {
             let joint = (i % 6) as u8 + 1;
             let command = Command::TransmitPosition { joint };
             let answer = world.master().submit(command, now_us);
-            if let (Err(why), false) = (answer, self.flood_refused) {
+            if let (Err(reason), false) = (answer, self.flood_refused) {
                 self.flood_refused = true;
-                let text = format!("flood of commands: number {i} refused: {}", reject(&why));
-                recorder.event(t_ns, EventKind::Command, text);
+                recorder.event(t_ns, Cause::Flood { number: i, reason });
             }
         }
     }
@@ -239,45 +241,24 @@ impl<'a> Operator<'a> {
     /// Writes the master's events into the record.
     pub(super) fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
         while let Some((_, event)) = world.master().take_event() {
-            let kind = match event {
-                _ if is_advice(&event) => EventKind::Fault,
-                Event::TouchDown { .. } | Event::LiftOff(_) => EventKind::Contact,
-                Event::Hold(_)
-                | Event::FootSwitch { .. }
-                | Event::HomingFailed { .. }
-                | Event::SchemaMismatch { .. }
-                | Event::ForeignBoard { .. }
-                | Event::WrongRole(_)
-                | Event::NodeLost(_)
-                | Event::Found { .. }
-                | Event::Diagnosis { .. }
-                | Event::DuplicateAddress { .. } => EventKind::Fault,
-                Event::Log { .. } | Event::LogLost { .. } => EventKind::Log,
-                Event::Link { node, record } => {
-                    let node = usize::from(node) - 1;
-                    recorder.link(t_ns, node, link_sample(&record));
-                    continue;
-                }
-                Event::Done(_)
-                | Event::Refused { .. }
-                | Event::Position { .. }
-                | Event::Parameter { .. } => EventKind::Command,
-                Event::Armed | Event::Disarmed => EventKind::Mode,
-                _ => EventKind::Info,
-            };
-            recorder.event(t_ns, kind, describe(&event));
+            // Counters have channels of their own.
+            if let Event::Link { node, record } = event {
+                let node = usize::from(node) - 1;
+                recorder.link(t_ns, node, link_sample(&record));
+                continue;
+            }
+            recorder.event(t_ns, Cause::Master(event));
         }
     }
 }
 
-/// What a board logs and somebody should act on, so that it is told as a finding is.
-fn is_advice(event: &Event) -> bool {
-    matches!(event, Event::Log { entry, .. } if entry.event == LogEvent::PrechargeLate)
-}
-
 pub(super) fn refused(command: &Command, why: &Reject) -> SimError {
     SimError::simulation(
-        format!("the master refuses {:?}: {}", command.code(), reject(why)),
+        format!(
+            "the master refuses {}: {}",
+            command.code().name(),
+            reject(why)
+        ),
         "the events of the log tell what the robot was doing",
     )
 }

@@ -3,12 +3,11 @@
 
 use std::f64::consts::TAU;
 
-use fixed::types::I16F16;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::homing::HomingConfig;
-use wheeleg_master::layer1::params::{GaitParams, Pattern};
+use wheeleg_master::layer1::params::Pattern;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::ground::{Ground, GroundPatch};
@@ -27,10 +26,6 @@ fn stepping_leg(scenario: &Scenario) -> LegChoice {
 
 fn millimetres(m: f64) -> PositionMm {
     PositionMm::from_f64(m * 1e3)
-}
-
-fn microseconds(s: f64) -> u32 {
-    (s * 1e6).round() as u32
 }
 
 /// Sums of the joints' parameters, as the file of the robot gives them.
@@ -74,28 +69,14 @@ pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
 /// The master's configuration; [`super::world::World`] adds the sample time of
 /// the wheel boards.
 pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
-    let gait = &robot.gait;
     let cycles = |s: f64| (s / robot.bus.cycle_s).round() as u16;
     let motor = &robot.plant.motors[0];
     let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
     let circumference_um = robot.plant.body.wheel_radius_m * TAU * 1e6;
     MasterConfig {
-        gait: GaitParams {
-            steps: gait.steps,
-            period_us: microseconds(gait.period_s),
-            lift_us: microseconds(gait.lift_s),
-            reach_us: microseconds(gait.reach_s),
-            lower_us: microseconds(gait.lower_s),
-            push_us: microseconds(gait.push_s),
-            stroke_mm: millimetres(gait.stroke_m),
-            held_leg_s5_mm: millimetres(gait.held_leg_s5_m),
-            held_leg_s6_mm: millimetres(gait.held_leg_s6_m),
-            yaw_s2_mm: millimetres(gait.yaw_s2_m),
-            push_speed_mm_s: VelocityMmS::from_f64(gait.push_speed_m_s * 1e3),
-            push_acceleration_mm_s2: I16F16::from_num(gait.push_acceleration_m_s2 * 1e3),
-            pattern: Pattern::Single(side(stepping_leg(scenario))),
-            touchdown_reflex: gait.touchdown_reflex,
-        },
+        gait: robot
+            .gait
+            .of_master(Pattern::Single(side(stepping_leg(scenario)))),
         homing: HomingConfig {
             slew_mm_s: VelocityMmS::from_f64(robot.homing.slew_m_s * 1e3),
             tolerance_mm: millimetres(robot.homing.tolerance_m),

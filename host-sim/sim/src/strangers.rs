@@ -6,16 +6,18 @@ use wheeleg_node::Transmission;
 use wheeleg_protocol::frame::{VERSION, encode};
 use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{
-    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, NackReason, ParamGet,
-    ParamSet, ParamValue, ResetCause,
+    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, ParamGet, ParamSet,
+    ParamValue, ResetCause,
 };
 
-use super::boards::{JointBoard, WheelBoard, twin_identity};
+use super::board::{Application, BoardInputs};
+use super::boards::twin_identity;
 use super::bus::{Bus, Delivery, Driver};
-use super::traffic::{NS_PER_US, micros};
+use super::clock::{NS_PER_US, micros};
 use crate::SimError;
 use wheeleg_config::NodeParams;
 use wheeleg_config::timing::SERVICE_NS;
+use wheeleg_telemetry::event::{BadRequest, Cause, ServiceOutcome};
 
 /// A second board drives the line as this plus the address.
 const TWIN: Driver = 0x40;
@@ -42,10 +44,9 @@ const NO_PARAMETER: u16 = 0x7FFF;
 #[derive(Default)]
 pub(super) struct Strangers {
     /// Boards with the address of another one.
-    joints: Vec<(u8, JointBoard)>,
-    wheels: Vec<(u8, WheelBoard)>,
+    boards: Vec<(Address, Application)>,
     service: Option<Service>,
-    notes: Vec<String>,
+    notes: Vec<Cause>,
 }
 
 impl Strangers {
@@ -55,24 +56,18 @@ impl Strangers {
     /// # Errors
     /// [`SimError::Simulation`] if the board refuses its parameters.
     pub(super) fn plug_in(&mut self, address: u8, stored: &NodeParams) -> Result<(), SimError> {
-        let i = usize::from(address) - 1;
-        let Some(who) = Address::new(address).map(twin_identity) else {
+        let Some(address) = Address::new(address) else {
             return Ok(());
         };
-        if i < 6 {
-            let board = JointBoard::new(who, Some(&stored.joints[i]), ResetCause::PowerUp)?;
-            self.joints.push((address, board));
-        } else {
-            let board = WheelBoard::new(who, Some(&stored.wheels[i - 6]), ResetCause::PowerUp)?;
-            self.wheels.push((address, board));
-        }
+        let (who, stored) = (twin_identity(address), stored.of(address));
+        let board = Application::new(who, Some(stored), ResetCause::PowerUp)?;
+        self.boards.push((address, board));
         Ok(())
     }
 
     /// It is unplugged.
     pub(super) fn unplug(&mut self, address: u8) {
-        self.joints.retain(|(own, _)| *own != address);
-        self.wheels.retain(|(own, _)| *own != address);
+        self.boards.retain(|(own, _)| own.raw() != address);
     }
 
     /// The service tool begins to write parameters of the board at `address`.
@@ -82,27 +77,30 @@ impl Strangers {
 
     /// One tick of the joints among the second boards.
     pub(super) fn joint_tick(&mut self, now_ns: u64) {
-        for (_, board) in &mut self.joints {
-            board.tick(micros(now_ns), BENCH_CODE, [false; 4]);
-        }
+        self.tick(now_ns, Address::is_joint);
     }
 
     /// One sample of the wheels among the second boards that stand for `address`.
     pub(super) fn wheel_sample(&mut self, address: u8, now_ns: u64) {
-        for (_, board) in self.wheels.iter_mut().filter(|(own, _)| *own == address) {
-            board.tick(micros(now_ns), 0, true);
+        self.tick(now_ns, |own| own.raw() == address);
+    }
+
+    /// One tick of the second boards that `due` names, on the bench side of their sensors.
+    fn tick(&mut self, now_ns: u64, due: impl Fn(Address) -> bool) {
+        let inputs = BoardInputs {
+            code: BENCH_CODE,
+            supply: true,
+            ..BoardInputs::default()
+        };
+        for (_, board) in self.boards.iter_mut().filter(|(own, _)| due(*own)) {
+            board.tick(micros(now_ns), &inputs);
         }
     }
 
     /// Hears a delivery.
     pub(super) fn hear(&mut self, bus: &Bus, delivery: &Delivery) {
-        for (address, board) in &mut self.joints {
-            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
-                board.on_bus_bytes(&bytes, micros(end_ns));
-            }
-        }
-        for (address, board) in &mut self.wheels {
-            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | *address, delivery) {
+        for (address, board) in &mut self.boards {
+            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | address.raw(), delivery) {
                 board.on_bus_bytes(&bytes, micros(end_ns));
             }
         }
@@ -115,14 +113,10 @@ impl Strangers {
 
     /// What a second board wants to send.
     pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
-        let joints = self.joints.iter_mut();
-        let mut joints = joints.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
-        if let Some(sent) = joints.next() {
-            return Some(sent);
-        }
-        let wheels = self.wheels.iter_mut();
-        let mut wheels = wheels.filter_map(|(a, b)| Some((TWIN | *a, b.take_transmission()?)));
-        wheels.next()
+        let boards = self.boards.iter_mut();
+        let mut sent =
+            boards.filter_map(|(a, board)| Some((TWIN | a.raw(), board.take_transmission()?)));
+        sent.next()
     }
 
     /// The next request of the service tool, if it has one and `left_ns` until the
@@ -134,8 +128,8 @@ impl Strangers {
         self.service.as_mut()?.request(now_us)
     }
 
-    /// What happened, in words; each once.
-    pub(super) fn take_notes(&mut self) -> Vec<String> {
+    /// What came of the service tool's requests; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<Cause> {
         std::mem::take(&mut self.notes)
     }
 }
@@ -233,7 +227,7 @@ impl Service {
         Some(encode(&header, &payload, &mut buffer).ok()?.to_vec())
     }
 
-    fn hear(&mut self, bytes: &[u8]) -> Vec<String> {
+    fn hear(&mut self, bytes: &[u8]) -> Vec<Cause> {
         let mut notes = Vec::new();
         for byte in bytes {
             let Some(Ok(frame)) = self.decoder.push(*byte) else {
@@ -253,29 +247,44 @@ impl Service {
         notes
     }
 
-    fn answer(&mut self, answer: &Message) -> Option<String> {
-        let (who, name) = (self.to, self.parameter.name);
-        let what = match *STEPS.get(self.step)? {
-            Write::Read => {
-                let Message::ParamValue(ParamValue { value, .. }) = answer else {
-                    return Some(format!("{who} does not tell its parameter {name}"));
-                };
-                let before = *self.value.get_or_insert(*value);
-                self.changed |= before != *value;
-                let last = self.step + 1 == STEPS.len();
-                let verdict = if self.changed { "CHANGED" } else { "unchanged" };
-                return last.then(|| format!("{who}: parameter {name} {verdict}, raw {value}"));
-            }
-            Write::TooLarge => format!("{name} above its limit"),
-            Write::Unknown => format!("parameter 0x{NO_PARAMETER:04X}"),
-            Write::OtherType => format!("{name} as a float, not a number"),
+    fn answer(&mut self, answer: &Message) -> Option<Cause> {
+        let request = match *STEPS.get(self.step)? {
+            Write::Read => return self.value_read(answer),
+            Write::TooLarge => BadRequest::AboveLimit,
+            Write::Unknown => BadRequest::UnknownParameter(NO_PARAMETER),
+            Write::OtherType => BadRequest::NotANumber,
         };
-        Some(match answer {
-            Message::Nack(nack) => {
-                let reason: NackReason = nack.reason;
-                format!("{who} refuses {what}: {}", reason.text())
-            }
-            _ => format!("{who} takes {what}: WRONG"),
+        Some(self.cause(match answer {
+            Message::Nack(nack) => ServiceOutcome::Refused {
+                request,
+                reason: nack.reason,
+            },
+            _ => ServiceOutcome::Taken(request),
+        }))
+    }
+
+    /// What the tool says of a value that it has read: after the last one, whether the
+    /// parameter has kept it.
+    fn value_read(&mut self, answer: &Message) -> Option<Cause> {
+        let Message::ParamValue(ParamValue { value: raw, .. }) = *answer else {
+            return Some(self.cause(ServiceOutcome::NotGiven));
+        };
+        self.changed |= *self.value.get_or_insert(raw) != raw;
+        let last = self.step + 1 == STEPS.len();
+        last.then(|| {
+            self.cause(if self.changed {
+                ServiceOutcome::Changed { raw }
+            } else {
+                ServiceOutcome::Unchanged { raw }
+            })
         })
+    }
+
+    fn cause(&self, outcome: ServiceOutcome) -> Cause {
+        Cause::Service {
+            board: self.to,
+            parameter: self.parameter.id,
+            outcome,
+        }
     }
 }

@@ -6,29 +6,36 @@
 //! plant is advanced to a tick before its inputs are latched; bus events do
 //! not touch it.
 
+mod edges;
+mod power;
+mod strike;
+mod traffic;
+
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
-use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_protocol::Address;
 use wheeleg_remote_link as link;
 
 use super::Boards;
 use super::audit::{Audit, LineAudit};
-use super::boards::{JointBoard, WheelBoard, identity};
+use super::board::{Board, BoardInputs};
+use super::boards::{JointBoard, WheelBoard};
 use super::bus::Bus;
+use super::client::Client;
+use super::clock::NS_PER_US;
 use super::downtime::DownTimes;
-use super::edges::Sensed;
-use super::memory::Memory;
-use super::power::{Client, Down};
 use super::strangers::Strangers;
-use super::traffic::NS_PER_US;
 use crate::SimError;
 use crate::faults::Injector;
 use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
 use wheeleg_remote_host::Outside;
+use wheeleg_telemetry::Cause;
+
+pub use power::BOARD_START_UP_NS;
 
 /// What has just happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,8 +56,8 @@ pub(super) struct World {
     pub(super) state: PlantState,
     pub(super) inputs: Inputs,
     pub(super) outputs: Outputs,
-    pub(super) joints: [JointBoard; 6],
-    pub(super) wheels: [WheelBoard; 2],
+    /// Addresses 1 to 8.
+    pub(super) boards: [Board; 8],
     /// Quadrature edges of each wheel at its newest sample and the one before it.
     pub(super) wheel_edges: [[i64; 2]; 2],
     pub(super) bus: Bus,
@@ -65,9 +72,6 @@ pub(super) struct World {
     pub(super) next_cycle_ns: u64,
     pub(super) tick_inputs: TickInputs,
     pub(super) faults: Injector,
-    pub(super) down: [Down; 8],
-    /// First tick edge of each board since its processor has started, ns.
-    pub(super) clock_zero_ns: [u64; 8],
     pub(super) strangers: Strangers,
     pub(super) config: MasterConfig,
     pub(super) master_back_ns: Option<u64>,
@@ -78,8 +82,6 @@ pub(super) struct World {
     /// When boards here are down after a fault, of those that do not find it themselves.
     pub(super) kept: DownTimes,
     pub(super) stored: NodeParams,
-    /// Parameter memories, addresses 1 to 8.
-    pub(super) memories: [Memory; 8],
 }
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
@@ -106,6 +108,9 @@ impl TickInputs {
 }
 
 const VALVE_TICK_US: u16 = 1000;
+
+/// Index of the left wheel's board, which has the dump valve and the supply switch.
+pub(super) const LEFT_WHEEL: usize = 6;
 
 /// Duty of a bridge, −1..=1.
 fn duty(outputs: &link::Outputs) -> f64 {
@@ -143,51 +148,31 @@ impl World {
         let state = plant
             .initial_state(seed)
             .map_err(|e| refused("plant", &e))?;
-        let stored = &robot.node;
-        let who = |n: u8| {
-            let address = Address::new(n).map(identity);
-            address.ok_or_else(|| SimError::simulation(format!("no address {n}"), ""))
-        };
-        let joint = |n: u8| {
-            JointBoard::new(
-                who(n)?,
-                Some(&stored.joints[usize::from(n) - 1]),
-                ResetCause::PowerUp,
-            )
-        };
-        let wheel = |n: u8| {
-            WheelBoard::new(
-                who(n)?,
-                Some(&stored.wheels[usize::from(n) - 7]),
-                ResetCause::PowerUp,
-            )
-        };
+        let mut boards = Vec::new();
+        for address in Address::nodes() {
+            boards.push(Board::new(address, robot.node.of(address))?);
+        }
+        let count = boards.len();
+        let boards: [Board; 8] = boards
+            .try_into()
+            .map_err(|_| SimError::simulation(format!("{count} boards, not eight"), ""))?;
         let outputs = plant.outputs(&state);
         let mut bus = Bus::new(robot.bus.baud_bit_s as u32);
         if outside.is_some() {
             bus.keep_delivered();
         }
-        let wheels = [wheel(7)?, wheel(8)?];
         // Both ends count speeds per sample, so the master must know the board's.
         let master = MasterConfig {
-            wheel_sample_us: wheels[0].period_us(),
+            wheel_sample_us: (boards[LEFT_WHEEL].application.tick_ns() / NS_PER_US) as u32,
             ..master
         };
-        let mut brain = Master::new(master).map_err(|e| refused("master", &format!("{e:?}")))?;
+        let mut brain = Master::new(master).map_err(|e| refused("master", &e.to_string()))?;
         Ok(Self {
             outputs,
             plant,
             state,
             inputs: Inputs::default(),
-            joints: [
-                joint(1)?,
-                joint(2)?,
-                joint(3)?,
-                joint(4)?,
-                joint(5)?,
-                joint(6)?,
-            ],
-            wheels,
+            boards,
             wheel_edges: [[0; 2]; 2],
             bus,
             audit: Audit::default(),
@@ -205,22 +190,22 @@ impl World {
             next_cycle_ns: 0,
             tick_inputs: TickInputs::default(),
             faults: Injector::new(seed),
-            down: [Down::No; 8],
-            clock_zero_ns: [0; 8],
             down_times: DownTimes::new(std::array::from_fn(|i| {
                 let there = outside.as_ref();
                 there.is_some_and(|o| o.has(i as u8 + 1))
             })),
             kept,
             outside,
-            memories: std::array::from_fn(|i| {
-                // Joints first, then wheels, as on the bus.
-                let wheel = || stored.wheels.get(i - stored.joints.len());
-                let kept = stored.joints.get(i).or_else(wheel);
-                Memory::new(kept.map_or(&[], Vec::as_slice))
-            }),
-            stored: stored.clone(),
+            stored: robot.node.clone(),
         })
+    }
+
+    /// When the next event is, ns.
+    pub(super) fn next_ns(&self) -> u64 {
+        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
+        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        let due_ns = self.bus.next_delivery_ns();
+        due_ns.map_or(tick_ns, |due_ns| due_ns.min(tick_ns))
     }
 
     /// Takes the next event.
@@ -258,17 +243,24 @@ impl World {
             .map_err(|e| unphysical(self.now_ns, &e))
     }
 
-    /// Positions and foot contacts as the boards read them now.
-    fn sense(&mut self) -> Sensed {
+    /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
+    fn active_outputs(&self, address: u8) -> link::Outputs {
+        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
+        outside.unwrap_or_else(|| self.board(address).outputs())
+    }
+
+    /// Positions and foot contacts as the joint boards read them now.
+    fn sense(&mut self) -> [BoardInputs; 6] {
         let feet = self.outputs.foot_switches;
-        let mut sensed = Sensed::default();
-        for i in 0..6 {
+        std::array::from_fn(|i| {
             let code = self.plant.read_position(&mut self.state, i);
             let stroke_m = self.plant.params().potentiometers[i].electrical_stroke_m;
-            sensed.codes[i] = self.faults.position_code(i, code, stroke_m);
-            sensed.feet[i] = self.faults.switches(i / 3, feet[i / 3]);
-        }
-        sensed
+            BoardInputs {
+                code: self.faults.position_code(i, code, stroke_m),
+                feet: self.faults.switches(i / 3, feet[i / 3]),
+                ..BoardInputs::default()
+            }
+        })
     }
 
     fn joint_tick(&mut self) -> Result<(), SimError> {
@@ -285,22 +277,12 @@ impl World {
             None
         };
         for (i, address) in (0..6).zip(1..) {
-            let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
-            let on_us = match (outside, self.down[i]) {
-                (Some(outputs), _) => outputs.valve_on_us,
-                (None, down) if down.is_off() => [0; 4],
-                (None, _) => self.joints[i].active_on_us(),
-            };
+            let on_us = self.active_outputs(address).valve_on_us;
             self.tick_inputs.take(i, on_us);
             self.inputs.valve_on_us[i] = on_us;
         }
-        let outside = self.outside.as_ref().and_then(|o| o.outputs(7));
-        self.inputs.dump = match (outside, self.down[6]) {
-            (Some(outputs), _) => outputs.dump,
-            // The dump valve shuts without current: air stays on.
-            (None, down) if down.is_off() => false,
-            (None, _) => self.wheels[0].dumps(),
-        };
+        // The dump valve shuts without current: air stays on.
+        self.inputs.dump = self.active_outputs(7).dump;
         self.plant
             .apply(&mut self.state, &self.inputs)
             .map_err(|e| unphysical(self.now_ns, &e))?;
@@ -309,12 +291,8 @@ impl World {
             Some(sensed) => sensed,
             None => self.sense(),
         };
-        for (i, address) in (0..6).zip(1..) {
-            let now = self.clock(address, self.now_ns);
-            if self.runs(address) {
-                self.joints[i].tick(now, sensed.codes[i], sensed.feet[i]);
-                self.store(address);
-            }
+        for (address, inputs) in (1..).zip(&sensed) {
+            self.tick_board(address, inputs);
         }
         self.strangers.joint_tick(self.now_ns);
         self.next_joint_ns += JOINT_TICK_NS;
@@ -322,6 +300,15 @@ impl World {
         self.collect_transmissions();
         self.offer_line();
         Ok(())
+    }
+
+    /// The tick of a board's application that starts now, if the board runs.
+    fn tick_board(&mut self, address: u8, inputs: &BoardInputs) {
+        let now = self.clock(address, self.now_ns);
+        if self.runs(address) {
+            self.board_mut(address).application.tick(now, inputs);
+            self.store(address);
+        }
     }
 
     /// What a wheel board reads now: encoder edges and the supply switch.
@@ -342,28 +329,29 @@ impl World {
         self.wheel_edge_outside(wheel)?;
         self.wheel_edges[wheel] = [edges, self.wheel_edges[wheel][0]];
         let address = wheel as u8 + 7;
-        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         // Only the bridge takes new inputs here: the valves keep their tick.
         let drives = self.drives(address);
+        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
         self.inputs.bridge_duty[wheel] = match outside {
             Some(outputs) => duty(&outputs),
             None if !drives => 0.0,
             // The program hands its newest output over at the next edge; stopped, it does not.
             None if self.hangs(address) => self.inputs.bridge_duty[wheel],
-            None => self.wheels[wheel].active_duty(),
+            None => duty(&self.board(address).application.active_outputs()),
         };
         // A board that does not drive lets its wheel coast, wherever it runs.
         self.inputs.bridge_enabled[wheel] = drives;
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];
-        let now = self.clock(address, self.now_ns);
-        if self.runs(address) {
-            self.wheels[wheel].tick(now, edges, switch);
-            self.store(address);
-        }
+        let inputs = BoardInputs {
+            edges,
+            supply: switch,
+            ..BoardInputs::default()
+        };
+        self.tick_board(address, &inputs);
         self.strangers.wheel_sample(address, self.now_ns);
-        self.next_wheel_ns[wheel] += u64::from(self.wheels[wheel].period_us()) * NS_PER_US;
+        self.next_wheel_ns[wheel] += self.board(address).application.tick_ns();
         self.collect_transmissions();
         Ok(())
     }
@@ -395,8 +383,8 @@ impl World {
         self.strike_power(fault, begin)
     }
 
-    /// What happened on the line beside the boards' own doing, in words; each once.
-    pub(super) fn take_notes(&mut self) -> Vec<String> {
+    /// What happened on the line beside the boards' own doing; each once.
+    pub(super) fn take_notes(&mut self) -> Vec<Cause> {
         self.strangers.take_notes()
     }
 
@@ -454,14 +442,24 @@ impl World {
         &self.tick_inputs
     }
 
+    /// The board at a node's address, 1 to 8.
+    pub(super) fn board(&self, address: u8) -> &Board {
+        &self.boards[usize::from(address) - 1]
+    }
+
+    /// As [`Self::board`].
+    pub(super) fn board_mut(&mut self, address: u8) -> &mut Board {
+        &mut self.boards[usize::from(address) - 1]
+    }
+
     /// The joint boards, addresses 1 to 6.
-    pub(super) fn joints(&self) -> &[JointBoard; 6] {
-        &self.joints
+    pub(super) fn joints(&self) -> impl Iterator<Item = &JointBoard> {
+        self.boards.iter().filter_map(Board::joint)
     }
 
     /// The wheel boards, addresses 7 and 8.
-    pub(super) fn wheels(&self) -> &[WheelBoard; 2] {
-        &self.wheels
+    pub(super) fn wheels(&self) -> impl Iterator<Item = &WheelBoard> {
+        self.boards.iter().filter_map(Board::wheel)
     }
 
     /// The line.

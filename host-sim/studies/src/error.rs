@@ -45,6 +45,14 @@ pub enum StudyError {
     #[diagnostic(transparent)]
     Sim(#[from] SimError),
 
+    /// Standard output takes no more.
+    #[error("cannot write to standard output: {0}")]
+    #[diagnostic(
+        code(wheeleg::output),
+        help("what a study writes into its folder is there; send standard output somewhere else")
+    )]
+    Stdout(std::io::Error),
+
     /// The study cannot be made, or its result is not what was asked for.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::simulation), help("{help}"))]

@@ -4,6 +4,7 @@
 //! * [`matrix`]: every fault, and what must come of it;
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`bench`]);
 //! * [`figures`]: the paper's figures and misprints;
+//! * [`study`]: what all of them do in the same way;
 //! * [`check`], [`export`]: the model against others' numbers, and for others' programs.
 
 pub mod analysis;
@@ -16,6 +17,7 @@ pub mod export;
 pub mod figures;
 pub mod matrix;
 pub mod run;
+pub mod study;
 pub mod tune;
 
 pub use error::StudyError;

@@ -3,7 +3,8 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use super::registry::{ChannelDef, channels};
+use super::registry::ChannelDef;
+use super::samples::channels;
 use super::sink::{Sink, Taken};
 use crate::LogError;
 

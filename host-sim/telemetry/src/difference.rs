@@ -5,7 +5,7 @@ use std::path::Path;
 use mcap::MessageStream;
 use serde_json::{Map, Value};
 
-use super::registry::channels;
+use super::samples::channels;
 use crate::LogError;
 
 /// One message of a log.
@@ -89,12 +89,13 @@ pub fn first_difference(here: &Path, there: &Path) -> Result<Option<String>, Log
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BodySample, EventKind, Recorder};
+    use crate::event::{Act, Cause};
+    use crate::{BodySample, Recorder};
 
     #[test]
     fn the_first_signal_that_differs_is_named_with_its_time_and_both_values() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        let log = |name: &str, speeds: &[f64], last: &str| {
+        let log = |name: &str, speeds: &[f64]| {
             let path = folder.path().join(name);
             let mut recorder = Recorder::create(&path).expect("created");
             for (t, speed_mm_s) in (0..).zip(speeds) {
@@ -105,18 +106,18 @@ mod tests {
                 // At the channel's rate.
                 recorder.body(t * 10_000_000, sample);
             }
-            recorder.event(90_000_000, EventKind::Info, last);
+            recorder.event(90_000_000, Cause::Scenario(Act::EStop));
             recorder.finish().expect("closed");
             path
         };
-        let here = log("here", &[1.0, 2.0, 3.0], "end");
-        let same = log("same", &[1.0, 2.0, 3.0], "end");
+        let here = log("here", &[1.0, 2.0, 3.0]);
+        let same = log("same", &[1.0, 2.0, 3.0]);
         assert_eq!(first_difference(&here, &same).expect("read"), None);
-        let other = log("other", &[1.0, 2.5, 7.0], "end");
+        let other = log("other", &[1.0, 2.5, 7.0]);
         let text = first_difference(&here, &other).expect("read");
         let expected = "0.010000 s, /body, speed_mm_s: 2 on the host, 2.5 with the boards";
         assert_eq!(text.as_deref(), Some(expected));
-        let short = log("short", &[1.0, 2.0], "end");
+        let short = log("short", &[1.0, 2.0]);
         let text = first_difference(&here, &short).expect("read");
         let text = text.expect("a message more");
         assert!(

@@ -56,7 +56,7 @@ impl TelemetryHash {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{EventSample, FootSample};
+    use crate::{FootSample, ProvenanceSample};
 
     fn foot(normal_force_n: f64, switches: u8) -> FootSample {
         FootSample {
@@ -106,7 +106,7 @@ mod tests {
             bytes.extend_from_slice(text.as_bytes());
         }
         let mut h = TelemetryHash::default();
-        let sample = EventSample {
+        let sample = ProvenanceSample {
             kind: "mode".into(),
             text: "joint 3 holds".into(),
         };

@@ -5,6 +5,8 @@
 //! channels with their JSON schemas, the CSV headers, the plots' labels and
 //! `wheeleg channels`.
 //!
+//! [`event`] says what happened as data, [`messages`] makes text of it.
+//!
 //! A [`Recorder`] takes the samples of a run and hands them to [`Sink`]s: a log file
 //! ([`LogFile`]), tables ([`Tables`]), the last seconds ([`Ring`]), and memory ([`Keep`]).
 
@@ -12,10 +14,12 @@ mod csv_out;
 mod difference;
 mod encode;
 mod error;
+pub mod event;
 mod filter;
 mod hash;
 mod log_file;
 mod memory;
+pub mod messages;
 mod recorder;
 mod recover;
 mod registry;
@@ -27,16 +31,17 @@ pub use csv_out::Tables;
 pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use error::LogError;
+pub use event::{Cause, Event, EventKind};
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use log_file::LogFile;
 pub use memory::{Keep, Memory, Recording, Row};
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};
-pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, channels, json_schema};
+pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, json_schema};
 pub use ring::{Message, Ring};
 pub use samples::{
-    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, StateSample, SupplySample, WheelSample,
+    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
+    ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
 };
 pub use sink::{SampleRef, Sink, Taken};

@@ -8,7 +8,8 @@ use std::path::Path;
 use mcap::Compression;
 use mcap::records::MessageHeader;
 
-use super::registry::{ChannelDef, channels, json_schema};
+use super::registry::{ChannelDef, json_schema};
+use super::samples::channels;
 use super::sink::{Sink, Taken};
 use crate::LogError;
 

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use super::registry::channels;
 use super::samples::{
-    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
-    SupplySample, WheelSample,
+    BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample, SupplySample,
+    WheelSample, channels,
 };
 use super::sink::{SampleRef, Taken};
+use crate::Event;
 
 /// One sample and its time.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +46,7 @@ pub struct Recording {
     /// Bus as each board has heard it, addresses 1 to 8.
     pub links: [Vec<Row<LinkSample>>; 8],
     /// Events.
-    pub events: Vec<Row<EventSample>>,
+    pub events: Vec<Row<Event>>,
     /// Determinism hash of the log, 64 hexadecimal digits.
     pub hash: String,
     /// Messages recorded.
@@ -173,14 +173,17 @@ impl Memory {
                 }
                 push(&mut data.links[number], t_ns, v);
             }
-            SampleRef::Event(v) => {
-                if data.events.len() < self.keep.events {
-                    push(&mut data.events, t_ns, v);
-                } else {
-                    data.events_left_out += 1;
-                }
-            }
-            SampleRef::State(_) => {}
+            // Events come typed, by a way of their own.
+            SampleRef::Event(_) | SampleRef::Provenance(_) | SampleRef::State(_) => {}
+        }
+    }
+
+    pub(crate) fn event(&mut self, t_ns: u64, event: Event) {
+        let data = &mut self.data;
+        if data.events.len() < self.keep.events {
+            data.events.push(Row { t_ns, v: event });
+        } else {
+            data.events_left_out += 1;
         }
     }
 
@@ -198,6 +201,7 @@ fn push<S: Clone>(rows: &mut Vec<Row<S>>, t_ns: u64, sample: &S) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::event::{Act, Cause};
 
     fn rows(keep: Keep, seconds: u64) -> Recording {
         let mut memory = Memory::new(keep);
@@ -250,16 +254,8 @@ mod tests {
     #[test]
     fn events_beyond_the_bound_are_counted() {
         let mut memory = Memory::new(Keep::bounded(1.0, &[]));
-        let event = EventSample::default();
         for t_ns in 0..EVENTS as u64 + 5 {
-            memory.take(&Taken {
-                channel: 15,
-                number: 0,
-                t_ns,
-                sample: (&event).into(),
-                due: true,
-                lost: false,
-            });
+            memory.event(t_ns, Cause::Scenario(Act::EStop).into());
         }
         let kept = memory.into_recording();
         assert_eq!((kept.events.len(), kept.events_left_out), (EVENTS, 5));

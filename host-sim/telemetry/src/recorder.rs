@@ -6,13 +6,13 @@ use super::filter::LowPass2;
 use super::hash::TelemetryHash;
 use super::log_file::LogFile;
 use super::memory::{Keep, Memory, Recording};
-use super::registry::{ChannelDef, Sample, channels};
+use super::registry::{ChannelDef, Sample};
 use super::samples::{
-    BodySample, BusSample, EventKind, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, StateSample, SupplySample, WheelSample,
+    BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample, ProvenanceSample,
+    StateSample, SupplySample, WheelSample, channels,
 };
 use super::sink::{SampleRef, Sink, Taken};
-use crate::LogError;
+use crate::{Event, LogError};
 
 /// Corner of the low-pass on force and acceleration signals, Hz
 /// (ARCHITECTURE.md, "Forces").
@@ -190,18 +190,16 @@ impl<'a> Recorder<'a> {
     }
 
     /// Records an event.
-    pub fn event(&mut self, t_ns: u64, kind: EventKind, text: impl Into<String>) {
-        let sample = EventSample {
-            kind: kind.name().to_owned(),
-            text: text.into(),
-        };
-        self.put(index::EVENTS, 0, t_ns, &sample);
+    pub fn event(&mut self, t_ns: u64, event: impl Into<Event>) {
+        let event = event.into();
+        self.put(index::EVENTS, 0, t_ns, &event.sample());
+        self.memory.event(t_ns, event);
     }
 
     /// Records one line of provenance (scenario, robot, seed, version) at time
     /// zero. Part of the hash, so it must not hold paths or wall-clock times.
     pub fn provenance(&mut self, kind: &str, text: impl Into<String>) {
-        let sample = EventSample {
+        let sample = ProvenanceSample {
             kind: kind.to_owned(),
             text: text.into(),
         };

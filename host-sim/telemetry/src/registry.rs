@@ -1,7 +1,5 @@
 //! What a signal is, and the list of all of them.
 
-use super::samples;
-
 /// Which layer of the machine a signal belongs to (ARCHITECTURE.md).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layer {
@@ -89,7 +87,7 @@ pub struct ChannelDef {
     pub fields: &'static [FieldDef],
 }
 
-/// A typed telemetry sample; implemented by the declarations in [`samples`].
+/// A typed telemetry sample; implemented by the declarations in [`crate::samples`].
 pub trait Sample: Clone {
     /// Schema name in the log.
     const SCHEMA: &'static str;
@@ -105,12 +103,6 @@ pub trait Sample: Clone {
 
     /// Calls `cell` with the text of each field in order.
     fn cells(&self, cell: &mut dyn FnMut(&[u8]));
-}
-
-/// All channels, in log order.
-#[must_use]
-pub fn channels() -> &'static [ChannelDef] {
-    &samples::CHANNELS
 }
 
 /// JSON Schema (draft 2020-12) of a sample, with the unit and resolution of

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::registry::channels;
+use super::samples::channels;
 use super::sink::{Sink, Taken};
 
 /// One message of the log.
@@ -68,7 +68,8 @@ impl Sink for Ring {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{EventKind, JointSample, Recorder};
+    use crate::event::{Act, Cause};
+    use crate::{JointSample, Recorder};
 
     #[test]
     fn it_holds_the_last_seconds_and_no_more() {
@@ -80,7 +81,7 @@ mod tests {
                 ..JointSample::default()
             };
             recorder.joint(ms * 1_000_000, 0, sample);
-            recorder.event(ms * 1_000_000, EventKind::Info, "a thing");
+            recorder.event(ms * 1_000_000, Cause::Scenario(Act::EStop));
         }
         recorder.finish().expect("no file");
         // 500 Hz.

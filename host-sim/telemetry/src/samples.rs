@@ -55,7 +55,13 @@ macro_rules! integer_values {
         }
     )*};
 }
-integer_values!(u8 => push_u64 as u64, u16 => push_u64 as u64, u32 => push_u64 as u64, i32 => push_i64 as i64);
+integer_values!(
+    u8 => push_u64 as u64,
+    u16 => push_u64 as u64,
+    u32 => push_u64 as u64,
+    u64 => push_u64 as u64,
+    i32 => push_i64 as i64
+);
 
 /// Declares sample structs: `name: type, "unit", decimals, layer;`. The doc
 /// comment of a field is its description in the log and in the documentation.
@@ -250,7 +256,7 @@ samples! {
         alive: bool, "flag", 0, Master;
         /// Step of the gait, counted from 1; 0 before the first.
         step: u32, "1", 0, Master;
-        /// Gait phase within the step: 0 none, 1 unload, 2 lift, 3 lower, 4 load, 5 advance.
+        /// Gait phase within the step: 0 none, 1 unload, 2 lift and reach, 3 lower, 4 rest, 5 push.
         phase: u8, "code", 0, Master;
         /// Link-loss action sent for the stepping leg: 0 hold, 1 hold then exhaust.
         link_loss_action: u8, "code", 0, Master;
@@ -290,47 +296,32 @@ samples! {
         parameters: u32, "1", 0, Node;
     }
 
-    /// Something that happened.
+    /// Something that happened. Filter by the fields; the text is for the eye.
     EventSample = "wheeleg.Event" {
-        /// Kind: info, scenario, command, mode, fault, contact.
+        /// Kind: info, scenario, command, mode, fault, contact, log.
         kind: String, "text", 0, Host;
-        /// What happened, in words.
+        /// What happened, by a name that stays the same: fault_latched, hold, command_refused and so on.
+        code: String, "text", 0, Host;
+        /// Mode entered, reason, finding, record of a board's log, side of a foot, parameter or fault injected; empty where there is none.
+        detail: String, "text", 0, Host;
+        /// Bus address of the board that it is about, 1 to 8; 0: none.
+        board: u8, "code", 0, Host;
+        /// Number of the fault or warning that it is about, as in the protocol's tables; 0: none.
+        fault: u8, "code", 0, Host;
+        /// Code of the user's command that it answers, as in the master's table of commands; 0: none.
+        command: u16, "code", 0, Host;
+        /// Time after power-up of an event of the start-up; 0: it happened later.
+        start_up_us: u64, "us", 0, Host;
+        /// What happened, for a person.
         text: String, "text", 0, Host;
     }
-}
 
-/// Kind of an event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum EventKind {
-    /// For information.
-    Info,
-    /// The scenario acted (master killed, E-stop pressed).
-    Scenario,
-    /// A user command was given or answered.
-    Command,
-    /// A node or the master changed its mode.
-    Mode,
-    /// A fault was latched or cleared.
-    Fault,
-    /// A foot touched or left the ground.
-    Contact,
-    /// A record of a board's own log.
-    Log,
-}
-
-impl EventKind {
-    /// Lower-case name, as logged.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Info => "info",
-            Self::Scenario => "scenario",
-            Self::Command => "command",
-            Self::Mode => "mode",
-            Self::Fault => "fault",
-            Self::Contact => "contact",
-            Self::Log => "log",
-        }
+    /// What a log is of.
+    ProvenanceSample = "wheeleg.Run" {
+        /// Kind: program, scenario, robot, seed, fault, parameter.
+        kind: String, "text", 0, Host;
+        /// Its value.
+        text: String, "text", 0, Host;
     }
 }
 
@@ -344,13 +335,19 @@ const fn channel<S: Sample>(topic: &'static str, rate_hz: u32, doc: &'static str
     }
 }
 
+/// All channels, in log order.
+#[must_use]
+pub fn channels() -> &'static [ChannelDef] {
+    &CHANNELS
+}
+
 /// Samples per second in the log for the fast channels. The recording in
 /// memory, which the analysis uses, has every 1 kHz sample.
 const FAST_HZ: u32 = 500;
 /// One sample per bus cycle.
 const CYCLE_HZ: u32 = 100;
 
-pub(super) static CHANNELS: [ChannelDef; 25] = [
+static CHANNELS: [ChannelDef; 25] = [
     channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
     channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),
     channel::<JointSample>("/joint/3", FAST_HZ, "Left vertical cylinder (b6)"),
@@ -367,7 +364,7 @@ pub(super) static CHANNELS: [ChannelDef; 25] = [
     channel::<MasterSample>("/master", CYCLE_HZ, "Master, layers 0 and 1"),
     channel::<StateSample>("/state", 10, "Fingerprint of the simulated state"),
     channel::<EventSample>("/events", 0, "Events"),
-    channel::<EventSample>("/run", 0, "Scenario, robot and seed of this log, at time 0"),
+    channel::<ProvenanceSample>("/run", 0, "Scenario, robot and seed of this log, at time 0"),
     channel::<LinkSample>("/link/1", 0, "Bus as heard by joint 1"),
     channel::<LinkSample>("/link/2", 0, "Bus as heard by joint 2"),
     channel::<LinkSample>("/link/3", 0, "Bus as heard by joint 3"),

@@ -3,7 +3,7 @@
 use super::registry::Sample;
 use super::samples::{
     BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
-    StateSample, SupplySample, WheelSample,
+    ProvenanceSample, StateSample, SupplySample, WheelSample,
 };
 use crate::LogError;
 
@@ -56,6 +56,7 @@ sample_ref! {
     State: StateSample,
     Event: EventSample,
     Link: LinkSample,
+    Provenance: ProvenanceSample,
 }
 
 /// One sample on its way to the sinks.

@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use mcap::read::Options;
+use wheeleg_master::contact::Side;
 use wheeleg_telemetry::{
-    BodySample, BusSample, EventKind, FootSample, JointSample, LinkSample, LogFile, MasterSample,
+    BodySample, BusSample, Cause, FootSample, JointSample, LinkSample, LogFile, MasterSample,
     Recorder, Recording, SupplySample, Tables, WheelSample, channels, recover,
 };
 
@@ -41,7 +42,11 @@ fn fill(recorder: &mut Recorder<'_>, amplitude: f64) {
             recorder.state(t_ns, format!("{ms:064x}"));
         }
         if ms == 1234 {
-            recorder.event(t_ns, EventKind::Info, "a, \"quoted\" text");
+            let touches = Cause::Contact {
+                side: Side::Left,
+                switches: [true, false, true, false],
+            };
+            recorder.event(t_ns, touches);
             for node in 0..8 {
                 recorder.link(t_ns, node, LinkSample::default());
             }
@@ -284,7 +289,9 @@ fn csv_has_units_in_its_header_and_the_recorded_values() {
     assert!((value - truth).abs() <= 0.51e-4);
     let events = std::fs::read_to_string(folder.path().join("events.csv")).expect("written");
     assert!(
-        events.contains("1.234,info,\"a, \"\"quoted\"\" text\""),
+        events.contains(
+            "1.234,contact,ground_contact,left,0,0,0,0,\"ground: left foot touches, front, back\""
+        ),
         "{events}"
     );
 }

@@ -1,18 +1,7 @@
 //! Names that the host shares with the boards and the master.
 
-use wheeleg_config::COMMAND_NAMES;
 use wheeleg_protocol::NodeMode;
 use wheeleg_telemetry::{JointSample, Sample};
-
-#[test]
-fn scenario_commands_exist_in_the_masters_table() {
-    for name in COMMAND_NAMES {
-        let known = wheeleg_master::command::TABLE
-            .iter()
-            .any(|row| row.name == name);
-        assert!(known, "{name}");
-    }
-}
 
 /// Log viewers see mode numbers; the channel's description explains them.
 #[test]

@@ -131,6 +131,9 @@ pub(crate) fn story(recording: &Recording) -> String {
     recording
         .events
         .iter()
-        .map(|r| format!("{:8.3} {:8} {}\n", r.t_s(), r.v.kind, r.v.text))
+        .map(|r| {
+            let kind = r.v.cause.kind().name();
+            format!("{:8.3} {kind:8} {}\n", r.t_s(), r.v)
+        })
         .collect()
 }

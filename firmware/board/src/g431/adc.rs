@@ -29,8 +29,10 @@ pub(super) fn start() {
     // Four converter clocks between calibration and enabling (RM0440 §21.4.8).
     cortex_m::asm::delay(16);
     adc.isr().write(|r| r.set_adrdy(true));
-    adc.cr().modify(|r| r.set_aden(true));
-    while !adc.isr().read().adrdy() {}
+    // Asked for until it is ready: so soon after a calibration the bit may not be taken.
+    while !adc.isr().read().adrdy() {
+        adc.cr().modify(|r| r.set_aden(true));
+    }
 
     adc.sqr1().write(|r| r.set_sq(0, CHANNEL));
     adc.smpr()

@@ -2,7 +2,7 @@
 
 use super::pac;
 use pac::gpio::Gpio;
-use pac::gpio::vals::{Moder, Pupdr};
+use pac::gpio::vals::{Moder, Ospeedr, Pupdr};
 
 /// How a pin is used.
 #[derive(Clone, Copy)]
@@ -107,6 +107,9 @@ pub fn configure_common() {
     for pin in [0, 1, 2, 10, 11] {
         configure(b, pin, Mode::Input(Pupdr::PULL_UP));
     }
+    // At the lowest speed an edge may take 170 ns, a sixth of a bit (DATASHEET).
+    b.ospeedr()
+        .modify(|r| r.set_ospeedr(6, Ospeedr::MEDIUM_SPEED));
     configure(b, 6, Mode::Alternate(7, Pupdr::FLOATING));
     configure(b, 7, Mode::Alternate(7, Pupdr::PULL_UP));
     configure(b, 14, Mode::Alternate(1, Pupdr::FLOATING));

@@ -2,17 +2,17 @@
 
 use wheeleg_protocol as proto;
 use wheeleg_protocol::{Address, Correction, Message, OpenMode, WheelControlMode};
-use wheeleg_units::PositionMm;
 
 use super::acyclic::{ARMING_JOBS, Job, PROFILE_JOBS, Purpose};
 use super::wheels::Wheels;
 use super::{Group, GroupKind, Layer0, Power};
+use crate::argument::{self, Argument, Value};
 use crate::command::{Command, CorrectionKind};
 use crate::config::WheelDrive;
 use crate::contact::Side;
 use crate::dispatcher::{Accepted, Refusal};
 use crate::event::{Event, Events};
-use crate::layer1::params::{STROKE_MM, in_range};
+use crate::layer1::params::ParamError;
 use crate::setpoint::PushProfile;
 
 impl Layer0 {
@@ -60,13 +60,7 @@ impl Layer0 {
             Command::JointReference { joint, stroke_mm } => {
                 self.may_lead()?;
                 let _exists = joint_address(joint)?;
-                in_range(
-                    "stroke_mm",
-                    stroke_mm.get(),
-                    PositionMm::ZERO.get(),
-                    STROKE_MM.get(),
-                )
-                .map_err(Refusal::Parameter)?;
+                in_range(&argument::STROKE, Value::Fixed(stroke_mm.get()))?;
                 let index = usize::from(joint).saturating_sub(1);
                 if let Some(slot) = self.direct.get_mut(index) {
                     *slot = Some(stroke_mm);
@@ -75,10 +69,13 @@ impl Layer0 {
             }
             Command::WheelReference { travel_mm } => {
                 self.may_lead()?;
+                in_range(&argument::TRAVEL, Value::Fixed(travel_mm.get()))?;
                 let limit = self.units.travel_limit();
-                let least = PositionMm::ZERO.saturating_sub(limit);
-                in_range("travel_mm", travel_mm.get(), least.get(), limit.get())
-                    .map_err(Refusal::Parameter)?;
+                if travel_mm.get().unsigned_abs() > limit.get().unsigned_abs() {
+                    return Err(Refusal::Parameter(ParamError::BeyondCounter {
+                        limit_mm: limit,
+                    }));
+                }
                 if !self
                     .wheels
                     .has_room(&travel_mm, &self.odometry, &self.units)
@@ -121,9 +118,7 @@ impl Layer0 {
                 self.ask(accepted, to, proto::SelectCorrection { correction }.into())
             }
             Command::WheelSpeed { side, speed_mm_s } => {
-                let one = const { fixed::types::I16F16::lit("1") };
-                let limit = const { fixed::types::I16F16::lit("400") };
-                in_range("speed_mm_s", speed_mm_s.get(), one, limit).map_err(Refusal::Parameter)?;
+                in_range(&argument::SPEED, Value::Fixed(speed_mm_s.get()))?;
                 let speed = self.units.speed(speed_mm_s);
                 self.ask(
                     accepted,
@@ -135,10 +130,7 @@ impl Layer0 {
                 side,
                 acceleration_mm_s2,
             } => {
-                let least = const { fixed::types::I16F16::lit("10") };
-                let limit = const { fixed::types::I16F16::lit("5000") };
-                in_range("acceleration_mm_s2", acceleration_mm_s2, least, limit)
-                    .map_err(Refusal::Parameter)?;
+                in_range(&argument::ACCELERATION, Value::Fixed(acceleration_mm_s2))?;
                 let acceleration = self.units.acceleration(acceleration_mm_s2);
                 let message = proto::WheelAcceleration { acceleration };
                 self.ask(accepted, wheel_address(side)?, message.into())
@@ -345,6 +337,11 @@ impl Layer0 {
         });
         Ok(false)
     }
+}
+
+fn in_range(argument: &'static Argument, value: Value) -> Result<(), Refusal> {
+    let checked = argument.check(value).map_err(ParamError::OutOfRange);
+    checked.map_err(Refusal::Parameter)
 }
 
 fn joint_address(joint: u8) -> Result<Address, Refusal> {

@@ -42,11 +42,10 @@ impl WheelUnits {
         Acceleration8p8::new(libm::roundf(raw).clamp(1.0, 32767.0) as u16).unwrap_or_default()
     }
 
-    /// Longest move of a single command: [`REACH_COUNTS`], at most 32 m.
+    /// Longest move of a single command that the counters can tell: [`REACH_COUNTS`].
     #[must_use]
     pub fn travel_limit(&self) -> PositionMm {
-        let reach_um = self.geometry.counts_to_um(i64::from(REACH_COUNTS));
-        um_to_mm(reach_um.min(32_000_000))
+        um_to_mm(self.geometry.counts_to_um(i64::from(REACH_COUNTS)))
     }
 
     /// Velocity in 12.4 counts per sample, nearest, saturating.

@@ -9,10 +9,12 @@
 //! [`FootShape::Literal`] is the caption taken word for word: z = sin²(t/8)
 //! metres over 3.5 s.
 
+use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use super::params::{ParamError, STROKE_MM, in_range};
+use super::params::{ParamError, STROKE_MM};
 use super::units::{seconds_to_us, us_to_seconds};
+use crate::argument::{self, Argument, Value};
 use crate::contact::Side;
 use crate::mirror;
 use crate::setpoint::{Cylinder, JointSetpoint, OnLinkLoss, Phase, Setpoints};
@@ -22,20 +24,20 @@ use crate::setpoint::{Cylinder, JointSetpoint, OnLinkLoss, Phase, Setpoints};
 pub enum FootShape {
     /// One arch: forward at constant speed, up and down as sin².
     Arch {
-        /// Distance X forward, mm, 0..=180. The 240 mm that fit Fig. 5 exceed
+        /// Distance X forward, mm ([`argument::FORWARD`]). The 240 mm that fit Fig. 5 exceed
         /// the stroke of Figs. 12–13 and are for drawing only.
         forward_mm: PositionMm,
-        /// Distance to the robot's left, mm, −60..=60 (0 in the paper).
+        /// Distance to the robot's left, mm ([`argument::LEFT`]; 0 in the paper).
         left_mm: PositionMm,
-        /// Height A, mm, 0..=180.
+        /// Height A, mm ([`argument::HEIGHT`]).
         height_mm: PositionMm,
-        /// Rate Ω, rad/s, 0.05..=2 (1/8 in the paper).
+        /// Rate Ω, rad/s ([`argument::RATE`]; 1/8 in the paper).
         rate_rad_s: f32,
     },
     /// The caption of Fig. 5 taken literally: z = sin²(t/8) m, 3.5 s, so that the
     /// foot rises 179.5 mm and stays up.
     Literal {
-        /// Distance X forward, mm, 0..=180.
+        /// Distance X forward, mm ([`argument::FORWARD`]).
         forward_mm: PositionMm,
     },
 }
@@ -61,8 +63,10 @@ impl FootShape {
     /// # Errors
     /// The first violation.
     pub fn validate(&self) -> Result<(), ParamError> {
-        use fixed::types::I16F16;
-        let full = STROKE_MM.get();
+        let length = |argument: &'static Argument, mm: PositionMm| {
+            let checked = argument.check(Value::Fixed(mm.get()));
+            checked.map_err(ParamError::OutOfRange)
+        };
         match *self {
             Self::Arch {
                 forward_mm,
@@ -70,20 +74,15 @@ impl FootShape {
                 height_mm,
                 rate_rad_s,
             } => {
-                in_range("forward_mm", forward_mm.get(), I16F16::ZERO, full)?;
-                let side = const { I16F16::lit("60") };
-                let right = const { I16F16::lit("-60") };
-                in_range("left_mm", left_mm.get(), right, side)?;
-                in_range("height_mm", height_mm.get(), I16F16::ZERO, full)?;
-                let field = "rate_rad_s";
+                length(&argument::FORWARD, forward_mm)?;
+                length(&argument::LEFT, left_mm)?;
+                length(&argument::HEIGHT, height_mm)?;
                 let rate = I16F16::checked_from_num(rate_rad_s).filter(|_| rate_rad_s.is_finite());
-                let rate = rate.ok_or(ParamError::NotFinite { field })?;
-                let (slow, fast) = const { (I16F16::lit("0.05"), I16F16::lit("2")) };
-                in_range(field, rate, slow, fast)
+                let rate = rate.ok_or(ParamError::NotFinite(&argument::RATE))?;
+                let checked = argument::RATE.check(Value::Fixed(rate));
+                checked.map_err(ParamError::OutOfRange)
             }
-            Self::Literal { forward_mm } => {
-                in_range("forward_mm", forward_mm.get(), I16F16::ZERO, full)
-            }
+            Self::Literal { forward_mm } => length(&argument::FORWARD, forward_mm),
         }
     }
 

@@ -1,8 +1,11 @@
 //! Gait parameters with units, limits and typed errors.
 
+use core::fmt;
+
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use crate::argument::{self, Argument, OutOfRange, Seconds, Value};
 use crate::contact::Side;
 
 /// Stroke of every cylinder in mm (MODEL.md: ASSUMED, fits the axes of Figs. 12–13).
@@ -30,7 +33,7 @@ pub enum Pattern {
 /// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaitParams {
-    /// Number of steps, 1..=10 000.
+    /// Number of steps ([`argument::STEPS`]).
     pub steps: u16,
     /// Duration of a step, µs. Paper: three steps in 10 s.
     pub period_us: u32,
@@ -42,19 +45,19 @@ pub struct GaitParams {
     pub lower_us: u32,
     /// Start of the push: the wheels drive, b5 gives way, µs.
     pub push_us: u32,
-    /// Stroke of b5 and b6 used by a step, mm, 1..=180.
+    /// Stroke of b5 and b6 used by a step, mm ([`argument::STEP_STROKE`]).
     pub stroke_mm: PositionMm,
     /// Stroke of b5 at which the held leg (or, alternating, the second leg)
-    /// stands, mm, 0..=180.
+    /// stands, mm.
     pub held_leg_s5_mm: PositionMm,
-    /// Stroke of b6 at which the held leg stands, mm, 0..=180 (180 = fully
+    /// Stroke of b6 at which the held leg stands, mm (180 = fully
     /// extended, foot on the ground).
     pub held_leg_s6_mm: PositionMm,
-    /// Stroke of both yaw cylinders, mm, 0..=180; 90 is straight ahead (b2 = 0.40 m).
+    /// Stroke of both yaw cylinders, mm; 90 is straight ahead (b2 = 0.40 m).
     pub yaw_s2_mm: PositionMm,
-    /// Speed of the push, mm/s, 1..=400.
+    /// Speed of the push, mm/s ([`argument::PUSH_SPEED`]).
     pub push_speed_mm_s: VelocityMmS,
-    /// Acceleration of the push, mm/s², 10..=5000.
+    /// Acceleration of the push, mm/s² ([`argument::PUSH_ACCELERATION`]).
     pub push_acceleration_mm_s2: I16F16,
     /// Which leg steps when.
     pub pattern: Pattern,
@@ -87,32 +90,22 @@ impl Default for GaitParams {
 /// Why a parameter set is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParamError {
-    /// A value is outside its range (both ends included, unit of the field).
-    OutOfRange {
-        /// Field name.
-        field: &'static str,
-        /// Smallest value allowed.
-        min: I16F16,
-        /// Largest value allowed.
-        max: I16F16,
-        /// Value given.
-        value: I16F16,
-    },
-    /// `steps` outside 1..=10 000.
-    Steps {
-        /// Value given.
-        value: u16,
-    },
-    /// The instants are not in the order lift < reach, lift < lower, reach ≤ push,
-    /// lower < push < period.
+    /// A value is outside its range.
+    OutOfRange(
+        /// Which, and its range.
+        OutOfRange,
+    ),
+    /// An instant of the gait does not come before another one. The order is lift before
+    /// reach and before lower, both before push, push before period.
     Order {
-        /// Name of the first instant out of order.
-        field: &'static str,
-    },
-    /// The period exceeds one minute.
-    PeriodTooLong {
-        /// Value given, µs.
-        value_us: u32,
+        /// The instant that must come first.
+        first: &'static Argument,
+        /// Its value, µs.
+        first_us: u32,
+        /// The instant that must come later.
+        then: &'static Argument,
+        /// Its value, µs.
+        then_us: u32,
     },
     /// The push takes longer than the step leaves for it.
     PushTooLong {
@@ -122,100 +115,183 @@ pub enum ParamError {
         has_us: u32,
     },
     /// A number is not finite.
-    NotFinite {
-        /// Field name.
-        field: &'static str,
-    },
+    NotFinite(
+        /// Which.
+        &'static Argument,
+    ),
     /// The foot trajectory leaves the workspace of the leg.
     OutOfReach {
         /// Time at which it does, ms from its start.
         at_ms: u32,
     },
+    /// A move of the wheels is longer than their 24-bit counters can tell.
+    BeyondCounter {
+        /// Longest move either way, mm.
+        limit_mm: PositionMm,
+    },
 }
 
-/// Checks `value` against `min..=max`.
-///
-/// # Errors
-/// [`ParamError::OutOfRange`] with the limits.
-pub fn in_range(
-    field: &'static str,
-    value: I16F16,
-    min: I16F16,
-    max: I16F16,
-) -> Result<(), ParamError> {
-    if value < min || value > max {
-        return Err(ParamError::OutOfRange {
-            field,
-            min,
-            max,
-            value,
-        });
+impl ParamError {
+    /// The arguments whose values are at fault, the first one first.
+    pub fn arguments(&self) -> impl Iterator<Item = &'static Argument> + use<> {
+        let list: [Option<&'static Argument>; 5] = match *self {
+            Self::OutOfRange(OutOfRange { argument, .. }) | Self::NotFinite(argument) => {
+                [Some(argument), None, None, None, None]
+            }
+            Self::Order { first, then, .. } => [Some(then), Some(first), None, None, None],
+            Self::PushTooLong { .. } => [
+                Some(&argument::PERIOD),
+                Some(&argument::PUSH),
+                Some(&argument::STEP_STROKE),
+                Some(&argument::PUSH_SPEED),
+                Some(&argument::PUSH_ACCELERATION),
+            ],
+            Self::OutOfReach { .. } => [
+                Some(&argument::FORWARD),
+                Some(&argument::LEFT),
+                Some(&argument::HEIGHT),
+                None,
+                None,
+            ],
+            Self::BeyondCounter { .. } => [Some(&argument::TRAVEL), None, None, None, None],
+        };
+        list.into_iter().flatten()
     }
-    Ok(())
 }
 
-/// Longest step, µs.
-pub const PERIOD_MAX_US: u32 = 60_000_000;
-/// Most steps of one run.
-pub const STEPS_MAX: u16 = 10_000;
+impl fmt::Display for ParamError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::OutOfRange(error) => error.fmt(f),
+            Self::Order {
+                first,
+                first_us,
+                then,
+                then_us,
+            } => write!(
+                f,
+                "`{}` is {} s and must be less than `{}`, which is {} s; allowed: lift before \
+                 reach and lower, these before push, push before period",
+                first.name,
+                Seconds(first_us),
+                then.name,
+                Seconds(then_us)
+            ),
+            Self::PushTooLong { needs_us, has_us } => write!(
+                f,
+                "with this `stroke`, `push_speed` and `push_acceleration` the push takes {} s, \
+                 but from `push` to the end of the `period` there are {} s; allowed: `period` at \
+                 least {} s after `push`",
+                Seconds(needs_us),
+                Seconds(has_us),
+                Seconds(needs_us)
+            ),
+            Self::NotFinite(argument) => write!(
+                f,
+                "`{}` is not a finite number; allowed: {}",
+                argument.name,
+                argument.range()
+            ),
+            Self::OutOfReach { at_ms } => write!(
+                f,
+                "the foot would leave the reach of its leg {} s after the start; allowed: a \
+                 smaller `forward`, `left` or `height`",
+                Seconds(at_ms.saturating_mul(1000))
+            ),
+            Self::BeyondCounter { limit_mm } => write!(
+                f,
+                "`travel` is longer than the wheels' counters can tell; allowed: -{0} to {0} mm",
+                limit_mm.get()
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ParamError {}
 
 impl GaitParams {
-    /// Checks every limit.
+    /// Checks every limit and every relation.
     ///
     /// # Errors
     /// The first violation found.
     pub fn validate(&self) -> Result<(), ParamError> {
-        let one = const { I16F16::lit("1") };
-        if self.steps == 0 || self.steps > STEPS_MAX {
-            return Err(ParamError::Steps { value: self.steps });
-        }
-        if self.period_us > PERIOD_MAX_US {
-            return Err(ParamError::PeriodTooLong {
-                value_us: self.period_us,
-            });
-        }
-        for (bad, field) in [
-            (self.lift_us >= self.reach_us, "reach_us"),
-            (self.lift_us >= self.lower_us, "lower_us"),
-            (self.reach_us >= self.push_us, "push_us"),
-            (self.lower_us >= self.push_us, "push_us"),
-            (self.push_us >= self.period_us, "period_us"),
-        ] {
-            if bad {
-                return Err(ParamError::Order { field });
-            }
-        }
-        in_range("stroke_mm", self.stroke_mm.get(), one, STROKE_MM.get())?;
-        for (field, value) in [
-            ("held_leg_s5_mm", self.held_leg_s5_mm),
-            ("held_leg_s6_mm", self.held_leg_s6_mm),
-            ("yaw_s2_mm", self.yaw_s2_mm),
-        ] {
-            in_range(field, value.get(), I16F16::ZERO, STROKE_MM.get())?;
-        }
-        in_range(
-            "push_speed_mm_s",
-            self.push_speed_mm_s.get(),
-            one,
-            const { I16F16::lit("400") },
-        )?;
-        in_range(
-            "push_acceleration_mm_s2",
-            self.push_acceleration_mm_s2,
-            const { I16F16::lit("10") },
-            const { I16F16::lit("5000") },
-        )?;
+        self.violations().next().map_or(Ok(()), Err)
+    }
+
+    /// Every limit and relation that these parameters violate.
+    pub fn violations(&self) -> impl Iterator<Item = ParamError> + use<> {
+        let ranges = self.values().into_iter().filter_map(|(argument, value)| {
+            let checked = argument.check(value);
+            checked.err().map(ParamError::OutOfRange)
+        });
+        let [lift, reach, lower, push, period] = [
+            (&argument::LIFT, self.lift_us),
+            (&argument::REACH, self.reach_us),
+            (&argument::LOWER, self.lower_us),
+            (&argument::PUSH, self.push_us),
+            (&argument::PERIOD, self.period_us),
+        ];
+        let order = [
+            (lift, reach),
+            (lift, lower),
+            (reach, push),
+            (lower, push),
+            (push, period),
+        ];
+        let order = order.into_iter().filter(|(first, then)| first.1 >= then.1);
+        let order = order.map(|((first, first_us), (then, then_us))| ParamError::Order {
+            first,
+            first_us,
+            then,
+            then_us,
+        });
+        ranges.chain(order).chain(self.push_too_long())
+    }
+
+    /// The values that have a range of their own.
+    fn values(&self) -> [(&'static Argument, Value); 12] {
+        [
+            (&argument::STEPS, Value::Whole(i32::from(self.steps))),
+            (&argument::PERIOD, Value::Micros(self.period_us)),
+            (&argument::LIFT, Value::Micros(self.lift_us)),
+            (&argument::REACH, Value::Micros(self.reach_us)),
+            (&argument::LOWER, Value::Micros(self.lower_us)),
+            (&argument::PUSH, Value::Micros(self.push_us)),
+            (&argument::STEP_STROKE, Value::Fixed(self.stroke_mm.get())),
+            (
+                &argument::HELD_LEG_S5,
+                Value::Fixed(self.held_leg_s5_mm.get()),
+            ),
+            (
+                &argument::HELD_LEG_S6,
+                Value::Fixed(self.held_leg_s6_mm.get()),
+            ),
+            (&argument::YAW_S2, Value::Fixed(self.yaw_s2_mm.get())),
+            (
+                &argument::PUSH_SPEED,
+                Value::Fixed(self.push_speed_mm_s.get()),
+            ),
+            (
+                &argument::PUSH_ACCELERATION,
+                Value::Fixed(self.push_acceleration_mm_s2),
+            ),
+        ]
+    }
+
+    /// Whether the push ends within the step. A push behind the period is out of order, which
+    /// is said of it already.
+    fn push_too_long(&self) -> Option<ParamError> {
+        let has_us = self
+            .period_us
+            .checked_sub(self.push_us)
+            .filter(|us| *us > 0)?;
         let push = super::profile::Trapezoid::new(
             self.push_distance_mm(self.stroke_mm).get().to_num::<f32>(),
             self.push_speed_mm_s.get().to_num::<f32>(),
             self.push_acceleration_mm_s2.to_num::<f32>(),
         );
         let needs_us = super::units::seconds_to_us(push.duration_s());
-        let has_us = self.period_us.saturating_sub(self.push_us);
-        if needs_us > has_us {
-            return Err(ParamError::PushTooLong { needs_us, has_us });
-        }
-        Ok(())
+        (needs_us > has_us).then_some(ParamError::PushTooLong { needs_us, has_us })
     }
 
     /// Leg that steps in step `k`.

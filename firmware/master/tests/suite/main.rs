@@ -2,6 +2,7 @@
 //! (`cargo xtask mutants`) takes a third of the time that a program per file takes.
 
 mod answers;
+mod arguments;
 mod bus_cycle;
 mod commands;
 mod common;

@@ -8,55 +8,54 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 fn parameters_out_of_range_are_refused_by_name() {
     let good = GaitParams::default();
     assert_eq!(good.validate(), Ok(()));
-    let field = |params: GaitParams| match params.validate() {
-        Err(ParamError::OutOfRange { field, .. } | ParamError::Order { field }) => field,
-        Err(ParamError::Steps { .. }) => "steps",
-        Err(ParamError::PeriodTooLong { .. }) => "period",
-        Err(ParamError::PushTooLong { needs_us, has_us }) => {
+    let field = |params: GaitParams| {
+        let error = params.validate().expect_err("refused");
+        if let ParamError::PushTooLong { needs_us, has_us } = error {
             assert!(needs_us > has_us);
-            "push"
         }
-        other => panic!("{other:?}"),
+        let first = error.arguments().next();
+        (first.map(|argument| argument.name), error.to_string())
     };
+    let named = |params| field(params).0.unwrap_or_default();
     let mm = PositionMm::from_int;
-    assert_eq!(field(GaitParams { steps: 0, ..good }), "steps");
+    assert_eq!(named(GaitParams { steps: 0, ..good }), "steps");
     assert_eq!(
-        field(GaitParams {
+        named(GaitParams {
             stroke_mm: mm(181),
             ..good
         }),
-        "stroke_mm"
+        "stroke"
     );
     assert_eq!(
-        field(GaitParams {
+        named(GaitParams {
             yaw_s2_mm: mm(-1),
             ..good
         }),
-        "yaw_s2_mm"
+        "yaw_s2"
     );
     assert_eq!(
-        field(GaitParams {
+        named(GaitParams {
             lift_us: 500_000,
             ..good
         }),
-        "reach_us"
+        "reach"
     );
     assert_eq!(
-        field(GaitParams {
+        named(GaitParams {
             push_us: 1_000_000,
             ..good
         }),
-        "push_us"
+        "push"
     );
     assert_eq!(
-        field(GaitParams {
+        named(GaitParams {
             period_us: 2_000_000,
             ..good
         }),
-        "period_us"
+        "period"
     );
     assert_eq!(
-        field(GaitParams {
+        named(GaitParams {
             period_us: 60_000_001,
             ..good
         }),
@@ -66,7 +65,54 @@ fn parameters_out_of_range_are_refused_by_name() {
         push_speed_mm_s: VelocityMmS::from_int(150),
         ..good
     };
-    assert_eq!(field(slow), "push");
+    let (first, told) = field(slow);
+    assert_eq!(first, Some("period"));
+    assert_eq!(
+        told,
+        "with this `stroke`, `push_speed` and `push_acceleration` the push takes 1.45 s, but from \
+         `push` to the end of the `period` there are 1.333333 s; allowed: `period` at least 1.45 s \
+         after `push`"
+    );
+    let early = GaitParams {
+        period_us: 1_000_000,
+        ..good
+    };
+    assert_eq!(
+        field(early).1,
+        "`push` is 2 s and must be less than `period`, which is 1 s; allowed: lift before reach and \
+         lower, these before push, push before period"
+    );
+}
+
+/// Each of the five relations of order alone, and all violations at once.
+#[test]
+fn every_relation_names_both_instants() {
+    let good = GaitParams::default();
+    let named = |params: GaitParams| -> Vec<Vec<&str>> {
+        let names = |error: ParamError| error.arguments().map(|argument| argument.name).collect();
+        params.violations().map(names).collect()
+    };
+    let at = |lift, reach, lower, push| GaitParams {
+        lift_us: lift,
+        reach_us: reach,
+        lower_us: lower,
+        push_us: push,
+        ..good
+    };
+    for (params, pair) in [
+        (at(5, 5, 6, 7), ["reach", "lift"]),
+        (at(5, 6, 5, 7), ["lower", "lift"]),
+        (at(5, 7, 6, 7), ["push", "reach"]),
+        (at(5, 6, 7, 7), ["push", "lower"]),
+        (at(5, 6, 7, good.period_us), ["period", "push"]),
+    ] {
+        assert_eq!(named(params), [pair]);
+    }
+    let both = GaitParams {
+        steps: 0,
+        ..at(5, 5, 6, 7)
+    };
+    assert_eq!(named(both), [vec!["steps"], vec!["reach", "lift"]]);
 }
 
 #[test]

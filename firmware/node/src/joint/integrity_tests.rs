@@ -172,6 +172,19 @@ fn after_damage_all_that_holds_a_history_of_strokes_begins_anew() {
 }
 
 #[test]
+fn after_damage_the_correction_is_that_of_the_parameters() {
+    let mut node = armed();
+    let sound = node.controller.correction();
+    node.controller.set_correction(Correction::Id);
+    assert_ne!(node.controller.correction(), sound);
+    node.tick(Micros(21_000));
+    assert_eq!(
+        (node.mode(), node.controller.correction()),
+        (Mode::Hold, sound)
+    );
+}
+
+#[test]
 fn a_request_does_not_hide_earlier_damage() {
     assert!(holds_after(|node| {
         node.state.reference = PositionMm::from_raw(node.state.reference.raw() ^ 1);

@@ -36,6 +36,7 @@ pub(super) struct TickState {
     pub(super) following: Ticks,
     pub(super) motion: MotionWatch,
     pub(super) precharge: Precharge,
+    boot_ticks: Ticks,
 }
 
 /// Application of one joint board: sense, control, valves.
@@ -116,6 +117,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 following: Ticks::ZERO,
                 motion: MotionWatch::new(&settings.tick.motion, PositionMm::ZERO),
                 precharge: Precharge::default(),
+                boot_ticks: Ticks::ZERO,
             },
             fixed_seals: PartSeals::new(),
             seal: Seal::default(),
@@ -188,6 +190,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !self.looks_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
             self.controller.forget();
+            self.controller.set_correction(self.settings.correction);
             // Nobody knows which stroke was damaged: with the next good reading all that holds
             // a history of them begins anew.
             self.monitor.restart();
@@ -263,6 +266,11 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// The board's transmitter was cut off by its time limit: a latched fault.
     pub fn driver_cut_off(&mut self, at: Micros) {
         self.core.axis_fault(Fault::SlotOverrun, at);
+    }
+
+    /// A frame that was taken was not sent: its slot had passed.
+    pub fn missed_slot(&mut self) {
+        self.core.port.missed();
     }
 
     /// Whether the parameters are to be stored: call [`Self::save`] between two ticks.
@@ -414,10 +422,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             }
             return;
         }
-        let ticks = self.state.precharge.self_test();
+        self.state.boot_ticks = self.state.boot_ticks.next();
         if self.monitor.is_settled() {
             let _ = self.core.supervisor.apply(Event::SelfTestPassed, now);
-        } else if ticks >= SELF_TEST_TICKS {
+        } else if self.state.boot_ticks >= SELF_TEST_TICKS {
             let fault = fault.unwrap_or(Fault::SensorRange);
             self.core
                 .supervisor

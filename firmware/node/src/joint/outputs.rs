@@ -105,9 +105,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     #[inline(never)]
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
         self.state.reference = self.state.measured;
-        if self.core.mode() != Mode::Boot {
-            self.state.precharge = Precharge::default();
-        }
+        self.state.precharge = Precharge::default();
         self.target = Target::at(self.state.measured);
         let on_times = if self.core.mode() == Mode::Exhaust {
             let openings = self.exhaust_openings();

@@ -29,7 +29,7 @@ use crate::JOINT_TICK;
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_control::valve::ValveOpenings;
 use wheeleg_protocol::LogEvent;
-use wheeleg_units::{Micros, PositionMm, Ticks};
+use wheeleg_units::{Micros, PositionMm};
 
 /// Longest precharge, ticks of 1 ms (ASSUMED: four times what the slowest axis of this
 /// project takes to 1 bar).
@@ -62,7 +62,7 @@ const NEXT: u32 = 0xFF << NEXT_SHIFT;
 const NEXT_SHIFT: u32 = 16;
 const FILLS_B: u32 = 1 << 24;
 
-/// A precharge under way, or none; in Boot, where there can be none, the ticks of the self-test.
+/// A precharge under way, or none.
 /// The force to be held is kept by the watch of motion, which learns none meanwhile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Precharge {
@@ -79,12 +79,6 @@ impl Precharge {
         }
         motion.hold_force(&settings.motion);
         Self { state: LONGEST }
-    }
-
-    /// One more tick in Boot; how many there were.
-    pub(super) fn self_test(&mut self) -> Ticks {
-        self.state = self.state.saturating_add(1);
-        Ticks(self.state)
     }
 
     /// Whether one is under way.

@@ -102,6 +102,39 @@ fn damaged_configuration_is_seen_within_a_round() {
     found_in_turn(|node| node.control_mode = WheelControlMode::ProportionalVelocity);
 }
 
+/// What is cleared later must not go on with what was damaged.
+#[test]
+fn after_damage_the_controller_begins_anew_with_its_parameters() {
+    let damages: [fn(&mut Node); 3] = [
+        |node| {
+            let filter = LeadFilter {
+                gain: 99,
+                ..node.settings.filter
+            };
+            node.controller.apply(WheelCommand::Filter(filter)).unwrap();
+        },
+        |node| {
+            let timer = SampleTimer(77);
+            let _ = node.controller.apply(WheelCommand::SampleTimer(timer));
+        },
+        |node| {
+            let speed = WheelCommand::MaximumVelocity(3);
+            node.controller.apply(speed).unwrap();
+        },
+    ];
+    let stopped = |damage: fn(&mut Node)| {
+        let mut node = armed();
+        damage(&mut node);
+        assert!(is_held_at(&mut node, 21));
+        node.tick(Micros(22 * 520));
+        node.controller
+    };
+    let sound = stopped(|node| node.state.drive ^= 1);
+    for (index, damage) in damages.into_iter().enumerate() {
+        assert_eq!(stopped(damage), sound, "{index}");
+    }
+}
+
 #[test]
 fn untouched_state_is_sound() {
     assert!(!holds_after(|_| {}));

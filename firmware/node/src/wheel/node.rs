@@ -175,6 +175,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             self.state.actual = self.undamaged_count();
             actual = self.encoder.count(self.state.actual);
             self.axis_fault(Fault::StateCorrupt, now);
+            // What is cleared later must not go on with what was damaged.
+            self.controller = WheelController::new();
+            self.tune();
         }
         // A pin that cannot be read keeps its last debounced level.
         if let Ok(raw) = switches {
@@ -251,6 +254,11 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     /// The board's transmitter was cut off by its time limit: a latched fault.
     pub fn driver_cut_off(&mut self, at: Micros) {
         self.core.axis_fault(Fault::SlotOverrun, at);
+    }
+
+    /// A frame that was taken was not sent: its slot had passed.
+    pub fn missed_slot(&mut self) {
+        self.core.port.missed();
     }
 
     /// Whether the parameters are to be stored: call [`Self::save`] between two ticks.

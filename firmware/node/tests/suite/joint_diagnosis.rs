@@ -422,3 +422,27 @@ fn a_save_that_arming_has_prevented_is_forgotten() {
     assert!(matches!(save(&mut rig, &mut memory), Message::Ack(_)));
     assert_eq!(memory.saves, 1);
 }
+
+#[test]
+fn a_slot_that_was_missed_is_told_with_the_frames_that_were_not_sent() {
+    let mut rig = JointRig::new();
+    rig.run_cycles(3, None);
+    let unsent = |rig: &mut JointRig| match rig.request(&Message::LinkReport(LinkReport {})) {
+        Message::LinkRecord(record) => record.unsent,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(unsent(&mut rig), 0);
+    rig.node.missed_slot();
+    assert_eq!(unsent(&mut rig), 1);
+    let sync = Message::Sync(Sync {
+        cycle: rig.cycle + 1,
+        master_time_us: 0,
+        flags: SyncFlags::NONE,
+        slots: SyncSlots::NONE,
+    });
+    let bytes = frame(Address::BROADCAST, 0, &sync);
+    rig.node.on_bus_bytes(&bytes, Micros(rig.now));
+    assert!(rig.node.take_transmission().unwrap().in_slot);
+    let answer = rig.send(&Message::LinkReport(LinkReport {}), 900).unwrap();
+    assert!(!answer.in_slot);
+}

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use toml_edit::{Item, TableLike, Value};
+use toml_edit::{Item, TableLike, Value, value};
 
 /// Key, position of the key, and item.
 pub(super) type Field = (String, Range<usize>, Item);
@@ -23,6 +23,12 @@ impl Entry {
             .iter()
             .find(|(k, ..)| k == key)
             .map(|(_, span, item)| (span.clone(), item.clone()))
+    }
+
+    /// Names and positions of the keys, in the order of the file.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
+        let keys = self.fields.iter();
+        keys.map(|(key, span, _)| (key.as_str(), span.clone()))
     }
 
     pub(crate) fn field_path(&self, key: &str) -> String {
@@ -54,4 +60,24 @@ pub(super) fn number(value: Option<&Value>) -> Option<f64> {
         Value::Float(f) => Some(*f.value()).filter(|f| f.is_finite()),
         _ => None,
     }
+}
+
+/// The fields of a quantity that is written short, `"10 s"` or `true`: its value, and its
+/// unit if it has one. `None` if there is no number in it.
+pub(super) fn short(item: &Item, span: &Range<usize>) -> Option<Vec<Field>> {
+    let field = |key: &str, item| (key.to_owned(), span.clone(), item);
+    if let Some(flag) = item.as_bool() {
+        return Some(vec![field("value", value(flag))]);
+    }
+    let text = item.as_str()?.trim();
+    let (number, unit) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    let number = match number.parse::<i64>() {
+        Ok(whole) => value(whole),
+        Err(_) => value(number.parse::<f64>().ok()?),
+    };
+    let mut fields = vec![field("value", number)];
+    if !unit.trim().is_empty() {
+        fields.push(field("unit", value(unit.trim())));
+    }
+    Some(fields)
 }

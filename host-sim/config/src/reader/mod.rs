@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use toml_edit::{Document, Item};
 
-use super::error::{ConfigError, Problem};
+use super::error::{ConfigError, Problem, line_of};
 use super::params::{FieldSpec, ParameterInfo, Params};
 use super::quantity::suffix;
 use super::suggest::closest;
@@ -79,6 +79,11 @@ impl Reader {
         self.problems.push(Problem::at(
             &self.file, &self.text, span, message, label, help,
         ));
+    }
+
+    /// Line of a position in the file, from 1.
+    pub(crate) fn line_of(&self, span: &Range<usize>) -> usize {
+        line_of(&self.text, span.start)
     }
 
     fn item(&self, path: &str) -> Option<&Item> {
@@ -223,11 +228,6 @@ impl Reader {
         Some(T::build(&mut || values.next().unwrap_or_default()))
     }
 
-    /// Problems found so far.
-    pub(crate) fn problem_count(&self) -> usize {
-        self.problems.len()
-    }
-
     /// Reports every field of `entry` that is not in `known`.
     pub(crate) fn reject_unknown(&mut self, entry: &Entry, known: &[&str]) {
         self.reject_misplaced(entry, known, &[]);
@@ -236,28 +236,39 @@ impl Reader {
     /// The same; of a field that is one of the `top` of the file it says where it belongs.
     /// TOML takes whatever stands below a heading for that section.
     pub(crate) fn reject_misplaced(&mut self, entry: &Entry, known: &[&str], top: &[&str]) {
-        for (key, span, _) in &entry.fields {
-            if known.contains(&key.as_str()) {
-                continue;
+        for (key, span) in entry.keys() {
+            if !known.contains(&key) {
+                self.reject_field(entry, key, span, known, top);
             }
-            let place = match entry.path.as_str() {
-                "" => "at the top of the file".to_owned(),
-                path => format!("in [{path}]"),
-            };
-            let help = match closest(key, known.iter().copied()) {
-                _ if top.contains(&key.as_str()) => {
-                    format!("`{key}` belongs to the top of the file, above the first section")
-                }
-                Some(word) => format!("did you mean `{word}`?"),
-                None => format!("known here: {}", known.join(", ")),
-            };
-            self.problem(
-                Some(span.clone()),
-                format!("unknown field `{key}` {place}"),
-                "not known",
-                Some(help),
-            );
         }
+    }
+
+    /// Reports a field of `entry` that is not in `known`.
+    pub(crate) fn reject_field(
+        &mut self,
+        entry: &Entry,
+        key: &str,
+        span: Range<usize>,
+        known: &[&str],
+        top: &[&str],
+    ) {
+        let place = match entry.path.as_str() {
+            "" => "at the top of the file".to_owned(),
+            path => format!("in [{path}]"),
+        };
+        let help = match closest(key, known.iter().copied()) {
+            _ if top.contains(&key) => {
+                format!("`{key}` belongs to the top of the file, above the first section")
+            }
+            Some(word) => format!("did you mean `{word}`?"),
+            None => format!("known here: {}", known.join(", ")),
+        };
+        self.problem(
+            Some(span),
+            format!("unknown field `{key}` {place}"),
+            "not known",
+            Some(help),
+        );
     }
 
     /// Adds a parameter to the listing.

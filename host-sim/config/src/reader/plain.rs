@@ -5,7 +5,40 @@ use std::ops::RangeInclusive;
 use super::{Entry, Reader};
 use crate::suggest::closest;
 
+/// Longest name, in characters.
+const NAME_LENGTH: usize = 64;
+
+/// Whether a name can stand in a path, in TOML and in a page as it is.
+fn is_name(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    (1..=NAME_LENGTH).contains(&text.len()) && text.chars().all(allowed) && !text.starts_with('.')
+}
+
 impl Reader {
+    /// Reads the name of a robot, an axis or a scenario: results go to folders and files of
+    /// that name, so it must be one and cannot lead out of the folder that it stands in.
+    pub(crate) fn name(&mut self, entry: &Entry, key: &str) -> Option<String> {
+        let text = self.text(entry, key)?;
+        if is_name(&text) {
+            return Some(text);
+        }
+        let span = entry.get(key).and_then(|(k, item)| item.span().or(Some(k)));
+        // A long text says no more than its beginning.
+        let shown: String = text.chars().take(NAME_LENGTH).collect();
+        let more = if shown.len() < text.len() { "…" } else { "" };
+        self.problem(
+            span,
+            format!(
+                "`{}` = {shown:?}{more} is not a name: allowed are 1 to {NAME_LENGTH} of the \
+                 characters A-Z, a-z, 0-9, `.`, `_` and `-`, not beginning with a dot",
+                entry.field_path(key)
+            ),
+            "not a name",
+            Some("files and folders are named after it, for example `bench-1`".to_owned()),
+        );
+        None
+    }
+
     /// Reads a text field; `None` and a problem if it is missing or not a text.
     pub(crate) fn text(&mut self, entry: &Entry, key: &str) -> Option<String> {
         let path = entry.field_path(key);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use toml_edit::Item;
 
-use super::entry::{fields, number};
+use super::entry::{fields, number, short};
 use super::{Entry, Reader};
 use crate::params::{FieldSpec, ParameterInfo};
 use crate::quantity::{Dimension, pretty, suffix};
@@ -18,16 +18,22 @@ impl Reader {
     /// Reads one quantity `{ value, unit, source }` in SI.
     pub(crate) fn quantity(&mut self, entry: &Entry, spec: &FieldSpec) -> Option<Vec<f64>> {
         let path = entry.field_path(spec.key);
-        let example = format!(
-            "write `{} = {{ value = …, unit = \"{}\"{} }}`",
-            spec.key,
-            spec.dimension.units()[0].0,
-            if self.source_required {
-                ", source = \"…\""
-            } else {
-                ""
-            }
-        );
+        let example = self.example(spec.key, spec.dimension);
+        let (key_span, item) = entry.get(spec.key)?;
+        let bare = item.as_bool().is_none() && !item.is_table_like();
+        if spec.dimension == Dimension::Flag && !self.source_required && bare {
+            let message = format!(
+                "`{path}` = {} must be true or false",
+                item.to_string().trim()
+            );
+            self.problem(
+                item.span().or(Some(key_span)),
+                message,
+                "wrong type",
+                Some(example),
+            );
+            return None;
+        }
         let inner = self.stated(entry, spec.key, &spec.dimension.unit_names(), &example)?;
         let source = self.source(&inner);
         let (factor, unit) = self.unit(&inner, spec, &example)?;
@@ -142,13 +148,36 @@ impl Reader {
         Some((number_found, span, source))
     }
 
-    /// The table `{ value, unit, source }` that `key` must hold, if it is there.
+    /// How a quantity is written.
+    pub(crate) fn example(&self, key: &str, dimension: Dimension) -> String {
+        let unit = dimension.units()[0].0;
+        match (self.source_required, dimension) {
+            (true, _) => {
+                format!("write `{key} = {{ value = …, unit = \"{unit}\", source = \"…\" }}`")
+            }
+            (false, Dimension::Flag) => format!("write `{key} = true` or `{key} = false`"),
+            (false, _) => format!(
+                "write `{key} = {{ value = …, unit = \"{unit}\" }}`, or `{key} = \"… {unit}\"`"
+            ),
+        }
+    }
+
+    /// The table `{ value, unit, source }` that `key` must hold, if it is there. Where no
+    /// source is asked for, a text such as `"10 s"` says the same.
     fn stated(&mut self, entry: &Entry, key: &str, units: &str, example: &str) -> Option<Entry> {
         let path = entry.field_path(key);
         let (key_span, item) = entry.get(key)?;
         let span = item.span().unwrap_or(key_span);
+        if let (false, Some(fields)) = (self.source_required, short(&item, &span)) {
+            return Some(Entry { path, fields, span });
+        }
         let Some(table) = item.as_table_like() else {
-            let message = format!("`{path}` has no unit; accepted: {units}");
+            let message = match item.as_str() {
+                Some(text) if !self.source_required => {
+                    format!("`{path}` = \"{text}\" does not begin with a number; units: {units}")
+                }
+                _ => format!("`{path}` has no unit; accepted: {units}"),
+            };
             self.problem(
                 Some(span),
                 message,

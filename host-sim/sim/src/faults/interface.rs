@@ -2,7 +2,7 @@
 
 use wheeleg_protocol::{Decoder, Envelope, MAX_ENCODED, Message, SCHEMA_HASH};
 
-use wheeleg_remote_host::interface::archive;
+use wheeleg_interface::archive;
 
 /// The interface that such a board was built from: the newest that is not this program's.
 fn other() -> u64 {

@@ -77,7 +77,8 @@ impl Meter {
         };
         match scenario.targets {
             TargetSet::ThreeStep => {
-                Self::ThreeStep(Box::new(ThreeStepMeter::new(robot.gait, start_s)))
+                let sample_s = robot.reference.sample_period_s;
+                Self::ThreeStep(Box::new(ThreeStepMeter::new(robot.gait, sample_s, start_s)))
             }
             TargetSet::Stand => Self::Stand(Box::default()),
             TargetSet::MasterLost => safe_state(|a| matches!(a, EventAction::KillMaster), false),

@@ -1,9 +1,10 @@
 //! One target with its measured value and verdict.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A target: what was measured, what was asked, and whether it holds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Target {
     /// Identifier, from MODEL.md §11 where there is one.
     pub id: String,

@@ -8,8 +8,8 @@ use wheeleg_control::joint::{Correction, Law};
 use wheeleg_protocol::param::{Format, JointParam, ParamInfo};
 use wheeleg_units::PositionMm;
 
+use super::error::BenchError;
 use super::firmware::Design;
-use super::suite::BenchError;
 
 /// Every parameter that a design sets, raw, in ascending order of number. What
 /// the axis says nothing about (watchdog, staged exhaust) keeps its default.

@@ -14,7 +14,9 @@ use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 use super::firmware::{Design, Supervision};
 
 /// A controller of the comparison.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Full push or pull outside a dead band.

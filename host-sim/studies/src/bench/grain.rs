@@ -5,6 +5,7 @@
 //! forces up to twice its break-away force apart. A step beyond that cannot bring a piston
 //! to where it rests but by luck, whatever the law.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::chamber::GasModel;
@@ -18,7 +19,7 @@ use super::design::axis_data;
 pub const COARSE: f64 = 0.5;
 
 /// Smallest step of force, against what friction holds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Grain {
     /// Shortest opening of a valve \[ms\].
     pub shortest_opening_ms: f64,

@@ -29,6 +29,7 @@
 
 pub mod commission;
 mod design;
+mod error;
 pub mod export;
 mod firmware;
 pub mod grain;
@@ -38,6 +39,7 @@ mod motion;
 mod node;
 pub mod optimal;
 pub mod plant_check;
+mod refusal;
 mod run;
 pub mod suite;
 

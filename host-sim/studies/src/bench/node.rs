@@ -20,9 +20,9 @@ use wheeleg_protocol::{
 use wheeleg_units::Micros;
 
 use super::commission::commission;
+use super::error::BenchError;
 use super::firmware::{Design, TICK};
 use super::run::{Action, Board, Sample};
-use super::suite::BenchError;
 use wheeleg_sim::{JointBoard, identity};
 
 /// Ticks of a bus cycle.

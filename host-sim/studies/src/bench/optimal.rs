@@ -45,12 +45,30 @@ pub fn fastest(
     seed: u64,
     runs: u32,
 ) -> Result<Bound, PlantError> {
+    fastest_while(axis, state, target_m, seed, runs, &|| true)
+}
+
+/// As [`fastest`]; a search that is not to go on ends with the best so far, which is no bound.
+///
+/// # Errors
+/// Any [`PlantError`].
+pub fn fastest_while(
+    axis: &Axis,
+    state: &AxisState,
+    target_m: f64,
+    seed: u64,
+    runs: u32,
+    go_on: &dyn Fn() -> bool,
+) -> Result<Bound, PlantError> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut best = ([0.0; 6], f64::INFINITY);
     let distance_m = (target_m - state.core.motion.stroke_m).abs();
     let starts = 24_u32;
     let mut used = 0;
     for _ in 0..starts {
+        if !go_on() {
+            break;
+        }
         // A guess: full drive for the time at 0.5 m/s, then brake for a part of it.
         let base = distance_m / 0.5;
         let mut unit = || rng.random_range(0.0..1.0_f64);

@@ -8,67 +8,12 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
-use wheeleg_control::joint::ConfigError;
-use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
+pub use super::error::BenchError;
 use super::{Bench, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
-use wheeleg_config::brief;
-
-/// An experiment could not be made.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
-pub enum BenchError {
-    /// The plant refused its parameters or left its range.
-    #[error("the plant of the axis: {0}")]
-    #[diagnostic(
-        code(wheeleg::bench::plant),
-        help("check the axis file against the ranges in its messages")
-    )]
-    Plant(#[from] PlantError),
-    /// The design is not one the board accepts.
-    #[error("the board refuses the design for this axis: {0:?}")]
-    #[diagnostic(
-        code(wheeleg::bench::design),
-        help(
-            "the axis's data lie outside what the joint board supports; see the parameter table in SPEC.md"
-        )
-    )]
-    Design(ConfigError),
-    /// A value that the board's parameter table does not hold.
-    #[error(
-        "the design needs `{name}` = {} {unit}; a joint board allows {} to {} {unit}",
-        brief(*.value),
-        brief(*.min),
-        brief(*.max)
-    )]
-    #[diagnostic(
-        code(wheeleg::bench::parameter),
-        help(
-            "the axis's data lie outside what the joint board supports; see the parameter table in SPEC.md"
-        )
-    )]
-    Parameter {
-        /// Name in the table.
-        name: &'static str,
-        /// What the design needs.
-        value: f64,
-        /// Smallest value of the table.
-        min: f64,
-        /// Largest value of the table.
-        max: f64,
-        /// Unit.
-        unit: &'static str,
-    },
-    /// The board refuses the set of parameters.
-    #[error("{0}")]
-    #[diagnostic(
-        code(wheeleg::bench::board),
-        help("please report this with the axis file")
-    )]
-    Board(String),
-}
 
 /// What differs from the data sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

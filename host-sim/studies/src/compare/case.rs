@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
@@ -228,7 +229,7 @@ fn feasible_margin() -> f64 {
 }
 
 /// One case in tables and JSON.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Row {
     /// Which case.
     #[serde(flatten)]
@@ -239,7 +240,7 @@ pub struct Row {
 }
 
 /// What was played.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CaseFacts {
     /// Name, for `--case`.
     pub id: String,
@@ -280,7 +281,7 @@ pub struct CaseFacts {
 
 /// Figures of a case: the worse of its measured moves. What a move does not have
 /// is absent.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Figures {
     /// Mean error of the last 0.2 s, signed, of the larger magnitude \[mm\].
     pub steady_error_mm: Option<f64>,

@@ -13,10 +13,10 @@ mod page;
 mod single;
 mod variation;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
 pub use case::{BadCaseId, CaseFacts, CaseId, Figures, MARGIN, Row, Scene};
@@ -29,9 +29,8 @@ pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 use crate::StudyError;
 use crate::bench::suite::{BenchError, Rig};
 use crate::bench::{Kind, design, optimal};
+use crate::study::{self, Ended, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
-use wheeleg_report::output;
-use wheeleg_report::subfolder;
 
 /// What is compared.
 #[derive(Debug, Clone)]
@@ -92,15 +91,23 @@ pub struct Comparison {
     pub rows: Vec<Row>,
     /// Of the first seed, as on the sheet.
     pub overlays: Vec<Overlay>,
+    /// What stopped it before all cases were played.
+    pub stopped: Option<Stopped>,
 }
 
-/// Files that were written.
-#[derive(Debug, Clone)]
-pub struct Finished {
-    /// The page.
-    pub report: PathBuf,
-    /// What was compared.
-    pub comparison: Comparison,
+/// Contents of `summary.json`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Cases<'a> {
+    /// One object per case that was played or is not feasible.
+    cases: &'a [Row],
+}
+
+impl study::Summary for Cases<'_> {
+    const SCHEMA: &'static str = "wheeleg.compare/1";
+}
+
+impl study::Summary for Row {
+    const SCHEMA: &'static str = "wheeleg.case/1";
 }
 
 /// An axis that cannot be compared: names the file, field, value and range.
@@ -121,139 +128,148 @@ pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError>
     Ok(config)
 }
 
+/// Plays all cases and writes report, figures, tables and `summary.json`.
+///
+/// # Errors
+/// [`StudyError`] if an axis cannot be read or used, or something not be drawn or written.
+pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Comparison>, StudyError> {
+    let configs = configs(options)?;
+    let job = Job::begin("compare", settings)?;
+    let comparison = Comparison::play(options, configs, &job.progress)?;
+    comparison.write(job)
+}
+
+/// Reads the axes of a comparison.
+fn configs(options: &Options) -> Result<Vec<AxisConfig>, StudyError> {
+    let mut configs = Vec::new();
+    for name in &options.axes {
+        let config = load(name, &options.kinds)?;
+        if configs.iter().any(|c: &AxisConfig| c.name == config.name) {
+            return Err(StudyError::refused(
+                format!("the axis name `{}` is given twice", config.name),
+                "give each axis file a `name` of its own",
+            ));
+        }
+        configs.push(config);
+    }
+    Ok(configs)
+}
+
 impl Comparison {
-    /// Plays all cases.
+    /// Plays all cases, as far as it is not stopped.
     ///
     /// # Errors
     /// [`StudyError`] if an axis cannot be read or used.
-    pub fn run(options: &Options) -> Result<Self, StudyError> {
-        let mut configs = Vec::new();
-        for name in &options.axes {
-            let config = load(name, &options.kinds)?;
-            if configs.iter().any(|c: &AxisConfig| c.name == config.name) {
-                return Err(StudyError::refused(
-                    format!("the axis name `{}` is given twice", config.name),
-                    "give each axis file a `name` of its own",
-                ));
-            }
-            configs.push(config);
-        }
+    pub fn run(options: &Options, progress: &Progress) -> Result<Self, StudyError> {
+        Self::play(options, configs(options)?, progress)
+    }
+
+    fn play(
+        options: &Options,
+        configs: Vec<AxisConfig>,
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(options.threads)
             .build()
             .map_err(|e| {
                 StudyError::refused(format!("cannot start threads: {e}"), "try --threads 1")
             })?;
-        pool.install(|| Self::play(options, configs))
+        pool.install(|| Self::play_here(options, configs, progress))
     }
 
-    fn play(options: &Options, configs: Vec<AxisConfig>) -> Result<Self, StudyError> {
-        let file = |axis: &str| axis.to_owned();
-        let bar = progress_bar("bounds");
+    fn play_here(
+        options: &Options,
+        configs: Vec<AxisConfig>,
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
+        let planned: Vec<(usize, Variation, u64)> = plan(options, &configs);
+        let cases_of = |variation| options.kinds.len() * moves_of(options, variation).len();
+        let of: usize = planned.iter().map(|&(_, v, _)| cases_of(v)).sum();
+
         let wanted = options
             .moves
             .as_ref()
             .is_none_or(|m| m.iter().any(|m| matches!(m, Move::Step20 | Move::Step100)));
+        let runs = if options.quick { 480 } else { 1500 };
+        let found = progress.all("bounds", &configs, |config| {
+            if !wanted {
+                return Ok([None; 2]);
+            }
+            bounds(&config.axis, runs, progress).map_err(|e| axis_error(&config.name, &e))
+        });
+        let found = Ended::kept(found)?.unwrap_or_else(|| vec![[None; 2]; configs.len()]);
         let axes: Vec<ComparedAxis> = configs
-            .into_par_iter()
-            .map(|config| {
-                let bound_s = if wanted {
-                    bounds(&config.axis, if options.quick { 480 } else { 1500 })
-                } else {
-                    Ok([None; 2])
-                };
-                let bound_s = bound_s.map_err(|e| axis_error(&config.name, &e))?;
-                Ok(ComparedAxis { config, bound_s })
-            })
-            .collect::<Result<_, StudyError>>()?;
-
-        bar.set_message("start-up");
-        let scenes: Vec<(usize, Variation, u64)> = plan(options, &axes);
-        bar.set_length(scenes.len() as u64);
-        let scenes: Vec<(usize, Scene)> = scenes
-            .into_par_iter()
-            .map(|(i, variation, seed)| {
-                let axis = &axes[i].config;
-                let scene = Scene::new(&axis.name, &axis.axis, variation, seed);
-                bar.inc(1);
-                scene
-                    .map(|scene| (i, scene))
-                    .map_err(|e| axis_error(&file(&axis.name), &e))
-            })
-            .collect::<Result<_, _>>()?;
-
-        let cases: Vec<(usize, &Scene, Kind, Move)> = scenes
-            .iter()
-            .flat_map(|(i, scene)| {
-                let moves = moves_of(options, scene.variation);
-                options.kinds.iter().flat_map(move |kind| {
-                    moves
-                        .clone()
-                        .into_iter()
-                        .map(move |m| (*i, scene, *kind, m))
-                })
-            })
+            .into_iter()
+            .zip(found)
+            .map(|(config, bound_s)| ComparedAxis { config, bound_s })
             .collect();
-        bar.set_message("cases");
-        bar.set_position(0);
-        bar.set_length(cases.len() as u64);
-        let played: Vec<(Row, Option<Overlay>)> = cases
-            .into_par_iter()
-            .map(|(i, scene, kind, motion)| {
-                let played = scene
-                    .play(kind, motion)
-                    .map_err(|e| axis_error(&scene.axis, &e))?;
-                let nominal = scene.variation == Variation::Nominal;
-                let bound_s = match motion {
-                    Move::Step100 if nominal => axes[i].bound_s[0],
-                    Move::Step20 if nominal => axes[i].bound_s[1],
-                    _ => None,
-                };
-                let row = scene.row(kind, motion, played.as_ref(), bound_s);
-                let shown = nominal && scene.seed == options.seed;
-                let overlay = played
-                    .filter(|_| shown)
-                    .map(|p| Overlay::of(scene, kind, motion, &p));
-                bar.inc(1);
-                Ok((row, overlay))
-            })
-            .collect::<Result<_, StudyError>>()?;
-        bar.finish_and_clear();
-        let (rows, overlays): (Vec<Row>, Vec<Option<Overlay>>) = played.into_iter().unzip();
+
+        progress.begin("cases", of as u64);
+        let played = progress.map(&planned, |&(i, variation, seed)| {
+            play_scene(options, &axes[i], variation, seed, progress)
+        })?;
+        let played = played.into_iter().flatten().flatten();
+        let (rows, overlays): (Vec<Row>, Vec<Option<Overlay>>) = played.unzip();
         Ok(Self {
             options: options.clone(),
             axes,
+            stopped: progress.stopped(rows.len() as u64, of as u64, "cases"),
             rows,
             overlays: overlays.into_iter().flatten().collect(),
         })
     }
 
-    /// All rows as JSON: an array of one object per case.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        // Numbers and texts always serialise.
-        let mut text = serde_json::to_string_pretty(&self.rows).unwrap_or_default();
-        text.push('\n');
-        text
-    }
-
-    /// Writes report, figures, tables and `summary.json` into `folder`; earlier
-    /// results in it are set aside.
+    /// Writes report, figures, tables and `summary.json`.
     ///
     /// # Errors
     /// [`StudyError`] if something cannot be drawn or written.
-    pub fn write(self, folder: &Path) -> Result<Finished, StudyError> {
-        output::prepare(folder)?;
-        save(&folder.join("summary.json"), &self.to_json())?;
-        table(&subfolder(folder, "csv")?.join("cases.csv"), &self.rows)?;
-        let drawn = draw(&subfolder(folder, "figures")?, charts::figures(&self))?;
-        let report = folder.join("report.html");
-        save(&report, &page::render(&self, &drawn)?)?;
-        Ok(Finished {
-            report,
-            comparison: self,
-        })
+    pub fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
+        let stopped = self.stopped.clone();
+        let summary = job.summary(&Cases { cases: &self.rows }, stopped.as_ref())?;
+        table(&job.subfolder("csv")?.join("cases.csv"), &self.rows)?;
+        let drawn = job.draw(charts::figures(&self))?;
+        let page = page::render(&self, &drawn)?;
+        job.finish(self, summary, &page, stopped)
     }
+}
+
+/// Plays the cases of a scene, as far as the comparison is not stopped. One is played after
+/// its start-up rather than after those of all scenes, so that there are rows from the
+/// beginning on.
+fn play_scene(
+    options: &Options,
+    axis: &ComparedAxis,
+    variation: Variation,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Vec<(Row, Option<Overlay>)>, StudyError> {
+    let failed = |e: BenchError| axis_error(&axis.config.name, &e);
+    let scene = Scene::new(&axis.config.name, &axis.config.axis, variation, seed);
+    let scene = scene.map_err(failed)?;
+    let moves = moves_of(options, variation);
+    let cases: Vec<(Kind, Move)> = options
+        .kinds
+        .iter()
+        .flat_map(|kind| moves.iter().map(move |motion| (*kind, *motion)))
+        .collect();
+    let nominal = variation == Variation::Nominal;
+    let rows = progress.map(&cases, |&(kind, motion)| {
+        let played = scene.play(kind, motion).map_err(failed)?;
+        let bound_s = match motion {
+            Move::Step100 if nominal => axis.bound_s[0],
+            Move::Step20 if nominal => axis.bound_s[1],
+            _ => None,
+        };
+        let row = scene.row(kind, motion, played.as_ref(), bound_s);
+        let shown = nominal && seed == options.seed;
+        let overlay = played
+            .filter(|_| shown)
+            .map(|p| Overlay::of(&scene, kind, motion, &p));
+        progress.step();
+        Ok::<_, StudyError>((row, overlay))
+    })?;
+    Ok(rows.into_iter().flatten().collect())
 }
 
 impl Overlay {
@@ -278,13 +294,13 @@ impl Overlay {
 
 /// Scenes in their order: as on the sheet for all seeds, then factors, then
 /// combinations.
-fn plan(options: &Options, axes: &[ComparedAxis]) -> Vec<(usize, Variation, u64)> {
+fn plan(options: &Options, axes: &[AxisConfig]) -> Vec<(usize, Variation, u64)> {
     let mut list = Vec::new();
     for (i, axis) in axes.iter().enumerate() {
         for k in 0..options.seeds {
             list.push((i, Variation::Nominal, options.seed + k));
         }
-        for variation in Variation::one_at_a_time(&axis.config.axis, options.quick) {
+        for variation in Variation::one_at_a_time(&axis.axis, options.quick) {
             list.push((i, variation, options.seed));
         }
         for number in 0..options.combinations {
@@ -304,8 +320,13 @@ fn moves_of(options: &Options, variation: Variation) -> Vec<Move> {
 }
 
 /// The fastest large and small step of an axis, retracting and extending, from the
-/// rest in which the predictive controller begins them.
-fn bounds(sheet: &AxisParams, runs: u32) -> Result<[Option<[f64; 2]>; 2], BenchError> {
+/// rest in which the predictive controller begins them. Of no use once it is stopped.
+fn bounds(
+    sheet: &AxisParams,
+    runs: u32,
+    progress: &Progress,
+) -> Result<[Option<[f64; 2]>; 2], BenchError> {
+    let go_on = || !progress.is_stopped();
     let sizes = Sizes::of(sheet);
     let [low_m, high_m] = sizes.large_m;
     let pairs = [[low_m, high_m], [high_m - sizes.small_m, high_m]];
@@ -315,7 +336,8 @@ fn bounds(sheet: &AxisParams, runs: u32) -> Result<[Option<[f64; 2]>; 2], BenchE
         rig.step(to_m, STEP_S)?;
         let mut fastest = |target_m: f64| -> Result<f64, BenchError> {
             let bench = rig.bench();
-            let bound = optimal::fastest(bench.axis(), &bench.state, target_m, 1, runs)?;
+            let bound =
+                optimal::fastest_while(bench.axis(), &bench.state, target_m, 1, runs, &go_on)?;
             rig.step(target_m, STEP_S)?;
             Ok(bound.settle_s)
         };
@@ -327,10 +349,6 @@ fn bounds(sheet: &AxisParams, runs: u32) -> Result<[Option<[f64; 2]>; 2], BenchE
             .then_some(both);
     }
     Ok(found)
-}
-
-pub(crate) fn save(path: &Path, text: &str) -> Result<(), StudyError> {
-    std::fs::write(path, text).map_err(|e| StudyError::output("write", path, e))
 }
 
 /// Writes rows as CSV with a head line.
@@ -352,7 +370,7 @@ fn table(path: &Path, rows: &[Row]) -> Result<(), StudyError> {
 
 /// Names and values of a struct of numbers and texts. (The library writes no head
 /// line for a struct within a struct.)
-fn record<T: serde::Serialize>(value: &T) -> Result<[csv::StringRecord; 2], StudyError> {
+fn record<T: Serialize>(value: &T) -> Result<[csv::StringRecord; 2], StudyError> {
     let failed = |e: csv::Error| StudyError::output("write", "a table", e.into());
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.serialize(value).map_err(failed)?;
@@ -365,29 +383,4 @@ fn record<T: serde::Serialize>(value: &T) -> Result<[csv::StringRecord; 2], Stud
     let mut lines = reader.records();
     let mut next = || lines.next().unwrap_or_else(|| Ok(csv::StringRecord::new()));
     Ok([next().map_err(failed)?, next().map_err(failed)?])
-}
-
-/// Draws figures as PNG and SVG; gives them back with their SVG text.
-pub(crate) fn draw(
-    folder: &Path,
-    figures: Vec<wheeleg_report::plot::Figure>,
-) -> Result<Vec<(wheeleg_report::plot::Figure, String)>, StudyError> {
-    figures
-        .into_par_iter()
-        .map(|figure| {
-            figure.png(&folder.join(format!("{}.png", figure.id)))?;
-            let svg = figure.svg()?;
-            save(&folder.join(format!("{}.svg", figure.id)), &svg)?;
-            Ok((figure, svg))
-        })
-        .collect()
-}
-
-fn progress_bar(what: &'static str) -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal.
-    let bar = ProgressBar::new(1);
-    let style = ProgressStyle::with_template("compare {wide_bar} {pos} of {len} {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_message(what);
-    bar
 }

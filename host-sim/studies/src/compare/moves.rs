@@ -6,7 +6,9 @@ use crate::bench::suite::{BenchError, LEAD_S, Rig, force_left_n};
 use crate::bench::{LoadEvent, Motion, Trace};
 
 /// What a case asks of the axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Move {
     /// 20 mm back and out.

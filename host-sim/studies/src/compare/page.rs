@@ -6,7 +6,7 @@ use super::case::MARGIN;
 use super::{Comparison, Move, Row, Variation};
 use crate::StudyError;
 use crate::bench::Kind;
-use wheeleg_report::{page, pictures, plot::Figure};
+use wheeleg_report::{page, pictures, plot::Figure, stats};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -50,9 +50,7 @@ fn median<'a>(
     value: impl Fn(&Row) -> Option<f64>,
 ) -> Option<f64> {
     let all: Option<Vec<f64>> = rows.map(value).collect();
-    let mut all = all?;
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied()
+    stats::median(&all?)
 }
 
 impl Comparison {
@@ -222,6 +220,7 @@ pub(super) fn render(
         })
         .collect();
     let values = context! {
+        stopped => comparison.stopped.as_ref().map(ToString::to_string),
         version => env!("CARGO_PKG_VERSION"),
         kinds => kinds,
         columns => COLUMNS,

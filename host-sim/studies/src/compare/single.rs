@@ -1,15 +1,14 @@
 //! One case alone: what happened in it, tick by tick.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::case::{CaseId, Row, Scene};
 use super::moves::Played;
-use super::{axis_error, draw, load, save};
+use super::{axis_error, load};
 use crate::StudyError;
 use crate::bench::Trace;
-use wheeleg_report::output;
+use crate::study::{Job, Settings};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
-use wheeleg_report::subfolder;
 
 /// A case that was played alone.
 #[derive(Debug, Clone)]
@@ -51,32 +50,32 @@ pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
 
 impl Single {
     /// Writes `summary.json`, the rows of every measured move as CSV, and a figure of
-    /// each, into `folder`; earlier results in it are set aside. The figures.
+    /// each; earlier results in the folder are set aside. The summary, and the figures.
     ///
     /// # Errors
     /// [`StudyError`] if something cannot be drawn or written.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, StudyError> {
-        output::prepare(folder)?;
-        let json = serde_json::to_string_pretty(&self.row).unwrap_or_default();
-        save(&folder.join("summary.json"), &format!("{json}\n"))?;
+    pub fn write(&self, settings: &Settings) -> Result<(String, Vec<PathBuf>), StudyError> {
+        let job = Job::begin("case", settings)?;
+        let summary = job.summary(&self.row, None)?;
         let Some(played) = &self.played else {
-            return Ok(Vec::new());
+            return Ok((summary, Vec::new()));
         };
-        let tables = subfolder(folder, "csv")?;
-        let plots = subfolder(folder, "figures")?;
+        job.subfolder("csv")?;
         let first = std::iter::once(("first".to_owned(), &played.first));
         let measured = played.measured.iter().enumerate();
         let all = first.chain(measured.map(|(k, t)| (format!("measured-{}", k + 1), t)));
         let mut figures = Vec::new();
         for (name, trace) in all {
-            save(&tables.join(format!("{name}.csv")), &rows(trace))?;
+            job.save(&format!("csv/{name}.csv"), &rows(trace))?;
             figures.push(figure(&name, &self.row.case.id, trace));
         }
-        let drawn = draw(&plots, figures)?;
-        Ok(drawn
-            .into_iter()
-            .map(|(f, _)| plots.join(format!("{}.png", f.id)))
-            .collect())
+        let drawn = job.draw(figures)?;
+        job.progress.clear();
+        let plots = job.folder().join("figures");
+        let paths = drawn
+            .iter()
+            .map(|(f, _)| plots.join(format!("{}.svg", f.id)));
+        Ok((summary, paths.collect()))
     }
 }
 

@@ -6,7 +6,7 @@
 //! not, and what is left over is the interaction. Every row runs with the same seeds and
 //! the same gains: what is taken away is taken from the plant.
 
-use indicatif::ProgressBar;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::chamber::GasModel;
@@ -16,6 +16,7 @@ use wheeleg_plant::sensors::AdcNoise;
 use super::trial::{Before, BusPath, Law, Start, Trial};
 use super::{mean_delay, run_all};
 use crate::StudyError;
+use crate::study::{Ended, Progress};
 
 /// Most seeds of a row: wait for SYNC, phase of the command and noise.
 const SEEDS: u32 = 20;
@@ -252,7 +253,7 @@ fn tube(trial: &mut Trial, length_m: f64, bore_m: f64) {
 }
 
 /// One contribution.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Row {
     /// Short name.
     pub id: &'static str,
@@ -269,7 +270,7 @@ pub struct Row {
 }
 
 /// Something else that was varied.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Variation {
     /// What.
     pub id: &'static str,
@@ -282,7 +283,7 @@ pub struct Variation {
 }
 
 /// Contributions, sum and interaction.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Ablation {
     /// Seeds that each row is the mean of.
     pub seeds: u64,
@@ -307,14 +308,15 @@ pub struct Ablation {
 /// Measures all rows, each with `seeds` seeds or 20, whichever is less.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the axis cannot be simulated or does not start in the base case.
+/// [`Ended`] if the axis cannot be simulated or does not start in the base case, or the study
+/// is stopped.
 pub fn measure(
     axis: &AxisParams,
     bus: BusPath,
     weight_n: f64,
     seeds: u32,
-    bar: &ProgressBar,
-) -> Result<Ablation, StudyError> {
+    progress: &Progress,
+) -> Result<Ablation, Ended> {
     let seeds = u64::from(seeds.min(SEEDS));
     let base: Vec<Trial> = (1..=seeds)
         .map(|seed| Trial {
@@ -341,8 +343,7 @@ pub fn measure(
             own
         }))
         .collect();
-    bar.inc_length(trials.len() as u64);
-    let outcomes = run_all(&trials, bar)?;
+    let outcomes = run_all("ablation", &trials, progress)?;
     let delays: Vec<Option<f64>> = outcomes.chunks(base.len()).map(mean_delay).collect();
     let at = |i: usize| delays.get(i).copied().flatten();
     let needed = |i: usize, what: &str| {

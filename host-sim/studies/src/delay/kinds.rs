@@ -1,11 +1,12 @@
 //! Laws and kinds of move.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::bench;
 
 /// Which law drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
     /// P + fuzzy PD, as the paper describes it.
@@ -36,7 +37,7 @@ impl Law {
 }
 
 /// From where a move starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
     /// Retracts from the extended stop, against which the law kept pushing.

@@ -25,21 +25,17 @@ pub mod starts;
 mod tables;
 pub mod trial;
 
-use std::path::{Path, PathBuf};
-
-use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::MessageType;
 use wheeleg_protocol::link::SlotTiming;
 
 use crate::StudyError;
-use crate::bench::suite::BenchError;
+use crate::study::{self, Ended, Finished, Job, Progress, Settings};
 use trial::{BusPath, Outcome, Trial};
 use wheeleg_config::RobotConfig;
-use wheeleg_report::output;
-use wheeleg_report::subfolder;
+use wheeleg_report::stats;
 
 /// The paper's delay, and the band that counts as explained \[s\].
 pub const PAPER_DELAY_S: f64 = 0.25;
@@ -73,7 +69,7 @@ impl Default for Options {
 }
 
 /// Everything that was measured.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub struct Study {
     /// Name of the robot.
     pub robot: String,
@@ -129,53 +125,140 @@ pub fn bus_of(robot: &RobotConfig) -> BusPath {
     }
 }
 
-/// Runs trials on two threads, in order, and tells `bar`.
-fn run_all(trials: &[Trial], bar: &ProgressBar) -> Result<Vec<Outcome>, StudyError> {
-    let work = || {
-        trials
-            .par_iter()
-            .map(|trial| {
-                let outcome = trial.run();
-                bar.inc(1);
-                outcome
-            })
-            .collect::<Result<Vec<_>, BenchError>>()
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
-    let outcomes = match pool {
-        Ok(pool) => pool.install(work),
-        // Without threads of its own the pool of the program does it.
-        Err(_) => work(),
-    };
-    outcomes.map_err(|e| {
-        StudyError::refused(
-            format!("a start cannot be simulated: {e}"),
-            "check the cylinder, valves and supply of the robot file; the message is in SI units",
-        )
+/// Runs trials; their outcomes are in order.
+fn run_all(what: &str, trials: &[Trial], progress: &Progress) -> Result<Vec<Outcome>, Ended> {
+    progress.all(what, trials, |trial| {
+        trial.run().map_err(|e| {
+            StudyError::refused(
+                format!("a start cannot be simulated: {e}"),
+                "check the cylinder, valves and supply of the robot file; the message is in SI units",
+            )
+        })
     })
-}
-
-/// Median; `None` of nothing.
-fn median(values: &[f64]) -> Option<f64> {
-    quantile(values, 0.5)
-}
-
-/// Quantile, interpolated; `None` of nothing.
-fn quantile(values: &[f64], share: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().checked_sub(1)?;
-    let at = share * last as f64;
-    let low = sorted.get(at.floor() as usize)?;
-    let high = sorted.get(at.ceil() as usize)?;
-    Some(low + (high - low) * at.fract())
 }
 
 /// Mean start delay of outcomes \[s\]; `None` if one of them never started.
 fn mean_delay(outcomes: &[Outcome]) -> Option<f64> {
     let delays: Option<Vec<f64>> = outcomes.iter().map(|o| o.delay_s).collect();
-    let delays = delays?;
-    (!delays.is_empty()).then(|| delays.iter().sum::<f64>() / delays.len() as f64)
+    stats::mean(&delays?)
+}
+
+/// What was measured until the study ended or was stopped.
+#[derive(Debug)]
+struct Collected {
+    starts: starts::Starts,
+    ablation: Option<ablation::Ablation>,
+    notice: Option<notice::Notice>,
+    predictions: Option<predictions::Predictions>,
+}
+
+impl Collected {
+    fn measure(
+        robot: &RobotConfig,
+        options: &Options,
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
+        let axis = axis_of(robot, options.mass_kg, options.load_n);
+        let bus = bus_of(robot);
+        let weight_n = robot.reference.m6_kg * robot.reference.gravity_m_s2;
+        let seeds = options.seeds;
+        let starts = starts::measure(&axis, seeds, progress)?;
+        let ablation = ablation::measure(&axis, bus, weight_n, seeds, progress);
+        let ablation = Ended::kept(ablation)?;
+        let notice = Ended::kept(notice::measure(&axis, seeds.min(8), progress))?;
+        let predictions = match &notice {
+            Some(notice) => Ended::kept(predictions::measure(
+                &axis, &starts, notice, seeds, progress,
+            ))?,
+            None => None,
+        };
+        Ok(Self {
+            starts,
+            ablation,
+            notice,
+            predictions,
+        })
+    }
+
+    /// The parts of the study, and which of them are done.
+    fn parts(&self) -> Vec<(String, bool)> {
+        let kinds = trial::Law::ALL
+            .into_iter()
+            .flat_map(|law| trial::Start::ALL.map(|start| (law, start)));
+        let mut parts: Vec<(String, bool)> = kinds
+            .map(|(law, start)| {
+                let name = format!("starts under the {} law: {}", law.name(), start.name());
+                (name, self.starts.of(law, start).is_some())
+            })
+            .collect();
+        parts.extend([
+            ("ablation".to_owned(), self.ablation.is_some()),
+            ("announced moves".to_owned(), self.notice.is_some()),
+            ("predictions".to_owned(), self.predictions.is_some()),
+        ]);
+        parts
+    }
+
+    /// What `summary.json` holds.
+    fn summary<'a>(&'a self, robot: &'a RobotConfig, options: &Options) -> Summary<'a> {
+        Summary {
+            robot: &robot.name,
+            robot_hash: robot.fingerprint(),
+            seeds: options.seeds,
+            mass_kg: options.mass_kg,
+            load_n: options.load_n,
+            bus: bus_of(robot),
+            starts: &self.starts,
+            ablation: self.ablation.as_ref(),
+            predictions: self.predictions.as_ref(),
+            notice: self.notice.as_ref(),
+        }
+    }
+
+    /// The whole study, if it is whole.
+    fn study(self, robot: &RobotConfig, options: &Options) -> Option<Study> {
+        Some(Study {
+            robot: robot.name.clone(),
+            robot_hash: robot.fingerprint(),
+            seeds: options.seeds,
+            mass_kg: options.mass_kg,
+            load_n: options.load_n,
+            bus: bus_of(robot),
+            starts: self.starts,
+            ablation: self.ablation?,
+            predictions: self.predictions?,
+            notice: self.notice?,
+        })
+    }
+}
+
+/// Contents of `summary.json`. A part that a study was stopped before is null.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Summary<'a> {
+    /// Name of the robot.
+    robot: &'a str,
+    /// Fingerprint of its parameters.
+    robot_hash: String,
+    /// Starts per kind of move and law.
+    seeds: u32,
+    /// Moving mass \[kg\].
+    mass_kg: f64,
+    /// Load \[N\].
+    load_n: f64,
+    /// The way from master to board.
+    bus: BusPath,
+    /// Distributions.
+    starts: &'a starts::Starts,
+    /// Contributions.
+    ablation: Option<&'a ablation::Ablation>,
+    /// Predictions.
+    predictions: Option<&'a predictions::Predictions>,
+    /// Announced moves.
+    notice: Option<&'a notice::Notice>,
+}
+
+impl study::Summary for Summary<'_> {
+    const SCHEMA: &'static str = "wheeleg.delay/1";
 }
 
 /// Measures everything.
@@ -183,92 +266,35 @@ fn mean_delay(outcomes: &[Outcome]) -> Option<f64> {
 /// # Errors
 /// [`StudyError::Refused`] if the robot's cylinder cannot be simulated or does not move.
 pub fn study(robot: &RobotConfig, options: &Options) -> Result<Study, StudyError> {
-    let axis = axis_of(robot, options.mass_kg, options.load_n);
-    let bus = bus_of(robot);
-    let weight_n = robot.reference.m6_kg * robot.reference.gravity_m_s2;
-    let bar = progress_bar();
-    let part = |what: &'static str| bar.set_message(what);
-    part("distributions");
-    let starts = starts::measure(&axis, options.seeds, &bar)?;
-    part("ablation");
-    let ablation = ablation::measure(&axis, bus, weight_n, options.seeds, &bar)?;
-    part("announced moves");
-    let notice = notice::measure(&axis, options.seeds.min(8), &bar)?;
-    part("predictions");
-    let predictions = predictions::measure(&axis, &starts, &notice, options.seeds, &bar)?;
-    bar.finish_and_clear();
-    Ok(Study {
-        robot: robot.name.clone(),
-        robot_hash: robot.fingerprint(),
-        seeds: options.seeds,
-        mass_kg: options.mass_kg,
-        load_n: options.load_n,
-        bus,
-        starts,
-        ablation,
-        predictions,
-        notice,
-    })
+    let collected = Collected::measure(robot, options, &Progress::silent())?;
+    // Nothing asks the silent one to stop.
+    let study = collected.study(robot, options);
+    study.ok_or_else(|| StudyError::refused("the study was stopped", ""))
 }
 
-/// Files that were written.
-#[derive(Debug)]
-pub struct Finished {
-    /// The page.
-    pub report: PathBuf,
-    /// What was measured.
-    pub study: Study,
-}
-
-impl Study {
-    /// What `summary.json` holds.
-    ///
-    /// # Panics
-    /// Never: every field has a JSON form.
-    #[must_use]
-    pub fn summary(&self) -> serde_json::Value {
-        serde_json::to_value(self).unwrap_or_default()
-    }
-}
-
-/// Measures and writes everything into `folder`. Results of an earlier run in it are set
-/// aside in its folders `previous`, `previous-2`, …
+/// Measures and writes everything; the study itself is there if it was not stopped.
 ///
 /// # Errors
 /// [`StudyError`] if something cannot be simulated, drawn or written.
 pub fn write(
-    folder: &Path,
     robot: &RobotConfig,
     options: &Options,
-) -> Result<Finished, StudyError> {
-    output::prepare(folder)?;
-    let study = study(robot, options)?;
-    tables::write(&subfolder(folder, "csv")?, &study)?;
-    let plots = subfolder(folder, "figures")?;
-    let mut drawn = Vec::new();
-    for figure in charts::figures(&study) {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
-        save(&plots.join(format!("{}.svg", figure.id)), &svg)?;
-        drawn.push((figure, svg));
+    settings: &Settings,
+) -> Result<Finished<Option<Study>>, StudyError> {
+    let job = Job::begin("delay", settings)?;
+    let collected = Collected::measure(robot, options, &job.progress)?;
+    let parts = collected.parts();
+    let done = parts.iter().filter(|(_, done)| *done).count() as u64;
+    let stopped = job.progress.stopped(done, parts.len() as u64, "parts");
+    let summary = job.summary(&collected.summary(robot, options), stopped.as_ref())?;
+    if let Some(stopped) = stopped {
+        let page = Job::stopped_page("Start delay of a pneumatic joint", &stopped, &parts)?;
+        return job.finish(None, summary, &page, Some(stopped));
     }
-    save(
-        &folder.join("summary.json"),
-        &format!("{:#}\n", study.summary()),
-    )?;
-    let report = folder.join("report.html");
-    save(&report, &page::render(&study, &drawn)?)?;
-    Ok(Finished { report, study })
-}
-
-fn save(path: &Path, text: &str) -> Result<(), StudyError> {
-    std::fs::write(path, text).map_err(|e| StudyError::output("write", path, e))
-}
-
-fn progress_bar() -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal. The length grows as parts begin.
-    let bar = ProgressBar::new(0);
-    let style = ProgressStyle::with_template("delay {wide_bar} {pos}/{len} starts  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
+    let study = collected.study(robot, options);
+    let study = study.ok_or_else(|| StudyError::refused("a part is missing", ""))?;
+    tables::write(&job.subfolder("csv")?, &study)?;
+    let drawn = job.draw(charts::figures(&study))?;
+    let page = page::render(&study, &drawn)?;
+    job.finish(Some(study), summary, &page, None)
 }

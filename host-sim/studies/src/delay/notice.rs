@@ -1,13 +1,14 @@
 //! What an announced move gains: the counter chamber vented and the drive chamber
 //! filled ahead of time.
 
-use indicatif::ProgressBar;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
 use super::trial::{Law, Outcome, Start, Trial};
-use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, median, quantile, run_all};
-use crate::StudyError;
+use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, run_all};
+use crate::study::{Ended, Progress};
+use wheeleg_report::stats::{largest, median};
 
 /// Notice \[s\].
 pub const NOTICES_S: [f64; 9] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4];
@@ -23,7 +24,7 @@ const STARTS: [Start; 5] = [
 const LOADS_N: [f64; 4] = [-30.0, -15.0, 15.0, 30.0];
 
 /// Starts of one kind at one notice, worst of all seeds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Noticed {
     /// Law; only the default one uses the notice.
     pub law: Law,
@@ -50,7 +51,7 @@ impl Noticed {
 }
 
 /// All of them.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Notice {
     /// Seeds of each row.
     pub seeds: u32,
@@ -81,8 +82,8 @@ impl Notice {
 /// Measures all rows.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the axis cannot be simulated.
-pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Notice, StudyError> {
+/// [`Ended`] if the axis cannot be simulated, or the study is stopped.
+pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Notice, Ended> {
     let mut cases = Vec::new();
     for start in STARTS {
         cases.extend(NOTICES_S.map(|notice_s| (Law::Default, start, 0.0, notice_s)));
@@ -101,8 +102,7 @@ pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Notic
             trial
         })
         .collect();
-    bar.inc_length(trials.len() as u64);
-    let mut outcomes = run_all(&trials, bar)?;
+    let mut outcomes = run_all("announced moves", &trials, progress)?;
     let each = seeds as usize;
     let rows = cases
         .iter()
@@ -115,7 +115,7 @@ pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Notic
                 load_n,
                 notice_s,
                 median_s: delays.as_deref().and_then(median),
-                delay_s: delays.as_deref().and_then(|d| quantile(d, 1.0)),
+                delay_s: delays.as_deref().and_then(largest),
                 early_mm: group.iter().map(|o| o.early_mm).fold(0.0, f64::max),
             }
         })

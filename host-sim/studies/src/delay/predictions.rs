@@ -5,7 +5,7 @@
 //! conductance in known ways. Each statement below was made before the plant existed;
 //! its band is in the statement, and the verdict is the band's.
 
-use indicatif::ProgressBar;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
@@ -17,10 +17,10 @@ use super::scaling::{
 use super::starts::Starts;
 use super::trial::{Before, Law, Start, Trial};
 use super::{PAPER_BAND_S, PAPER_DELAY_S};
-use crate::StudyError;
+use crate::study::{Ended, Progress};
 
 /// A statement and what became of it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Prediction {
     /// Short name.
     pub id: &'static str,
@@ -57,7 +57,7 @@ fn prediction(
 }
 
 /// Statements and the studies behind them.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Predictions {
     /// All statements.
     pub list: Vec<Prediction>,
@@ -76,17 +76,17 @@ pub struct Predictions {
 /// Tests all of them.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the axis cannot be simulated or does not move.
+/// [`Ended`] if the axis cannot be simulated or does not move, or the study is stopped.
 pub fn measure(
     axis: &AxisParams,
     starts: &Starts,
     notice: &Notice,
     seeds: u32,
-    bar: &ProgressBar,
-) -> Result<Predictions, StudyError> {
+    progress: &Progress,
+) -> Result<Predictions, Ended> {
     let work = Work {
         seeds: seeds.min(SEEDS),
-        bar,
+        progress,
     };
     let prepared = |before: Before| Trial {
         before,
@@ -102,7 +102,7 @@ pub fn measure(
         of.map(|s| (s.ratio_s_pa, s.delay_s)).collect()
     };
     let (line, own_line) = (fit(&points(&TUBES)), fit(&points(&[1.0])));
-    let stroke_s = thrown(axis)?.travel_s.ok_or_else(never)?;
+    let stroke_s = thrown(axis, progress)?.travel_s.ok_or_else(never)?;
     let bores = bores(axis, stroke_s, work)?;
 
     let of = |law, start| {

@@ -1,6 +1,6 @@
 //! The delay over conductance, volume and bore.
 
-use indicatif::ProgressBar;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
@@ -8,6 +8,7 @@ use super::ablation::conductance;
 use super::trial::{Law, Outcome, Start, Trial};
 use super::{mean_delay, run_all};
 use crate::StudyError;
+use crate::study::{Ended, Progress};
 
 /// Most seeds of a point.
 pub(super) const SEEDS: u32 = 6;
@@ -19,7 +20,7 @@ pub(super) const TUBES: [f64; 5] = [0.0, 0.5, 1.0, 2.0, 3.0];
 const BORES_M: [(f64, f64); 3] = [(0.016, 0.006), (0.020, 0.008), (0.025, 0.010)];
 
 /// One point of the scaling study.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Scaled {
     /// Factor on the conductance.
     pub factor: f64,
@@ -34,7 +35,7 @@ pub struct Scaled {
 }
 
 /// One bore at the base's stroke time.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Bored {
     /// Bore \[m\].
     pub bore_m: f64,
@@ -49,7 +50,7 @@ pub struct Bored {
 }
 
 /// A straight line through points.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct Line {
     /// Value at zero.
     pub offset: f64,
@@ -78,7 +79,7 @@ pub(super) fn fit(points: &[(f64, f64)]) -> Line {
 #[derive(Clone, Copy)]
 pub(super) struct Work<'a> {
     pub(super) seeds: u32,
-    pub(super) bar: &'a ProgressBar,
+    pub(super) progress: &'a Progress,
 }
 
 pub(super) fn never() -> StudyError {
@@ -89,7 +90,7 @@ pub(super) fn never() -> StudyError {
 }
 
 /// Mean delays of several trials, each under all seeds.
-pub(super) fn delays(trials: &[Trial], work: Work<'_>) -> Result<Vec<f64>, StudyError> {
+pub(super) fn delays(trials: &[Trial], work: Work<'_>) -> Result<Vec<f64>, Ended> {
     let seeded = |trial: &Trial, seed: u32| Trial {
         seed: u64::from(seed),
         ..trial.clone()
@@ -98,10 +99,10 @@ pub(super) fn delays(trials: &[Trial], work: Work<'_>) -> Result<Vec<f64>, Study
         .iter()
         .flat_map(|trial| (1..=work.seeds).map(move |seed| seeded(trial, seed)))
         .collect();
-    work.bar.inc_length(all.len() as u64);
-    let outcomes = run_all(&all, work.bar)?;
+    let outcomes = run_all("predictions", &all, work.progress)?;
     let means = outcomes.chunks(work.seeds as usize).map(mean_delay);
-    means.collect::<Option<Vec<f64>>>().ok_or_else(never)
+    let means: Option<Vec<f64>> = means.collect();
+    Ok(means.ok_or_else(never)?)
 }
 
 pub(super) fn home(axis: &AxisParams) -> Trial {
@@ -109,17 +110,17 @@ pub(super) fn home(axis: &AxisParams) -> Trial {
 }
 
 /// The whole stroke from the held home with the valves thrown open.
-pub(super) fn thrown(axis: &AxisParams) -> Result<Outcome, StudyError> {
+pub(super) fn thrown(axis: &AxisParams, progress: &Progress) -> Result<Outcome, Ended> {
     let trial = Trial {
         thrown: true,
         ..home(axis)
     };
-    let outcomes = run_all(&[trial], &ProgressBar::hidden())?;
-    outcomes.into_iter().next().ok_or_else(never)
+    let outcomes = run_all("predictions", &[trial], progress)?;
+    Ok(outcomes.into_iter().next().ok_or_else(never)?)
 }
 
 /// Delay against volume and conductance.
-pub(super) fn scaling(axis: &AxisParams, work: Work<'_>) -> Result<Vec<Scaled>, StudyError> {
+pub(super) fn scaling(axis: &AxisParams, work: Work<'_>) -> Result<Vec<Scaled>, Ended> {
     let mut points = Vec::new();
     let mut trials = Vec::new();
     for factor in FACTORS {
@@ -153,11 +154,7 @@ pub(super) fn scaling(axis: &AxisParams, work: Work<'_>) -> Result<Vec<Scaled>, 
 }
 
 /// Delay of other bores whose valves give the same stroke time.
-pub(super) fn bores(
-    axis: &AxisParams,
-    stroke_s: f64,
-    work: Work<'_>,
-) -> Result<Vec<Bored>, StudyError> {
+pub(super) fn bores(axis: &AxisParams, stroke_s: f64, work: Work<'_>) -> Result<Vec<Bored>, Ended> {
     let base_m = axis.cylinder.bore_m;
     let mut rows = Vec::new();
     for scaled in [false, true] {
@@ -196,7 +193,7 @@ pub(super) fn bores(
             let (mut low, mut high) = (0.3 * given, 4.0 * given);
             for _ in 0..12 {
                 let middle = 0.5 * (low + high);
-                let time_s = thrown(&with(middle))?.travel_s;
+                let time_s = thrown(&with(middle), work.progress)?.travel_s;
                 if time_s.is_none_or(|t| t > stroke_s) {
                     low = middle;
                 } else {
@@ -204,7 +201,7 @@ pub(super) fn bores(
                 }
             }
             let fitted = with(0.5 * (low + high));
-            let stroke_s = thrown(&fitted)?.travel_s.ok_or_else(never)?;
+            let stroke_s = thrown(&fitted, work.progress)?.travel_s.ok_or_else(never)?;
             let delay = delays(&[home(&fitted)], work)?;
             rows.push(Bored {
                 bore_m,

@@ -1,15 +1,17 @@
 //! How long a move takes to start, per kind of move and law.
 
-use indicatif::ProgressBar;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
+use super::run_all;
 use super::trial::{Law, Outcome, Start, Trial};
-use super::{median, quantile, run_all};
 use crate::StudyError;
+use crate::study::{Ended, Progress};
+use wheeleg_report::stats::{median, quantile};
 
 /// Distribution of one kind of move under one law. Times from the set-point in the board.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Distribution {
     /// Kind.
     pub start: Start,
@@ -34,13 +36,13 @@ pub struct Distribution {
 }
 
 /// All of them.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct Starts {
     /// Kinds of the first law, then of the second.
     pub list: Vec<Distribution>,
     /// Move from the held home of each law, first seed.
     #[serde(skip)]
-    pub home: [Outcome; 2],
+    pub home: Vec<Outcome>,
 }
 
 impl Starts {
@@ -51,22 +53,24 @@ impl Starts {
     }
 }
 
-/// Measures `seeds` starts of every kind under both laws.
+/// Measures `seeds` starts of every kind under both laws, as far as the study is not stopped.
 ///
 /// # Errors
 /// [`StudyError::Refused`] if the axis cannot be simulated, or no start of a kind moved.
-pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Starts, StudyError> {
+pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Starts, StudyError> {
     let kinds = Law::ALL
         .into_iter()
         .flat_map(|law| Start::ALL.map(|start| (law, start)));
-    bar.inc_length(u64::from(seeds) * 14);
     let mut list = Vec::new();
     let mut home = Vec::new();
     for (law, start) in kinds {
         let trials: Vec<Trial> = (1..=u64::from(seeds))
             .map(|seed| Trial::new(axis, law, start, seed))
             .collect();
-        let outcomes = run_all(&trials, bar)?;
+        let what = format!("{} law, {}", law.name(), start.name());
+        let Some(outcomes) = Ended::kept(run_all(&what, &trials, progress))? else {
+            break;
+        };
         let distribution = distribution(law, start, &outcomes).ok_or_else(|| {
             StudyError::refused(
                 format!(
@@ -82,8 +86,6 @@ pub fn measure(axis: &AxisParams, seeds: u32, bar: &ProgressBar) -> Result<Start
             home.extend(outcomes.into_iter().next());
         }
     }
-    let home = <[Outcome; 2]>::try_from(home)
-        .map_err(|_| StudyError::refused("no start was simulated", "ask for one seed at least"))?;
     Ok(Starts { list, home })
 }
 

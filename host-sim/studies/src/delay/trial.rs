@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_units::{Duty, PositionMm};
@@ -77,7 +78,7 @@ pub struct Trial {
 }
 
 /// Time from a command in the master to the board.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct BusPath {
     /// Bus cycle; the wait for the next one is uniform within it \[s\].
     pub cycle_s: f64,
@@ -128,7 +129,7 @@ impl Trial {
 }
 
 /// What came of it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Outcome {
     /// Command to the first millimetre in its direction \[s\]; `None` if it never moved.
     pub delay_s: Option<f64>,

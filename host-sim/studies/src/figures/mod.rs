@@ -9,9 +9,8 @@ pub mod precision;
 pub mod section6;
 pub(crate) mod tables;
 
-use std::path::{Path, PathBuf};
-
-use indicatif::{ProgressBar, ProgressStyle};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use audit::Misprint;
 use force::Force;
@@ -20,10 +19,9 @@ use section6::{ARGUMENT, AxisCheck, Instant, LITERAL, Reading};
 use wheeleg_kinematics::{LegGeometry, LegParameters};
 
 use crate::StudyError;
+use crate::study::{self, Finished, Job, Progress, Settings};
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_ROBOT;
-use wheeleg_report::output;
-use wheeleg_report::subfolder;
 
 /// Instants of a curve, less one.
 const INSTANTS: usize = 2000;
@@ -47,30 +45,26 @@ pub struct Results {
     pub precision: PrecisionMap,
 }
 
-/// Files that were written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Finished {
-    /// The page.
-    pub report: PathBuf,
-    /// Contents of `summary.json`.
-    pub summary: serde_json::Value,
-    /// What was computed.
-    pub results: Results,
+/// What was computed until the study ended or was stopped.
+struct Collected {
+    readings: [(Reading, Vec<Instant>); 2],
+    force: Force,
+    checks: Vec<AxisCheck>,
+    misprints: Option<Vec<Misprint>>,
+    precision: Option<PrecisionMap>,
 }
 
-impl Results {
-    /// Computes everything; `progress` is told the share that is done and what is being done.
-    ///
-    /// # Errors
-    /// [`StudyError::Refused`]; the motions of the paper are inside the leg's reach.
-    pub fn compute(progress: &mut dyn FnMut(f64, &'static str)) -> Result<Self, StudyError> {
+impl Collected {
+    fn compute(progress: &Progress) -> Result<Self, StudyError> {
         let failed = |e: &dyn std::fmt::Display| {
             StudyError::refused(
                 format!("cannot compute the figures: {e}"),
                 "please report this",
             )
         };
-        progress(0.0, "trajectories");
+        // Steps of the bar: thousandths of a part.
+        let at = |share: f64| progress.at((1e3 * share) as u64);
+        progress.begin("trajectories", 1000);
         let geometry = LegGeometry::new(LegParameters::wheeleg_2003()).map_err(|e| failed(&e))?;
         let motion = |reading: Reading| {
             let motion = reading.motion(&geometry, INSTANTS);
@@ -84,86 +78,127 @@ impl Results {
             .flat_map(|(reading, motion)| section6::checks(reading, motion))
             .collect();
         checks.push(force.check());
-        let misprints = audit::misprints(&mut |share| progress(0.02 + 0.18 * share, "misprints"));
-        let misprints = misprints.map_err(|e| failed(&e))?;
-        let precision = PrecisionMap::new(MAP_STEPS, MAP_LEVELS, &mut |share| {
-            progress(0.2 + 0.5 * share, "single precision");
-        });
+        let mut misprints = None;
+        if !progress.is_stopped() {
+            progress.begin("misprints", 1000);
+            misprints = Some(audit::misprints(&mut |share| at(share)).map_err(|e| failed(&e))?);
+        }
+        let mut precision = None;
+        if !progress.is_stopped() {
+            progress.begin("single precision", 1000);
+            let map = PrecisionMap::new(MAP_STEPS, MAP_LEVELS, &mut |share| at(share));
+            precision = Some(map.map_err(|e| failed(&e))?);
+        }
         Ok(Self {
             readings,
             force,
             checks,
             misprints,
-            precision: precision.map_err(|e| failed(&e))?,
+            precision,
         })
+    }
+
+    /// The parts of the study, and which of them are done.
+    fn parts(&self) -> [(String, bool); 3] {
+        [
+            ("motions and forces", true),
+            ("misprints", self.misprints.is_some()),
+            ("single precision", self.precision.is_some()),
+        ]
+        .map(|(name, done)| (name.to_owned(), done))
     }
 
     /// What `summary.json` holds.
-    #[must_use]
-    pub fn summary(&self) -> serde_json::Value {
-        serde_json::json!({
-            "axes": self.checks,
-            "fig9": {
-                "maximum_at_s": self.force.maximum_at_s,
-                "worst_difference_n": self.force.worst_difference_n,
+    fn summary(&self) -> Summary<'_> {
+        Summary {
+            axes: &self.checks,
+            fig9: Fig9 {
+                maximum_at_s: self.force.maximum_at_s,
+                worst_difference_n: self.force.worst_difference_n,
             },
-            "misprints": self.misprints,
-            "single_precision": {
-                "poses": self.precision.poses,
-                "worst_forward_m": self.precision.worst_forward_m,
-                "worst_inverse_m": self.precision.worst_inverse_m,
-                "limit_m": precision::LIMIT_M,
-                "pass": self.precision.worst_m() < precision::LIMIT_M,
-            },
+            misprints: self.misprints.as_deref(),
+            single_precision: self.precision.as_ref().map(|map| SinglePrecision {
+                poses: map.poses,
+                worst_forward_m: map.worst_forward_m,
+                worst_inverse_m: map.worst_inverse_m,
+                limit_m: precision::LIMIT_M,
+                pass: map.worst_m() < precision::LIMIT_M,
+            }),
+        }
+    }
+
+    /// All results, if all are there.
+    fn results(self) -> Option<Results> {
+        Some(Results {
+            readings: self.readings,
+            force: self.force,
+            checks: self.checks,
+            misprints: self.misprints?,
+            precision: self.precision?,
         })
     }
 }
 
-/// Computes and writes everything into `folder`. Results of an earlier run in it are set aside in
-/// its folders `previous`, `previous-2`, …
+/// Contents of `summary.json`. A part that the study was stopped before is null.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Summary<'a> {
+    /// Axes of the paper beside what was computed.
+    axes: &'a [AxisCheck],
+    /// Fig. 9.
+    fig9: Fig9,
+    /// Equations as printed beside the corrected ones.
+    misprints: Option<&'a [Misprint]>,
+    /// Single against double precision.
+    single_precision: Option<SinglePrecision>,
+}
+
+impl study::Summary for Summary<'_> {
+    const SCHEMA: &'static str = "wheeleg.figures/1";
+}
+
+/// Fig. 9.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Fig9 {
+    /// Time of the largest force (s).
+    maximum_at_s: f64,
+    /// Largest difference between the inverse dynamics and the paper's formula (N).
+    worst_difference_n: f64,
+}
+
+/// Single against double precision.
+#[derive(Debug, Serialize, JsonSchema)]
+struct SinglePrecision {
+    /// Poses computed both ways.
+    poses: usize,
+    /// Worst distance of the foot (m).
+    worst_forward_m: f64,
+    /// Worst difference of a stroke (m).
+    worst_inverse_m: f64,
+    /// Largest difference allowed (m).
+    limit_m: f64,
+    /// Whether both are below it.
+    pass: bool,
+}
+
+/// Computes and writes everything; the results are there if the study was not stopped.
 ///
 /// # Errors
 /// [`StudyError`] if something cannot be computed, drawn or written.
-pub fn write(folder: &Path) -> Result<Finished, StudyError> {
-    output::prepare(folder)?;
-    let bar = progress_bar();
-    let results = Results::compute(&mut |share, what| {
-        bar.set_position((1e3 * share) as u64);
-        bar.set_message(what);
-    })?;
-    tables::write(&subfolder(folder, "csv")?, &results)?;
-    let plots = subfolder(folder, "figures")?;
-    let figures = charts::figures(&results);
-    let mut drawn = Vec::with_capacity(figures.len());
-    bar.set_message("drawing");
-    for (i, figure) in figures.into_iter().enumerate() {
-        figure.png(&plots.join(format!("{}.png", figure.id)))?;
-        let svg = figure.svg()?;
-        let path = plots.join(format!("{}.svg", figure.id));
-        save(&path, &svg)?;
-        drawn.push((figure, svg));
-        bar.set_position(700 + 25 * i as u64);
+pub fn write(settings: &Settings) -> Result<Finished<Option<Results>>, StudyError> {
+    let job = Job::begin("figures", settings)?;
+    let collected = Collected::compute(&job.progress)?;
+    let parts = collected.parts();
+    let done = parts.iter().filter(|(_, done)| *done).count() as u64;
+    let stopped = job.progress.stopped(done, parts.len() as u64, "parts");
+    let summary = job.summary(&collected.summary(), stopped.as_ref())?;
+    if let Some(stopped) = stopped {
+        let page = Job::stopped_page("Figures of the paper", &stopped, &parts)?;
+        return job.finish(None, summary, &page, Some(stopped));
     }
-    let summary = results.summary();
-    save(&folder.join("summary.json"), &format!("{summary:#}\n"))?;
-    let report = folder.join("report.html");
-    save(&report, &page::render(&results, &drawn)?)?;
-    bar.finish_and_clear();
-    Ok(Finished {
-        report,
-        summary,
-        results,
-    })
-}
-
-fn save(path: &Path, text: &str) -> Result<(), StudyError> {
-    std::fs::write(path, text).map_err(|e| StudyError::output("write", path, e))
-}
-
-fn progress_bar() -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal.
-    let bar = ProgressBar::new(1000);
-    let style = ProgressStyle::with_template("figures {wide_bar} {percent:>3} %  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
+    let results = collected.results();
+    let results = results.ok_or_else(|| StudyError::refused("a part is missing", ""))?;
+    tables::write(&job.subfolder("csv")?, &results)?;
+    let drawn = job.draw(charts::figures(&results))?;
+    let page = page::render(&results, &drawn)?;
+    job.finish(Some(results), summary, &page, None)
 }

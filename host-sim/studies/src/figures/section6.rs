@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_kinematics::{FootState, KinematicsError, LegGeometry};
 
@@ -123,7 +124,7 @@ impl Reading {
 }
 
 /// An axis of a figure of the paper and what was computed for it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AxisCheck {
     /// Id of MODEL.md §11.
     pub id: &'static str,

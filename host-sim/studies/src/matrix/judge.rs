@@ -220,7 +220,10 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, after_all: &AfterAll, m: &
     f.check(m.latched, || "not latched".to_owned());
     if let Some(limit) = row.held_mm {
         f.check(m.held_mm.is_some_and(|mm| mm <= limit), || {
-            format!("a held joint moves by {:?} mm, allowed {limit}", m.held_mm)
+            let moved = m
+                .held_mm
+                .map_or("an unknown way".to_owned(), |mm| format!("{mm} mm"));
+            format!("a held joint moves by {moved}, allowed {limit}")
         });
     }
     if row.estop {
@@ -233,7 +236,8 @@ fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
     let rows = ran.recording.joints.get(usize::from(board) - 1);
     let last = rows.and_then(|rows| rows.last()).map(|row| row.v.mode);
     f.check(last == Some(IDLE), || {
-        format!("the board ends in mode {last:?}, not disarmed")
+        let last = last.map_or("unknown".to_owned(), |mode| mode.to_string());
+        format!("the board ends in mode {last}, not disarmed")
     });
     if let Some(ms) = m.detected_ms {
         f.0.push(format!(

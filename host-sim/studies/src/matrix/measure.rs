@@ -1,13 +1,14 @@
 //! What is measured of a row: latencies on commanded, sensed and physical signals,
 //! latching, deviation, and what the user can read.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::row::{Expect, Row, Since};
 use super::run::Ran;
 use crate::analysis::{commanded_open, window};
 use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
-use wheeleg_telemetry::{JointSample, Recording, Row as Sample};
+use wheeleg_telemetry::{Event, EventKind, JointSample, Recording, Row as Sample};
 
 const TICK_S: f64 = 1e-3;
 /// Armed and tracking.
@@ -25,7 +26,7 @@ const HELD_S: f64 = 0.5;
 /// What was measured. Times in ms count from the row's instant; `None`: never. Those of the stop
 /// are `None`, too, where axes go on or none has driven: the last pulse of a motion that goes on
 /// is no latency.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Measured {
     /// Instant of the fault, s of scenario time.
     pub at_s: f64,
@@ -226,9 +227,10 @@ fn detected_s(r: &Recording, from_s: f64, master_heard: bool) -> Option<f64> {
             .find(|s| s.t_ns >= from_ns && s.v.faults != 0)
             .map(Sample::t_s)
     });
-    let hold = r.events.iter().find(|e| {
-        master_heard && e.t_ns >= from_ns && e.v.text.starts_with("master: all axes hold")
-    });
+    let hold = r
+        .events
+        .iter()
+        .find(|e| master_heard && e.t_ns >= from_ns && e.v.cause.is_hold());
     let all = joints.chain(wheels).chain(hold.map(Sample::t_s));
     all.min_by(f64::total_cmp)
 }
@@ -335,18 +337,25 @@ fn deviation_mm(r: &Recording, sound: &Recording, from_s: f64) -> Option<f64> {
         .max_by(f64::total_cmp)
 }
 
+/// What the robot says from the instant on. What the scenario does is not that.
+pub(super) fn messages(ran: &Ran) -> impl Iterator<Item = &Sample<Event>> {
+    let from_ns = (ran.at_s * 1e9).round() as u64;
+    let silent = [EventKind::Contact, EventKind::Scenario];
+    let events = ran.recording.events.iter();
+    events.filter(move |e| e.t_ns >= from_ns && !silent.contains(&e.v.cause.kind()))
+}
+
+/// A message as the user reads it.
+pub(super) fn line(event: &Sample<Event>) -> String {
+    format!("{:.3} s: {}", event.t_s(), event.v)
+}
+
 /// What the user reads from the instant on, each line once.
 fn reads(ran: &Ran) -> Vec<String> {
-    let from_ns = (ran.at_s * 1e9).round() as u64;
-    let events = ran.recording.events.iter();
-    // What the scenario does is not what the robot says of it.
-    let said = |kind: &str| kind != "contact" && kind != "scenario";
-    let events = events.filter(|e| e.t_ns >= from_ns && said(&e.v.kind));
     let mut lines: Vec<String> = Vec::new();
     let dropped = ran.recording.dropped;
-    let told = (dropped > 0).then(|| format!("{dropped} messages could not be written to the log"));
-    let texts = events.map(|e| format!("{:.3} s: {}", e.t_s(), e.v.text));
-    for line in texts.chain(told).chain(ran.error.clone()) {
+    let lost = (dropped > 0).then(|| format!("{dropped} messages could not be written to the log"));
+    for line in messages(ran).map(line).chain(lost).chain(ran.error.clone()) {
         if !lines.contains(&line) {
             lines.push(line);
         }
@@ -357,6 +366,8 @@ fn reads(ran: &Ran) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_master::event::{Event as MasterEvent, HoldReason};
+    use wheeleg_telemetry::Cause;
 
     fn rows(energised: impl Fn(u64) -> bool) -> Vec<Sample<JointSample>> {
         (0..1000)
@@ -419,10 +430,7 @@ mod tests {
         assert_eq!(detected_s(&r, 0.5, true), Some(0.640));
         r.events.push(Sample {
             t_ns: 560_000_000,
-            v: wheeleg_telemetry::EventSample {
-                kind: "fault".to_owned(),
-                text: "master: all axes hold: E-stop".to_owned(),
-            },
+            v: Cause::Master(MasterEvent::Hold(HoldReason::EmergencyStop)).into(),
         });
         assert_eq!(detected_s(&r, 0.5, true), Some(0.560));
         assert_eq!(

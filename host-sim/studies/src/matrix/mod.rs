@@ -5,7 +5,7 @@
 //! * [`run`]: one run per row;
 //! * [`measure`]: latencies, latching, deviation, words;
 //! * [`judge`]: measured against expected;
-//! * [`page`]: report and JSON.
+//! * [`page`], [`summary`]: report and JSON.
 
 mod judge;
 mod measure;
@@ -13,38 +13,17 @@ mod page;
 mod row;
 mod rows;
 mod run;
-
-use std::path::{Path, PathBuf};
-
-use indicatif::{ProgressBar, ProgressStyle};
+mod summary;
 
 pub use judge::{AfterAll, Outcome, Verdict};
 pub use measure::Measured;
 pub use row::{Expect, Phase, Row, Since, Stop, Strike, Variant};
 pub use rows::ROWS;
 pub use run::{run, select};
+pub use summary::Summary;
 
 use crate::StudyError;
-use wheeleg_report::output;
-
-/// What came of a run of the matrix.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Finished {
-    /// Rows in the order of the table.
-    pub outcomes: Vec<Outcome>,
-    /// Contents of `summary.json`.
-    pub summary: serde_json::Value,
-    /// The page.
-    pub report: PathBuf,
-}
-
-impl Finished {
-    /// Whether no row that was run failed.
-    #[must_use]
-    pub fn passed(&self) -> bool {
-        count(&self.outcomes, Verdict::Fail) == 0
-    }
-}
+use crate::study::{Finished, Job, Settings};
 
 /// Rows that came out so.
 #[must_use]
@@ -58,41 +37,23 @@ pub fn not_implemented() -> impl Iterator<Item = (&'static str, &'static str)> {
         .filter_map(|row| Some((row.id, row.not_implemented()?)))
 }
 
-/// Runs rows and writes `report.html` and `summary.json` into `folder`. Results of an
-/// earlier run in it are set aside in its folders `previous`, `previous-2`, …
+/// Runs rows and writes `report.html` and `summary.json`. The outcomes are in the order of the
+/// rows.
 ///
 /// # Errors
 /// [`StudyError`] if a run without a fault fails or something cannot be written.
-pub fn write(rows: &[&'static Row], seed: u64, folder: &Path) -> Result<Finished, StudyError> {
-    output::prepare(folder)?;
-    let bar = progress_bar(rows.len() as u64);
-    let outcomes = run(rows, seed, &|row| {
-        bar.inc(1);
-        bar.set_message(row.id);
-    });
-    bar.finish_and_clear();
-    let outcomes = outcomes?;
-    let summary = page::summary(&outcomes, seed);
-    let save = |name: &str, text: String| {
-        let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|e| StudyError::output("write", &path, e))?;
-        Ok::<_, StudyError>(path)
-    };
-    save("summary.json", format!("{summary:#}\n"))?;
-    let report = save("report.html", page::render(&outcomes, seed)?)?;
-    Ok(Finished {
-        outcomes,
-        summary,
-        report,
-    })
-}
-
-fn progress_bar(rows: u64) -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal.
-    let bar = ProgressBar::new(rows);
-    let style = ProgressStyle::with_template("faults {wide_bar} {pos}/{len}  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
+pub fn write(
+    rows: &[&'static Row],
+    seed: u64,
+    settings: &Settings,
+) -> Result<Finished<Vec<Outcome>>, StudyError> {
+    let job = Job::begin("faults", settings)?;
+    let outcomes = run(rows, seed, &job.progress)?;
+    let (done, of) = (outcomes.len() as u64, rows.len() as u64);
+    let stopped = job.progress.stopped(done, of, "rows");
+    let summary = job.summary(&Summary::new(&outcomes, seed), stopped.as_ref())?;
+    let page = page::render(&outcomes, seed, stopped.as_ref())?;
+    job.finish(outcomes, summary, &page, stopped)
 }
 
 #[cfg(test)]

@@ -1,81 +1,15 @@
-//! The report of the matrix, as a page and as JSON.
+//! The report of the matrix.
 
 use minijinja::{Value, context};
-use serde_json::json;
 
 use super::count;
 use super::judge::{AfterAll, DEGRADED_MM, Outcome, REACTION_MS, Verdict};
 use super::row::{Expect, Row, Since};
 use crate::StudyError;
+use crate::study::Stopped;
 use wheeleg_report::page;
 
 const TEMPLATE: &str = include_str!("page.html");
-
-/// Contents of `summary.json`.
-pub(super) fn summary(outcomes: &[Outcome], seed: u64) -> serde_json::Value {
-    let rows: Vec<serde_json::Value> = outcomes.iter().map(row_json).collect();
-    json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "seed": seed,
-        "passed": count(outcomes, Verdict::Pass),
-        "failed": count(outcomes, Verdict::Fail),
-        "not_implemented": count(outcomes, Verdict::NotImplemented),
-        "rows": rows,
-    })
-}
-
-fn row_json(outcome: &Outcome) -> serde_json::Value {
-    let row = &outcome.row;
-    let pass = match outcome.verdict {
-        Verdict::NotImplemented => None,
-        verdict => Some(verdict == Verdict::Pass),
-    };
-    let run = outcome.verdict != Verdict::NotImplemented;
-    json!({
-        "row": row.id,
-        "faults": outcome.faults,
-        "phase": row.phase.words(),
-        "expected": expected_json(outcome),
-        "measured": run.then_some(&outcome.measured),
-        "latched": run.then_some(outcome.measured.latched),
-        "pass": pass,
-        "verdict": outcome.verdict.words(),
-        "failures": outcome.failures,
-        "note": row.note,
-    })
-}
-
-fn expected_json(outcome: &Outcome) -> serde_json::Value {
-    let (row, after_all) = (&outcome.row, &outcome.after_all);
-    let mut value = match row.expect {
-        Expect::Stop(stop) => json!({
-            "reaction": reaction(row),
-            "detected_ms": stop.detected_ms,
-            "axis": (stop.axis > 0).then_some(stop.axis),
-            "own_ms": stop.own_ms,
-            "all_ms": stop.all_ms,
-            "physical_ms": tidy(stop.all_ms + after_all.physical_ms),
-            "wheels_stand_ms": tidy(stop.all_ms + after_all.wheels_ms),
-            "dump_ms": row.estop.then_some(stop.all_ms),
-            "held_mm": row.held_mm,
-            "latched": true,
-        }),
-        Expect::GoesOn { deviation_mm } => json!({
-            "reaction": reaction(row), "deviation_mm": deviation_mm, "latched": false,
-        }),
-        Expect::Degrades => json!({
-            "reaction": reaction(row),
-            "all_ms_after_detection": REACTION_MS,
-            "physical_ms_after_detection": tidy(REACTION_MS + after_all.physical_ms),
-            "wheels_stand_ms_after_detection": tidy(REACTION_MS + after_all.wheels_ms),
-            "deviation_mm_without_detection": DEGRADED_MM,
-            "latched": "if all axes stop",
-        }),
-        _ => json!({ "reaction": reaction(row) }),
-    };
-    value["reads"] = json!(row.reads);
-    value
-}
 
 /// What must come of a row, in words.
 pub(super) fn reaction(row: &Row) -> String {
@@ -102,7 +36,7 @@ pub(super) fn reaction(row: &Row) -> String {
 }
 
 /// A sum of limits without the tail of its binary fraction.
-fn tidy(ms: f64) -> f64 {
+pub(super) fn tidy(ms: f64) -> f64 {
     (ms * 1e3).round() / 1e3
 }
 
@@ -176,7 +110,11 @@ fn quoted(outcome: &Outcome) -> Vec<String> {
     lines
 }
 
-pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, StudyError> {
+pub(super) fn render(
+    outcomes: &[Outcome],
+    seed: u64,
+    stopped: Option<&Stopped>,
+) -> Result<String, StudyError> {
     let ms = |value: Option<f64>| {
         // Without the sign of a zero.
         let shown = |v: f64| if v.abs() < 0.05 { 0.0 } else { v };
@@ -217,6 +155,7 @@ pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, StudyErr
         })
         .collect();
     let values = context! {
+        stopped => stopped.map(ToString::to_string),
         version => env!("CARGO_PKG_VERSION"),
         seed => seed,
         rows => rows,

@@ -1,8 +1,8 @@
-//! Runs rows of the matrix on the simulated robot, two at a time.
+//! Runs rows of the matrix on the simulated robot.
 
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
 use wheeleg_master::command::Command;
 use wheeleg_node::mode::ModeRules as _;
 use wheeleg_protocol::param::{ParamInfo, params_at};
@@ -12,6 +12,7 @@ use super::measure::{Measured, measure};
 use super::row::{Ask, Expect, Phase, Row, Variant};
 use super::rows::ROWS;
 use crate::StudyError;
+use crate::study::Progress;
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{
@@ -20,11 +21,9 @@ use wheeleg_config::{
 };
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults::check;
-use wheeleg_sim::{self as sil, LineAudit, WatchedJoint};
+use wheeleg_sim::{self as sil, Boards, LineAudit, Onlookers, WatchedJoint};
 use wheeleg_telemetry::{Recorder, Recording};
 
-/// Rows at a time.
-const THREADS: usize = 2;
 /// E-stop after the instant, s.
 pub(super) const ESTOP_S: f64 = 0.1;
 /// Arming is asked for this long before the end, s.
@@ -117,7 +116,9 @@ impl Robots {
         };
         let run = self.sound[index].get_or_init(|| {
             let scenario = self.scenario(stands, SOUND_S);
-            let run = simulate(&scenario, self.robot(row.variant), self.seed);
+            // Short, and of use to other rows: it is not stopped.
+            let run = simulate(&scenario, self.robot(row.variant), self.seed, &|| false);
+            let run = run.ok_or_else(|| "stopped".to_owned())?;
             run.error.map_or(Ok(run.recording), Err)
         });
         run.as_ref()
@@ -125,10 +126,11 @@ impl Robots {
             .map_err(|e| StudyError::refused(format!("the run without a fault fails: {e}"), ""))
     }
 
-    fn run(&self, row: &Row) -> Result<Outcome, StudyError> {
+    /// What comes of a row; none if the study is stopped in it.
+    fn run(&self, row: &Row, progress: &Progress) -> Result<Option<Outcome>, StudyError> {
         let robot = self.robot(row.variant);
         if let Some(reason) = row.not_implemented() {
-            return Ok(Outcome::not_implemented(*row, robot, reason));
+            return Ok(Some(Outcome::not_implemented(*row, robot, reason)));
         }
         let at_s = instant_s(row, robot, self.seed);
         let faults = faults(row, at_s)?;
@@ -155,14 +157,18 @@ impl Robots {
         }
         check(&scenario, robot, &Nodes::default())?;
         let arming_asked = stops && faults.iter().all(|fault| fault.over_s() < arm_s);
+        let ran = simulate(&scenario, robot, self.seed, &|| progress.is_stopped());
+        let Some(ran) = ran else {
+            return Ok(None);
+        };
         let ran = Ran {
             at_s,
             faults,
             arming_asked,
-            ..simulate(&scenario, robot, self.seed)
+            ..ran
         };
         let measured: Measured = measure(row, &ran, self.sound(row)?);
-        Ok(judge(*row, robot, &ran, measured))
+        Ok(Some(judge(*row, robot, &ran, measured)))
     }
 }
 
@@ -194,8 +200,13 @@ fn stands(phase: Phase) -> bool {
     matches!(phase, Phase::Stand | Phase::PowerUp)
 }
 
-/// A run in memory; an error ends it and is told.
-fn simulate(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Ran {
+/// A run in memory; an error ends it and is told. None if it was stopped.
+fn simulate(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    is_stopped: &dyn Fn() -> bool,
+) -> Option<Ran> {
     let mut recorder = Recorder::in_memory();
     let mut outputs = Outputs::default();
     let mut look = |joint: &WatchedJoint<'_>| {
@@ -203,8 +214,20 @@ fn simulate(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Ran {
         outputs.ticks += 1;
         outputs.driven += u64::from(driven);
     };
-    let run = sil::run_watched(scenario, robot, seed, &mut recorder, &mut look);
+    let mut progress = |_| match is_stopped() {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    };
+    let run = sil::run_on(
+        Boards::default(),
+        scenario,
+        robot,
+        seed,
+        &mut recorder,
+        Onlookers::new(&mut progress).watching(&mut look),
+    );
     let (line, error) = match run {
+        Ok(outcome) if outcome.stopped => return None,
         Ok(outcome) => (outcome.line, None),
         Err(e) => (LineAudit::default(), Some(e.to_string())),
     };
@@ -212,7 +235,7 @@ fn simulate(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Ran {
         Ok(recording) => (recording, error),
         Err(e) => (Recording::default(), error.or(Some(e.to_string()))),
     };
-    Ran {
+    Some(Ran {
         at_s: 0.0,
         faults: Vec::new(),
         recording,
@@ -220,7 +243,7 @@ fn simulate(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Ran {
         arming_asked: false,
         outputs,
         error,
-    }
+    })
 }
 
 /// The instant of a row, s: somewhere in its phase, by the seed, on a whole tick.
@@ -313,27 +336,16 @@ fn meant(id: &str) -> String {
     wheeleg_config::closest(id, ids).map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
 }
 
-/// Runs rows; `progress` is told each as it is done.
+/// Runs rows, as far as the study is not stopped.
 ///
 /// # Errors
 /// [`StudyError`] if a run without a fault fails, or a row of the table is wrong.
 pub fn run(
     rows: &[&'static Row],
     seed: u64,
-    progress: &(dyn Fn(&Row) + Sync),
+    progress: &Progress,
 ) -> Result<Vec<Outcome>, StudyError> {
     let robots = Robots::new(seed)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(THREADS)
-        .build()
-        .map_err(|e| StudyError::refused(format!("cannot start threads: {e}"), ""))?;
-    pool.install(|| {
-        rows.par_iter()
-            .map(|row| {
-                let outcome = robots.run(row);
-                progress(row);
-                outcome
-            })
-            .collect()
-    })
+    let outcomes = progress.each("rows", rows, |row| robots.run(row, progress))?;
+    Ok(outcomes.into_iter().flatten().flatten().collect())
 }

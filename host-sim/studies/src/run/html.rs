@@ -8,42 +8,45 @@ use crate::StudyError;
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_report::plot::Figure;
 use wheeleg_report::{page, pictures};
-use wheeleg_sim::START_UP;
-use wheeleg_telemetry::{EventSample, LinkSample, Row};
+use wheeleg_telemetry::event::BoardChange;
+use wheeleg_telemetry::messages::after_power_up;
+use wheeleg_telemetry::{Cause, Event, EventKind, LinkSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
 
-/// Events as lines of a table: time, kind, text. What several boards report at
-/// the same time in the same words becomes one line that names them all.
-fn grouped(events: &[Row<EventSample>]) -> Vec<(f64, &str, String)> {
-    // Time, kind, boards, words.
-    let mut lines: Vec<(u64, &str, Vec<&str>, &str)> = Vec::new();
+/// A line of the table of events.
+struct Line {
+    t_ns: u64,
+    kind: EventKind,
+    text: String,
+}
+
+/// Events as lines of a table. What happens to several boards at the same time becomes one line
+/// that names them all.
+fn grouped<'a>(events: impl Iterator<Item = &'a Row<Event>>) -> Vec<Line> {
+    let mut lines: Vec<Line> = Vec::new();
+    // Changes of boards at one time, each with its boards and the place of its line.
+    let mut changes: Vec<(BoardChange, Vec<String>, usize)> = Vec::new();
     for row in events {
-        let (kind, text) = (row.v.kind.as_str(), row.v.text.as_str());
-        let (board, words) = match text.split_once(": ") {
-            Some((board, words)) if board.starts_with("joint ") || board.starts_with("wheel ") => {
-                (Some(board), words)
-            }
-            _ => (None, text),
-        };
-        let same = lines.iter_mut().rev().take_while(|l| l.0 == row.t_ns);
-        let mut same = same.filter(|l| l.1 == kind && l.3 == words && !l.2.is_empty());
-        match (board, same.next()) {
-            (Some(board), Some(line)) => line.2.push(board),
-            _ => lines.push((row.t_ns, kind, board.into_iter().collect(), words)),
+        if lines.last().is_some_and(|last| last.t_ns != row.t_ns) {
+            changes.clear();
         }
+        let cause = &row.v.cause;
+        if let Cause::Board { board, change } = cause {
+            if let Some((_, boards, place)) = changes.iter_mut().find(|known| known.0 == *change) {
+                boards.push(board.to_string());
+                lines[*place].text = format!("{}: {change}", boards.join(", "));
+                continue;
+            }
+            changes.push((*change, vec![board.to_string()], lines.len()));
+        }
+        lines.push(Line {
+            t_ns: row.t_ns,
+            kind: cause.kind(),
+            text: cause.to_string(),
+        });
     }
     lines
-        .into_iter()
-        .map(|(t_ns, kind, boards, words)| {
-            let text = if boards.is_empty() {
-                words.to_owned()
-            } else {
-                format!("{}: {words}", boards.join(", "))
-            };
-            (t_ns as f64 * 1e-9, kind, text)
-        })
-        .collect()
 }
 
 /// What each board heard on the bus, as it told last; without those that never told.
@@ -105,21 +108,24 @@ pub(super) fn render(
         .collect();
     // The start-up is a story of its own, told at time zero.
     let all = &source.recording.events;
-    let begin = all.partition_point(|r| r.v.text.starts_with(START_UP));
-    let start_up: Vec<String> = all[..begin]
+    let start_up: Vec<String> = all
         .iter()
-        .map(|r| r.v.text.trim_start_matches(START_UP).to_owned())
+        .filter_map(|r| {
+            let at = after_power_up(r.v.start_up_us?);
+            Some(format!("{at}: {}", r.v.cause))
+        })
         .collect();
     // What the boards logged themselves stands in the log and its tables.
-    let told = all[begin..].iter().filter(|r| r.v.kind != "log").cloned();
-    let told: Vec<Row<EventSample>> = told.collect();
-    let events: Vec<Value> = grouped(&told)
+    let later = all
+        .iter()
+        .filter(|r| r.v.start_up_us.is_none() && r.v.cause.kind() != EventKind::Log);
+    let events: Vec<Value> = grouped(later)
         .into_iter()
-        .map(|(t_s, kind, text)| {
+        .map(|line| {
             context! {
-                t => format!("{t_s:.3}"),
-                kind => kind,
-                text => text,
+                t => format!("{:.3}", line.t_ns as f64 * 1e-9),
+                kind => line.kind.name(),
+                text => line.text,
             }
         })
         .collect();
@@ -178,35 +184,49 @@ pub(super) fn render(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_master::event::Event as MasterEvent;
+    use wheeleg_protocol::{Address, Fault, NodeMode};
 
     #[test]
-    fn boards_that_say_the_same_share_a_line() {
-        let row = |ms: u64, kind: &str, text: &str| Row {
-            t_ns: ms * 1_000_000,
-            v: EventSample {
-                kind: kind.to_owned(),
-                text: text.to_owned(),
-            },
+    fn boards_that_change_alike_share_a_line() {
+        let board = |number: u8, change| Cause::Board {
+            board: Address::new(number).expect("a board"),
+            change,
         };
+        let holds = BoardChange::Mode {
+            from: NodeMode::Tracking,
+            to: NodeMode::Hold,
+        };
+        let lost = BoardChange::FaultLatched(Fault::LinkLost);
+        let homed = || Cause::Master(MasterEvent::Homed);
         let events = [
-            row(10, "mode", "joint 1: Tracking to Hold"),
-            row(10, "fault", "joint 1: no SYNC: check the cable"),
-            row(10, "mode", "wheel 7: Tracking to Hold"),
-            row(10, "fault", "wheel 7: no SYNC: check the cable"),
-            row(10, "info", "master: a thing"),
-            row(10, "info", "master: a thing"),
-            row(11, "mode", "joint 2: Tracking to Hold"),
+            (10, board(1, holds)),
+            (10, board(1, lost)),
+            (10, board(7, holds)),
+            (10, board(7, lost)),
+            (10, homed()),
+            (10, homed()),
+            (11, board(2, holds)),
         ];
-        let lines = grouped(&events);
-        let texts: Vec<&str> = lines.iter().map(|l| l.2.as_str()).collect();
+        let rows: Vec<Row<Event>> = events
+            .into_iter()
+            .map(|(ms, cause)| Row {
+                t_ns: ms * 1_000_000,
+                v: cause.into(),
+            })
+            .collect();
+        let lines = grouped(rows.iter());
+        let texts: Vec<&str> = lines.iter().map(|l| l.text.as_str()).collect();
+        let lost = format!("joint 1, wheel 7: {}", Fault::LinkLost);
         let expected = [
             "joint 1, wheel 7: Tracking to Hold",
-            "joint 1, wheel 7: no SYNC: check the cable",
-            "master: a thing",
-            "master: a thing",
+            &lost,
+            "master: start pose reached",
+            "master: start pose reached",
             "joint 2: Tracking to Hold",
         ];
         assert_eq!(texts, expected);
-        assert!((lines[4].0 - 0.011).abs() < 1e-12);
+        assert_eq!(lines[1].kind, EventKind::Fault);
+        assert_eq!(lines[4].t_ns, 11_000_000);
     }
 }

@@ -12,18 +12,15 @@ use std::fs::File;
 use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-
-use indicatif::{ProgressBar, ProgressStyle};
 
 use self::figures::Source;
 use crate::StudyError;
 use crate::analysis::Analyser;
+use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
-use wheeleg_report::{output, subfolder};
 use wheeleg_sim::faults;
 use wheeleg_sim::{self as sil, Boards, DownTimes};
 use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
@@ -43,19 +40,17 @@ pub struct Options {
     pub faults: Vec<FaultSpec>,
     /// Folder for the results instead of `runs/<scenario>-seed<N>`.
     pub out: Option<PathBuf>,
+    /// Figures as PNG, too.
+    pub png: bool,
     /// The run is to equal one with all nodes in this program ([`repeat_natively`]).
     pub compared: bool,
 }
 
-/// A run that was simulated and judged, and its files.
+/// A run that was simulated and judged.
 #[derive(Debug)]
-pub struct Finished {
+pub struct Run {
     /// Contents of `summary.json`.
     pub summary: Summary,
-    /// Folder of the results.
-    pub folder: PathBuf,
-    /// Path of the report, if it could be written.
-    pub report: Option<PathBuf>,
     /// What could not be written, in order; everything else is there.
     pub unwritten: Vec<StudyError>,
     /// When boards outside were down.
@@ -73,10 +68,7 @@ const LONG_S: f64 = 60.0;
 /// Room that is held for the summary while log and tables fill the disk, bytes.
 const RESERVE_BYTES: usize = 256 * 1024;
 
-/// Set by Ctrl-C.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// Runs a scenario: log, tables, figures, summary, report. Ctrl-C stops it at
+/// Runs a scenario: log, tables, figures, summary, report. `stop` ends it at
 /// the next bus cycle and the files are finished all the same. Results of an
 /// earlier run in the same folder are set aside in its folders `previous`,
 /// `previous-2`, …
@@ -84,9 +76,9 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// # Errors
 /// Any [`StudyError`]. A log that was begun is closed and stays readable. A file that cannot be
 /// written once the run has begun is no error: the run is judged all the same, and
-/// [`Finished::unwritten`] names the file.
-pub fn run(options: &Options) -> Result<Finished, StudyError> {
-    run_on(options, None)
+/// [`Run::unwritten`] names the file.
+pub fn run(options: &Options, stop: &Stop) -> Result<Finished<Run>, StudyError> {
+    run_on(options, stop, None)
 }
 
 /// Runs a scenario once more with all nodes in this program. Boards that a fault strikes
@@ -97,19 +89,24 @@ pub fn run(options: &Options) -> Result<Finished, StudyError> {
 /// As [`run`].
 pub fn repeat_natively(
     options: &Options,
-    before: &Finished,
+    stop: &Stop,
+    before: &Run,
     out: PathBuf,
-) -> Result<Finished, StudyError> {
+) -> Result<Finished<Run>, StudyError> {
     let options = Options {
         nodes: Nodes::default(),
         out: Some(out),
         compared: false,
         ..options.clone()
     };
-    run_on(&options, Some(&before.down_times))
+    run_on(&options, stop, Some(&before.down_times))
 }
 
-fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, StudyError> {
+fn run_on(
+    options: &Options,
+    stop: &Stop,
+    kept: Option<&DownTimes>,
+) -> Result<Finished<Run>, StudyError> {
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
     let robot = match &options.robot {
@@ -130,30 +127,35 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
         Some(kept) => Boards::native_with(kept.clone()),
         None => Boards::connect(&options.nodes, &robot)?,
     };
-    output::prepare(&folder)?;
+    let settings = Settings {
+        out: folder,
+        png: options.png,
+        stop: stop.clone(),
+    };
+    let job = Job::begin(&scenario.name, &settings)?;
     announce(scenario.duration_s);
-    let reserve = reserve(&folder);
+    let reserve = reserve(job.folder());
     let mut analyser = Analyser::new(&scenario, &robot);
     let mut recorder = Recorder::new(keep(&scenario))
-        .with(LogFile::create(&folder.join("log.mcap"))?)
-        .with(Tables::create(&subfolder(&folder, "csv")?, CSV_RATE_HZ)?)
+        .with(LogFile::create(&job.folder().join("log.mcap"))?)
+        .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?)
         .with(&mut analyser);
     provenance(&mut recorder, &scenario, &robot, seed);
-
-    // Only one handler can be set in a process; a second run keeps the first.
-    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst));
-    let bar = progress_bar(&scenario);
+    let duration_ms = (scenario.duration_s * 1e3).round() as u64;
+    job.progress.begin(
+        format!("{:.0} s simulated", scenario.duration_s),
+        duration_ms,
+    );
     let begun = Instant::now();
     let outcome = sil::run_on(
         boards,
         &scenario,
         &robot,
         seed,
-        &options.nodes,
         &mut recorder,
         sil::Onlookers::new(&mut |t_s| {
-            bar.set_position((t_s * 1e3) as u64);
-            if INTERRUPTED.load(Ordering::SeqCst) {
+            job.progress.at((t_s * 1e3) as u64);
+            if job.progress.is_stopped() {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -162,9 +164,8 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
     );
     let (recording, failed) = recorder.close();
     let wall_s = begun.elapsed().as_secs_f64();
-    bar.finish_and_clear();
     let outcome = outcome?;
-    let mut unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
+    let unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
 
     let info = RunInfo {
         seed,
@@ -178,20 +179,23 @@ fn run_on(options: &Options, kept: Option<&DownTimes>) -> Result<Finished, Study
     let mut summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
     summary.unwritten = unwritten.iter().map(ToString::to_string).collect();
     drop(reserve);
+    let recorded_ms = (summary.recorded_s * 1e3).round() as u64;
+    let stopped = job
+        .progress
+        .stopped(recorded_ms, duration_ms, "ms of the scenario")
+        .filter(|_| !summary.complete);
     let source = Source {
         scenario: &scenario,
         robot: &robot,
         recording: &recording,
         analysis: &analysis,
     };
-    let report = report::write(&folder, &source, &summary, &mut unwritten);
-    Ok(Finished {
+    let run = Run {
         summary,
-        folder,
-        report,
         unwritten,
         down_times: outcome.down_times,
-    })
+    };
+    Ok(report::write(job, &source, run, stopped))
 }
 
 /// What figures and page are made from: the analysis sees every sample as it comes.
@@ -247,16 +251,6 @@ fn default_out(scenario: &str, seed: u64) -> PathBuf {
     Path::new("runs").join(format!("{scenario}-seed{seed}"))
 }
 
-fn progress_bar(scenario: &Scenario) -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal.
-    let bar = ProgressBar::new((scenario.duration_s * 1e3) as u64);
-    let style = ProgressStyle::with_template("{prefix} {wide_bar} {percent:>3} %  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_prefix(scenario.name.clone());
-    bar.set_message(format!("{:.0} s simulated", scenario.duration_s));
-    bar
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -277,9 +271,12 @@ mod tests {
             nodes,
             faults: Vec::new(),
             out: Some(folder.clone()),
+            png: false,
             compared: false,
         };
-        let error = run(&options).expect_err("no such port").to_string();
+        let error = run(&options, &Stop::default())
+            .expect_err("no such port")
+            .to_string();
         assert!(error.contains("no-port"), "{error}");
         let kept = std::fs::read_to_string(folder.join("summary.json"));
         assert_eq!(kept.expect("kept"), "earlier");

@@ -1,115 +1,100 @@
 //! What a run leaves behind beside log and tables: summary, one HTML page, figures.
 
-use std::path::{Path, PathBuf};
-
-use super::Summary;
 use super::figures::{self, Source};
-use super::html;
+use super::{Run, html};
 use crate::StudyError;
+use crate::study::{Finished, Job, Stopped, schema};
 use wheeleg_report::plot::Figure;
-use wheeleg_report::subfolder;
 
-/// Writes summary, page and figures into `folder`, which must exist, in this order: what is
-/// worth most goes first where room is short. A file that cannot be written is told in
-/// `unwritten`, leaves no part of it behind, and takes nothing with it. Gives the path of the
-/// report if it is there.
+/// Writes summary, page and figures into the folder of the job, in this order: what is worth most
+/// goes first where room is short. A file that cannot be written is added to
+/// [`Run::unwritten`], leaves no part of it behind, and takes nothing with it.
 pub(super) fn write(
-    folder: &Path,
+    job: Job,
     source: &Source<'_>,
-    summary: &Summary,
-    unwritten: &mut Vec<StudyError>,
-) -> Option<PathBuf> {
-    let path = folder.join("summary.json");
-    let written = write_whole("write the summary", &path, summary.to_json());
-    unwritten.extend(written.err());
+    mut run: Run,
+    stopped: Option<Stopped>,
+) -> Finished<Run> {
+    let summary = schema::json(&run.summary, stopped.as_ref());
+    run.unwritten
+        .extend(job.save("summary.json", &summary).err());
 
     let mut drawn = Vec::new();
     for figure in figures::figures(source) {
         match figure.svg() {
             Ok(svg) => drawn.push((figure, svg)),
-            Err(e) => unwritten.push(e.into()),
+            Err(e) => run.unwritten.push(e.into()),
         }
     }
-    let path = folder.join("report.html");
-    let page = html::render(source, summary, &drawn);
-    let page = page.and_then(|page| write_whole("write the report", &path, page));
-    let report = match page {
-        Ok(()) => Some(path),
-        Err(e) => {
-            unwritten.push(e);
-            None
-        }
-    };
-    unwritten.extend(write_figures(folder, &drawn).err());
-    report
+    let page = html::render(source, &run.summary, &drawn);
+    let page = page.and_then(|page| job.save("report.html", &page));
+    run.unwritten.extend(page.err());
+    run.unwritten.extend(write_figures(&job, &drawn).err());
+    job.end(run, summary, stopped)
 }
 
-/// Writes a file, or nothing of it.
-fn write_whole(action: &'static str, path: &Path, text: String) -> Result<(), StudyError> {
-    std::fs::write(path, text).map_err(|e| {
-        let _ = std::fs::remove_file(path);
-        StudyError::output(action, path, e)
-    })
-}
-
-/// Every figure as PNG and SVG; one error for all that fail.
-fn write_figures(folder: &Path, drawn: &[(Figure, String)]) -> Result<(), StudyError> {
-    let plots = subfolder(folder, "figures")?;
-    let mut failed = Vec::new();
-    for (figure, svg) in drawn {
-        let path = |extension: &str| plots.join(format!("{}.{extension}", figure.id));
-        let (png, vector) = (path("png"), path("svg"));
-        if let Err(e) = figure.png(&png) {
-            let _ = std::fs::remove_file(&png);
-            failed.push((png, e.into()));
-        }
-        if let Err(e) = write_whole("write the figure", &vector, svg.clone()) {
-            failed.push((vector, e));
-        }
-    }
-    let count = failed.len();
-    let Some((_, first)) = failed.into_iter().next() else {
+/// Every figure as SVG, and as PNG where that was asked for; one error for all that fail.
+fn write_figures(job: &Job, drawn: &[(Figure, String)]) -> Result<(), StudyError> {
+    job.subfolder("figures")?;
+    let files = drawn
+        .iter()
+        .map(|(figure, svg)| job.save_figure(figure, svg));
+    let mut failed = files.filter_map(Result::err);
+    let Some(first) = failed.next() else {
         return Ok(());
     };
-    if count == 1 {
-        return Err(first);
-    }
-    Err(StudyError::refused(
-        format!(
-            "{count} of {} figures are missing: {first}",
-            2 * drawn.len()
+    Err(match failed.count() {
+        0 => first,
+        more => StudyError::refused(
+            format!(
+                "{} of {} figures are missing: {first}",
+                more + 1,
+                drawn.len()
+            ),
+            "the report has all figures in it, if it could be written",
         ),
-        "the report has all figures in it, if it could be written",
-    ))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::analysis::{self, Analysis, testing};
-    use crate::run::RunInfo;
+    use crate::run::{RunInfo, Summary};
+    use crate::study::Settings;
+    use std::path::Path;
     use wheeleg_config::{RobotConfig, Scenario, builtin};
-    use wheeleg_telemetry::{EventSample, Recording, Row};
+    use wheeleg_telemetry::event::{Act, Cause};
+    use wheeleg_telemetry::{Recording, Row};
 
-    /// [`super::write`] where everything can be written.
-    fn write(
+    /// Writes a run with this summary; figures as PNG, too.
+    fn written(
         folder: &Path,
         scenario: &Scenario,
         robot: &RobotConfig,
         recording: &Recording,
         analysis: &Analysis,
         summary: &Summary,
-    ) -> PathBuf {
+    ) {
+        let settings = Settings {
+            png: true,
+            ..Settings::new(folder)
+        };
+        let job = Job::begin("test", &settings).expect("a folder");
+        let run = Run {
+            summary: summary.clone(),
+            unwritten: Vec::new(),
+            down_times: wheeleg_sim::DownTimes::default(),
+        };
         let source = Source {
             scenario,
             robot,
             recording,
             analysis,
         };
-        let mut unwritten = Vec::new();
-        let path = super::write(folder, &source, summary, &mut unwritten);
+        let finished = write(job, &source, run, None);
+        let unwritten = &finished.result.unwritten;
         assert!(unwritten.is_empty(), "{unwritten:?}");
-        path.expect("written")
     }
 
     /// Every file of a run, from a recording made of the reference model.
@@ -128,7 +113,7 @@ mod tests {
             pil: None,
         };
         let summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
-        write(
+        written(
             folder.path(),
             &scenario,
             &robot,
@@ -169,7 +154,7 @@ mod tests {
         let mut page = |complete: bool| {
             summary.complete = complete;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary);
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(true), page(false));
@@ -188,10 +173,7 @@ mod tests {
         let mut recording = testing::from_reference(&robot, 0.25, 0.0);
         recording.events.push(Row {
             t_ns: 3_000_000_000,
-            v: EventSample {
-                kind: "fault".to_owned(),
-                text: "a thing".to_owned(),
-            },
+            v: Cause::Scenario(Act::EStop).into(),
         });
         let mut analysis = analysis::analyse(&scenario, &robot, &recording);
         analysis.start_s = 0.25;
@@ -199,11 +181,11 @@ mod tests {
         let mut page = |dropped: u64| {
             summary.dropped_messages = dropped;
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary);
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (whole, part) = (page(0), page(321));
-        assert!(whole.contains(">3.000</td><td>fault</td><td>a thing"));
+        assert!(whole.contains(">3.000</td><td>scenario</td><td>E-stop pressed"));
         assert!(whole.contains("0.250 s of scenario time"));
         let loss = "messages could not be written to the log";
         assert!(!whole.contains(loss) && part.contains(loss) && part.contains("321 of "));
@@ -253,7 +235,7 @@ mod tests {
                 }],
             });
             let (r, a) = (&recording, &analysis);
-            write(folder.path(), &scenario, &robot, r, a, &summary);
+            written(folder.path(), &scenario, &robot, r, a, &summary);
             std::fs::read_to_string(folder.path().join("report.html")).expect("written")
         };
         let (equal, other) = (page(0), page(5));

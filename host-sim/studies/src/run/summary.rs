@@ -1,13 +1,15 @@
 //! The machine-readable summary of a run.
 
-use std::collections::HashMap;
-
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, Target};
+use crate::study;
 use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_master::dispatcher::Ticket;
+use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_remote_host::PilSummary;
-use wheeleg_telemetry::{EventSample, Recording};
+use wheeleg_telemetry::{Cause, EventKind, Recording};
 
 /// Facts about a run that are not in its recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +29,7 @@ pub struct RunInfo {
 }
 
 /// Contents of `summary.json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Name of the scenario.
     pub scenario: String,
@@ -71,33 +73,46 @@ pub struct Summary {
     pub pil: Option<PilSummary>,
 }
 
-/// Whether a user's command, or a service tool's, came to nothing. The record has the answers to
-/// all commands as one kind of event; only the words tell a refusal.
-fn is_refusal(event: &EventSample) -> bool {
-    let words = ["refused", "refuses", "nobody answers"];
-    event.kind == "command" && words.iter().any(|word| event.text.contains(word))
+/// A refusal without the number of its request, so that a user who asks for the same again and
+/// again is refused the same.
+fn refusal(cause: &Cause) -> Option<Cause> {
+    match cause {
+        Cause::Master(MasterEvent::Refused { ticket, reason }) => {
+            let ticket = Ticket {
+                client: 0,
+                id: 0,
+                ..*ticket
+            };
+            let reason = *reason;
+            Some(Cause::Master(MasterEvent::Refused { ticket, reason }))
+        }
+        cause => cause.is_refusal().then(|| cause.clone()),
+    }
 }
 
 /// Faults, findings and refusals as the user reads them, with their time. A user who asks for the
 /// same again and again gets one line, at the time of the first refusal.
 fn messages(recording: &Recording) -> Vec<String> {
-    let mut counts: HashMap<&str, usize> = HashMap::new();
-    for event in recording.events.iter().filter(|e| is_refusal(&e.v)) {
-        *counts.entry(&event.v.text).or_default() += 1;
+    let mut lines: Vec<String> = Vec::new();
+    // Each refusal with the place of its line, and how often it came.
+    let mut refusals: Vec<(Cause, usize, u32)> = Vec::new();
+    for event in &recording.events {
+        let refusal = refusal(&event.v.cause);
+        if refusal.is_none() && event.v.cause.kind() != EventKind::Fault {
+            continue;
+        }
+        if let Some(refusal) = refusal {
+            if let Some((_, _, count)) = refusals.iter_mut().find(|known| known.0 == refusal) {
+                *count += 1;
+                continue;
+            }
+            refusals.push((refusal, lines.len(), 1));
+        }
+        lines.push(format!("{:.3} s: {}", event.t_s(), event.v));
     }
-    let told = recording.events.iter().filter_map(|e| {
-        let line = format!("{:.3} s: {}", e.t_s(), e.v.text);
-        if e.v.kind == "fault" {
-            return Some(line);
-        }
-        // Taken out with the first, so that the others find none.
-        let count = is_refusal(&e.v).then(|| counts.remove(e.v.text.as_str()));
-        match count.flatten()? {
-            1 => Some(line),
-            n => Some(format!("{line} ({n} times)")),
-        }
-    });
-    let mut lines: Vec<String> = told.collect();
+    for (_, place, count) in refusals.into_iter().filter(|(_, _, count)| *count > 1) {
+        lines[place].push_str(&format!(" ({count} times)"));
+    }
     if recording.events_left_out > 0 {
         lines.push(format!(
             "{} later events are in the log and the tables alone",
@@ -138,48 +153,77 @@ impl Summary {
             targets: analysis.targets.clone(),
         }
     }
+}
 
-    /// As indented JSON with a final newline.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        // A struct of numbers and texts always serialises.
-        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
-        text.push('\n');
-        text
-    }
+impl study::Summary for Summary {
+    const SCHEMA: &'static str = "wheeleg.run/1";
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_master::command::CommandCode;
+    use wheeleg_master::dispatcher::{Refusal, Reject};
+    use wheeleg_protocol::{Address, Fault};
     use wheeleg_telemetry::Row;
+    use wheeleg_telemetry::event::{Answer, BoardChange};
 
     #[test]
     fn faults_are_all_told_and_equal_refusals_once_with_their_number() {
+        let moving = || Cause::Command {
+            code: CommandCode::JointReference,
+            answer: Answer::Rejected(Reject::Refused(Refusal::Moving)),
+        };
+        let fault = || Cause::Board {
+            board: Address::joint(1).expect("a joint"),
+            change: BoardChange::FaultLatched(Fault::EmergencyStop),
+        };
+        let refused = |id| {
+            let ticket = Ticket {
+                client: 0,
+                id,
+                code: CommandCode::Arm,
+            };
+            let reason = Refusal::Interrupted;
+            Cause::Master(MasterEvent::Refused { ticket, reason })
+        };
+        let accepted = Cause::Command {
+            code: CommandCode::Arm,
+            answer: Answer::Accepted,
+        };
+        let causes = [
+            accepted,
+            moving(),
+            fault(),
+            moving(),
+            fault(),
+            refused(6),
+            refused(7),
+            Cause::Master(MasterEvent::Homed),
+        ];
         let mut recording = Recording::default();
-        for (ms, kind, text) in [
-            (1, "command", "Arm: accepted"),
-            (2, "command", "JointReference refused: the robot is moving"),
-            (3, "fault", "joint 1: a thing"),
-            (4, "command", "JointReference refused: the robot is moving"),
-            (5, "fault", "joint 1: a thing"),
-            (6, "command", "master: Arm refused: a stop came between"),
-            (7, "info", "nothing is refused"),
-        ] {
+        for (ms, cause) in (1..).zip(causes) {
             recording.events.push(Row {
                 t_ns: ms * 1_000_000,
-                v: EventSample {
-                    kind: kind.to_owned(),
-                    text: text.to_owned(),
-                },
+                v: cause.into(),
             });
         }
-        let expected = [
-            "0.002 s: JointReference refused: the robot is moving (2 times)",
-            "0.003 s: joint 1: a thing",
-            "0.005 s: joint 1: a thing",
-            "0.006 s: master: Arm refused: a stop came between",
+        let found = messages(&recording);
+        let begins = [
+            "0.002 s: JointReference refused: the robot is moving",
+            "0.003 s: joint 1: Emergency stop.",
+            "0.005 s: joint 1: Emergency stop.",
+            "0.006 s: master: Arm refused: a stop or another command came between",
         ];
-        assert_eq!(messages(&recording), expected);
+        let times = [
+            " (2 times)",
+            "clear the fault.",
+            "clear the fault.",
+            " (2 times)",
+        ];
+        assert_eq!(found.len(), begins.len(), "{found:?}");
+        for ((line, begin), end) in found.iter().zip(begins).zip(times) {
+            assert!(line.starts_with(begin) && line.ends_with(end), "{line}");
+        }
     }
 }

@@ -8,10 +8,7 @@
 mod feasible;
 mod page;
 
-use std::path::{Path, PathBuf};
-
-use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_control::joint::{Correction, JointGains};
 use wheeleg_protocol::param::JointParam;
@@ -21,10 +18,9 @@ use crate::StudyError;
 use crate::bench::commission::{commission, toml_lines, value};
 use crate::bench::suite::{Factors, Rig};
 use crate::bench::{Delays, Design, Grain, Kind, Supervision, design, design_with, identify};
-use crate::compare::{Figures, MARGIN, Move, Played, axis_error, draw, save};
+use crate::compare::{Figures, MARGIN, Move, Played, axis_error};
+use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
-use wheeleg_report::output;
-use wheeleg_report::subfolder;
 
 /// Section of a robot file that the parameters are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,7 +63,7 @@ impl Section {
 }
 
 /// One test, before and after.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Test {
     /// Move.
     #[serde(rename = "move")]
@@ -82,7 +78,7 @@ pub struct Test {
 }
 
 /// One parameter of the board.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Parameter {
     /// Name in the board's table.
     pub name: &'static str,
@@ -118,17 +114,78 @@ pub struct Tuned {
     pub parameters: Vec<Parameter>,
     /// Section for a robot file.
     pub toml: String,
+    /// What stopped it before all tests were played.
+    pub stopped: Option<Stopped>,
 }
 
-/// Files that were written.
-#[derive(Debug, Clone)]
-pub struct Finished {
-    /// The page.
-    pub report: PathBuf,
-    /// Parameters for a robot file.
-    pub parameters: PathBuf,
-    /// What was found.
-    pub tuned: Tuned,
+/// Contents of `summary.json`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Summary<'a> {
+    /// Name of the axis.
+    axis: &'a str,
+    /// Seed of the converter's noise.
+    seed: u64,
+    /// Force left over the load, at most 1000 for no load.
+    static_margin: f64,
+    /// Least margin of an axis that can be tuned.
+    least_margin: f64,
+    /// How fine its valves are.
+    valve_grain: Grain,
+    /// What would make the valves finer, where they are coarse.
+    advice: Option<String>,
+    /// Opening delay of the data sheet \[ms\].
+    sheet_t_on_ms: f64,
+    /// Closing delay of the data sheet \[ms\].
+    sheet_t_off_ms: f64,
+    /// Opening delay found \[ms\]; null if the piston did not answer.
+    found_t_on_ms: Option<f64>,
+    /// Closing delay found \[ms\]; null if the piston did not answer.
+    found_t_off_ms: Option<f64>,
+    /// The tests that were played before and after.
+    tests: &'a [Test],
+    /// All parameters that are set.
+    parameters: &'a [Parameter],
+}
+
+impl study::Summary for Summary<'_> {
+    const SCHEMA: &'static str = "wheeleg.tune/1";
+}
+
+/// File of the tuned parameters, below the folder of the results. A tuning that was stopped
+/// writes none: not all of its tests were played.
+pub const PARAMETERS: &str = "node-parameters.toml";
+
+/// Tunes an axis and writes report, figures, `summary.json` and [`PARAMETERS`] into the folder
+/// of the settings that `settings` makes of the axis's name.
+///
+/// # Errors
+/// [`StudyError`] if the file is wrong, the axis cannot do what is asked, or something cannot
+/// be drawn or written.
+pub fn tune(
+    file: &str,
+    seed: u64,
+    section: Section,
+    settings: impl FnOnce(&str) -> Settings,
+) -> Result<Finished<Tuned>, StudyError> {
+    let config = load(file)?;
+    let settings = settings(&config.name);
+    // An axis that is refused costs no earlier results.
+    let delays = delays(file, &config, seed)?;
+    let job = Job::begin("tune", &settings)?;
+    Tuned::play(file, config, delays, (seed, section), &job.progress)?.write(job)
+}
+
+/// Reads an axis that can be tuned.
+fn load(file: &str) -> Result<AxisConfig, StudyError> {
+    let config = AxisConfig::load(file)?;
+    feasible::check(file, &config.axis)?;
+    Ok(config)
+}
+
+/// The delays of its valves, as a board looks for them at start-up.
+fn delays(file: &str, config: &AxisConfig, seed: u64) -> Result<Option<Delays>, StudyError> {
+    let plant = &config.axis;
+    identify(plant, plant, seed).map_err(|e| axis_error(file, &e.into()))
 }
 
 /// A board as it comes, told no more than where its piston is and how long its
@@ -151,41 +208,35 @@ fn defaults(tuned: &Design) -> Design {
 }
 
 impl Tuned {
-    /// Tunes the axis of a file, or of a built-in name.
-    ///
-    /// # Errors
-    /// [`StudyError`] if the file is wrong, or the axis cannot do what is asked: it
-    /// names file, field, value and allowed range.
-    pub fn new(file: &str, seed: u64, section: Section) -> Result<Self, StudyError> {
-        let config = AxisConfig::load(file)?;
+    /// Plays the tests, as far as it is not stopped.
+    fn play(
+        file: &str,
+        config: AxisConfig,
+        delays: Option<Delays>,
+        (seed, section): (u64, Section),
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
         let plant = &config.axis;
-        feasible::check(file, plant)?;
         let failed = |e| axis_error(file, &e);
-        let delays = identify(plant, plant, seed).map_err(|e| failed(e.into()))?;
         let after = design_with(plant, delays, Kind::Predictive);
         let before = defaults(&design(plant, Kind::Predictive));
         let list = commission(&after).map_err(failed)?;
 
-        let bar = progress_bar(2 * Move::ALL.len() as u64);
         let runs: Vec<(Move, &Design)> = Move::ALL
             .into_iter()
             .flat_map(|motion| [(motion, &before), (motion, &after)])
             .collect();
-        let played: Vec<Played> = runs
-            .into_par_iter()
-            .map(|(motion, design)| {
-                let loaded = motion.plant(plant, plant);
-                let mut rig = Rig::new(&loaded, design, seed)?;
-                let played = motion.play(&mut rig, plant, loaded.load_n);
-                bar.inc(1);
-                played
-            })
-            .collect::<Result<_, _>>()
-            .map_err(failed)?;
-        bar.finish_and_clear();
+        let played = progress.each("tests", &runs, |&(motion, design)| {
+            let loaded = motion.plant(plant, plant);
+            let mut rig = Rig::new(&loaded, design, seed).map_err(failed)?;
+            let played = motion.play(&mut rig, plant, loaded.load_n);
+            played.map_err(failed)
+        })?;
+        // A test that was played with one of the two boards alone says nothing.
         let mut played = played.into_iter();
         let tests = Move::ALL.into_iter().filter_map(|motion| {
-            let pair = [played.next()?, played.next()?];
+            let (before, after) = (played.next()?, played.next()?);
+            let pair = [before?, after?];
             Some(Test {
                 motion,
                 before: Figures::of(motion, &pair[0], None),
@@ -193,7 +244,8 @@ impl Tuned {
                 played: pair,
             })
         });
-        let tests = tests.collect();
+        let tests: Vec<Test> = tests.collect();
+        let stopped = progress.stopped(tests.len() as u64, Move::ALL.len() as u64, "tests");
         let source = format!("DERIVED: wheeleg tune {}", config.name);
         Ok(Self {
             seed,
@@ -201,6 +253,7 @@ impl Tuned {
             grain: Grain::of(plant),
             delays,
             tests,
+            stopped,
             toml: format!(
                 "# Joint board of the axis {}: derived from its data sheet, delays found at start-up.\n\
                  # For a robot file; what it does not name keeps the board's default.\n\
@@ -237,53 +290,39 @@ impl Tuned {
         stopped.map(|test| test.motion.name()).collect()
     }
 
-    /// Summary as JSON.
+    /// What `summary.json` holds.
     #[must_use]
-    pub fn to_json(&self) -> String {
+    pub fn summary(&self) -> Summary<'_> {
         let valve = &self.config.axis.cylinder.fill_valve;
         let ms = |s: f64| (s * 1e6).round() * 1e-3;
-        let summary = serde_json::json!({
-            "axis": self.config.name,
-            "seed": self.seed,
-            "static_margin": self.margin,
-            "least_margin": MARGIN,
-            "valve_grain": self.grain,
-            "advice": self.grain.advice(),
-            "sheet_t_on_ms": ms(valve.t_on_s),
-            "sheet_t_off_ms": ms(valve.t_off_s),
-            "found_t_on_ms": self.delays.map(|d| ms(d.t_on_s)),
-            "found_t_off_ms": self.delays.map(|d| ms(d.t_off_s)),
-            "tests": self.tests,
-            "parameters": self.parameters,
-        });
-        format!("{summary:#}\n")
+        Summary {
+            axis: &self.config.name,
+            seed: self.seed,
+            static_margin: self.margin,
+            least_margin: MARGIN,
+            valve_grain: self.grain,
+            advice: self.grain.advice(),
+            sheet_t_on_ms: ms(valve.t_on_s),
+            sheet_t_off_ms: ms(valve.t_off_s),
+            found_t_on_ms: self.delays.map(|d| ms(d.t_on_s)),
+            found_t_off_ms: self.delays.map(|d| ms(d.t_off_s)),
+            tests: &self.tests,
+            parameters: &self.parameters,
+        }
     }
 
-    /// Writes report, figures, `summary.json` and `node-parameters.toml` into
-    /// `folder`; earlier results in it are set aside.
+    /// Writes report, figures, `summary.json` and [`PARAMETERS`].
     ///
     /// # Errors
     /// [`StudyError`] if something cannot be drawn or written.
-    pub fn write(self, folder: &Path) -> Result<Finished, StudyError> {
-        output::prepare(folder)?;
-        save(&folder.join("summary.json"), &self.to_json())?;
-        let parameters = folder.join("node-parameters.toml");
-        save(&parameters, &self.toml)?;
-        let drawn = draw(&subfolder(folder, "figures")?, page::figures(&self))?;
-        let report = folder.join("report.html");
-        save(&report, &page::render(&self, &drawn)?)?;
-        Ok(Finished {
-            report,
-            parameters,
-            tuned: self,
-        })
+    pub fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
+        let stopped = self.stopped.clone();
+        let summary = job.summary(&self.summary(), stopped.as_ref())?;
+        if stopped.is_none() {
+            job.save(PARAMETERS, &self.toml)?;
+        }
+        let drawn = job.draw(page::figures(&self))?;
+        let page = page::render(&self, &drawn)?;
+        job.finish(self, summary, &page, stopped)
     }
-}
-
-fn progress_bar(length: u64) -> ProgressBar {
-    // Draws on stderr, and only if that is a terminal.
-    let bar = ProgressBar::new(length);
-    let style = ProgressStyle::with_template("tune {wide_bar} {pos} of {len}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
 }

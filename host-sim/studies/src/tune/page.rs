@@ -158,6 +158,7 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
     let large = tuned.tests.iter().find(|t| t.motion == Move::Step100);
     let settle = |f: fn(&Test) -> Option<f64>| number(large.and_then(f), 3);
     let values = context! {
+        stopped => tuned.stopped.as_ref().map(ToString::to_string),
         version => env!("CARGO_PKG_VERSION"),
         name => &*tuned.config.name,
         description => &*tuned.config.description,

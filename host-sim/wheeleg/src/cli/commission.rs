@@ -11,8 +11,9 @@ use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes};
-use wheeleg_sim::{self as sil, hex};
+use wheeleg_sim as sil;
 use wheeleg_studies::StudyError;
+use wheeleg_telemetry::messages::hex;
 
 /// Arguments of `wheeleg commission`.
 #[derive(Debug, Args)]

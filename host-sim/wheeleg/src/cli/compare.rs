@@ -1,12 +1,12 @@
 //! `wheeleg compare`: every controller on the same plants, moves and inputs.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{print, whole};
+use super::{Drawing, end, print, settings, whole};
 use wheeleg_config::axis::AXES;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::bench::{Grain, Kind};
@@ -52,7 +52,9 @@ pub(super) struct CompareArgs {
     /// AXIS/CONTROLLER/MOVE/VARIATION/SEED.
     #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "quick"])]
     case: Option<CaseId>,
-    /// Print all cases as JSON on stdout, an array of one object each.
+    #[command(flatten)]
+    drawing: Drawing,
+    /// Print the summary as JSON on stdout: all cases, one object each.
     #[arg(long)]
     json: bool,
 }
@@ -143,11 +145,14 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
         quick: args.quick,
         threads: args.threads.map_or(0, usize::from),
     };
-    let finished = Comparison::run(&options)?.write(&args.out)?;
-    let comparison = &finished.comparison;
-    if args.json {
-        return print(&comparison.to_json());
-    }
+    let settings = settings(&args.out, args.drawing.png)?;
+    let finished = compare::compare(&options, &settings)?;
+    let text = |comparison: &Comparison| text(comparison, &finished.report);
+    end(&finished, args.json, text, true)
+}
+
+/// The tables of the axes, false alarms, and where the report is.
+fn text(comparison: &Comparison, report: &Path) -> String {
     let mut out = String::new();
     for axis in &comparison.axes {
         out.push_str(&axis_table(comparison, &axis.config.name));
@@ -169,16 +174,14 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
         out,
         "cases       {}, false alarms {alarms}, infeasible corners {infeasible}\n{told}report      {}",
         comparison.rows.len(),
-        finished.report.display()
+        report.display()
     );
-    print(&out)
+    out
 }
 
 fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, StudyError> {
     let single = compare::play(id, axes)?;
-    let figures = single.write(&args.out)?;
-    let row = serde_json::to_string_pretty(&single.row).unwrap_or_default();
-    let mut out = format!("{row}\n");
+    let (mut out, figures) = single.write(&settings(&args.out, args.drawing.png)?)?;
     if !args.json {
         for figure in figures {
             let _ = writeln!(out, "{}", figure.display());

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{print, whole};
+use super::{Drawing, end, settings, whole};
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_ROBOT;
 use wheeleg_studies::StudyError;
@@ -23,6 +23,8 @@ pub(super) struct DelayArgs {
     /// move to its folder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/delay")]
     out: PathBuf,
+    #[command(flatten)]
+    drawing: Drawing,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -62,13 +64,14 @@ pub(super) fn command(args: &DelayArgs) -> Result<ExitCode, StudyError> {
         mass_kg: args.mass,
         load_n: args.load,
     };
-    let finished = delay::write(&args.out, &robot, &options)?;
-    if args.json {
-        return print(&format!("{:#}\n", finished.study.summary()));
-    }
-    let mut out = text(&finished.study);
-    let _ = writeln!(out, "report     {}", finished.report.display());
-    print(&out)
+    let settings = settings(&args.out, args.drawing.png)?;
+    let finished = delay::write(&robot, &options, &settings)?;
+    let text = |study: &Option<Study>| {
+        let mut out = study.as_ref().map(text).unwrap_or_default();
+        let _ = writeln!(out, "report     {}", finished.report.display());
+        out
+    };
+    end(&finished, args.json, text, true)
 }
 
 fn text(study: &Study) -> String {

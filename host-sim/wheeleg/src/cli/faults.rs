@@ -1,15 +1,15 @@
 //! `wheeleg faults`: what can go wrong, and what the robot does about it.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::{TARGETS_MISSED, print};
+use super::{end, print, settings};
 use wheeleg_config::faults::{KINDS, KindInfo};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::matrix::{self, Verdict};
+use wheeleg_studies::matrix::{self, Outcome, Verdict};
 
 /// Arguments of `wheeleg faults`.
 #[derive(Debug, Args)]
@@ -92,27 +92,20 @@ fn run(args: &RunArgs) -> Result<ExitCode, StudyError> {
         ));
     }
     let rows = matrix::select(&args.row)?;
-    let finished = matrix::write(&rows, args.seed, &args.out)?;
-    if args.json {
-        print(&format!("{:#}\n", finished.summary))?;
-    } else {
-        print(&verdicts(&finished))?;
-    }
-    Ok(if finished.passed() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(TARGETS_MISSED)
-    })
+    let finished = matrix::write(&rows, args.seed, &settings(&args.out, false)?)?;
+    let passed = matrix::count(&finished.result, Verdict::Fail) == 0;
+    let text = |outcomes: &Vec<Outcome>| verdicts(outcomes, &finished.report);
+    end(&finished, args.json, text, passed)
 }
 
-fn verdicts(finished: &matrix::Finished) -> String {
+fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
     let width = id_width();
     let mut out = format!(
         "{:15}  {:width$} {:>9} {:>9} {:>9} {:>9}  latched\n",
         "verdict", "row", "detected", "commanded", "telemetry", "physical"
     );
     let ms = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} ms"));
-    for o in &finished.outcomes {
+    for o in outcomes {
         let m = &o.measured;
         let _ = write!(out, "{:15}  {:width$}", o.verdict.words(), o.row.id);
         if o.verdict != Verdict::NotImplemented {
@@ -129,14 +122,14 @@ fn verdicts(finished: &matrix::Finished) -> String {
             let _ = writeln!(out, "{:17}{failure}", "");
         }
     }
-    let count = |verdict| matrix::count(&finished.outcomes, verdict);
+    let count = |verdict| matrix::count(outcomes, verdict);
     let _ = writeln!(
         out,
         "\n{} rows as they must be, {} not, {} not implemented\nreport  {}",
         count(Verdict::Pass),
         count(Verdict::Fail),
         count(Verdict::NotImplemented),
-        finished.report.display()
+        report.display()
     );
     out
 }

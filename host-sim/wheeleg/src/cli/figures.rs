@@ -6,9 +6,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::print;
+use super::{Drawing, end, settings};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::figures;
+use wheeleg_studies::figures::{self, Results};
 
 /// Arguments of `wheeleg figures`.
 #[derive(Debug, Args)]
@@ -17,6 +17,8 @@ pub(super) struct FiguresArgs {
     /// move to its folder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/figures")]
     out: PathBuf,
+    #[command(flatten)]
+    drawing: Drawing,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -24,11 +26,16 @@ pub(super) struct FiguresArgs {
 
 /// Computes and writes everything.
 pub(super) fn command(args: &FiguresArgs) -> Result<ExitCode, StudyError> {
-    let finished = figures::write(&args.out)?;
-    if args.json {
-        return print(&format!("{:#}\n", finished.summary));
-    }
-    let results = &finished.results;
+    let finished = figures::write(&settings(&args.out, args.drawing.png)?)?;
+    let text = |results: &Option<Results>| {
+        let mut out = results.as_ref().map(text).unwrap_or_default();
+        let _ = writeln!(out, "report     {}", finished.report.display());
+        out
+    };
+    end(&finished, args.json, text, true)
+}
+
+fn text(results: &Results) -> String {
     let mut out = String::from("axes of the paper\n");
     // Three decimals, without the sign of a zero.
     let shown = |v: f64| if v.abs() < 5e-4 { 0.0 } else { v };
@@ -60,6 +67,5 @@ pub(super) fn command(args: &FiguresArgs) -> Result<ExitCode, StudyError> {
         1e3 * map.worst_inverse_m,
         map.poses
     );
-    let _ = writeln!(out, "report     {}", finished.report.display());
-    print(&out)
+    out
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use wheeleg_protocol::{SCHEMA_HASH, VERSION};
 
 use super::print;
-use wheeleg_remote_host::interface::{self, Side, archive};
+use wheeleg_interface::{Side, archive, changes, first_difference, not_archived};
 use wheeleg_studies::StudyError;
 
 /// Arguments of `wheeleg interface`.
@@ -26,8 +26,7 @@ pub(super) fn command(args: &InterfaceArgs) -> Result<ExitCode, StudyError> {
         return print(&list());
     };
     let there = parse(given)?;
-    let changes = interface::changes(SCHEMA_HASH, there)
-        .map_err(|hash| refused(interface::not_archived(hash)))?;
+    let changes = changes(SCHEMA_HASH, there).map_err(|hash| refused(not_archived(hash)))?;
     let name = format!("{there:016x}");
     if changes.is_empty() {
         return print("The interfaces are the same.\n");
@@ -47,7 +46,7 @@ pub(super) fn command(args: &InterfaceArgs) -> Result<ExitCode, StudyError> {
         name: &name,
         hash: there,
     };
-    print(&format!("{}\n", interface::first_difference(here, there)))
+    print(&format!("{}\n", first_difference(here, there)))
 }
 
 /// This program's interface, and what it can be compared with.

@@ -2,6 +2,7 @@
 
 mod channels;
 mod check;
+mod commands;
 mod commission;
 mod compare;
 mod delay;
@@ -19,20 +20,20 @@ mod usage;
 
 use std::fmt::Display;
 use std::io::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
 use std::str::FromStr;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_studies::StudyError;
+use wheeleg_studies::study::{Finished, Settings, Stop};
 
 /// Exit code when `--strict` is given and a required target is not met.
 const TARGETS_MISSED: u8 = 1;
 /// Exit code of any error (wrong input, unwritable output, failed simulation).
 const FAILED: u8 = 2;
-/// Exit code after Ctrl-C, as shells expect it.
-const INTERRUPTED: u8 = 130;
 
 /// Simulator and control stack of the hybrid robot Wheeleg.
 ///
@@ -47,7 +48,8 @@ struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
-1 a required target is not met (--strict only), or a checked quantity beyond tolerance; 2 error; 130 stopped with Ctrl-C.";
+1 a required target is not met (--strict only), or a checked quantity beyond tolerance; 2 error; \
+130 stopped with Ctrl-C, 143 with SIGTERM, 129 by a hang-up: the files hold what was done until then.";
 
 /// Parses a whole number from `low` to `high`, and says so of any other.
 fn whole<N>(low: N, high: N) -> impl Fn(&str) -> Result<N, String> + Clone + Send + Sync
@@ -72,6 +74,8 @@ enum Command {
     Faults(faults::FaultsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
+    /// Print the commands that a scenario can give: arguments, units, ranges.
+    Commands(commands::CommandsArgs),
     /// Write the robot for other programs.
     Export(export::ExportArgs),
     /// Print the unique ids of a robot's boards, as a section for its file.
@@ -106,6 +110,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::List(args)) => list::command(&args),
         Some(Command::Params(args)) => params::command(&args),
         Some(Command::Channels(args)) => channels::command(&args),
+        Some(Command::Commands(args)) => commands::command(&args),
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Commission(args)) => commission::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
@@ -126,11 +131,70 @@ pub(crate) fn main() -> ExitCode {
 /// Writes to stdout. A reader that has gone away (`| head`) is no error.
 fn print(text: &str) -> Result<ExitCode, StudyError> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(StudyError::output("write to", "standard output", e))
-        }
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(StudyError::Stdout(e)),
         _ => Ok(ExitCode::SUCCESS),
     }
+}
+
+/// Writes a line to standard error. There may be nobody left to read it after a hang-up.
+fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// What every study that draws can be asked for.
+#[derive(Debug, Args)]
+struct Drawing {
+    /// Write the figures as PNG, too, beside the SVG ones.
+    #[arg(long)]
+    png: bool,
+}
+
+/// Where a study's results go; from here on signals stop it.
+fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
+    Ok(Settings {
+        out: out.to_owned(),
+        png,
+        stop: stop_on_signals()?,
+    })
+}
+
+/// Ctrl-C, TERM and HUP stop a study, which finishes its files.
+fn stop_on_signals() -> Result<Stop, StudyError> {
+    Stop::on_signals().map_err(|e| {
+        StudyError::refused(
+            format!("cannot be told to stop by a signal: {e}"),
+            "please report this",
+        )
+    })
+}
+
+/// Prints what came of a study, and gives its exit code: that of the signal that stopped it;
+/// else whether it `passed`.
+fn end<T>(
+    finished: &Finished<T>,
+    json: bool,
+    text: impl FnOnce(&T) -> String,
+    passed: bool,
+) -> Result<ExitCode, StudyError> {
+    let printed = if json {
+        print(&finished.summary)
+    } else {
+        print(&text(&finished.result))
+    };
+    if let Some(stopped) = &finished.stopped {
+        // The files are what counts; a terminal that hung up takes no text.
+        tell(&format!(
+            "{stopped}; summary and report hold what was done until then: {}",
+            finished.report.display()
+        ));
+        return Ok(ExitCode::from(stopped.signal.exit_code()));
+    }
+    printed?;
+    Ok(if passed {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(TARGETS_MISSED)
+    })
 }
 
 #[cfg(test)]

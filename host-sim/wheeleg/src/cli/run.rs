@@ -2,18 +2,19 @@
 
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{FAILED, INTERRUPTED, TARGETS_MISSED, print};
+use super::{Drawing, FAILED, end, stop_on_signals, tell};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_report::output;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
-use wheeleg_studies::run::{self, Finished, Options};
+use wheeleg_studies::run::{self, Options, Run, Summary};
+use wheeleg_studies::study::{Finished, Stop, Stopped};
 use wheeleg_telemetry as telemetry;
 
 /// Arguments of `wheeleg run`.
@@ -56,6 +57,8 @@ pub(super) struct RunOptions {
     /// than this program's are refused, as are faults of the line.
     #[arg(long)]
     compare_sil: bool,
+    #[command(flatten)]
+    drawing: Drawing,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -83,60 +86,65 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
         out: args.out.clone(),
         faults: args.faults.clone(),
         nodes: Nodes::new(&args.nodes, &args.node)?,
+        png: args.drawing.png,
         compared: args.compare_sil,
     };
     if args.compare_sil {
         pil::ensure_same_sources(&options.nodes)?;
     }
-    let finished = run::run(&options)?;
+    let stop = stop_on_signals()?;
+    let finished = run::run(&options, &stop)?;
+    let mut native = None;
     // A part of a run equals no whole one.
-    if args.compare_sil && finished.summary.complete {
-        compare_sil(&options, &finished)?;
+    if args.compare_sil && finished.result.summary.complete {
+        native = compare_sil(&options, &stop, &finished)?;
     }
-    if args.json {
-        print(&finished.summary.to_json())?;
-    } else {
-        print(&run_text(&finished))?;
+    let summary = &finished.result.summary;
+    let differ = differing_bits(summary) > 0;
+    let passed = !differ && (!args.strict || summary.passed);
+    let code = end(&finished, args.json, |_| run_text(&finished), passed)?;
+    if differ && finished.stopped.is_none() {
+        tell("boards differ from the native application beside them");
     }
-    let differs = differing_bits(&finished) > 0;
-    let Finished {
-        summary, unwritten, ..
-    } = finished;
-    let all_written = unwritten.is_empty();
+    let unwritten = finished.result.unwritten;
+    if unwritten.is_empty() {
+        return Ok(native.map_or(code, |stopped| ExitCode::from(stopped.signal.exit_code())));
+    }
     for error in unwritten {
-        eprintln!("{:?}", miette::Report::new(error));
+        tell(&format!("{:?}", miette::Report::new(error)));
     }
-    Ok(if !all_written {
-        eprintln!("the values above hold; of the files, those named here are missing or cut short");
-        ExitCode::from(FAILED)
-    } else if !summary.complete {
-        eprintln!("interrupted; the files hold what was recorded until then");
-        ExitCode::from(INTERRUPTED)
-    } else if differs {
-        eprintln!("boards differ from the native application beside them");
-        ExitCode::from(TARGETS_MISSED)
-    } else if args.strict && !summary.passed {
-        ExitCode::from(TARGETS_MISSED)
-    } else {
-        ExitCode::SUCCESS
-    })
+    tell("the values above hold; of the files, those named here are missing or cut short");
+    Ok(ExitCode::from(FAILED))
 }
 
 /// Bits in which boards outside differ from the application here.
-fn differing_bits(finished: &Finished) -> u64 {
-    let pil = finished.summary.pil.as_ref();
+fn differing_bits(summary: &Summary) -> u64 {
+    let pil = summary.pil.as_ref();
     pil.map_or(0, |pil| pil.differing_bits)
 }
 
 /// Repeats a run with all nodes here. The logs hold every input, output,
 /// frame and internal at its time, so equal hashes mean equal runs. Boards here are down
-/// when those outside were; that time is the hardware's.
-fn compare_sil(options: &Options, finished: &Finished) -> Result<(), StudyError> {
-    let folder = &finished.folder;
-    let native = run::repeat_natively(options, finished, folder.join(output::NATIVE))?;
-    if native.summary.hash == finished.summary.hash {
-        eprintln!("the log is that of the native run, to the bit");
-        return Ok(());
+/// when those outside were; that time is the hardware's. What stopped the native run, if
+/// anything did.
+fn compare_sil(
+    options: &Options,
+    stop: &Stop,
+    finished: &Finished<Run>,
+) -> Result<Option<Stopped>, StudyError> {
+    let folder = finished.report.parent().unwrap_or(Path::new("."));
+    let run = &finished.result;
+    let native = run::repeat_natively(options, stop, run, folder.join(output::NATIVE))?;
+    if let Some(stopped) = native.stopped {
+        tell(&format!(
+            "the logs are not compared: the native run was {stopped}"
+        ));
+        return Ok(Some(stopped));
+    }
+    let (here_hash, there_hash) = (&native.result.summary.hash, &run.summary.hash);
+    if here_hash == there_hash {
+        tell("the log is that of the native run, to the bit");
+        return Ok(None);
     }
     let here = folder.join(output::NATIVE).join("log.mcap");
     let first = telemetry::first_difference(&here, &folder.join("log.mcap"))?;
@@ -144,15 +152,14 @@ fn compare_sil(options: &Options, finished: &Finished) -> Result<(), StudyError>
         Some(first) => format!("first difference: {first}"),
         None => "but what could be written to them does not".to_owned(),
     };
-    let pil = finished.summary.pil.as_ref();
+    let pil = run.summary.pil.as_ref();
     let pins = match pil.and_then(|p| p.first_difference.as_ref()) {
         Some(pins) => format!("; first at a board's pins: {pins}"),
         None => "; no board differed from the application beside it".to_owned(),
     };
     Err(StudyError::refused(
         format!(
-            "the logs differ: {} on the host, {} with the boards; {first}{pins}",
-            native.summary.hash, finished.summary.hash
+            "the logs differ: {here_hash} on the host, {there_hash} with the boards; {first}{pins}"
         ),
         format!("both logs are below {}", folder.display()),
     ))
@@ -200,8 +207,8 @@ fn messages_text(messages: &[String]) -> String {
     out
 }
 
-fn run_text(finished: &Finished) -> String {
-    let s = &finished.summary;
+fn run_text(finished: &Finished<Run>) -> String {
+    let s = &finished.result.summary;
     let mut out = String::new();
     // A part of a run meets or misses nothing.
     if s.complete && !s.targets.is_empty() {
@@ -239,9 +246,10 @@ fn run_text(finished: &Finished) -> String {
         "time    {:.2} s simulated in {:.2} s, {:.1} times faster than real time",
         s.simulated_s, s.wall_s, s.realtime_factor
     );
-    let _ = match &finished.report {
-        Some(report) => writeln!(out, "report  {}", report.display()),
-        None => writeln!(out, "results {}", finished.folder.display()),
+    // A full disk may have left none.
+    let _ = match (finished.report.exists(), finished.report.parent()) {
+        (false, Some(folder)) => writeln!(out, "results {}", folder.display()),
+        _ => writeln!(out, "report  {}", finished.report.display()),
     };
     out
 }

@@ -1,17 +1,18 @@
 //! `wheeleg tune`: one cylinder with a user's own parameters.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::print;
+use super::{Drawing, end, stop_on_signals};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::bench::grain::COARSE;
 use wheeleg_studies::compare::number;
-use wheeleg_studies::tune::{Section, Tuned};
+use wheeleg_studies::study::Settings;
+use wheeleg_studies::tune::{self, PARAMETERS, Section, Tuned};
 
 /// Arguments of `wheeleg tune`.
 #[derive(Debug, Args)]
@@ -28,6 +29,8 @@ pub(super) struct TuneArgs {
     /// Section of the robot file that the parameters are for.
     #[arg(long, value_name = "SECTION", default_value = "joint", value_parser = sections())]
     section: Section,
+    #[command(flatten)]
+    drawing: Drawing,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -44,16 +47,19 @@ fn sections() -> impl TypedValueParser<Value = Section> {
 
 /// Tunes, writes and prints.
 pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
-    let tuned = Tuned::new(&args.axis, args.seed, args.section)?;
-    let out = args
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("runs").join(format!("tune-{}", tuned.config.name)));
-    let finished = tuned.write(&out)?;
-    let tuned = &finished.tuned;
-    if args.json {
-        return print(&tuned.to_json());
-    }
+    let stop = stop_on_signals()?;
+    let default = |axis: &str| PathBuf::from("runs").join(format!("tune-{axis}"));
+    let finished = tune::tune(&args.axis, args.seed, args.section, |axis| Settings {
+        out: args.out.clone().unwrap_or_else(|| default(axis)),
+        png: args.drawing.png,
+        stop,
+    })?;
+    let text = |tuned: &Tuned| text(tuned, finished.stopped.is_none(), &finished.report);
+    end(&finished, args.json, text, true)
+}
+
+/// The tests before and after, what supervision stopped, delays, and where the files are.
+fn text(tuned: &Tuned, whole: bool, report: &Path) -> String {
     let mut text = format!(
         "{:<15}{:>20}{:>20}{:>20}{:>20}\n{:<15}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
         "",
@@ -105,11 +111,19 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
     );
     let _ = writeln!(
         text,
-        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})\nparameters     {}\nreport         {}",
+        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})",
         valve.t_on_s * 1e3,
         tuned.grain.ratio,
-        finished.parameters.display(),
-        finished.report.display()
     );
-    print(&text)
+    let parameters = report.with_file_name(PARAMETERS);
+    let parameters = match whole {
+        true => parameters.display().to_string(),
+        false => "not written: not all tests were played".to_owned(),
+    };
+    let _ = writeln!(
+        text,
+        "parameters     {parameters}\nreport         {}",
+        report.display()
+    );
+    text
 }

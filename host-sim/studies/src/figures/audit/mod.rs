@@ -5,6 +5,7 @@ mod r2p;
 mod rpr;
 
 use nalgebra::{Vector3, Vector6};
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_kinematics::r2p::R2p;
 use wheeleg_kinematics::{LegGeometry, LegLengths, LegParameters, LegPosture};
@@ -19,7 +20,7 @@ const ACCELERATION_M_S2: f64 = 10.0;
 const ROUNDING: f64 = 1e-9;
 
 /// What is the matter with an equation. MODEL.md §10.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Wrong as printed.
@@ -71,7 +72,7 @@ struct Model {
 }
 
 /// One line of the table: an equation, in one unit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Misprint {
     /// Number in the paper.
     pub equation: &'static str,

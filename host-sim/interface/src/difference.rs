@@ -92,7 +92,7 @@ impl Change {
     }
 
     /// The first differing line in words; the two are told by their names.
-    pub(super) fn told(&self, here_name: &str, there_name: &str) -> String {
+    pub(crate) fn told(&self, here_name: &str, there_name: &str) -> String {
         let (here, there) = self.first();
         let place = here.or(there).map_or("", |line| line.place.as_str());
         let says = |line: Option<&Line>| {

@@ -2,7 +2,6 @@
 
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject};
 use wheeleg_master::finding::Finding;
-use wheeleg_master::layer1::params::{PERIOD_MAX_US, ParamError, STEPS_MAX};
 use wheeleg_protocol::{Fault, FaultBits};
 
 use super::{board, other_interface};
@@ -68,7 +67,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
                 .to_owned()
         }
         Refusal::NoSuchJoint { joint } => format!("there is no joint {joint}: they are 1 to 6"),
-        Refusal::Parameter(ref error) => parameter(error),
+        Refusal::Parameter(ref error) => error.to_string(),
         Refusal::Busy => "other requests are still under way: wait for their answers".to_owned(),
         Refusal::Interrupted => {
             "a stop or another command came between: see what came before it, then give it again"
@@ -80,8 +79,9 @@ pub(super) fn refusal(reason: &Refusal) -> String {
     }
 }
 
-/// A command that was not accepted.
-pub(crate) fn reject(reason: &Reject) -> String {
+/// Why a command was refused at the door, with what to do about it.
+#[must_use]
+pub fn reject(reason: &Reject) -> String {
     match *reason {
         Reject::Expired { late_us } => format!("its deadline passed {late_us} µs ago"),
         Reject::DeadlineTooFar => {
@@ -95,38 +95,6 @@ pub(crate) fn reject(reason: &Reject) -> String {
         Reject::QueueFull { layer } => format!(
             "the queue to layer {} is full: give fewer commands at a time",
             layer as u8
-        ),
-    }
-}
-
-fn parameter(error: &ParamError) -> String {
-    match *error {
-        ParamError::OutOfRange {
-            field,
-            min,
-            max,
-            value,
-        } => format!("`{field}` is {value}, allowed are {min} to {max}"),
-        ParamError::Steps { value } => {
-            format!("`steps` is {value}, allowed are 1 to {STEPS_MAX}")
-        }
-        ParamError::Order { field } => {
-            format!("`{field}` is out of order: lift, reach or lower, push, period")
-        }
-        ParamError::PeriodTooLong { value_us } => format!(
-            "`period` is {} s, allowed are at most {} s",
-            f64::from(value_us) * 1e-6,
-            f64::from(PERIOD_MAX_US) * 1e-6
-        ),
-        ParamError::PushTooLong { needs_us, has_us } => format!(
-            "the push takes {} s, the step leaves {} s for it",
-            f64::from(needs_us) * 1e-6,
-            f64::from(has_us) * 1e-6
-        ),
-        ParamError::NotFinite { field } => format!("`{field}` is not a finite number"),
-        ParamError::OutOfReach { at_ms } => format!(
-            "the foot would leave the reach of its leg {} s after the start",
-            f64::from(at_ms) * 1e-3
         ),
     }
 }

@@ -24,7 +24,7 @@ pub fn newest_earlier() -> Option<u64> {
 }
 
 /// The text of a definition. This program's own needs no archive.
-pub(super) fn text(hash: u64) -> Option<Cow<'static, str>> {
+pub(crate) fn text(hash: u64) -> Option<Cow<'static, str>> {
     if hash == SCHEMA_HASH {
         let mut own = String::new();
         return INTERFACE.write_text(&mut own).is_ok().then(|| own.into());

@@ -4,43 +4,41 @@
 use wheeleg_protocol::{Address, ResetCause};
 use wheeleg_remote_link as link;
 
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::board::BoardInputs;
 use wheeleg_remote_host::Outside;
-
-/// What the joint boards read at a tick edge.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sensed {
-    pub(super) codes: [u16; 6],
-    pub(super) feet: [[bool; 4]; 6],
-}
 
 impl World {
     /// The edge of all joint boards outside, and the comparison of the outputs
     /// that act from it on.
-    pub(super) fn joint_edge_outside(&mut self, sensed: &Sensed) -> Result<(), SimError> {
+    pub(super) fn joint_edge_outside(&mut self, sensed: &[BoardInputs; 6]) -> Result<(), SimError> {
         // The dump valve acts at once: its board is brought to this instant.
         let mut edges: Vec<(u8, Option<link::Inputs>)> = vec![(7, None)];
-        for (address, (code, feet)) in (1..).zip(sensed.codes.iter().zip(sensed.feet)) {
+        for (address, board) in (1..).zip(sensed) {
             let inputs = link::Inputs {
-                adc: *code,
-                switches: link::Switches::from_foot(feet),
+                adc: board.code,
+                switches: link::Switches::from_foot(board.feet),
                 encoder: 0,
             };
             edges.push((address, Some(inputs)));
         }
         edges.rotate_left(1);
         self.run_outside(&edges)?;
-        for i in 0..6 {
-            let address = i as u8 + 1;
-            if self.runs(address)
-                && let Some(outside) = &mut self.outside
-            {
-                let here = self.joints[i].active_outputs();
+        for address in 1..=6 {
+            self.compare_outputs(address);
+        }
+        Ok(())
+    }
+
+    /// Compares the outputs of a board outside with those of the application beside it.
+    fn compare_outputs(&mut self, address: u8) {
+        if self.runs(address) {
+            let here = self.board(address).application.active_outputs();
+            if let Some(outside) = &mut self.outside {
                 outside.compare_outputs(self.now_ns, address, &here);
             }
         }
-        Ok(())
     }
 
     /// The edge of a wheel board outside, and the comparison of its outputs. Boards
@@ -65,13 +63,7 @@ impl World {
         if !edges.is_empty() {
             self.run_outside(&edges)?;
         }
-        let address = wheel as u8 + 7;
-        if self.runs(address)
-            && let Some(outside) = &mut self.outside
-        {
-            let here = self.wheels[wheel].active_outputs();
-            outside.compare_outputs(now_ns, address, &here);
-        }
+        self.compare_outputs(wheel as u8 + 7);
         Ok(())
     }
 

@@ -3,9 +3,10 @@
 use wheeleg_protocol::ResetCause;
 use wheeleg_remote_link as link;
 
-use super::power::{Client, Down};
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::client::Client;
+use crate::down::Down;
 use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
 use wheeleg_config::timing::{JOINT_TICK_NS, WATCHDOG_NS};
 
@@ -43,9 +44,10 @@ impl World {
             _ => return Ok(()),
         };
         if let Down::Off { .. } = down {
-            self.memories[usize::from(address) - 1].power_fails(self.now_ns);
+            let now_ns = self.now_ns;
+            self.board_mut(address).memory.power_fails(now_ns);
         }
-        self.down[usize::from(address) - 1] = down;
+        self.board_mut(address).down = down;
         let Some(outside) = &mut self.outside else {
             return Ok(());
         };
@@ -61,20 +63,20 @@ impl World {
 
     /// The processor of a board faults: its handler turns the outputs off and resets it.
     fn fault_processor(&mut self, address: u8) -> Result<(), SimError> {
-        let i = usize::from(address) - 1;
-        self.memories[i].power_fails(self.now_ns);
+        let now_ns = self.now_ns;
+        self.board_mut(address).memory.power_fails(now_ns);
         match &mut self.outside {
             Some(outside) if outside.has(address) => {
                 // Until its own reset.
-                self.down[i] = Down::Hung {
-                    until_ns: self.now_ns.saturating_add(JOINT_TICK_NS),
-                };
                 outside.hook(address, link::Hook::FaultProcessor)?;
+                self.board_mut(address).down = Down::Hung {
+                    until_ns: now_ns.saturating_add(JOINT_TICK_NS),
+                };
                 self.run_outside(&[(address, None)])
             }
             // How long its start takes is known from the run that this one repeats.
             _ if self.kept.rule(address) => {
-                self.down[i] = Down::Off { until_ns: u64::MAX };
+                self.board_mut(address).down = Down::Off { until_ns: u64::MAX };
                 Ok(())
             }
             _ => {

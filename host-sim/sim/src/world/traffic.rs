@@ -3,19 +3,13 @@
 use wheeleg_protocol::Address;
 use wheeleg_units::Micros;
 
-use super::audit::Audit;
-use super::bus::{Bus, Driver};
-use super::strangers;
-use super::world::World;
+use super::World;
 use crate::SimError;
+use crate::audit::Audit;
+use crate::bus::{Bus, Driver};
+use crate::clock::{NS_PER_US, micros};
 use crate::faults::Injector;
-
-pub(super) const NS_PER_US: u64 = 1_000;
-
-pub(super) fn micros(ns: u64) -> Micros {
-    // The boards' clocks are 32-bit microsecond counters and wrap.
-    Micros((ns / NS_PER_US) as u32)
-}
+use crate::strangers;
 
 /// How far a start lies ahead on the board's own clock, µs, when that shows `now`.
 fn ahead_us(now: Micros, start_at: Micros) -> u32 {
@@ -81,11 +75,8 @@ impl World {
                     continue;
                 }
                 let t_end = self.clock(address, end_ns);
-                let i = usize::from(address) - 1;
-                match self.joints.get_mut(i) {
-                    Some(board) => board.on_bus_bytes(bytes, t_end),
-                    None => self.wheels[i - 6].on_bus_bytes(bytes, t_end),
-                }
+                let board = self.board_mut(address);
+                board.application.on_bus_bytes(bytes, t_end);
             }
             let master = Address::MASTER.raw();
             if self.master_alive
@@ -134,17 +125,10 @@ impl World {
                 }
             }
         };
-        for (board, address) in self.joints.iter_mut().zip(1..) {
-            while let Some(t) = board.take_transmission() {
+        for (board, address) in self.boards.iter_mut().zip(1..) {
+            while let Some(t) = board.application.take_transmission() {
                 if send(address, t) {
-                    board.driver_cut_off(clock(address));
-                }
-            }
-        }
-        for (board, address) in self.wheels.iter_mut().zip(7..) {
-            while let Some(t) = board.take_transmission() {
-                if send(address, t) {
-                    board.driver_cut_off(clock(address));
+                    board.application.driver_cut_off(clock(address));
                 }
             }
         }

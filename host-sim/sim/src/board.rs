@@ -1,0 +1,170 @@
+//! One board of the simulation: its application with the hardware around it, its parameter
+//! memory, its clock and its power. Joint and wheel boards differ in what they read and drive,
+//! and in nothing else that the simulation asks of them.
+
+use wheeleg_node::{NodeIdentity, Transmission};
+use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_remote_link::Outputs;
+use wheeleg_units::Micros;
+
+use super::boards::{JointBoard, WheelBoard, identity};
+use super::clock::NS_PER_US;
+use super::down::Down;
+use super::memory::Memory;
+use crate::SimError;
+use wheeleg_config::timing::JOINT_TICK_NS;
+
+/// What a board reads at a tick edge: a joint its potentiometer and foot switches, a wheel its
+/// encoder and supply switch.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BoardInputs {
+    /// Code of the potentiometer.
+    pub(super) code: u16,
+    /// Foot switches front, left, back, right.
+    pub(super) feet: [bool; 4],
+    /// Quadrature edges of the encoder since power-up of the robot.
+    pub(super) edges: i64,
+    /// The supply-pressure switch is closed.
+    pub(super) supply: bool,
+}
+
+/// The application of a board and the simulated hardware around it.
+pub(super) enum Application {
+    /// Addresses 1 to 6.
+    Joint(JointBoard),
+    /// Addresses 7 and 8.
+    Wheel(WheelBoard),
+}
+
+macro_rules! either {
+    ($self:expr, $board:ident => $call:expr) => {
+        match $self {
+            Application::Joint($board) => $call,
+            Application::Wheel($board) => $call,
+        }
+    };
+}
+
+impl Application {
+    /// The board `who`, in boot, all outputs off. `stored` are the parameters (number, raw
+    /// value) that its memory holds, none if it is damaged, `cause` why its processor starts.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the application refuses its parameters.
+    pub(super) fn new(
+        who: NodeIdentity,
+        stored: Option<&[(u16, i32)]>,
+        cause: ResetCause,
+    ) -> Result<Self, SimError> {
+        Ok(if who.address.is_joint() {
+            Self::Joint(JointBoard::new(who, stored, cause)?)
+        } else {
+            Self::Wheel(WheelBoard::new(who, stored, cause)?)
+        })
+    }
+
+    /// Latches the inputs and runs the tick that starts now.
+    pub(super) fn tick(&mut self, now: Micros, inputs: &BoardInputs) {
+        match self {
+            Self::Joint(board) => board.tick(now, inputs.code, inputs.feet),
+            Self::Wheel(board) => board.tick(now, inputs.edges, inputs.supply),
+        };
+    }
+
+    /// Hands received bytes over; the last one ended at `t_end`.
+    pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
+        either!(self, board => board.on_bus_bytes(bytes, t_end));
+    }
+
+    /// What the application wants to send.
+    pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
+        either!(self, board => board.take_transmission())
+    }
+
+    /// The driver-enable guard has cut a transmission off.
+    pub(super) fn driver_cut_off(&mut self, at: Micros) {
+        either!(self, board => board.driver_cut_off(at));
+    }
+
+    /// What is to be stored now, if the board wants it: then it takes it as stored.
+    pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
+        either!(self, board => board.take_save(now))
+    }
+
+    /// The outputs that become active at this tick edge.
+    pub(super) fn active_outputs(&self) -> Outputs {
+        either!(self, board => board.active_outputs())
+    }
+
+    /// Tick of the board, ns.
+    pub(super) fn tick_ns(&self) -> u64 {
+        match self {
+            Self::Joint(_) => JOINT_TICK_NS,
+            Self::Wheel(board) => u64::from(board.period_us()) * NS_PER_US,
+        }
+    }
+}
+
+/// One board, wherever its outputs come from.
+pub(super) struct Board {
+    pub(super) application: Application,
+    /// Its parameter memory.
+    pub(super) memory: Memory,
+    /// Why it does not run, if it does not.
+    pub(super) down: Down,
+    /// Its first tick edge since its processor has started, ns.
+    pub(super) clock_zero_ns: u64,
+}
+
+impl Board {
+    /// The board at an address, as power comes on for the first time; `stored` are its
+    /// commissioned parameters.
+    ///
+    /// # Errors
+    /// As [`Application::new`].
+    pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+        let cause = ResetCause::PowerUp;
+        Ok(Self {
+            application: Application::new(identity(address), Some(stored), cause)?,
+            memory: Memory::new(stored),
+            down: Down::No,
+            clock_zero_ns: 0,
+        })
+    }
+
+    /// It, if it is a joint board.
+    pub(super) fn joint(&self) -> Option<&JointBoard> {
+        match &self.application {
+            Application::Joint(board) => Some(board),
+            Application::Wheel(_) => None,
+        }
+    }
+
+    /// It, if it is a wheel board.
+    pub(super) fn wheel(&self) -> Option<&WheelBoard> {
+        match &self.application {
+            Application::Joint(_) => None,
+            Application::Wheel(board) => Some(board),
+        }
+    }
+
+    /// The application from a reset by `cause` on.
+    ///
+    /// # Errors
+    /// As [`Application::new`].
+    pub(super) fn restart(&mut self, address: Address, cause: ResetCause) -> Result<(), SimError> {
+        let stored = self.memory.records();
+        self.application = Application::new(identity(address), stored.as_deref(), cause)?;
+        Ok(())
+    }
+
+    /// What acts on valves, bridge and dump valve from this edge on, if the board runs here.
+    /// Without power everything is off; a program that has stopped keeps its outputs.
+    pub(super) fn outputs(&self) -> Outputs {
+        if self.down.is_off() {
+            Outputs::default()
+        } else {
+            self.application.active_outputs()
+        }
+    }
+}

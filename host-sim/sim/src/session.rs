@@ -1,0 +1,254 @@
+//! A simulated robot that somebody drives: step by step, to a time, with commands and faults
+//! given from outside. [`run`](crate::run) is its first caller.
+
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_config::{EventAction, RobotConfig, Scenario};
+use wheeleg_master::command::Command;
+use wheeleg_telemetry::Recorder;
+use wheeleg_telemetry::event::{Act, Cause};
+
+use crate::faults::Schedule;
+use crate::observe::Observer;
+use crate::operator::Operator;
+use crate::world::{Happened, World};
+use crate::{Boards, RunOutcome, SimError, WatchedJoint, setup};
+
+/// One robot, from power-up on: boards, bus, master and plant on one clock, the operator who
+/// gets it ready and carries the scenario out, and the observer who samples it.
+///
+/// The same scenario, robot, seed and inputs at the same times give the same recording, however
+/// the time is cut into calls.
+pub struct Session {
+    world: World,
+    operator: Operator,
+    observer: Observer,
+    schedule: Schedule,
+    cycle_ns: u64,
+    duration_ns: u64,
+    /// Simulated time at which the scenario began, once it has.
+    start_ns: Option<u64>,
+    over: bool,
+}
+
+impl Session {
+    /// Powers the robot up in the start pose of the scenario.
+    ///
+    /// # Errors
+    /// [`SimError`] if a part refuses its parameters or a fault that is built in cannot be.
+    pub fn new(
+        boards: Boards,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        seed: u64,
+    ) -> Result<Self, SimError> {
+        let plant = setup::plant(scenario, robot);
+        let master = setup::master(scenario, robot);
+        let mut world = World::new(robot, &plant, master, seed, boards)?;
+        for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
+            world.strike(fault, true)?;
+        }
+        Ok(Self {
+            world,
+            operator: Operator::new(scenario, &robot.start_up),
+            observer: Observer::default(),
+            schedule: Schedule::new(&scenario.faults),
+            cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
+            duration_ns: (scenario.duration_s * 1e9).round() as u64,
+            start_ns: None,
+            over: false,
+        })
+    }
+
+    /// Simulated time since power-up, ns.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.world.now_ns()
+    }
+
+    /// Time of the scenario, s: from the instant at which the robot stood at rest in its start
+    /// pose. `None` during the start-up.
+    #[must_use]
+    pub fn scenario_s(&self) -> Option<f64> {
+        self.scenario_ns().map(|ns| ns as f64 * 1e-9)
+    }
+
+    fn scenario_ns(&self) -> Option<u64> {
+        self.start_ns.map(|start_ns| self.now_ns() - start_ns)
+    }
+
+    /// Whether the scenario has reached its end.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.over
+    }
+
+    /// Simulates up to `t_ns` since power-up, or to the end of the scenario if that is earlier.
+    ///
+    /// # Errors
+    /// As [`run`](crate::run).
+    pub fn step_to(&mut self, t_ns: u64, recorder: &mut Recorder) -> Result<(), SimError> {
+        while !self.over && self.world.next_ns() <= t_ns {
+            let happened = self.advance()?;
+            self.handle(happened, recorder)?;
+        }
+        Ok(())
+    }
+
+    /// A user command, now. A refusal is an event of the recording, as on the real console.
+    ///
+    /// # Errors
+    /// Never at present; kept for commands that cannot be given at all.
+    pub fn submit(&mut self, command: Command, recorder: &mut Recorder) -> Result<(), SimError> {
+        let t_ns = self.scenario_ns().unwrap_or(0);
+        self.operator
+            .submit(&mut self.world, command, t_ns, recorder)
+    }
+
+    /// A fault begins, or ends, now.
+    ///
+    /// # Errors
+    /// [`SimError`] if a board elsewhere refuses it, or one that starts anew.
+    pub fn inject(
+        &mut self,
+        fault: &FaultSpec,
+        begin: bool,
+        recorder: &mut Recorder,
+    ) -> Result<(), SimError> {
+        let t_ns = self.scenario_ns().unwrap_or(0);
+        self.world.strike(fault, begin)?;
+        recorder.set_disk_full(!self.world.faults().can_record());
+        let act = if begin {
+            Act::FaultBegins(*fault)
+        } else {
+            Act::FaultEnds(*fault)
+        };
+        recorder.event(t_ns, Cause::Scenario(act));
+        Ok(())
+    }
+
+    /// Shows every joint board and its cylinder as they are after a tick.
+    pub(crate) fn show(&self, watcher: &mut dyn FnMut(&WatchedJoint<'_>)) {
+        let world = &self.world;
+        for ((joint, board), cylinder) in (1..).zip(world.joints()).zip(&world.outputs().cylinders)
+        {
+            watcher(&WatchedJoint {
+                now_s: world.now_ns() as f64 * 1e-9,
+                joint,
+                board: board.snapshot(),
+                account: board.motion_account(),
+                cylinder,
+            });
+        }
+    }
+
+    /// Simulates to the next thing that happens.
+    pub(crate) fn advance(&mut self) -> Result<Happened, SimError> {
+        self.world.step()
+    }
+
+    /// What operator, observer and scenario make of it.
+    pub(crate) fn handle(
+        &mut self,
+        happened: Happened,
+        recorder: &mut Recorder,
+    ) -> Result<(), SimError> {
+        match (happened, self.scenario_ns()) {
+            (Happened::JointTick, None) => self.get_ready(recorder),
+            (Happened::JointTick, Some(t_ns)) => self.tick(t_ns, recorder),
+            (Happened::MasterCycle, _) => {
+                self.cycle(recorder);
+                Ok(())
+            }
+            (Happened::Delivery | Happened::WheelSample, _) => Ok(()),
+        }
+    }
+
+    fn get_ready(&mut self, recorder: &mut Recorder) -> Result<(), SimError> {
+        let ready = self.operator.prepare(&mut self.world);
+        if !matches!(ready, Ok(false)) {
+            // Also of a robot that does not get ready: the record says why.
+            self.operator.report_start_up(recorder);
+        }
+        if ready? {
+            self.start_ns = Some(self.now_ns());
+            self.operator.begin(&mut self.world)?;
+            self.observer.tick(&self.world, 0, recorder);
+        }
+        Ok(())
+    }
+
+    fn tick(&mut self, t_ns: u64, recorder: &mut Recorder) -> Result<(), SimError> {
+        self.observer.tick(&self.world, t_ns, recorder);
+        if t_ns >= self.duration_ns {
+            self.over = true;
+            return Ok(());
+        }
+        for (fault, begin) in self.schedule.due(t_ns) {
+            self.inject(&fault, begin, recorder)?;
+        }
+        for event in self.operator.due(t_ns) {
+            self.act(&event.action, t_ns, recorder)?;
+        }
+        self.operator.listen(&mut self.world, t_ns, recorder);
+        for note in self.world.take_notes() {
+            recorder.event(t_ns, note);
+        }
+        Ok(())
+    }
+
+    fn cycle(&mut self, recorder: &mut Recorder) {
+        let now_ns = self.now_ns();
+        let record = self.world.master().take_telemetry();
+        let Some(start_ns) = self.start_ns else {
+            self.observer.pass(&self.world);
+            return;
+        };
+        let t_ns = now_ns - start_ns;
+        self.operator.flood(&mut self.world, t_ns, recorder);
+        let times = (start_ns, now_ns);
+        self.observer
+            .cycle(&self.world, record, times, self.cycle_ns, recorder);
+    }
+
+    /// Carries out one event of the scenario.
+    fn act(
+        &mut self,
+        action: &EventAction,
+        t_ns: u64,
+        recorder: &mut Recorder,
+    ) -> Result<(), SimError> {
+        let command = match action {
+            EventAction::KillMaster => {
+                self.world.kill_master();
+                recorder.event(t_ns, Cause::Scenario(Act::KillMaster));
+                return Ok(());
+            }
+            EventAction::EStop => {
+                recorder.event(t_ns, Cause::Scenario(Act::EStop));
+                Command::EmergencyStop
+            }
+            EventAction::ClearFault => Command::ClearFault,
+            EventAction::Command(command) => *command,
+        };
+        self.submit(command, recorder)
+    }
+
+    /// Ends the session; `stopped` says that its driver wanted that before the scenario's end.
+    pub fn finish(mut self, stopped: bool, recorder: &mut Recorder) -> RunOutcome {
+        let now_ns = self.now_ns();
+        let link = self.observer.link();
+        if link.errors() > 0 {
+            let t_ns = self.scenario_ns().unwrap_or(0);
+            recorder.event(t_ns, Cause::LineErrors(link));
+        }
+        RunOutcome {
+            recorded_s: self.scenario_s().unwrap_or(0.0),
+            simulated_s: now_ns as f64 * 1e-9,
+            stopped,
+            pil: self.world.outside().map(|outside| outside.summary(now_ns)),
+            line: self.world.audit(),
+            link,
+            down_times: self.world.take_down_times(),
+        }
+    }
+}

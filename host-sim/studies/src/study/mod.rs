@@ -1,0 +1,238 @@
+//! What all studies do in the same way: progress, stopping, the folder of the results, the
+//! summary as JSON, figures and report.
+//!
+//! A study begins a [`Job`], which holds the output folder; works through [`Progress`], which
+//! says when to stop; and ends with [`Job::finish`]. One that is stopped writes what it has,
+//! and says so in summary, report and exit code ([`Stopped`]).
+
+mod progress;
+pub mod schema;
+mod stop;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use minijinja::context;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+use wheeleg_report::output::Folder;
+use wheeleg_report::plot::Figure;
+use wheeleg_report::{page, subfolder};
+
+pub use progress::{Ended, Progress};
+pub use schema::Summary;
+pub use stop::{Signal, Stop};
+
+use crate::StudyError;
+
+/// Where a study's results go, and what ends it early.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Folder for the results.
+    pub out: PathBuf,
+    /// Figures as PNG, too; SVG they are always.
+    pub png: bool,
+    /// Asks to stop.
+    pub stop: Stop,
+}
+
+impl Settings {
+    /// Results without PNG in a folder, and no signal that ends it.
+    #[must_use]
+    pub fn new(out: impl Into<PathBuf>) -> Self {
+        Self {
+            out: out.into(),
+            png: false,
+            stop: Stop::default(),
+        }
+    }
+}
+
+/// What stopped a study before its end, and how far it was.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Stopped {
+    /// The signal.
+    pub signal: Signal,
+    /// Parts that were done.
+    pub done: u64,
+    /// Parts of the whole study.
+    pub of: u64,
+    /// What the parts are.
+    pub unit: &'static str,
+}
+
+impl fmt::Display for Stopped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            signal,
+            done,
+            of,
+            unit,
+        } = self;
+        write!(f, "{} after {done} of {of} {unit}", signal.words())
+    }
+}
+
+/// A study with its files written.
+#[derive(Debug, Clone)]
+pub struct Finished<T> {
+    /// What came of it.
+    pub result: T,
+    /// Contents of `summary.json`.
+    pub summary: String,
+    /// The page.
+    pub report: PathBuf,
+    /// What stopped it before its end.
+    pub stopped: Option<Stopped>,
+}
+
+/// A study under way. It holds the folder of its results.
+#[derive(Debug)]
+pub struct Job {
+    folder: Folder,
+    png: bool,
+    /// How far it is.
+    pub progress: Progress,
+}
+
+impl Job {
+    /// Takes the folder; results of an earlier run in it are set aside in its folders
+    /// `previous`, `previous-2`, …
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if the folder is in use or cannot be written.
+    pub fn begin(name: &str, settings: &Settings) -> Result<Self, StudyError> {
+        Ok(Self {
+            folder: Folder::prepare(&settings.out)?,
+            png: settings.png,
+            progress: Progress::new(name, settings.stop.clone()),
+        })
+    }
+
+    /// The folder of the results.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Creates a folder for tables or figures.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if it cannot be created.
+    pub fn subfolder(&self, name: &str) -> Result<PathBuf, StudyError> {
+        Ok(subfolder(self.folder(), name)?)
+    }
+
+    /// Writes a text file; returns its path.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if it cannot be written.
+    pub fn save(&self, name: &str, text: &str) -> Result<PathBuf, StudyError> {
+        let path = self.folder().join(name);
+        std::fs::write(&path, text).map_err(|e| {
+            // A part of a file would be taken for the whole.
+            let _ = std::fs::remove_file(&path);
+            StudyError::output("write", &path, e)
+        })?;
+        Ok(path)
+    }
+
+    /// Writes a figure into the folder `figures`, which must exist: its SVG text, and a PNG where
+    /// that was asked for.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if one of them cannot be drawn or written.
+    pub fn save_figure(&self, figure: &Figure, svg: &str) -> Result<(), StudyError> {
+        if self.png {
+            let path = self.folder().join(format!("figures/{}.png", figure.id));
+            figure.png(&path).inspect_err(|_| {
+                let _ = std::fs::remove_file(&path);
+            })?;
+        }
+        self.save(&format!("figures/{}.svg", figure.id), svg)?;
+        Ok(())
+    }
+
+    /// Writes `summary.json`; returns its text.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if it cannot be written.
+    pub fn summary<T: Summary>(
+        &self,
+        body: &T,
+        stopped: Option<&Stopped>,
+    ) -> Result<String, StudyError> {
+        let text = schema::json(body, stopped);
+        self.save("summary.json", &text)?;
+        Ok(text)
+    }
+
+    /// Draws figures as SVG into the folder `figures`, and as PNG where that was asked for;
+    /// gives them back with their SVG text.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if one cannot be drawn or written.
+    pub fn draw(&self, figures: Vec<Figure>) -> Result<Vec<(Figure, String)>, StudyError> {
+        self.subfolder("figures")?;
+        self.progress.begin("drawing", figures.len() as u64);
+        figures
+            .into_par_iter()
+            .map(|figure| {
+                let svg = figure.svg()?;
+                self.save_figure(&figure, &svg)?;
+                self.progress.step();
+                Ok((figure, svg))
+            })
+            .collect()
+    }
+
+    /// Writes the report of a study that was stopped before its page could be made: the parts,
+    /// and which of them are done.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if the page cannot be made.
+    pub fn stopped_page(
+        title: &str,
+        stopped: &Stopped,
+        parts: &[(String, bool)],
+    ) -> Result<String, StudyError> {
+        let parts: Vec<_> = parts
+            .iter()
+            .map(|(name, done)| context! { name => name, done => done })
+            .collect();
+        let values = context! {
+            title => title,
+            stopped => stopped.to_string(),
+            parts => parts,
+            version => env!("CARGO_PKG_VERSION"),
+        };
+        Ok(page(include_str!("stopped.html"), values)?)
+    }
+
+    /// Writes the report, and lets go of the folder.
+    ///
+    /// # Errors
+    /// [`StudyError::Report`] if it cannot be written.
+    pub fn finish<T>(
+        self,
+        result: T,
+        summary: String,
+        page: &str,
+        stopped: Option<Stopped>,
+    ) -> Result<Finished<T>, StudyError> {
+        self.save("report.html", page)?;
+        Ok(self.end(result, summary, stopped))
+    }
+
+    /// Lets go of the folder.
+    pub fn end<T>(self, result: T, summary: String, stopped: Option<Stopped>) -> Finished<T> {
+        self.progress.clear();
+        Finished {
+            result,
+            summary,
+            report: self.folder().join("report.html"),
+            stopped,
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! How far a study is, and whether it is to stop.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use super::{Stop, Stopped};
+use crate::StudyError;
+
+/// Shows how far a study is, on standard error and only if that is a terminal, and knows
+/// whether it is to stop.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    stop: Stop,
+}
+
+/// Why a part of a study has no result.
+#[derive(Debug)]
+pub enum Ended {
+    /// The study was asked to stop.
+    Stopped,
+    /// It cannot be made.
+    Failed(Box<StudyError>),
+}
+
+impl Ended {
+    /// The result of a part, or none if the study was stopped in it.
+    ///
+    /// # Errors
+    /// What made the part fail.
+    pub fn kept<T>(result: Result<T, Self>) -> Result<Option<T>, StudyError> {
+        match result {
+            Ok(value) => Ok(Some(value)),
+            Err(Self::Stopped) => Ok(None),
+            Err(Self::Failed(e)) => Err(*e),
+        }
+    }
+}
+
+impl From<StudyError> for Ended {
+    fn from(e: StudyError) -> Self {
+        Self::Failed(Box::new(e))
+    }
+}
+
+impl Progress {
+    /// Nothing done yet.
+    #[must_use]
+    pub fn new(name: &str, stop: Stop) -> Self {
+        let bar = ProgressBar::new(0);
+        let style = ProgressStyle::with_template("{prefix} {wide_bar} {percent:>3} %  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_prefix(name.to_owned());
+        Self { bar, stop }
+    }
+
+    /// One that shows nothing and never stops.
+    #[must_use]
+    pub fn silent() -> Self {
+        Self {
+            bar: ProgressBar::hidden(),
+            stop: Stop::default(),
+        }
+    }
+
+    /// A phase of so many steps begins.
+    pub fn begin(&self, what: impl Into<String>, steps: u64) {
+        self.bar.set_message(what.into());
+        self.bar.set_length(steps);
+        self.bar.set_position(0);
+    }
+
+    /// So many steps of the phase are done.
+    pub fn at(&self, steps: u64) {
+        self.bar.set_position(steps);
+    }
+
+    /// One more step of the phase is done.
+    pub fn step(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Takes the bar off the terminal.
+    pub fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    /// Whether to stop.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_asked()
+    }
+
+    /// What to tell of a study that was stopped with `done` of its parts; none if it was
+    /// not, or had nothing left to do.
+    #[must_use]
+    pub fn stopped(&self, done: u64, of: u64, unit: &'static str) -> Option<Stopped> {
+        let signal = self.stop.signal().filter(|_| done < of)?;
+        Some(Stopped {
+            signal,
+            done,
+            of,
+            unit,
+        })
+    }
+
+    /// Works on items in parallel; results are in the order of the items. An item that was not
+    /// begun before the study was asked to stop has none.
+    ///
+    /// # Errors
+    /// That of an item; no further one is begun then.
+    pub fn map<T: Sync, R: Send, E: Send>(
+        &self,
+        items: &[T],
+        work: impl Fn(&T) -> Result<R, E> + Sync,
+    ) -> Result<Vec<Option<R>>, E> {
+        items
+            .par_iter()
+            .map(|item| match self.is_stopped() {
+                true => Ok(None),
+                false => work(item).map(Some),
+            })
+            .collect()
+    }
+
+    /// The same as a phase, with a step for each item.
+    ///
+    /// # Errors
+    /// As [`Progress::map`].
+    pub fn each<T: Sync, R: Send, E: Send>(
+        &self,
+        what: &str,
+        items: &[T],
+        work: impl Fn(&T) -> Result<R, E> + Sync,
+    ) -> Result<Vec<Option<R>>, E> {
+        self.begin(what, items.len() as u64);
+        self.map(items, |item| {
+            let result = work(item)?;
+            self.step();
+            Ok(result)
+        })
+    }
+
+    /// The same where all results are needed.
+    ///
+    /// # Errors
+    /// As [`Progress::map`], or that the study was asked to stop.
+    pub fn all<T: Sync, R: Send, E: Send + Into<StudyError>>(
+        &self,
+        what: &str,
+        items: &[T],
+        work: impl Fn(&T) -> Result<R, E> + Sync,
+    ) -> Result<Vec<R>, Ended> {
+        let results = self.each(what, items, work).map_err(Into::into)?;
+        let results: Option<Vec<R>> = results.into_iter().collect();
+        results.ok_or(Ended::Stopped)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::Signal;
+
+    #[test]
+    fn what_was_done_before_the_stop_is_kept_in_its_place() {
+        let stop = Stop::default();
+        let progress = Progress::new("test", stop.clone());
+        let items: Vec<u32> = (0..1000).collect();
+        let work = |item: &u32| {
+            if *item == 0 {
+                stop.ask(Signal::HangUp);
+            }
+            Ok::<_, StudyError>(10 * item)
+        };
+        let results = progress.each("items", &items, work).expect("no error");
+        let done = results.iter().flatten().count() as u64;
+        assert!((1..1000).contains(&done), "{done}");
+        for (item, result) in items.iter().zip(&results) {
+            assert!(result.is_none_or(|result| result == 10 * item));
+        }
+        let stopped = progress.stopped(done, 1000, "items").expect("stopped");
+        assert_eq!(
+            stopped.to_string(),
+            format!("hung up after {done} of 1000 items")
+        );
+        assert_eq!(progress.stopped(1000, 1000, "items"), None);
+        let all = progress.all("items", &items, |item| Ok::<_, StudyError>(*item));
+        assert!(matches!(all, Err(Ended::Stopped)));
+    }
+
+    #[test]
+    fn an_error_of_an_item_is_that_of_all() {
+        let items: Vec<u32> = (0..100).collect();
+        let work = |item: &u32| match item {
+            30.. => Err(StudyError::refused(item.to_string(), "")),
+            _ => Ok(()),
+        };
+        let error = Progress::silent().each("items", &items, work);
+        let said = error.expect_err("an item fails").to_string();
+        assert!(said.parse().is_ok_and(|item: u32| item >= 30), "{said}");
+    }
+}

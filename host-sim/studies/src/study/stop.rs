@@ -1,0 +1,136 @@
+//! Signals that ask a study to stop.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+#[cfg(unix)]
+use signal_hook::consts::SIGHUP;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
+/// Windows has no hang-up, and sends none.
+#[cfg(not(unix))]
+const SIGHUP: i32 = 1;
+
+/// A signal that asks the program to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub enum Signal {
+    /// Ctrl-C.
+    #[serde(rename = "SIGINT")]
+    Interrupt,
+    /// What `kill` and a machine that shuts down send.
+    #[serde(rename = "SIGTERM")]
+    Terminate,
+    /// The terminal or the connection is gone.
+    #[serde(rename = "SIGHUP")]
+    HangUp,
+}
+
+impl Signal {
+    const ALL: [Self; 3] = [Self::Interrupt, Self::Terminate, Self::HangUp];
+
+    const fn number(self) -> i32 {
+        match self {
+            Self::Interrupt => SIGINT,
+            Self::Terminate => SIGTERM,
+            Self::HangUp => SIGHUP,
+        }
+    }
+
+    /// Exit code of a program that this signal has stopped, as shells expect it.
+    #[must_use]
+    pub const fn exit_code(self) -> u8 {
+        128 + self.number() as u8
+    }
+
+    /// What happened to the program, in words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Interrupt => "interrupted",
+            Self::Terminate => "terminated",
+            Self::HangUp => "hung up",
+        }
+    }
+}
+
+/// Whether a study is to stop. Copies of it are one.
+#[derive(Debug, Clone, Default)]
+pub struct Stop {
+    /// Number of the signal; 0: none.
+    signal: Arc<AtomicUsize>,
+}
+
+impl Stop {
+    /// One that the program's signals set. The first asks; a second Ctrl-C or TERM ends the
+    /// program at once. A hang-up that whoever started the program has it ignore (`nohup`)
+    /// stays ignored.
+    ///
+    /// # Errors
+    /// What the operating system says if a handler cannot be set.
+    pub fn on_signals() -> std::io::Result<Self> {
+        let stop = Self::default();
+        let asked = Arc::new(AtomicBool::new(false));
+        for signal in Signal::ALL {
+            let number = signal.number();
+            if signal == Signal::HangUp {
+                if !cfg!(unix) || is_ignored(number) {
+                    continue;
+                }
+            } else {
+                // A terminal that closes may hang up twice, so only these.
+                flag::register_conditional_default(number, Arc::clone(&asked))?;
+            }
+            flag::register(number, Arc::clone(&asked))?;
+            flag::register_usize(number, Arc::clone(&stop.signal), number as usize)?;
+        }
+        Ok(stop)
+    }
+
+    /// Asks to stop, as the signal does.
+    pub fn ask(&self, signal: Signal) {
+        self.signal
+            .store(signal.number() as usize, Ordering::SeqCst);
+    }
+
+    /// The signal that asked to stop.
+    #[must_use]
+    pub fn signal(&self) -> Option<Signal> {
+        let number = self.signal.load(Ordering::SeqCst);
+        let mut all = Signal::ALL.into_iter();
+        all.find(|signal| signal.number() as usize == number)
+    }
+
+    /// Whether it was asked to stop.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.signal().is_some()
+    }
+}
+
+/// Whether this process was started to ignore a signal, as far as the system tells it.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mut lines = status.lines();
+    let mask = lines.find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_are_one_and_know_the_signal() {
+        let stop = Stop::default();
+        let copy = stop.clone();
+        assert!(!copy.is_asked());
+        stop.ask(Signal::Terminate);
+        assert_eq!(copy.signal(), Some(Signal::Terminate));
+        let codes = Signal::ALL.map(Signal::exit_code);
+        assert_eq!(codes, [130, 143, 129]);
+    }
+}

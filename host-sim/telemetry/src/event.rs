@@ -1,0 +1,691 @@
+//! Events: what happened in a run, as data. Its text is made last, by [`messages`](crate::messages).
+
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_master::command::CommandCode;
+use wheeleg_master::contact::Side;
+use wheeleg_master::dispatcher::{Refusal, Reject};
+use wheeleg_master::event::{Event as MasterEvent, HoldReason};
+use wheeleg_protocol::param::params_at;
+use wheeleg_protocol::{
+    Address, Fault, FaultBits, LinkQuality, LogEntry, LogEvent, NackReason, NodeMode,
+};
+
+use crate::samples::EventSample;
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// What.
+    pub cause: Cause,
+    /// Time since power-up of an event of the start-up, µs. The start-up is recorded at scenario
+    /// time 0; `None`: the event happened later.
+    pub start_up_us: Option<u64>,
+}
+
+/// What happened, by who tells of it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cause {
+    /// The master reports something.
+    Master(MasterEvent),
+    /// A board is seen to change.
+    Board {
+        /// Which.
+        board: Address,
+        /// How.
+        change: BoardChange,
+    },
+    /// A foot touches the ground, or leaves it, as it physically is; what the master makes of its
+    /// switches stands beside it.
+    Contact {
+        /// Which foot.
+        side: Side,
+        /// Switches closed by the ground: front, left, back, right. None: the foot is free.
+        switches: [bool; 4],
+    },
+    /// The scenario's user gives a command.
+    Command {
+        /// Which.
+        code: CommandCode,
+        /// The master's answer at the door.
+        answer: Answer,
+    },
+    /// The first refusal of a user who gives commands without end.
+    Flood {
+        /// Number of the command within its bus cycle, from 0.
+        number: usize,
+        /// Why.
+        reason: Reject,
+    },
+    /// The scenario acts.
+    Scenario(Act),
+    /// A service tool asks a board for what it must refuse.
+    Service {
+        /// Which board.
+        board: Address,
+        /// Number of the parameter.
+        parameter: u16,
+        /// What comes of it.
+        outcome: ServiceOutcome,
+    },
+    /// The master has heard broken frames: its counts at the end of the run.
+    LineErrors(LinkQuality),
+}
+
+/// How a board changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BoardChange {
+    /// Its mode.
+    Mode {
+        /// Before.
+        from: NodeMode,
+        /// Now.
+        to: NodeMode,
+    },
+    /// It latches a fault.
+    FaultLatched(Fault),
+    /// Its last fault is cleared.
+    FaultsCleared,
+}
+
+/// What a user hears when giving a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// It is queued.
+    Accepted,
+    /// It is refused at the door.
+    Rejected(Reject),
+    /// Nothing: the master is dead.
+    Nothing,
+}
+
+/// What the scenario does to the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Act {
+    /// The master dies.
+    KillMaster,
+    /// The E-stop is pressed.
+    EStop,
+    /// A fault begins.
+    FaultBegins(FaultSpec),
+    /// A fault ends.
+    FaultEnds(FaultSpec),
+}
+
+/// What comes of a service tool's requests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServiceOutcome {
+    /// The board refuses.
+    Refused {
+        /// What.
+        request: BadRequest,
+        /// Why.
+        reason: NackReason,
+    },
+    /// The board takes what it must refuse.
+    Taken(BadRequest),
+    /// The parameter has kept its value.
+    Unchanged {
+        /// Raw value.
+        raw: i32,
+    },
+    /// The parameter has changed.
+    Changed {
+        /// Raw value now.
+        raw: i32,
+    },
+    /// The board does not give the parameter's value.
+    NotGiven,
+}
+
+/// A request that a board must refuse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BadRequest {
+    /// A value above the parameter's limit.
+    AboveLimit,
+    /// A number that no parameter has.
+    UnknownParameter(
+        /// The number.
+        u16,
+    ),
+    /// A value of another size: a float that is not a number.
+    NotANumber,
+}
+
+/// Kind of an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EventKind {
+    /// For information.
+    Info,
+    /// The scenario acted (master killed, E-stop pressed).
+    Scenario,
+    /// A user command was given or answered.
+    Command,
+    /// A node or the master changed its mode.
+    Mode,
+    /// A fault was latched or cleared, or something is to be mended.
+    Fault,
+    /// A foot touched or left the ground.
+    Contact,
+    /// A record of a board's own log.
+    Log,
+}
+
+impl EventKind {
+    /// Lower-case name, as logged.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Scenario => "scenario",
+            Self::Command => "command",
+            Self::Mode => "mode",
+            Self::Fault => "fault",
+            Self::Contact => "contact",
+            Self::Log => "log",
+        }
+    }
+}
+
+impl From<Cause> for Event {
+    /// An event after the start-up.
+    fn from(cause: Cause) -> Self {
+        Self {
+            cause,
+            start_up_us: None,
+        }
+    }
+}
+
+impl Event {
+    /// An event of the start-up, µs after power-up.
+    #[must_use]
+    pub fn of_start_up(cause: Cause, after_power_up_us: u64) -> Self {
+        Self {
+            cause,
+            start_up_us: Some(after_power_up_us),
+        }
+    }
+
+    /// As it stands in the log.
+    #[must_use]
+    pub fn sample(&self) -> EventSample {
+        let cause = &self.cause;
+        EventSample {
+            kind: cause.kind().name().to_owned(),
+            code: cause.code().to_owned(),
+            detail: cause.detail(),
+            board: cause.board().map_or(0, Address::raw),
+            fault: cause.fault_code().unwrap_or(0),
+            command: cause.command().map_or(0, |code| code as u16),
+            start_up_us: self.start_up_us.unwrap_or(0),
+            text: self.to_string(),
+        }
+    }
+}
+
+impl Cause {
+    /// Kind, for the eye and for coarse filters.
+    #[must_use]
+    pub const fn kind(&self) -> EventKind {
+        match self {
+            Self::Master(event) => master_kind(event),
+            Self::Board { change, .. } => match change {
+                BoardChange::Mode { .. } => EventKind::Mode,
+                BoardChange::FaultLatched(_) | BoardChange::FaultsCleared => EventKind::Fault,
+            },
+            Self::Contact { .. } => EventKind::Contact,
+            Self::Command { .. } | Self::Flood { .. } | Self::Service { .. } => EventKind::Command,
+            Self::Scenario(_) => EventKind::Scenario,
+            Self::LineErrors(_) => EventKind::Info,
+        }
+    }
+
+    /// Name that stays the same from version to version, in snake case.
+    #[must_use]
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::Master(event) => master_code(event),
+            Self::Board { change, .. } => match change {
+                BoardChange::Mode { .. } => "mode",
+                BoardChange::FaultLatched(_) => "fault_latched",
+                BoardChange::FaultsCleared => "faults_cleared",
+            },
+            Self::Contact { switches, .. } => match switches {
+                [false, false, false, false] => "ground_free",
+                _ => "ground_contact",
+            },
+            Self::Command { answer, .. } => match answer {
+                Answer::Accepted => "command_accepted",
+                Answer::Rejected(_) => "command_rejected",
+                Answer::Nothing => "command_unanswered",
+            },
+            Self::Flood { .. } => "flood_rejected",
+            Self::Scenario(act) => match act {
+                Act::KillMaster => "master_killed",
+                Act::EStop => "e_stop_pressed",
+                Act::FaultBegins(_) => "fault_begins",
+                Act::FaultEnds(_) => "fault_ends",
+            },
+            Self::Service { outcome, .. } => match outcome {
+                ServiceOutcome::Refused { .. } => "service_refused",
+                ServiceOutcome::Taken(_) => "service_taken",
+                ServiceOutcome::Unchanged { .. } => "service_unchanged",
+                ServiceOutcome::Changed { .. } => "service_changed",
+                ServiceOutcome::NotGiven => "service_not_given",
+            },
+            Self::LineErrors(_) => "line_errors",
+        }
+    }
+
+    /// What tells events of one [`code`](Self::code) apart, in snake case: the mode entered, the
+    /// reason, the finding, the record of a board's log, the side of a foot, the parameter, the
+    /// fault injected. Empty where there is nothing to tell apart.
+    #[must_use]
+    pub fn detail(&self) -> String {
+        match self {
+            Self::Master(event) => master_detail(event),
+            Self::Board { change, .. } => match change {
+                BoardChange::Mode { to, .. } => snake_case(to.name()),
+                BoardChange::FaultLatched(fault) => snake_case(fault.name()),
+                BoardChange::FaultsCleared => String::new(),
+            },
+            Self::Contact { side, .. } => side_name(*side).to_owned(),
+            Self::Command { answer, .. } => match answer {
+                Answer::Rejected(reason) => reject_name(reason).to_owned(),
+                Answer::Accepted | Answer::Nothing => String::new(),
+            },
+            Self::Flood { reason, .. } => reject_name(reason).to_owned(),
+            Self::Scenario(act) => match act {
+                Act::KillMaster | Act::EStop => String::new(),
+                Act::FaultBegins(fault) | Act::FaultEnds(fault) => {
+                    fault.kind.name().replace('-', "_")
+                }
+            },
+            Self::Service {
+                board, parameter, ..
+            } => parameter_name(board.raw(), *parameter),
+            Self::LineErrors(_) => String::new(),
+        }
+    }
+
+    /// The board that it is about, by its address 1 to 8.
+    #[must_use]
+    pub fn board(&self) -> Option<Address> {
+        match self {
+            Self::Master(event) => master_board(event).and_then(Address::new),
+            Self::Board { board, .. } | Self::Service { board, .. } => Some(*board),
+            _ => None,
+        }
+    }
+
+    /// Number of the fault or warning that it is about, in the protocol's tables; of several, the
+    /// first.
+    #[must_use]
+    pub fn fault_code(&self) -> Option<u8> {
+        let first = |bits: u16| FaultBits::from_raw(bits).iter().next().map(Fault::code);
+        match self {
+            Self::Board {
+                change: BoardChange::FaultLatched(fault),
+                ..
+            } => Some(fault.code()),
+            Self::Master(event) => match event {
+                MasterEvent::Hold(HoldReason::NodeFault { faults, .. })
+                | MasterEvent::Refused {
+                    reason: Refusal::NodeFault { faults, .. },
+                    ..
+                } => first(*faults),
+                MasterEvent::Diagnosis { record, .. } => {
+                    record.first_fault.fault().map(Fault::code)
+                }
+                MasterEvent::Log {
+                    entry:
+                        LogEntry {
+                            event: LogEvent::Fault,
+                            a,
+                            ..
+                        },
+                    ..
+                } => Some(*a),
+                MasterEvent::FootSwitch { warning, .. } => Some(warning.code()),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The user's command that it answers.
+    #[must_use]
+    pub const fn command(&self) -> Option<CommandCode> {
+        match self {
+            Self::Command { code, .. } => Some(*code),
+            Self::Master(MasterEvent::Done(ticket) | MasterEvent::Refused { ticket, .. }) => {
+                Some(ticket.code)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether all axes were told to hold.
+    #[must_use]
+    pub const fn is_hold(&self) -> bool {
+        matches!(self, Self::Master(MasterEvent::Hold(_)))
+    }
+
+    /// Whether a command of a user, or a request of a service tool, came to nothing.
+    #[must_use]
+    pub const fn is_refusal(&self) -> bool {
+        matches!(
+            self,
+            Self::Master(MasterEvent::Refused { .. })
+                | Self::Command {
+                    answer: Answer::Rejected(_) | Answer::Nothing,
+                    ..
+                }
+                | Self::Flood { .. }
+                | Self::Service {
+                    outcome: ServiceOutcome::Refused { .. },
+                    ..
+                }
+        )
+    }
+}
+
+const fn master_kind(event: &MasterEvent) -> EventKind {
+    match event {
+        MasterEvent::TouchDown { .. } | MasterEvent::LiftOff(_) => EventKind::Contact,
+        MasterEvent::Hold(_)
+        | MasterEvent::FootSwitch { .. }
+        | MasterEvent::HomingFailed { .. }
+        | MasterEvent::SchemaMismatch { .. }
+        | MasterEvent::ForeignBoard { .. }
+        | MasterEvent::WrongRole(_)
+        | MasterEvent::NodeLost(_)
+        | MasterEvent::Found { .. }
+        | MasterEvent::Diagnosis { .. }
+        | MasterEvent::DuplicateAddress { .. } => EventKind::Fault,
+        // Somebody should act on it, as on a finding.
+        MasterEvent::Log { entry, .. } if matches!(entry.event, LogEvent::PrechargeLate) => {
+            EventKind::Fault
+        }
+        MasterEvent::Log { .. } | MasterEvent::LogLost { .. } => EventKind::Log,
+        MasterEvent::Done(_)
+        | MasterEvent::Refused { .. }
+        | MasterEvent::Position { .. }
+        | MasterEvent::Parameter { .. } => EventKind::Command,
+        MasterEvent::Armed | MasterEvent::Disarmed => EventKind::Mode,
+        MasterEvent::NodeReady(_)
+        | MasterEvent::Commissioned { .. }
+        | MasterEvent::Link { .. }
+        | MasterEvent::NodeBack(_)
+        | MasterEvent::Homed
+        | MasterEvent::GaitDone { .. }
+        | MasterEvent::TrajectoryDone => EventKind::Info,
+    }
+}
+
+const fn master_code(event: &MasterEvent) -> &'static str {
+    match event {
+        MasterEvent::Done(_) => "command_done",
+        MasterEvent::Refused { .. } => "command_refused",
+        MasterEvent::NodeReady(_) => "board_ready",
+        MasterEvent::SchemaMismatch { .. } => "other_interface",
+        MasterEvent::WrongRole(_) => "wrong_role",
+        MasterEvent::DuplicateAddress { .. } => "duplicate_address",
+        MasterEvent::ForeignBoard { .. } => "foreign_board",
+        MasterEvent::Commissioned { .. } => "commissioned",
+        MasterEvent::Found { .. } => "finding",
+        MasterEvent::Diagnosis { .. } => "diagnosis",
+        MasterEvent::Link { .. } => "link",
+        MasterEvent::Log { .. } => "log",
+        MasterEvent::LogLost { .. } => "log_lost",
+        MasterEvent::Parameter { .. } => "parameter",
+        MasterEvent::NodeLost(_) => "board_lost",
+        MasterEvent::NodeBack(_) => "board_back",
+        MasterEvent::Armed => "armed",
+        MasterEvent::Disarmed => "disarmed",
+        MasterEvent::Hold(_) => "hold",
+        MasterEvent::Homed => "homed",
+        MasterEvent::HomingFailed { .. } => "homing_failed",
+        MasterEvent::GaitDone { .. } => "gait_done",
+        MasterEvent::TrajectoryDone => "trajectory_done",
+        MasterEvent::TouchDown { .. } => "touch_down",
+        MasterEvent::FootSwitch { .. } => "foot_switch",
+        MasterEvent::LiftOff(_) => "lift_off",
+        MasterEvent::Position { .. } => "position",
+    }
+}
+
+fn master_detail(event: &MasterEvent) -> String {
+    match event {
+        MasterEvent::Refused { reason, .. } => refusal_name(reason).to_owned(),
+        MasterEvent::Found { finding, .. } => snake_case(&format!("{finding:?}")),
+        MasterEvent::Diagnosis { record, .. } => snake_case(record.disarm_reason.name()),
+        MasterEvent::Log { entry, .. } => snake_case(entry.event.name()),
+        MasterEvent::Parameter { node, id, .. } => parameter_name(*node, *id),
+        MasterEvent::Hold(reason) => hold_name(reason).to_owned(),
+        MasterEvent::TouchDown { side, .. }
+        | MasterEvent::FootSwitch { side, .. }
+        | MasterEvent::LiftOff(side) => side_name(*side).to_owned(),
+        _ => String::new(),
+    }
+}
+
+const fn master_board(event: &MasterEvent) -> Option<u8> {
+    match *event {
+        MasterEvent::NodeReady(node)
+        | MasterEvent::SchemaMismatch { node, .. }
+        | MasterEvent::WrongRole(node)
+        | MasterEvent::DuplicateAddress { node, .. }
+        | MasterEvent::ForeignBoard { node, .. }
+        | MasterEvent::Commissioned { node, .. }
+        | MasterEvent::Diagnosis { node, .. }
+        | MasterEvent::Link { node, .. }
+        | MasterEvent::Log { node, .. }
+        | MasterEvent::LogLost { node, .. }
+        | MasterEvent::Parameter { node, .. }
+        | MasterEvent::NodeLost(node)
+        | MasterEvent::NodeBack(node)
+        | MasterEvent::HomingFailed { joint: node }
+        | MasterEvent::Position { joint: node, .. } => Some(node),
+        MasterEvent::Found { node, .. } => node,
+        MasterEvent::Refused { reason, .. } => refusing_board(&reason),
+        MasterEvent::Hold(reason) => match reason {
+            HoldReason::NodeLost(node)
+            | HoldReason::NodeFault { node, .. }
+            | HoldReason::NodeDisarmed(node) => Some(node),
+            HoldReason::SupplyLost | HoldReason::LayerOneStalled | HoldReason::EmergencyStop => {
+                None
+            }
+        },
+        _ => None,
+    }
+}
+
+const fn refusing_board(reason: &Refusal) -> Option<u8> {
+    match *reason {
+        Refusal::NodeMissing { node }
+        | Refusal::SchemaMismatch { node, .. }
+        | Refusal::WrongRole { node }
+        | Refusal::DuplicateAddress { node }
+        | Refusal::ForeignBoard { node }
+        | Refusal::NodeFault { node, .. }
+        | Refusal::NodeReset { node }
+        | Refusal::NodeRefused { node, .. }
+        | Refusal::NodeBusy { node }
+        | Refusal::NoAnswer { node }
+        | Refusal::NotSettled { joint: node } => Some(node),
+        _ => None,
+    }
+}
+
+const fn hold_name(reason: &HoldReason) -> &'static str {
+    match reason {
+        HoldReason::NodeLost(_) => "board_lost",
+        HoldReason::NodeFault { .. } => "board_fault",
+        HoldReason::NodeDisarmed(_) => "board_disarmed",
+        HoldReason::SupplyLost => "supply_lost",
+        HoldReason::LayerOneStalled => "layer_one_stalled",
+        HoldReason::EmergencyStop => "emergency_stop",
+    }
+}
+
+const fn reject_name(reason: &Reject) -> &'static str {
+    match reason {
+        Reject::Expired { .. } => "expired",
+        Reject::DeadlineTooFar => "deadline_too_far",
+        Reject::Duplicate => "duplicate",
+        Reject::OutOfOrder { .. } => "out_of_order",
+        Reject::UnknownClient => "unknown_client",
+        Reject::QueueFull { .. } => "queue_full",
+        Reject::Refused(reason) => refusal_name(reason),
+    }
+}
+
+const fn refusal_name(reason: &Refusal) -> &'static str {
+    match reason {
+        Refusal::Expired => "expired",
+        Refusal::NotArmed => "not_armed",
+        Refusal::NotDisarmed => "not_disarmed",
+        Refusal::Moving => "moving",
+        Refusal::NotMoving => "not_moving",
+        Refusal::NotAtStart => "not_at_start",
+        Refusal::Latched => "latched",
+        Refusal::NoAir => "no_air",
+        Refusal::NodeMissing { .. } => "board_missing",
+        Refusal::SchemaMismatch { .. } => "other_interface",
+        Refusal::WrongRole { .. } => "wrong_role",
+        Refusal::DuplicateAddress { .. } => "duplicate_address",
+        Refusal::ForeignBoard { .. } => "foreign_board",
+        Refusal::NoSuchBoard { .. } => "no_such_board",
+        Refusal::NodeFault { .. } => "board_fault",
+        Refusal::NodeReset { .. } => "board_reset",
+        Refusal::NodeRefused { .. } => "board_refused",
+        Refusal::NodeBusy { .. } => "board_busy",
+        Refusal::NoAnswer { .. } => "no_answer",
+        Refusal::NotConfirmed => "not_confirmed",
+        Refusal::NoSuchJoint { .. } => "no_such_joint",
+        Refusal::Parameter(_) => "parameter",
+        Refusal::Busy => "busy",
+        Refusal::Interrupted => "interrupted",
+        Refusal::NotSettled { .. } => "not_settled",
+    }
+}
+
+const fn side_name(side: Side) -> &'static str {
+    match side {
+        Side::Left => "left",
+        Side::Right => "right",
+    }
+}
+
+/// Name of a board's parameter; its number where the table has none.
+pub(crate) fn parameter_name(node: u8, id: u16) -> String {
+    let row = params_at(node).iter().find(|row| row.id == id);
+    row.map_or_else(|| format!("0x{id:04X}"), |row| row.name.to_owned())
+}
+
+/// `SlotBabble` as `slot_babble`.
+fn snake_case(name: &str) -> String {
+    let mut out = String::with_capacity(name.len() + 4);
+    for (i, c) in name.char_indices() {
+        if c.is_ascii_uppercase() && i > 0 {
+            out.push('_');
+        }
+        out.push(c.to_ascii_lowercase());
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_master::dispatcher::Ticket;
+    use wheeleg_master::finding::Finding;
+
+    fn joint(number: u8) -> Address {
+        Address::joint(number).expect("a joint")
+    }
+
+    #[test]
+    fn a_log_is_filtered_by_fields_without_reading_the_text() {
+        let latched = Event::from(Cause::Board {
+            board: joint(3),
+            change: BoardChange::FaultLatched(Fault::SensorRange),
+        });
+        let sample = latched.sample();
+        assert_eq!(
+            (&*sample.kind, &*sample.code, &*sample.detail),
+            ("fault", "fault_latched", "sensor_range")
+        );
+        assert_eq!((sample.board, sample.fault, sample.command), (3, 32, 0));
+        assert!(sample.text.starts_with("joint 3: The position sensor"));
+
+        let ticket = Ticket {
+            client: 0,
+            id: 7,
+            code: CommandCode::SaveParameters,
+        };
+        let reason = Refusal::NodeBusy { node: 8 };
+        let refused = Event::from(Cause::Master(MasterEvent::Refused { ticket, reason }));
+        let sample = refused.sample();
+        assert_eq!(
+            (&*sample.kind, &*sample.code, &*sample.detail),
+            ("command", "command_refused", "board_busy")
+        );
+        assert_eq!((sample.board, sample.command), (8, 0x0132));
+
+        let ready = Cause::Master(MasterEvent::NodeReady(1));
+        let sample = Event::of_start_up(ready, 5_000).sample();
+        assert_eq!((&*sample.code, sample.start_up_us), ("board_ready", 5_000));
+        assert!(sample.text.starts_with("start-up, 0.005 s after power-up"));
+    }
+
+    #[test]
+    fn faults_are_named_wherever_they_are_told() {
+        let node = 4;
+        let faults = FaultBits::from(Fault::FollowingError)
+            .with(Fault::NoMotion)
+            .raw();
+        let hold = Cause::Master(MasterEvent::Hold(HoldReason::NodeFault { node, faults }));
+        assert!(hold.is_hold() && hold.kind() == EventKind::Fault);
+        assert_eq!(hold.board(), Some(joint(4)));
+        assert_eq!(hold.fault_code(), Some(Fault::FollowingError.code()));
+        let entry = |event, a| {
+            let entry = LogEntry {
+                time_us: 1,
+                event,
+                a,
+                b: 0,
+            };
+            Cause::Master(MasterEvent::Log { node, entry })
+        };
+        let logged = entry(LogEvent::Fault, Fault::LinkLost.code());
+        assert_eq!(
+            (logged.kind(), logged.fault_code()),
+            (EventKind::Log, Some(1))
+        );
+        // A record that somebody should act on is no mere record.
+        let late = entry(LogEvent::PrechargeLate, 0);
+        assert_eq!(late.kind(), EventKind::Fault);
+        assert_eq!(
+            (late.fault_code(), &*late.detail()),
+            (None, "precharge_late")
+        );
+    }
+
+    #[test]
+    fn findings_have_details_of_their_own() {
+        let detail = |finding| {
+            Cause::Master(MasterEvent::Found {
+                node: None,
+                finding,
+            })
+            .detail()
+        };
+        assert_eq!(detail(Finding::SlotBabble), "slot_babble");
+        let mut all: Vec<String> = Finding::ALL.iter().map(|f| detail(*f)).collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), Finding::ALL.len());
+    }
+}

@@ -1,0 +1,336 @@
+//! Events as a person reads them: the one place that makes text of what happened. Nothing decides
+//! by these texts.
+
+mod refusal;
+
+use std::fmt;
+
+use wheeleg_interface::{Side, first_difference};
+use wheeleg_master::config::UniqueId;
+use wheeleg_master::contact::Side as FootSide;
+use wheeleg_master::event::{Event as MasterEvent, HoldReason};
+use wheeleg_master::finding::Finding;
+use wheeleg_protocol::param::params_at;
+use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord, LinkQuality};
+
+use crate::event::{
+    Act, Answer, BadRequest, BoardChange, Cause, Event, ServiceOutcome, parameter_name,
+};
+use refusal::refusal;
+pub use refusal::reject;
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.start_up_us {
+            Some(us) => write!(f, "start-up, {}: {}", after_power_up(us), self.cause),
+            None => self.cause.fmt(f),
+        }
+    }
+}
+
+/// A time of the start-up.
+#[must_use]
+pub fn after_power_up(us: u64) -> String {
+    format!("{:.3} s after power-up", us as f64 * 1e-6)
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Master(event) => write!(f, "master: {}", master(event)),
+            Self::Board { board, change } => write!(f, "{board}: {change}"),
+            Self::Contact { side, switches } => {
+                write!(f, "ground: {}", contact(*side, *switches))
+            }
+            Self::Command { code, answer } => match answer {
+                Answer::Accepted => write!(f, "{}: accepted", code.name()),
+                Answer::Rejected(reason) => {
+                    write!(f, "{} refused: {}", code.name(), reject(reason))
+                }
+                Answer::Nothing => write!(f, "{}: nobody answers, the master is dead", code.name()),
+            },
+            Self::Flood { number, reason } => write!(
+                f,
+                "flood of commands: number {number} refused: {}",
+                reject(reason)
+            ),
+            Self::Scenario(act) => match act {
+                Act::KillMaster => f.write_str("the master dies and stays silent"),
+                Act::EStop => f.write_str("E-stop pressed"),
+                Act::FaultBegins(fault) => write!(f, "fault {fault} begins"),
+                Act::FaultEnds(fault) => write!(f, "fault {fault} ends"),
+            },
+            Self::Service {
+                board,
+                parameter,
+                outcome,
+            } => {
+                let name = parameter_name(board.raw(), *parameter);
+                write!(f, "service: {}", service(*board, &name, outcome))
+            }
+            Self::LineErrors(link) => write!(f, "master: {}", line_errors(link)),
+        }
+    }
+}
+
+impl fmt::Display for BoardChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mode { from, to } => write!(f, "{from:?} to {to:?}"),
+            Self::FaultLatched(fault) => fault.fmt(f),
+            Self::FaultsCleared => f.write_str("faults cleared"),
+        }
+    }
+}
+
+fn contact(side: FootSide, switches: [bool; 4]) -> String {
+    let side = word(side);
+    let closed: Vec<&str> = ["front", "left", "back", "right"]
+        .into_iter()
+        .zip(switches)
+        .filter_map(|(name, closed)| closed.then_some(name))
+        .collect();
+    if closed.is_empty() {
+        format!("{side} foot free")
+    } else {
+        format!("{side} foot touches, {}", closed.join(", "))
+    }
+}
+
+fn service(board: Address, parameter: &str, outcome: &ServiceOutcome) -> String {
+    let what = |request: &BadRequest| match request {
+        BadRequest::AboveLimit => format!("{parameter} above its limit"),
+        BadRequest::UnknownParameter(id) => format!("parameter 0x{id:04X}"),
+        BadRequest::NotANumber => format!("{parameter} as a float, not a number"),
+    };
+    match outcome {
+        ServiceOutcome::Refused { request, reason } => {
+            format!("{board} refuses {}: {}", what(request), reason.text())
+        }
+        ServiceOutcome::Taken(request) => format!("{board} takes {}: WRONG", what(request)),
+        ServiceOutcome::Unchanged { raw } => {
+            format!("{board}: parameter {parameter} unchanged, raw {raw}")
+        }
+        ServiceOutcome::Changed { raw } => {
+            format!("{board}: parameter {parameter} CHANGED, raw {raw}")
+        }
+        ServiceOutcome::NotGiven => format!("{board} does not tell its parameter {parameter}"),
+    }
+}
+
+/// What the master counted on the line.
+fn line_errors(link: &LinkQuality) -> String {
+    let kinds = [
+        ("overflow", link.overflow),
+        ("truncated", link.truncated),
+        ("short", link.short),
+        ("crc", link.crc),
+        ("version", link.version),
+        ("length", link.length),
+        ("address", link.address),
+    ];
+    let kinds = kinds.iter().filter(|(_, count)| *count > 0);
+    let kinds: Vec<String> = kinds
+        .map(|(kind, count)| format!("{kind} {count}"))
+        .collect();
+    format!(
+        "{} sound frames heard, broken ones: {}",
+        link.frames,
+        kinds.join(", ")
+    )
+}
+
+fn master(event: &MasterEvent) -> String {
+    match *event {
+        MasterEvent::Done(ticket) => format!("{} done", ticket.code.name()),
+        MasterEvent::Refused { ticket, reason } => {
+            format!("{} refused: {}", ticket.code.name(), refusal(&reason))
+        }
+        MasterEvent::NodeReady(node) => format!("{} identified, interface matches", board(node)),
+        MasterEvent::SchemaMismatch {
+            node,
+            master,
+            theirs,
+            firmware: [major, minor, patch],
+        } => format!(
+            "{} has interface {theirs:016x} (firmware {major}.{minor}.{patch}), the master has \
+             {master:016x} ({}): will not arm. {}",
+            board(node),
+            env!("CARGO_PKG_VERSION"),
+            other_interface(node, master, theirs)
+        ),
+        MasterEvent::ForeignBoard {
+            node,
+            commissioned,
+            found,
+            belongs,
+        } => {
+            let belongs = belongs.map_or_else(
+                || "was commissioned nowhere".to_owned(),
+                |home| format!("belongs to {}", board(home)),
+            );
+            format!(
+                "at the address of {} stands the board {}, which {belongs}; commissioned is {}: will not arm. {}",
+                board(node),
+                hex(found),
+                hex(commissioned),
+                Finding::ForeignBoard
+            )
+        }
+        MasterEvent::Commissioned { node, unique_id } => {
+            format!("{} is the board {}", board(node), hex(unique_id))
+        }
+        MasterEvent::Found { node, finding } => match node {
+            Some(node) => format!("{}: {finding}", board(node)),
+            None => finding.to_string(),
+        },
+        MasterEvent::Diagnosis { node, record } => diagnosis(node, &record),
+        // Sample by sample in the log.
+        MasterEvent::Link { node, record } => {
+            format!("{} has heard {} sound frames", board(node), record.frames)
+        }
+        MasterEvent::Log { node, entry } => format!(
+            "{} logs at {:.6} s of its clock: {entry}",
+            board(node),
+            f64::from(entry.time_us) * 1e-6
+        ),
+        MasterEvent::LogLost { node, records } => {
+            format!("{records} records of the log of {} are lost", board(node))
+        }
+        MasterEvent::Parameter { node, id, raw } => {
+            format!(
+                "parameter {} of {} is {}",
+                parameter_name(node, id),
+                board(node),
+                value(node, id, raw)
+            )
+        }
+        MasterEvent::DuplicateAddress { node, unique_ids } => {
+            let [one, other] = unique_ids.map(hex);
+            let remedy = Fault::DuplicateAddress.remedy();
+            format!(
+                "two boards at the address of {}, unique ids {one} and {other}: will not arm. {remedy}",
+                board(node)
+            )
+        }
+        MasterEvent::WrongRole(node) => format!("{}: {}", board(node), Finding::WrongRole),
+        MasterEvent::NodeLost(node) => format!("{} is lost. {}", board(node), Finding::NodeLost),
+        MasterEvent::NodeBack(node) => format!("{} answers", board(node)),
+        MasterEvent::Armed => "all axes armed".to_owned(),
+        MasterEvent::Disarmed => "all axes disarmed".to_owned(),
+        MasterEvent::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
+        MasterEvent::Homed => "start pose reached".to_owned(),
+        MasterEvent::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
+        MasterEvent::GaitDone { steps } => format!("gait over after {steps} steps"),
+        MasterEvent::TrajectoryDone => "foot trajectory over".to_owned(),
+        MasterEvent::TouchDown { side, sector } => match sector {
+            Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
+            None => format!("{} foot stands flat", word(side)),
+        },
+        MasterEvent::FootSwitch {
+            side,
+            sector,
+            warning,
+        } => {
+            let place = sector.map_or_else(String::new, word);
+            format!("{} foot, {place} switch: {warning}", word(side))
+        }
+        MasterEvent::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
+        MasterEvent::Position { joint, stroke_mm } => {
+            format!("joint {joint} stands at {:.2} mm", stroke_mm.to_f64())
+        }
+    }
+}
+
+/// Name of a side or sector inside a sentence.
+fn word(name: impl std::fmt::Debug) -> String {
+    format!("{name:?}").to_lowercase()
+}
+
+/// Name of a board by its bus address.
+fn board(address: u8) -> String {
+    Address::new(address).map_or_else(|| format!("address {address}"), |a| a.to_string())
+}
+
+fn hold_reason(reason: &HoldReason) -> String {
+    match *reason {
+        HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
+        HoldReason::NodeFault { node, faults } => {
+            let words: Vec<&str> = FaultBits::from_raw(faults)
+                .iter()
+                .map(|fault| fault.sentence())
+                .collect();
+            format!("{} reports: {}", board(node), words.join(" "))
+        }
+        HoldReason::NodeDisarmed(node) => {
+            format!("{} is no longer armed: it has restarted", board(node))
+        }
+        HoldReason::SupplyLost => {
+            "supply pressure lost. Check compressor, hose and regulator, then clear and arm."
+                .to_owned()
+        }
+        HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
+        HoldReason::EmergencyStop => "E-stop".to_owned(),
+    }
+}
+
+/// What is wrong with a board of another interface, and where it begins to differ.
+fn other_interface(node: u8, master: u64, theirs: u64) -> String {
+    let here = Side {
+        name: "the master",
+        hash: master,
+    };
+    let there = Side {
+        name: &board(node),
+        hash: theirs,
+    };
+    format!(
+        "{} {}",
+        Finding::OtherInterface,
+        first_difference(here, there)
+    )
+}
+
+/// A unique id, hexadecimal, lowest byte first.
+#[must_use]
+pub fn hex(id: UniqueId) -> String {
+    id.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Why a board stopped or started, with the remedy of the tables.
+fn diagnosis(node: u8, record: &FaultRecord) -> String {
+    let mut parts = Vec::new();
+    if let Some(fault) = record.first_fault.fault() {
+        // Both clocks count microseconds modulo 2^32.
+        let at_us = record.first_time_us.wrapping_add(record.clock_offset_us);
+        let at_s = f64::from(at_us) * 1e-6;
+        parts.push(format!("first fault, {at_s:.3} s after power-up: {fault}"));
+    }
+    if record.disarm_reason == DisarmReason::Reset || record.reset_cause.is_fault() {
+        let cause = record.reset_cause;
+        parts.push(format!(
+            "it has started anew: {} {}",
+            cause.text(),
+            cause.remedy()
+        ));
+    }
+    if parts.is_empty() {
+        parts.push(format!(
+            "no fault of its own. {}",
+            record.disarm_reason.text()
+        ));
+    }
+    format!("{} says why: {}", board(node), parts.join(" "))
+}
+
+/// Value of a parameter in its unit.
+fn value(node: u8, id: u16, raw: i32) -> String {
+    let row = params_at(node).iter().find(|row| row.id == id);
+    row.map_or_else(
+        || raw.to_string(),
+        |row| {
+            let scale = f64::from(row.format.fraction_bits()).exp2();
+            format!("{} {}", f64::from(raw) / scale, row.unit)
+        },
+    )
+}

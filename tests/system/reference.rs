@@ -1,0 +1,172 @@
+//! docs/reference is made from the code: the committed pages equal what it says.
+//!
+//! `UPDATE_REFERENCE=1 cargo test -p wheeleg-tests --test system reference` writes them anew.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+
+use crate::program;
+use wheeleg_config::builtin;
+use wheeleg_config::faults::{KINDS, NOT_IMPLEMENTED};
+use wheeleg_telemetry::channels;
+
+/// Compares a page with the committed one, or writes it.
+fn page(name: &str, title: &str, intro: &str, body: &str) {
+    let text = format!("# {title}\n\n{intro} Generated from the code: do not edit.\n\n{body}");
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../docs/reference")
+        .join(name);
+    if std::env::var_os("UPDATE_REFERENCE").is_some() {
+        fs::write(&path, &text).expect("a page");
+        return;
+    }
+    let committed = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        committed == text,
+        "docs/reference/{name} is not what the code says; set UPDATE_REFERENCE=1 and run this test again"
+    );
+}
+
+/// A row of a table; bars in its cells are no borders.
+fn row(out: &mut String, cells: &[&str]) {
+    let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "\\|")).collect();
+    let _ = writeln!(out, "| {} |", cells.join(" | "));
+}
+
+fn head(out: &mut String, cells: &[&str]) {
+    row(out, cells);
+    let _ = writeln!(out, "|{}", "---|".repeat(cells.len()));
+}
+
+#[test]
+fn channels_page() {
+    let mut body = String::new();
+    let mut schemas: Vec<&str> = Vec::new();
+    head(&mut body, &["channel", "rate", "schema", "what"]);
+    for channel in channels() {
+        let rate = match channel.rate_hz {
+            0 => "on change".to_owned(),
+            hz => format!("{hz} Hz"),
+        };
+        let topic = format!("`{}`", channel.topic);
+        row(&mut body, &[&topic, &rate, channel.schema, channel.doc]);
+    }
+    for channel in channels() {
+        if schemas.contains(&channel.schema) {
+            continue;
+        }
+        schemas.push(channel.schema);
+        let _ = writeln!(body, "\n## {}\n", channel.schema);
+        head(&mut body, &["field", "unit", "layer", "what"]);
+        for field in channel.fields {
+            let name = format!("`{}`", field.name);
+            row(
+                &mut body,
+                &[&name, field.unit, field.layer.name(), field.doc],
+            );
+        }
+    }
+    let intro = "Every channel of the log with its fields. `wheeleg channels` prints the same.";
+    page("channels.md", "Log channels", intro, &body);
+}
+
+#[test]
+fn faults_page() {
+    let mut body = String::new();
+    head(&mut body, &["fault", "target", "value", "what happens"]);
+    for kind in KINDS {
+        let name = format!("`{}`", kind.name);
+        let value = kind.value.map_or_else(String::new, |v| {
+            format!("{}, default {}: {}", v.range(), v.default, v.doc)
+        });
+        row(&mut body, &[&name, kind.place.expected(), &value, kind.doc]);
+    }
+    body.push_str("\n## Not implemented\n\nThese are refused by name.\n\n");
+    head(&mut body, &["fault", "why"]);
+    for (name, why) in NOT_IMPLEMENTED {
+        row(&mut body, &[&format!("`{name}`"), why]);
+    }
+    let intro = "Faults that can be put into any run: `--fault NAME[:TARGET][=VALUE]@TIME[..TIME]`. \
+                 `wheeleg faults list` prints the same.";
+    page("faults.md", "Faults", intro, &body);
+}
+
+#[test]
+fn parameters_page() {
+    let robot = builtin::robot(builtin::DEFAULT_ROBOT).expect("built in");
+    let mut body = String::new();
+    let mut section = "";
+    for p in &robot.parameters {
+        let of = p.path.rsplit_once('.').map_or("", |(section, _)| section);
+        if of != section {
+            section = of;
+            let _ = writeln!(body, "\n## [{section}]\n");
+            head(
+                &mut body,
+                &["parameter", "value", "unit", "range", "source", "what"],
+            );
+        }
+        let name = p.path.rsplit('.').next().unwrap_or(&p.path);
+        let range = format!("{} to {}", p.min, p.max);
+        row(
+            &mut body,
+            &[
+                &format!("`{name}`"),
+                &p.value_text(),
+                &p.unit,
+                &range,
+                &p.source,
+                p.doc,
+            ],
+        );
+    }
+    let intro = "Every parameter of a robot file, with the values of `wheeleg-2003`. \
+                 `wheeleg params` prints the same.";
+    page(
+        "parameters.md",
+        "Parameters of a robot",
+        intro,
+        body.trim_start(),
+    );
+}
+
+#[test]
+fn scenarios_page() {
+    let mut body = String::new();
+    head(
+        &mut body,
+        &["scenario", "robot", "duration", "events", "what"],
+    );
+    for (name, ..) in builtin::SCENARIOS {
+        let s = builtin::scenario(name).expect("built in");
+        let duration = format!("{} s", s.duration_s);
+        let events = s.events.len().to_string();
+        let name = format!("`{name}`");
+        row(
+            &mut body,
+            &[&name, &s.robot, &duration, &events, &s.description],
+        );
+    }
+    let intro = "The scenarios that are part of the program: `wheeleg run NAME`.";
+    page("scenarios.md", "Scenarios", intro, &body);
+}
+
+#[test]
+fn exit_codes_page() {
+    let mut program = std::process::Command::new(program::path());
+    let output = program.arg("--help").output().expect("it runs");
+    let help = String::from_utf8(output.stdout).expect("UTF-8");
+    let codes = help
+        .lines()
+        .find_map(|line| line.strip_prefix("Exit codes: "));
+    let codes = codes.expect("they are in the help").trim_end_matches('.');
+    let mut body = String::new();
+    head(&mut body, &["code", "when"]);
+    for code in codes.split("; ") {
+        let (code, when) = code.split_once(' ').expect("code and text");
+        row(&mut body, &[code, when]);
+    }
+    let intro = "What the program tells the shell, as in `wheeleg --help`.";
+    page("exit-codes.md", "Exit codes", intro, &body);
+}

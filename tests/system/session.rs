@@ -1,0 +1,89 @@
+//! A session that somebody drives from outside: how time is cut changes nothing, inputs at the
+//! same times give the same recording, and commands and faults act.
+
+use wheeleg_config::builtin;
+use wheeleg_master::command::Command;
+use wheeleg_sim::{Boards, Session};
+use wheeleg_telemetry::{Recorder, Recording};
+
+use crate::sil::{gait, robot, run};
+use wheeleg_config::LegChoice;
+
+const MS: u64 = 1_000_000;
+
+/// A session of a walk of 3 s, driven in steps of `slice_ns`.
+fn driven(slice_ns: u64, at: &mut dyn FnMut(&mut Session, &mut Recorder)) -> Recording {
+    let mut recorder = Recorder::in_memory();
+    let scenario = gait(LegChoice::Left, 3.0, &[]);
+    let mut session = Session::new(Boards::default(), &scenario, &robot(), 1).expect("it starts");
+    while !session.is_over() {
+        let to_ns = session.now_ns() + slice_ns;
+        session.step_to(to_ns, &mut recorder).expect("it goes on");
+        at(&mut session, &mut recorder);
+    }
+    let outcome = session.finish(false, &mut recorder);
+    assert!((outcome.recorded_s - 3.0).abs() < 1e-9);
+    recorder.finish().expect("in memory")
+}
+
+#[test]
+fn slices_of_any_length_give_the_recording_of_a_run() {
+    let whole = run(&gait(LegChoice::Left, 3.0, &[]), &robot(), 1);
+    for slice_ns in [10 * MS, 7 * MS + 333_333, 10_000 * MS] {
+        let sliced = driven(slice_ns, &mut |_, _| {});
+        assert_eq!(sliced.hash, whole.hash, "{slice_ns} ns");
+    }
+}
+
+#[test]
+fn inputs_from_outside_act_and_repeat() {
+    let brake_and_fault = || {
+        let (mut braked, mut struck) = (false, false);
+        driven(10 * MS, &mut |session, recorder| {
+            let Some(t_s) = session.scenario_s() else {
+                return;
+            };
+            if t_s >= 0.5 && !braked {
+                braked = true;
+                let command = Command::EmergencyBrake { joint: 2 };
+                session.submit(command, recorder).expect("given");
+            }
+            if t_s >= 1.0 && !struck {
+                struck = true;
+                let fault = "pot-open:joint3@0s".parse().expect("a fault");
+                session.inject(&fault, true, recorder).expect("injected");
+            }
+        })
+    };
+    let (first, second) = (brake_and_fault(), brake_and_fault());
+    assert_eq!(first.hash, second.hash);
+    assert_ne!(first.hash, driven(10 * MS, &mut |_, _| {}).hash);
+    // Joint 2 holds from the brake on, joint 3 has a latched fault after its potentiometer.
+    let at = |joint: usize, t_s: f64| {
+        let rows = &first.joints[joint - 1];
+        rows[rows.partition_point(|r| r.t_s() < t_s)].v.clone()
+    };
+    let hold = wheeleg_protocol::NodeMode::Hold.code();
+    assert_ne!(at(2, 0.45).mode, hold);
+    assert_eq!(at(2, 0.60).mode, hold);
+    assert_eq!(at(3, 0.95).faults, 0);
+    assert_ne!(at(3, 1.10).faults, 0);
+}
+
+#[test]
+fn a_session_knows_its_times() {
+    let scenario = builtin::scenario("stand").expect("built in");
+    let mut recorder = Recorder::in_memory();
+    let mut session = Session::new(Boards::default(), &scenario, &robot(), 1).expect("it starts");
+    assert_eq!((session.now_ns(), session.scenario_s()), (0, None));
+    session
+        .step_to(500 * MS, &mut recorder)
+        .expect("it goes on");
+    // Whatever is due at the time is done, nothing after it.
+    assert!(
+        (499 * MS..=500 * MS).contains(&session.now_ns()),
+        "{}",
+        session.now_ns()
+    );
+    assert!(!session.is_over());
+}

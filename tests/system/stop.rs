@@ -1,0 +1,272 @@
+//! Studies that a signal stops write what they have and say so; two of them never share a folder.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::schema::assert_valid;
+use crate::{cli, program};
+
+/// Longest time that a program may take to begin, or to end once it was asked to.
+const HUNG: Duration = Duration::from_secs(120);
+
+/// A study in the folder `out`.
+fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> Child {
+    Command::new(program::path())
+        .args(arguments)
+        .arg("--out")
+        .arg(out)
+        .env("NO_COLOR", "1")
+        .stdin(Stdio::null())
+        .stdout(outputs())
+        .stderr(outputs())
+        .spawn()
+        .expect("start")
+}
+
+/// Waits until something is there, while the program runs.
+fn wait_until(child: &mut Child, what: &str, there: impl Fn() -> bool) {
+    let begin = Instant::now();
+    while !there() {
+        if let Some(status) = child.try_wait().expect("status") {
+            panic!("no {what}: ended by itself with {status}");
+        }
+        assert!(begin.elapsed() < HUNG, "no {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill")
+        .args([&format!("-{name}"), &child.id().to_string()])
+        .status()
+        .expect("kill");
+    assert!(sent.success());
+}
+
+fn end(mut child: Child) -> Output {
+    let asked = Instant::now();
+    while child.try_wait().expect("status").is_none() {
+        if asked.elapsed() > HUNG {
+            let _ = child.kill();
+            panic!("still running {HUNG:?} after the signal");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.wait_with_output().expect("output")
+}
+
+fn summary(out: &Path) -> Value {
+    let text = fs::read_to_string(out.join("summary.json")).expect("summary.json");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+/// Starts a study, stops it with Ctrl-C once `lasting` has gone by since it took the folder,
+/// and checks message, exit code, summary and report. The summary.
+fn interrupted(study: &str, arguments: &[&str], lasting: Duration) -> (Value, TempDir) {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let mut child = start(&out, arguments, Stdio::piped);
+    wait_until(&mut child, "lock", || out.join(".lock").exists());
+    std::thread::sleep(lasting);
+    signal(&child, "INT");
+    let output = end(child);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{study}: {stderr}");
+    let summary = summary(&out);
+    assert_valid(&summary, study);
+    let stopped = &summary["stopped"];
+    assert_eq!(stopped["signal"], "SIGINT");
+    let [done, of] = ["done", "of"].map(|key| stopped[key].as_u64().expect("a number"));
+    assert!(done < of, "{stopped}");
+    let said = format!("interrupted after {done} of {of} ");
+    assert!(stderr.contains(&said), "{said}: {stderr}");
+    let page = fs::read_to_string(out.join("report.html")).expect("a report");
+    assert!(page.contains(&said), "{study}: the report says it, too");
+    (summary, folder)
+}
+
+#[test]
+fn a_comparison_that_is_interrupted_has_the_cases_that_were_played() {
+    let arguments = ["compare", "--axis", "bench-vq110u", "--seeds", "1000"];
+    let arguments = [&arguments[..], &["--controller", "predictive"]].concat();
+    let arguments = [
+        &arguments[..],
+        &["--move", "s-curve", "--combinations", "0"],
+    ]
+    .concat();
+    let (summary, folder) = interrupted("compare", &arguments, Duration::from_secs(3));
+    let cases = summary["cases"].as_array().expect("a list").len();
+    assert_eq!(summary["stopped"]["done"], cases);
+    assert_eq!(summary["stopped"]["of"], 1000 + 17);
+    assert!(cases > 0);
+    let csv = fs::read_to_string(folder.path().join("out/csv/cases.csv")).expect("a table");
+    assert_eq!(csv.lines().count(), cases + 1);
+}
+
+#[test]
+fn a_comparison_that_is_interrupted_while_it_looks_for_bounds_has_no_case() {
+    let arguments = ["compare", "--axis", "bench-vq110u"];
+    let (summary, _folder) = interrupted("compare", &arguments, Duration::from_millis(300));
+    assert_eq!(summary["stopped"]["done"], 0);
+    assert_eq!(summary["cases"], serde_json::json!([]));
+}
+
+#[test]
+fn a_matrix_that_is_interrupted_has_the_rows_that_were_run() {
+    let arguments = ["faults", "run", "--all"];
+    let (summary, _folder) = interrupted("faults", &arguments, Duration::from_secs(4));
+    let rows = summary["rows"].as_array().expect("a list");
+    assert!(!rows.is_empty());
+    assert_eq!(summary["stopped"]["done"], rows.len());
+    assert!(rows.iter().all(|row| row["verdict"].is_string()));
+}
+
+#[test]
+fn other_studies_that_are_interrupted_have_their_finished_parts() {
+    let (summary, folder) = interrupted("delay", &["delay"], Duration::from_secs(3));
+    let starts = summary["starts"]["list"].as_array().expect("a list");
+    assert!(starts.len() < 14 && summary["predictions"].is_null());
+    let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a report");
+    assert!(page.contains("not done"));
+    let (_, folder) = interrupted("tune", &["tune", "bench-vq110u"], Duration::ZERO);
+    // Not all of its tests were played.
+    assert!(!folder.path().join("out/node-parameters.toml").exists());
+    let (summary, _folder) = interrupted("figures", &["figures"], Duration::ZERO);
+    assert!(!summary["axes"].as_array().expect("a list").is_empty());
+}
+
+/// A run of an hour, its log begun.
+fn long_run(folder: &Path, out: &Path, outputs: fn() -> Stdio) -> Child {
+    let scenario = cli::scenario_file(folder, 3600.0);
+    let scenario = scenario.to_string_lossy();
+    let mut child = start(out, &["run", &scenario], outputs);
+    let log = out.join("log.mcap");
+    wait_until(&mut child, "log", || {
+        fs::metadata(&log).is_ok_and(|log| log.len() > 1_000_000)
+    });
+    child
+}
+
+fn ends_whole(log: &Path) {
+    let bytes = fs::read(log).expect("log");
+    assert!(bytes.ends_with(b"\x89MCAP0\r\n"), "a log has its footer");
+}
+
+#[test]
+fn a_run_that_is_terminated_or_hung_up_leaves_log_summary_and_report() {
+    for (name, code) in [("TERM", 143), ("HUP", 129)] {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let out = folder.path().join("out");
+        // Nobody reads what a program says whose terminal is gone.
+        let mut child = long_run(folder.path(), &out, Stdio::piped);
+        drop((child.stdout.take(), child.stderr.take()));
+        signal(&child, name);
+        assert_eq!(end(child).status.code(), Some(code), "{name}");
+        ends_whole(&out.join("log.mcap"));
+        let summary = summary(&out);
+        assert_valid(&summary, "run");
+        assert_eq!(summary["complete"], false);
+        assert_eq!(summary["stopped"]["signal"], format!("SIG{name}"));
+        let page = fs::read_to_string(out.join("report.html")).expect("a report");
+        assert!(page.contains("was stopped after"));
+    }
+}
+
+/// Both signals reach the program at once, before it could have ended by itself.
+#[test]
+fn a_second_signal_ends_the_program_at_once() {
+    use std::os::unix::process::ExitStatusExt as _;
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let child = long_run(folder.path(), &out, Stdio::null);
+    for name in ["STOP", "INT", "TERM", "CONT"] {
+        signal(&child, name);
+    }
+    let status: ExitStatus = end(child).status;
+    assert!(status.signal().is_some(), "{status}");
+    assert!(!out.join("report.html").exists());
+}
+
+/// `nohup` has a program ignore hang-ups.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hang_up_that_is_ignored_from_the_start_stays_ignored() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let scenario = cli::scenario_file(folder.path(), 3600.0);
+    let mut child = Command::new("nohup")
+        .arg(program::path())
+        .args(["run", &scenario.to_string_lossy(), "--out"])
+        .arg(&out)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("nohup");
+    let log = out.join("log.mcap");
+    let longer = |bytes: u64| fs::metadata(&log).is_ok_and(|log| log.len() > bytes);
+    wait_until(&mut child, "log", || longer(1_000_000));
+    signal(&child, "HUP");
+    let now = fs::metadata(&log).expect("log").len();
+    wait_until(&mut child, "more log", || longer(now + 2_000_000));
+    signal(&child, "TERM");
+    assert_eq!(end(child).status.code(), Some(143));
+}
+
+#[test]
+fn a_second_run_in_a_folder_is_refused_by_name_of_the_lock_and_the_first_loses_nothing() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let first = long_run(folder.path(), &out, Stdio::null);
+    let holder = format!("process {}", first.id());
+    for study in [
+        &["run", "stand"][..],
+        &["figures"],
+        &["faults", "run", "--all"],
+    ] {
+        let second = end(start(&out, study, Stdio::piped));
+        assert_eq!(second.status.code(), Some(2), "{study:?}");
+        let said = String::from_utf8_lossy(&second.stderr);
+        // Messages are wrapped to the width of a terminal.
+        let said: String = said.split_whitespace().collect();
+        for word in [".lock", &holder.replace(' ', ""), "--outDIR"] {
+            assert!(said.contains(word), "{word}: {said}");
+        }
+    }
+    assert!(!out.join("previous").exists());
+    signal(&first, "INT");
+    assert_eq!(end(first).status.code(), Some(130));
+    ends_whole(&out.join("log.mcap"));
+    assert!(out.join("summary.json").exists() && out.join("report.html").exists());
+
+    // A program that was killed holds nothing.
+    let mut killed = long_run(folder.path(), &out, Stdio::null);
+    killed.kill().expect("killed");
+    killed.wait().expect("ended");
+    let next = end(start(&out, &["figures"], Stdio::null));
+    assert!(next.status.success());
+}
+
+/// Standard output is no folder.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_named_as_such() {
+    let full = fs::OpenOptions::new().write(true).open("/dev/full");
+    let output = Command::new(program::path())
+        .args(["list"])
+        .env("NO_COLOR", "1")
+        .stdout(full.expect("/dev/full"))
+        .output()
+        .expect("start");
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        said.contains("standard output") && !said.contains("--out"),
+        "{said}"
+    );
+}
