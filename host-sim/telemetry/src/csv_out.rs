@@ -17,13 +17,13 @@ struct Table {
     /// 0: every row.
     period_ns: u64,
     next_ns: u64,
+    failed: Option<std::io::Error>,
 }
 
 /// Writes `joint-1.csv` … `events.csv` while the run lasts.
 pub struct Tables {
     /// One per channel of the registry.
     tables: Vec<Option<Table>>,
-    failed: Option<LogError>,
     record: csv::ByteRecord,
     text: Vec<u8>,
 }
@@ -46,7 +46,6 @@ impl Tables {
         });
         Ok(Self {
             tables: tables.collect::<Result<_, _>>()?,
-            failed: None,
             record: csv::ByteRecord::new(),
             text: Vec::new(),
         })
@@ -68,11 +67,8 @@ impl Table {
             out,
             period_ns,
             next_ns: 0,
+            failed: None,
         })
-    }
-
-    fn failed(&self, reason: std::io::Error) -> LogError {
-        LogError::output("write the table", &self.path, reason)
     }
 }
 
@@ -81,7 +77,7 @@ impl Sink for Tables {
         let Some(table) = &mut self.tables[taken.channel] else {
             return;
         };
-        if self.failed.is_some() || taken.t_ns < table.next_ns {
+        if table.failed.is_some() || taken.t_ns < table.next_ns {
             return;
         }
         // A period of zero keeps every row.
@@ -103,18 +99,26 @@ impl Sink for Tables {
                 _ => record.push_field(cell),
             }
         });
-        if let Err(e) = table.out.write_byte_record(record) {
-            self.failed = Some(table.failed(e.into()));
-        }
+        table.failed = table.out.write_byte_record(record).err().map(Into::into);
     }
 
     fn finish(&mut self) -> Result<(), LogError> {
+        let mut failed = Vec::new();
         for table in self.tables.iter_mut().flatten() {
-            if let Err(e) = table.out.flush() {
-                let error = table.failed(e);
-                self.failed.get_or_insert(error);
-            }
+            let error = table.failed.take().or_else(|| table.out.flush().err());
+            failed.extend(error.map(|reason| (table.path.clone(), reason)));
         }
-        self.failed.take().map_or(Ok(()), Err)
+        let count = failed.len();
+        match failed.into_iter().next() {
+            None => Ok(()),
+            Some((path, reason)) if count == 1 => {
+                Err(LogError::output("write the table", path, reason))
+            }
+            Some((path, reason)) => Err(LogError::Tables {
+                count,
+                path,
+                reason,
+            }),
+        }
     }
 }

@@ -24,12 +24,40 @@ pub enum LogError {
     },
 
     /// The log writer failed after the file had been opened.
-    #[error("cannot write the log: {0}")]
+    #[error("cannot write the log: {}", words(.0))]
     #[diagnostic(
         code(wheeleg::log),
         help("the disk may be full; `wheeleg log recover` makes a whole log of what was written")
     )]
     Log(#[from] mcap::McapError),
+
+    /// Tables that could not be written to their end.
+    #[error("cannot write {count} of the tables to their end, the first `{}`: {reason}", path.display())]
+    #[diagnostic(
+        code(wheeleg::output),
+        help("choose another folder with --out DIR, or make room in this one")
+    )]
+    Tables {
+        /// How many.
+        count: usize,
+        /// The first of them.
+        path: PathBuf,
+        /// What the operating system said of it.
+        reason: std::io::Error,
+    },
+
+    /// A recovered log that cannot be read back.
+    #[error("`{}` was written and cannot be read back: {}", path.display(), words(.reason))]
+    #[diagnostic(
+        code(wheeleg::log),
+        help("the disk may be at fault; write to another one")
+    )]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: mcap::McapError,
+    },
 
     /// A file that is no MCAP log.
     #[error("`{}` is not an MCAP log: it does not begin as one", path.display())]
@@ -67,6 +95,14 @@ pub enum LogError {
         /// Messages found.
         found: u64,
     },
+}
+
+/// What went wrong, without a word of the layers between.
+fn words(error: &mcap::McapError) -> String {
+    match error {
+        mcap::McapError::Io(reason) => reason.to_string(),
+        other => other.to_string(),
+    }
 }
 
 impl LogError {

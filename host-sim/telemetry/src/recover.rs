@@ -39,7 +39,8 @@ fn checked() -> LinearReaderOptions {
 /// # Errors
 /// [`LogError::Output`] if `from` cannot be read, or `to` exists or cannot be written;
 /// [`LogError::NotALog`] if `from` is none, [`LogError::Empty`] if it has no whole chunk;
-/// [`LogError::Log`] and [`LogError::Unsound`] if the new file cannot be read back. `to` is not
+/// [`LogError::Log`] if the new file cannot be written, [`LogError::Unreadable`] and
+/// [`LogError::Unsound`] if it cannot be read back. `to` is not
 /// left behind then, and `from` is never changed.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
     let unreadable = |e| LogError::output("read the log", from, e);
@@ -112,7 +113,10 @@ fn count(path: &Path) -> Result<u64, LogError> {
     let messages = MessageReader::new_with_options(BufReader::new(file), strict);
     let mut count = 0;
     for message in messages {
-        message?;
+        message.map_err(|reason| LogError::Unreadable {
+            path: path.into(),
+            reason,
+        })?;
         count += 1;
     }
     Ok(count)

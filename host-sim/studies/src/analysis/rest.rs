@@ -50,10 +50,10 @@ impl JointRest {
     }
 
     fn result(mut self) -> RestResult {
-        if let (Some((_, moved_s)), Some((t_s, _, error_mm))) = (self.reference, self.last) {
-            if t_s >= moved_s + SETTLING_S {
-                self.result.note_error(error_mm);
-            }
+        if let (Some((_, moved_s)), Some((t_s, _, error_mm))) = (self.reference, self.last)
+            && t_s >= moved_s + SETTLING_S
+        {
+            self.result.note_error(error_mm);
         }
         self.result
     }
