@@ -73,7 +73,8 @@ fn expected_json(outcome: &Outcome) -> serde_json::Value {
         }),
         _ => json!({ "reaction": reaction(row) }),
     };
-    value["reads"] = json!(row.reads);
+    let reads: Vec<String> = row.reads.iter().map(ToString::to_string).collect();
+    value["reads"] = json!(reads);
     value
 }
 
@@ -97,7 +98,7 @@ pub(super) fn reaction(row: &Row) -> String {
             format!("board {board} starts anew, disarmed, with the old parameters or the new ones")
         }
         Expect::NoArming => "the robot does not arm".to_owned(),
-        Expect::NotImplemented(reason) => reason.to_owned(),
+        Expect::NotImplemented => row.not_implemented().unwrap_or_default().to_owned(),
     }
 }
 
@@ -160,22 +161,6 @@ fn what_goes_wrong(outcome: &Outcome) -> String {
     all.join(", ")
 }
 
-/// The first line of the record that holds each of the expected words.
-fn quoted(outcome: &Outcome) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for words in outcome.row.reads {
-        let found = outcome
-            .measured
-            .reads
-            .iter()
-            .find(|line| line.contains(words));
-        if let Some(line) = found.filter(|line| !lines.contains(line)) {
-            lines.push(line.clone());
-        }
-    }
-    lines
-}
-
 pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, StudyError> {
     let ms = |value: Option<f64>| {
         // Without the sign of a zero.
@@ -211,7 +196,7 @@ pub(super) fn render(outcomes: &[Outcome], seed: u64) -> Result<String, StudyErr
                     Verdict::NotImplemented => "info",
                 },
                 failures => if run { o.failures.clone() } else { Vec::new() },
-                quoted => quoted(o),
+                quoted => &o.quoted,
                 note => o.row.note,
             }
         })

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 
 use super::{TARGETS_MISSED, print};
-use wheeleg_config::faults::{KINDS, KindInfo};
+use wheeleg_config::faults::{KINDS, KindInfo, NOT_IMPLEMENTED};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::matrix::{self, Verdict};
 
@@ -144,7 +144,8 @@ fn verdicts(finished: &matrix::Finished) -> String {
 fn listing(json: bool) -> String {
     if json {
         let list: Vec<serde_json::Value> = KINDS.iter().map(row_json).collect();
-        let missing: Vec<serde_json::Value> = matrix::not_implemented()
+        let missing: Vec<serde_json::Value> = NOT_IMPLEMENTED
+            .iter()
             .map(|(name, reason)| serde_json::json!({ "name": name, "reason": reason }))
             .collect();
         let lists = serde_json::json!({ "faults": list, "not_implemented": missing });
@@ -169,7 +170,7 @@ fn listing(json: bool) -> String {
     }
     out.push_str("\nNot implemented, refused by name:\n\n");
     let width = id_width();
-    for (name, reason) in matrix::not_implemented() {
+    for (name, reason) in NOT_IMPLEMENTED {
         let _ = writeln!(out, "  {name:width$}  {reason}");
     }
     out
