@@ -334,3 +334,98 @@ fn value(node: u8, id: u16, raw: i32) -> String {
         },
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_interface::archive;
+    use wheeleg_protocol::{FaultCode, LimitBits, ResetCause, SCHEMA_HASH};
+
+    /// Whoever is told of a fault is told what happened and what to do.
+    #[test]
+    fn faults_and_findings_are_told_with_their_remedies() {
+        let board = Address::joint(3).expect("a joint");
+        for fault in Fault::ALL {
+            let change = BoardChange::FaultLatched(*fault);
+            let text = Cause::Board { board, change }.to_string();
+            assert!(text.starts_with("joint 3: "), "{text}");
+            assert!(text.contains(fault.sentence()) && text.contains(fault.remedy()));
+        }
+        for finding in Finding::ALL {
+            for (node, begin) in [(Some(5), "master: joint 5: "), (None, "master: ")] {
+                let finding = *finding;
+                let text = Cause::Master(MasterEvent::Found { node, finding }).to_string();
+                assert!(text.starts_with(begin), "{text}");
+                assert!(text.contains(finding.sentence()) && text.contains(finding.remedy()));
+            }
+        }
+    }
+
+    #[test]
+    fn a_board_says_its_first_fault_and_why_it_started_anew() {
+        let says = |first_fault, reset_cause| {
+            let record = FaultRecord {
+                active: FaultBits::NONE,
+                sticky: FaultBits::NONE,
+                first_fault,
+                first_time_us: 2_298_000,
+                disarm_reason: DisarmReason::Fault,
+                limits: LimitBits::NONE,
+                reset_cause,
+                clock_offset_us: 0,
+            };
+            Cause::Master(MasterEvent::Diagnosis { node: 8, record }).to_string()
+        };
+        let fault = Fault::SlotOverrun;
+        let text = says(FaultCode::new(fault), ResetCause::PowerUp);
+        let expected =
+            format!("master: wheel 8 says why: first fault, 2.298 s after power-up: {fault}");
+        assert_eq!(text, expected);
+        for cause in [
+            ResetCause::Watchdog,
+            ResetCause::BrownOut,
+            ResetCause::ProcessorFault,
+        ] {
+            let text = says(FaultCode::NONE, cause);
+            let told = [cause.text(), cause.remedy()];
+            assert!(text.starts_with("master: wheel 8 says why: it has started anew"));
+            assert!(told.iter().all(|part| text.contains(part)), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_bars_arming_says_which_boards_and_in_what_they_differ() {
+        let event = MasterEvent::SchemaMismatch {
+            node: 4,
+            master: SCHEMA_HASH,
+            theirs: archive::newest_earlier().expect("one"),
+            firmware: [1, 2, 3],
+        };
+        let text = Cause::Master(event).to_string();
+        for part in [
+            "joint 4 has interface",
+            "(firmware 1.2.3)",
+            "the master has",
+            "will not arm",
+            "The first difference is in",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let event = MasterEvent::DuplicateAddress {
+            node: 4,
+            unique_ids: [[4; 12], [0xFB; 12]],
+        };
+        let text = Cause::Master(event).to_string();
+        assert!(
+            text.contains("joint 4") && text.contains("fbfbfb") && text.contains("will not arm")
+        );
+        assert!(text.contains(Fault::DuplicateAddress.remedy()), "{text}");
+    }
+
+    #[test]
+    fn an_event_of_the_start_up_says_when_after_power_up() {
+        let event = Event::of_start_up(Cause::Master(MasterEvent::Homed), 1_234_000);
+        let expected = "start-up, 1.234 s after power-up: master: start pose reached";
+        assert_eq!(event.to_string(), expected);
+    }
+}

@@ -1,9 +1,11 @@
 //! Holds what was measured against what must come of a row.
 
-use super::measure::Measured;
+use super::expected::Expected;
+use super::measure::{Measured, line, lost_messages, messages};
 use super::row::{Expect, Row, Stop};
 use super::run::Ran;
 use wheeleg_config::RobotConfig;
+use wheeleg_telemetry::event::{Cause, ServiceOutcome};
 
 /// Mode of a board that is disarmed.
 const IDLE: u8 = 1;
@@ -55,6 +57,8 @@ pub struct Outcome {
     pub after_all: AfterAll,
     /// What was measured.
     pub measured: Measured,
+    /// The first message of each that the user must be able to read.
+    pub quoted: Vec<String>,
     /// The faults as they were injected.
     pub faults: Vec<String>,
 }
@@ -67,6 +71,7 @@ impl Outcome {
             failures: vec![reason.to_owned()],
             after_all: AfterAll::of(robot),
             measured: Measured::default(),
+            quoted: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -113,7 +118,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         Expect::Degrades => degrades(&mut f, &after_all, &m),
         Expect::StartsAnew { board } => starts_anew(&mut f, board, ran, &m),
         Expect::NoArming => no_arming(&mut f, ran),
-        Expect::NotImplemented(_) => {}
+        Expect::NotImplemented => {}
     }
     if let (Some(error), false) = (&ran.error, row.expect == Expect::NoArming) {
         f.0.push(format!("the run ended early: {error}"));
@@ -121,19 +126,27 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
     f.check(m.wrong_frames == 0, || {
         format!("{} frames accepted that nobody sent", m.wrong_frames)
     });
-    for words in row.reads {
-        f.check(m.reads.iter().any(|line| line.contains(words)), || {
-            format!("the user does not read `{words}`")
+    let mut quoted: Vec<String> = Vec::new();
+    for expected in row.reads {
+        match message(ran, *expected) {
+            Some(line) if quoted.contains(&line) => {}
+            Some(line) => quoted.push(line),
+            None => f.0.push(format!("no message: {expected}")),
+        }
+    }
+    for unjust in row.silent_about {
+        f.check(message(ran, *unjust).is_none(), || {
+            format!("a message blames what is sound: {unjust}")
         });
     }
-    for words in row.silent_about {
-        f.check(!m.reads.iter().any(|line| line.contains(words)), || {
-            format!("the user reads `{words}`, which blames what is sound")
-        });
-    }
-    f.check(!m.reads.iter().any(|line| line.contains("WRONG")), || {
-        "a board takes what it must refuse".to_owned()
+    let taken = messages(ran).any(|event| {
+        let outcome = match event.v.cause {
+            Cause::Service { outcome, .. } => Some(outcome),
+            _ => None,
+        };
+        matches!(outcome, Some(ServiceOutcome::Taken(_)))
     });
+    f.check(!taken, || "a board takes what it must refuse".to_owned());
     let answering = row.answering;
     f.check(m.replies >= answering, || {
         format!("only {} boards answer, {answering} must", m.replies)
@@ -154,7 +167,18 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         failures: f.0,
         after_all,
         measured: m,
+        quoted,
         faults: ran.faults.iter().map(ToString::to_string).collect(),
+    }
+}
+
+/// The first message that is what is looked for, as the user reads it.
+fn message(ran: &Ran, expected: Expected) -> Option<String> {
+    match expected {
+        Expected::MessagesLost => lost_messages(&ran.recording),
+        _ => messages(ran)
+            .find(|event| expected.is(&event.v.cause))
+            .map(line),
     }
 }
 

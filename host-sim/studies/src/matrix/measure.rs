@@ -108,10 +108,10 @@ impl Blind {
 }
 
 /// Measures a run.
-pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measured {
+pub(super) fn measure(row: &Row, ran: &Ran, baseline: Option<&Recording>) -> Measured {
     let r = &ran.recording;
     let at_s = ran.at_s;
-    let since_s = since(row, at_s, r, sound);
+    let since_s = since(row, at_s, r, baseline);
     let ms = |t_s: f64| (t_s - since_s) * 1e3;
     let blind = Blind::of(&ran.faults);
     let axis = match row.expect {
@@ -154,7 +154,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
         m.held_mm = sensed.and_then(|from_s| held_mm(r, from_s));
     }
     if !m.stopped {
-        m.deviation_mm = sound.and_then(|sound| deviation_mm(r, sound, at_s));
+        m.deviation_mm = baseline.and_then(|baseline| deviation_mm(r, baseline, at_s));
     }
     let after = |t: f64| t >= since_s;
     let loads = r.bus.iter().filter(|b| after(b.t_s()));
@@ -167,7 +167,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, sound: Option<&Recording>) -> Measur
 }
 
 /// Instant from which the row counts.
-fn since(row: &Row, at_s: f64, r: &Recording, sound: Option<&Recording>) -> f64 {
+fn since(row: &Row, at_s: f64, r: &Recording, baseline: Option<&Recording>) -> f64 {
     let begin_s = if row.estop {
         at_s + super::run::ESTOP_S
     } else {
@@ -176,10 +176,10 @@ fn since(row: &Row, at_s: f64, r: &Recording, sound: Option<&Recording>) -> f64 
     let Expect::Stop(stop) = row.expect else {
         return begin_s;
     };
-    match (stop.since, sound) {
-        (Since::Motion(joint), Some(sound)) => {
+    match (stop.since, baseline) {
+        (Since::Motion(joint), Some(baseline)) => {
             let joint = usize::from(joint) - 1;
-            missing_s(&r.joints[joint], &sound.joints[joint], at_s).unwrap_or(begin_s)
+            missing_s(&r.joints[joint], &baseline.joints[joint], at_s).unwrap_or(begin_s)
         }
         _ => begin_s,
     }
@@ -188,11 +188,11 @@ fn since(row: &Row, at_s: f64, r: &Recording, sound: Option<&Recording>) -> f64 
 /// When the sensed stroke is first [`EXPECTED_MM`] from that of the run without the fault.
 fn missing_s(
     rows: &[Sample<JointSample>],
-    sound: &[Sample<JointSample>],
+    baseline: &[Sample<JointSample>],
     at_s: f64,
 ) -> Option<f64> {
     let from_ns = (at_s * 1e9).round() as u64;
-    let both = rows.iter().zip(sound).filter(|(r, _)| r.t_ns >= from_ns);
+    let both = rows.iter().zip(baseline).filter(|(r, _)| r.t_ns >= from_ns);
     let mut missing = both.filter(|(r, s)| {
         debug_assert_eq!(r.t_ns, s.t_ns);
         (r.v.sensed_mm - s.v.sensed_mm).abs() >= EXPECTED_MM
@@ -327,13 +327,14 @@ fn held_mm(r: &Recording, from_s: f64) -> Option<f64> {
     ranges.max_by(f64::total_cmp)
 }
 
-fn deviation_mm(r: &Recording, sound: &Recording, from_s: f64) -> Option<f64> {
+fn deviation_mm(r: &Recording, baseline: &Recording, from_s: f64) -> Option<f64> {
     let from_ns = (from_s * 1e9).round() as u64;
-    let pairs = r.joints.iter().zip(&sound.joints);
-    let pairs = pairs.flat_map(|(struck, sound)| struck.iter().zip(sound));
-    let after = pairs.filter(|(struck, sound)| struck.t_ns >= from_ns && struck.t_ns == sound.t_ns);
+    let pairs = r.joints.iter().zip(&baseline.joints);
+    let pairs = pairs.flat_map(|(struck, baseline)| struck.iter().zip(baseline));
+    let after =
+        pairs.filter(|(struck, baseline)| struck.t_ns >= from_ns && struck.t_ns == baseline.t_ns);
     after
-        .map(|(struck, sound)| (struck.v.position_mm - sound.v.position_mm).abs())
+        .map(|(struck, baseline)| (struck.v.position_mm - baseline.v.position_mm).abs())
         .max_by(f64::total_cmp)
 }
 
@@ -350,11 +351,16 @@ pub(super) fn line(event: &Sample<Event>) -> String {
     format!("{:.3} s: {}", event.t_s(), event.v)
 }
 
+/// That messages are lost, if there are any, as the user reads it.
+pub(super) fn lost_messages(recording: &Recording) -> Option<String> {
+    let lost = recording.dropped;
+    (lost > 0).then(|| format!("{lost} messages could not be written to the log"))
+}
+
 /// What the user reads from the instant on, each line once.
 fn reads(ran: &Ran) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    let dropped = ran.recording.dropped;
-    let lost = (dropped > 0).then(|| format!("{dropped} messages could not be written to the log"));
+    let lost = lost_messages(&ran.recording);
     for line in messages(ran).map(line).chain(lost).chain(ran.error.clone()) {
         if !lines.contains(&line) {
             lines.push(line);
@@ -406,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn expected_motion_is_what_the_sound_run_has_and_this_one_lacks() {
+    fn expected_motion_is_what_the_baseline_has_and_this_one_lacks() {
         let moving = |speed: f64| -> Vec<Sample<JointSample>> {
             let mut list = rows(|_| true);
             for (ms, row) in list.iter_mut().enumerate() {

@@ -1,12 +1,13 @@
 //! The fault matrix (host-sim/FAULTS.md): a table of what can go wrong with what must
 //! come of it, run on the simulated robot and held against what was measured.
 //!
-//! * [`row`], [`rows`]: the table;
+//! * [`row`], [`rows`]: the table; [`expected`]: what the user must be told;
 //! * [`run`]: one run per row;
-//! * [`measure`]: latencies, latching, deviation, words;
+//! * [`measure`]: latencies, latching, deviation, messages;
 //! * [`judge`]: measured against expected;
 //! * [`page`], [`summary`]: report and JSON.
 
+mod expected;
 mod judge;
 mod measure;
 mod page;
@@ -15,6 +16,7 @@ mod rows;
 mod run;
 mod summary;
 
+pub use expected::Expected;
 pub use judge::{AfterAll, Outcome, Verdict};
 pub use measure::Measured;
 pub use row::{Expect, Phase, Row, Since, Stop, Strike, Variant};
@@ -29,12 +31,6 @@ use crate::study::{Finished, Job, Settings};
 #[must_use]
 pub fn count(outcomes: &[Outcome], verdict: Verdict) -> usize {
     outcomes.iter().filter(|o| o.verdict == verdict).count()
-}
-
-/// Rows that cannot be run, each with the reason.
-pub fn not_implemented() -> impl Iterator<Item = (&'static str, &'static str)> {
-    ROWS.iter()
-        .filter_map(|row| Some((row.id, row.not_implemented()?)))
 }
 
 /// Runs rows and writes `report.html` and `summary.json`. The outcomes are in the order of the
@@ -59,6 +55,7 @@ pub fn write(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_config::faults::NOT_IMPLEMENTED;
 
     #[test]
     fn names_are_unique_and_a_wrong_one_is_named() {
@@ -85,6 +82,17 @@ mod tests {
         assert_eq!(ids, ["pot-open", "pot-short"]);
         let refused = one("ui-replay").expect_err("not implemented").to_string();
         assert!(refused.contains("not implemented"), "{refused}");
+    }
+
+    /// Rows that cannot be run are the faults that cannot be injected, in their order.
+    #[test]
+    fn rows_and_faults_that_are_not_implemented_are_the_same() {
+        let missing = ROWS
+            .iter()
+            .filter(|row| row.expect == Expect::NotImplemented);
+        let ids: Vec<&str> = missing.map(|row| row.id).collect();
+        let listed: Vec<&str> = NOT_IMPLEMENTED.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, listed);
     }
 
     /// A second board at an address is found as fast as one that is missing.

@@ -33,7 +33,7 @@ pub(super) fn reaction(row: &Row) -> String {
             format!("board {board} starts anew, disarmed, with the old parameters or the new ones")
         }
         Expect::NoArming => "the robot does not arm".to_owned(),
-        Expect::NotImplemented(reason) => reason.to_owned(),
+        Expect::NotImplemented => row.not_implemented().unwrap_or_default().to_owned(),
     }
 }
 
@@ -95,22 +95,6 @@ fn what_goes_wrong(outcome: &Outcome) -> String {
     all.join(", ")
 }
 
-/// The first line of the record that holds each of the expected words.
-fn quoted(outcome: &Outcome) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for words in outcome.row.reads {
-        let found = outcome
-            .measured
-            .reads
-            .iter()
-            .find(|line| line.contains(words));
-        if let Some(line) = found.filter(|line| !lines.contains(line)) {
-            lines.push(line.clone());
-        }
-    }
-    lines
-}
-
 /// What the template shows.
 #[derive(Serialize)]
 struct Page<'a> {
@@ -141,7 +125,7 @@ struct Shown<'a> {
     verdict: &'static str,
     class: &'static str,
     failures: &'a [String],
-    quoted: Vec<String>,
+    quoted: &'a [String],
     note: &'a str,
 }
 
@@ -162,7 +146,7 @@ impl<'a> Shown<'a> {
                 Verdict::NotImplemented => "info",
             },
             failures: &o.failures,
-            quoted: quoted(o),
+            quoted: &o.quoted,
             note: o.row.note,
         }
     }

@@ -1,5 +1,8 @@
 //! What a row of the matrix says: what goes wrong, when, and what must come of it.
 
+use super::expected::Expected;
+use wheeleg_config::faults::NOT_IMPLEMENTED;
+
 /// When the fault begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
@@ -75,8 +78,8 @@ pub enum Expect {
     },
     /// The robot does not arm.
     NoArming,
-    /// It cannot be injected, and why.
-    NotImplemented(&'static str),
+    /// It cannot be injected ([`NOT_IMPLEMENTED`] says why).
+    NotImplemented,
 }
 
 /// Limits of a stop, ms after the instant.
@@ -153,9 +156,9 @@ pub struct Row {
     /// that is judged.
     pub held_mm: Option<f64>,
     /// What the user must be able to read: all of it.
-    pub reads: &'static [&'static str],
+    pub reads: &'static [Expected],
     /// What the user must not read: it would blame what is sound.
-    pub silent_about: &'static [&'static str],
+    pub silent_about: &'static [Expected],
     /// Anything that the numbers do not tell.
     pub note: &'static str,
 }
@@ -164,10 +167,8 @@ impl Row {
     /// Why it cannot be run, if it cannot.
     #[must_use]
     pub fn not_implemented(&self) -> Option<&'static str> {
-        match self.expect {
-            Expect::NotImplemented(reason) => Some(reason),
-            _ => None,
-        }
+        let listed = NOT_IMPLEMENTED.iter().find(|(id, _)| *id == self.id);
+        listed.map(|(_, reason)| *reason)
     }
 }
 
@@ -183,7 +184,7 @@ pub(super) const fn row(
     strikes: &'static [Strike],
     phase: Phase,
     expect: Expect,
-    reads: &'static [&'static str],
+    reads: &'static [Expected],
 ) -> Row {
     Row {
         id,
@@ -203,8 +204,8 @@ pub(super) const fn row(
 }
 
 /// A row that cannot be run.
-pub(super) const fn missing(id: &'static str, reason: &'static str) -> Row {
-    row(id, &[], Phase::Stand, Expect::NotImplemented(reason), &[])
+pub(super) const fn missing(id: &'static str) -> Row {
+    row(id, &[], Phase::Stand, Expect::NotImplemented, &[])
 }
 
 impl Row {
@@ -213,8 +214,8 @@ impl Row {
         self
     }
 
-    pub(super) const fn silent_about(mut self, words: &'static [&'static str]) -> Self {
-        self.silent_about = words;
+    pub(super) const fn silent_about(mut self, messages: &'static [Expected]) -> Self {
+        self.silent_about = messages;
         self
     }
 

@@ -1,5 +1,6 @@
-//! Runs rows of the matrix on the simulated robot.
+//! Runs rows of the matrix on the simulated robot, as many at a time as there are processors.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
@@ -30,8 +31,6 @@ pub(super) const ESTOP_S: f64 = 0.1;
 const ARM_S: f64 = 0.6;
 /// Steps of the long walk.
 const LONG_STEPS: u16 = 18;
-/// Duration of the runs without faults, s: no run that is compared is longer.
-const SOUND_S: f64 = 7.0;
 
 /// A run of a row.
 pub(super) struct Ran {
@@ -60,25 +59,41 @@ pub(super) struct Outputs {
 struct Robots {
     scenario: Scenario,
     robots: [RobotConfig; 3],
-    /// Walking as plain robot, walking with reflex, standing.
-    sound: [OnceLock<Result<Recording, String>>; 3],
+    /// By the robot and by whether it stands.
+    baselines: BTreeMap<(Variant, bool), Baseline>,
     seed: u64,
 }
 
+/// A run without a fault, with which others are compared.
+#[derive(Default)]
+struct Baseline {
+    /// As long as the longest run that is compared with it.
+    duration_s: f64,
+    run: OnceLock<Result<Recording, String>>,
+}
+
 impl Robots {
-    fn new(seed: u64) -> Result<Self, StudyError> {
+    /// For these rows.
+    fn new(rows: &[&Row], seed: u64) -> Result<Self, StudyError> {
         let scenario = builtin::scenario(DEFAULT_SCENARIO)?;
         let plain = builtin::robot_of(&scenario.robot, DEFAULT_SCENARIO)?;
         let mut reflex = plain.clone();
         reflex.gait.touchdown_reflex = true;
         let mut long = plain.clone();
         long.gait.steps = LONG_STEPS;
-        Ok(Self {
+        let mut robots = Self {
             scenario,
             robots: [plain, reflex, long],
-            sound: Default::default(),
+            baselines: BTreeMap::new(),
             seed,
-        })
+        };
+        // The long walk is too long to be made twice.
+        for row in rows.iter().filter(|row| row.variant != Variant::Long) {
+            let duration_s = robots.duration_s(row);
+            let baseline = robots.baselines.entry(compared_with(row)).or_default();
+            baseline.duration_s = baseline.duration_s.max(duration_s);
+        }
+        Ok(robots)
     }
 
     fn robot(&self, variant: Variant) -> &RobotConfig {
@@ -105,18 +120,19 @@ impl Robots {
         }
     }
 
+    /// How long a row's run is, s.
+    fn duration_s(&self, row: &Row) -> f64 {
+        instant_s(row, self.robot(row.variant), self.seed) + row.after_s
+    }
+
     /// The same run without the fault; `None` for the long walk.
-    fn sound(&self, row: &Row) -> Result<Option<&Recording>, StudyError> {
-        let stands = stands(row.phase);
-        let index = match (row.variant, stands) {
-            (Variant::Plain, false) => 0,
-            (Variant::Reflex, _) => 1,
-            (Variant::Plain, true) => 2,
-            (Variant::Long, _) => return Ok(None),
+    fn baseline(&self, row: &Row) -> Result<Option<&Recording>, StudyError> {
+        let Some(baseline) = self.baselines.get(&compared_with(row)) else {
+            return Ok(None);
         };
-        let run = self.sound[index].get_or_init(|| {
-            let scenario = self.scenario(stands, SOUND_S);
-            // Short, and of use to other rows: it is not stopped.
+        let run = baseline.run.get_or_init(|| {
+            let scenario = self.scenario(stands(row.phase), baseline.duration_s);
+            // Of use to other rows: it is not stopped.
             let run = simulate(&scenario, self.robot(row.variant), self.seed, &|| false);
             let run = run.ok_or_else(|| "stopped".to_owned())?;
             run.error.map_or(Ok(run.recording), Err)
@@ -134,7 +150,7 @@ impl Robots {
         }
         let at_s = instant_s(row, robot, self.seed);
         let faults = faults(row, at_s)?;
-        let duration_s = at_s + row.after_s;
+        let duration_s = self.duration_s(row);
         let mut scenario = self.scenario(stands(row.phase), duration_s);
         scenario.faults.clone_from(&faults);
         let event = |at_s: f64, action| ScenarioEvent { at_s, action };
@@ -167,7 +183,7 @@ impl Robots {
             arming_asked,
             ..ran
         };
-        let measured: Measured = measure(row, &ran, self.sound(row)?);
+        let measured: Measured = measure(row, &ran, self.baseline(row)?);
         Ok(Some(judge(*row, robot, &ran, measured)))
     }
 }
@@ -194,6 +210,11 @@ fn asked(ask: &Ask) -> Command {
             raw: raw_of(row(node, of), value),
         },
     }
+}
+
+/// Robot, and whether it stands, of the run without a fault that is a row's.
+fn compared_with(row: &Row) -> (Variant, bool) {
+    (row.variant, stands(row.phase))
 }
 
 fn stands(phase: Phase) -> bool {
@@ -345,7 +366,7 @@ pub fn run(
     seed: u64,
     progress: &Progress,
 ) -> Result<Vec<Outcome>, StudyError> {
-    let robots = Robots::new(seed)?;
+    let robots = Robots::new(rows, seed)?;
     let outcomes = progress.each("rows", rows, |row| robots.run(row, progress))?;
     Ok(outcomes.into_iter().flatten().flatten().collect())
 }

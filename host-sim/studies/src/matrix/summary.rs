@@ -63,8 +63,8 @@ struct Expected {
     reaction: String,
     #[serde(flatten)]
     limits: Limits,
-    /// Words that the user must be able to read.
-    reads: &'static [&'static str],
+    /// What the user must be able to read.
+    reads: Vec<String>,
 }
 
 /// Limits of what must come of a row, by the kind of it. Times in ms.
@@ -142,7 +142,7 @@ impl<'a> RowSummary<'a> {
             expected: Expected {
                 reaction: reaction(row),
                 limits: Limits::new(outcome),
-                reads: row.reads,
+                reads: row.reads.iter().map(ToString::to_string).collect(),
             },
             measured: run.then_some(&outcome.measured),
             latched: run.then_some(outcome.measured.latched),

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 
 use super::{end, print, settings};
-use wheeleg_config::faults::{KINDS, KindInfo};
+use wheeleg_config::faults::{KINDS, KindInfo, NOT_IMPLEMENTED};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::matrix::{self, Outcome, Verdict};
 
@@ -137,7 +137,8 @@ fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
 fn listing(json: bool) -> String {
     if json {
         let list: Vec<serde_json::Value> = KINDS.iter().map(row_json).collect();
-        let missing: Vec<serde_json::Value> = matrix::not_implemented()
+        let missing: Vec<serde_json::Value> = NOT_IMPLEMENTED
+            .iter()
             .map(|(name, reason)| serde_json::json!({ "name": name, "reason": reason }))
             .collect();
         let lists = serde_json::json!({ "faults": list, "not_implemented": missing });
@@ -162,7 +163,7 @@ fn listing(json: bool) -> String {
     }
     out.push_str("\nNot implemented, refused by name:\n\n");
     let width = id_width();
-    for (name, reason) in matrix::not_implemented() {
+    for (name, reason) in NOT_IMPLEMENTED {
         let _ = writeln!(out, "  {name:width$}  {reason}");
     }
     out
