@@ -98,15 +98,11 @@ pub struct Comparison {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Cases<'a> {
     /// One object per case that was played or is not feasible.
-    cases: &'a [Row],
+    pub(crate) cases: &'a [Row],
 }
 
 impl study::Summary for Cases<'_> {
     const SCHEMA: &'static str = "wheeleg.compare/1";
-}
-
-impl study::Summary for Row {
-    const SCHEMA: &'static str = "wheeleg.case/1";
 }
 
 /// An axis that cannot be compared: names the file, field, value and range.

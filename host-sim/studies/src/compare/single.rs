@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::case::{CaseId, Row, Scene};
 use super::moves::Played;
-use super::{axis_error, load};
+use super::{Cases, axis_error, load};
 use crate::StudyError;
 use crate::bench::Trace;
 use crate::study::{Job, Settings};
@@ -56,7 +56,8 @@ impl Single {
     /// [`StudyError`] if something cannot be drawn or written.
     pub fn write(&self, settings: &Settings) -> Result<(String, Vec<PathBuf>), StudyError> {
         let job = Job::begin("case", settings)?;
-        let summary = job.summary(&self.row, None)?;
+        let cases = std::slice::from_ref(&self.row);
+        let summary = job.summary(&Cases { cases }, None)?;
         let Some(played) = &self.played else {
             return Ok((summary, Vec::new()));
         };

@@ -57,7 +57,6 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
     vec![
         schema::<crate::run::Summary>(),
         schema::<crate::compare::Cases<'static>>(),
-        schema::<crate::compare::Row>(),
         schema::<crate::tune::Summary<'static>>(),
         schema::<crate::delay::Summary<'static>>(),
         schema::<crate::matrix::Summary<'static>>(),
