@@ -52,7 +52,7 @@ impl Lines {
         axes.marks(svg, marks);
         for line in &self.series {
             let stroke = Stroke::new(line.colour, line.width);
-            let points = thin(&line.points, x_range, 2 * (WIDTH - LEFT) as usize);
+            let points = thin(&line.points, x_range, (WIDTH - LEFT) as usize);
             // A value that does not exist is a gap.
             for piece in points.split(|(_, y)| y.is_nan()) {
                 let pixels = piece.iter().map(|(x, y)| axes.at((*x, y.clamp(y0, y1))));

@@ -88,6 +88,8 @@ impl Svg {
         colour: Colour,
         opacity: f64,
     ) {
+        // Edges are rounded, not widths: neighbours leave no gap.
+        let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(|v| (10.0 * v).round() / 10.0);
         self.put(format_args!(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{colour}\"{} shape-rendering=\"crispEdges\"/>\n",
             Tenths(x0.min(x1)),
