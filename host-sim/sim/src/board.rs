@@ -29,6 +29,10 @@ pub(super) struct BoardInputs {
 }
 
 /// The application of a board and the simulated hardware around it.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "eight of them, made once and not moved"
+)]
 pub(super) enum Application {
     /// Addresses 1 to 6.
     Joint(JointBoard),

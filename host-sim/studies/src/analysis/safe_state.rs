@@ -334,9 +334,9 @@ mod tests {
             recording.supply.push(Row { t_ns, v });
         }
         let found = targets(&recording, 1.0, true);
-        let (commanded, pass) = value(&targets, "SS7");
+        let (commanded, pass) = value(&found, "SS7");
         assert!((commanded - 20.0).abs() < 1e-6 && pass, "{commanded}");
-        let (open, pass) = value(&targets, "SS7-open");
+        let (open, pass) = value(&found, "SS7-open");
         assert!((open - 45.0).abs() < 1e-6 && pass, "{open}");
         recording.supply.clear();
         let without = self::targets(&recording, 1.0, true);
