@@ -7,7 +7,7 @@ use wheeleg_config::AxisConfig;
 use wheeleg_control::axis::AxisData;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::testing::wheeleg_2003_axis;
-use wheeleg_studies::bench::suite::{self, Factors, Rig, StartUp};
+use wheeleg_studies::bench::suite::{self, Factors, StartUp, TestRig};
 use wheeleg_studies::bench::{
     Kind, Metrics, Motion, Trace, axis_data, design, identify, optimal, plant_check,
 };
@@ -263,7 +263,7 @@ fn nothing_switches_at_rest() {
     for (set, sheet) in [("A", bench_axis()), ("B", wheeleg_2003_axis())] {
         for seed in 0..5 {
             let context = format!("set {set}, seed {seed}");
-            let mut rig = Rig::new(&sheet, &design(&sheet, kind), seed).expect("valid");
+            let mut rig = TestRig::new(&sheet, &design(&sheet, kind), seed).expect("valid");
             let moved = rig.step(0.11, 3.0).expect("runs");
             let moved_to = moved.rows.last().expect("rows");
             assert!(moved_to.settled && moved_to.switches > 0, "{context}");
@@ -285,7 +285,7 @@ fn wandering_moves(axis: &AxisData) -> Vec<Trace> {
     design.gains.axis = *axis;
     let mut traces = Vec::new();
     for seed in 0..40_u32 {
-        let mut rig = Rig::new(&sheet, &design, u64::from(seed)).expect("valid");
+        let mut rig = TestRig::new(&sheet, &design, u64::from(seed)).expect("valid");
         for k in 0..6 {
             // Multiples of the golden ratio leave no gap.
             let share = (f64::from(6 * seed + k) * 0.618_033_988_75).fract();
@@ -400,7 +400,7 @@ fn the_start_from_home_and_what_notice_does() {
 #[test]
 fn the_time_optimal_bound_and_the_ratio_to_it() {
     let sheet = bench_axis();
-    let mut rig = Rig::new(&sheet, &design(&sheet, Kind::Predictive), 1).expect("valid");
+    let mut rig = TestRig::new(&sheet, &design(&sheet, Kind::Predictive), 1).expect("valid");
     for to_m in [0.14, 0.04] {
         rig.step(to_m, 2.0).expect("runs");
     }

@@ -7,8 +7,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_studies::bench::grain::{COARSE, Grain};
 use wheeleg_studies::bench::suite::{Factors, StartUp, steps};
+use wheeleg_studies::bench::valve_resolution::{COARSE, ValveResolution};
 use wheeleg_studies::bench::{Kind, Metrics};
 
 /// How many cylinders are drawn, and the number of the first: others than those that the law's
@@ -88,7 +88,7 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
             (0.5 * sheet.cylinder.stroke_m).min(0.1),
         );
         let (far, near) = (middle + 0.5 * span, middle - 0.5 * span);
-        let grain = Grain::of(&sheet).ratio;
+        let grain = ValveResolution::of(&sheet).ratio;
         let [runs, misses, alarms] = &mut tally[usize::from(grain > COARSE)];
         for case in 0..COMBINATIONS {
             let seed = which * COMBINATIONS + case;

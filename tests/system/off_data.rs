@@ -10,7 +10,7 @@ use crate::sil::{robot, scenario};
 use wheeleg_config::{RobotConfig, Scenario, builtin};
 use wheeleg_node::joint::MotionAccount;
 use wheeleg_protocol::Fault;
-use wheeleg_sim::{WatchedJoint, run_watched};
+use wheeleg_sim::{JointProbe, run_watched};
 use wheeleg_telemetry::Recorder;
 use wheeleg_tests::{STEP, mix};
 
@@ -81,7 +81,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(watched: &WatchedJoint<'_>, robot: &RobotConfig) -> Self {
+    fn of(watched: &JointProbe<'_>, robot: &RobotConfig) -> Self {
         Self {
             at_s: watched.now_s,
             joint: watched.joint,

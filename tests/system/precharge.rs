@@ -8,7 +8,7 @@ use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{Arm, ClearFault, Limit, LinkLossAction, LogEvent, SCHEMA_HASH};
-use wheeleg_studies::bench::{Bench, Kind, Motion, Node, Trace, design};
+use wheeleg_studies::bench::{AxisSim, Kind, Motion, Node, Trace, design};
 use wheeleg_telemetry::Cause;
 
 /// Raw value of a bar.
@@ -35,11 +35,11 @@ fn axes() -> Vec<(&'static str, AxisParams)> {
 }
 
 /// A bench whose board fills its chambers to `bar` when it is armed; 0: it does not.
-fn bench(axis: &AxisParams, bar: f64) -> Bench<Node> {
+fn bench(axis: &AxisParams, bar: f64) -> AxisSim<Node> {
     let sheet = design(axis, Kind::FuzzyPd);
     let raw = (bar * BAR).round() as i32;
     let node = Node::with(&sheet, &[(JointParam::Precharge, raw)]).unwrap();
-    Bench::new(axis, 1, node).unwrap()
+    AxisSim::new(axis, 1, node).unwrap()
 }
 
 /// A run from an arming on, and what the precharge in it did.
@@ -54,7 +54,7 @@ struct Start {
 }
 
 /// Runs from here on, where the board is about to be armed or just was.
-fn start(bench: &mut Bench<Node>, motion: &Motion, duration_s: f64) -> Start {
+fn start(bench: &mut AxisSim<Node>, motion: &Motion, duration_s: f64) -> Start {
     let from_m = bench.state.core.motion.stroke_m;
     let (mut filled_ms, mut way_m, mut least_pa) = (0, 0.0_f64, 0.0_f64);
     let trace = bench

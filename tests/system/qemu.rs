@@ -21,7 +21,7 @@ use wheeleg_remote::{JointPins, RemoteJoint, RemoteWheel, Session, WheelPins};
 use wheeleg_remote_host::RemoteError;
 use wheeleg_remote_host::qemu::{Qemu, QemuOptions};
 use wheeleg_remote_host::serial::{HilOptions, connect};
-use wheeleg_remote_host::{NodeKind, Nodes, Partner};
+use wheeleg_remote_host::{NodeKind, Nodes, Transport};
 use wheeleg_remote_link::{
     Figures, Inputs, Nonvolatile, Power, Ran, Reply, Request, Run, Switches,
 };
@@ -37,8 +37,8 @@ fn image(name: &str) -> PathBuf {
     Path::new(&folder).join(name)
 }
 
-fn board(name: &str) -> Partner<Qemu> {
-    let mut partner = Qemu::partner(&QemuOptions::new(image(name))).expect("QEMU starts");
+fn board(name: &str) -> Transport<Qemu> {
+    let mut partner = Qemu::transport(&QemuOptions::new(image(name))).expect("QEMU starts");
     let hello = partner.hello().expect("the image answers");
     assert_eq!(format!("qemu-{}", hello.image.name), name);
     partner
@@ -311,7 +311,7 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
         .zip(&lives)
         .map(|(address, life)| answers_here(address, life))
         .collect();
-    let mut boards: Vec<Partner<Qemu>> = (1..=8)
+    let mut boards: Vec<Transport<Qemu>> = (1..=8)
         .map(|address| {
             board(if address <= 6 {
                 "qemu-joint"
@@ -491,7 +491,7 @@ fn an_emulator_that_dies_or_hangs_is_an_error_and_none_is_left_behind() {
     // An image that never answers here: it listens to its UART.
     let mut options = QemuOptions::new(image("qemu-hil-joint"));
     options.patience = Duration::from_millis(600);
-    let mut partner = Qemu::partner(&options).expect("starts");
+    let mut partner = Qemu::transport(&options).expect("starts");
     let id = partner.stream().id();
     let error = said(&partner.hello().expect_err("silence"));
     assert!(error.contains("did not answer"), "{error}");

@@ -29,7 +29,7 @@ const GROUPS: [(&[&str], &[&str]); 4] = [
             "firmware/node/src/supervisor.rs",
             "firmware/node/src/store/mod.rs",
             "firmware/node/src/joint/air.rs",
-            "firmware/node/src/joint/expectation.rs",
+            "firmware/node/src/joint/no_motion_detector.rs",
             "firmware/node/src/joint/node.rs",
             "firmware/node/src/joint/outputs.rs",
             "firmware/node/src/joint/precharge.rs",

@@ -4,13 +4,13 @@ use crate::same_core::Announce;
 use core::sync::atomic::{AtomicU32, Ordering};
 use wheeleg_units::Micros;
 
-/// Marks that fit; a power of two. Two delimiters a frame and at most four
+/// RxTimestamps that fit; a power of two. Two delimiters a frame and at most four
 /// frames a millisecond leave more than a tick of time to the main loop.
 const CAPACITY: usize = 16;
 
 /// Everything in the receive buffer before `position` had arrived at `time`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mark {
+pub struct RxTimestamp {
     /// Index of the next byte in the receive buffer.
     pub position: u16,
     /// End of the byte before it.
@@ -22,7 +22,7 @@ pub struct Mark {
 /// When full, a new mark replaces none and is counted: its bytes are handed over
 /// with the next mark, and the frame check decides about them.
 #[derive(Debug)]
-pub struct Marks {
+pub struct RxTimestamps {
     times: [AtomicU32; CAPACITY],
     positions: [AtomicU32; CAPACITY],
     head: AtomicU32,
@@ -30,13 +30,13 @@ pub struct Marks {
     lost: AtomicU32,
 }
 
-impl Default for Marks {
+impl Default for RxTimestamps {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Marks {
+impl RxTimestamps {
     /// An empty queue.
     #[must_use]
     pub const fn new() -> Self {
@@ -54,7 +54,7 @@ impl Marks {
     }
 
     /// Adds a mark; the interrupt handler alone calls this.
-    pub fn push(&self, mark: Mark) {
+    pub fn push(&self, mark: RxTimestamp) {
         let head = self.head.load(Ordering::Relaxed);
         if head.wrapping_sub(self.tail.seen()) >= CAPACITY as u32 {
             let lost = self.lost.load(Ordering::Relaxed);
@@ -69,9 +69,9 @@ impl Marks {
         self.head.announce(head.wrapping_add(1));
     }
 
-    /// The oldest mark; the main loop alone calls this and [`Marks::pop`].
+    /// The oldest mark; the main loop alone calls this and [`RxTimestamps::pop`].
     #[must_use]
-    pub fn peek(&self) -> Option<Mark> {
+    pub fn peek(&self) -> Option<RxTimestamp> {
         let tail = self.tail.load(Ordering::Relaxed);
         if tail == self.head.seen() {
             return None;
@@ -79,14 +79,14 @@ impl Marks {
         let index = Self::index(tail);
         let time = self.times.get(index)?.load(Ordering::Relaxed);
         let position = self.positions.get(index)?.load(Ordering::Relaxed);
-        Some(Mark {
+        Some(RxTimestamp {
             position: position as u16,
             time: Micros(time),
         })
     }
 
     /// Takes the oldest mark.
-    pub fn pop(&self) -> Option<Mark> {
+    pub fn pop(&self) -> Option<RxTimestamp> {
         let mark = self.peek()?;
         let tail = self.tail.load(Ordering::Relaxed);
         self.tail.announce(tail.wrapping_add(1));
@@ -98,7 +98,7 @@ impl Marks {
         self.tail.announce(self.head.seen());
     }
 
-    /// Marks that found the queue full.
+    /// RxTimestamps that found the queue full.
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
@@ -109,8 +109,8 @@ impl Marks {
 mod tests {
     use super::*;
 
-    fn mark(n: u32) -> Mark {
-        Mark {
+    fn mark(n: u32) -> RxTimestamp {
+        RxTimestamp {
             position: (n % 256) as u16,
             time: Micros(n.wrapping_mul(0x0101_0101)),
         }
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn first_in_first_out_over_many_laps() {
-        let marks = Marks::new();
+        let marks = RxTimestamps::new();
         assert_eq!(marks.pop(), None);
         let (mut pushed, mut popped) = (0, 0);
         for round in 0..1000_u32 {
@@ -143,12 +143,12 @@ mod tests {
 
     #[test]
     fn a_full_queue_keeps_the_old_and_counts_the_new() {
-        let marks = Marks::new();
+        let marks = RxTimestamps::new();
         for n in 0..CAPACITY as u32 + 3 {
             marks.push(mark(n));
         }
         assert_eq!(marks.lost(), 3);
-        let kept: Vec<Mark> = std::iter::from_fn(|| marks.pop()).collect();
+        let kept: Vec<RxTimestamp> = std::iter::from_fn(|| marks.pop()).collect();
         assert_eq!(kept, (0..CAPACITY as u32).map(mark).collect::<Vec<_>>());
     }
 }

@@ -250,7 +250,7 @@ pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: 
             Incoming::Addressed(envelope, code, message) => {
                 take_request(application, envelope, code, &message, at);
             }
-            Incoming::Impostor => application.core().axis_fault(Fault::DuplicateAddress, at),
+            Incoming::AddressConflict => application.core().axis_fault(Fault::DuplicateAddress, at),
         }
     }
 }

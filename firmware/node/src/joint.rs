@@ -1,7 +1,7 @@
 //! The joint board: one pneumatic cylinder with four on/off valves.
 
 mod air;
-mod expectation;
+mod no_motion_detector;
 mod node;
 mod outputs;
 mod precharge;
@@ -12,6 +12,6 @@ mod settings;
 #[cfg(test)]
 mod integrity_tests;
 
-pub use expectation::MotionAccount;
+pub use no_motion_detector::MotionAccount;
 pub use node::{JointNode, PARTS};
 pub use settings::{JointSettings, TickSettings};

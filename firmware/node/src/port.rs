@@ -19,7 +19,7 @@ pub enum Incoming {
     /// A frame of the master to this board, whatever its payload.
     Addressed(Envelope, u8, Result<Message, ParseError>),
     /// A frame that claims to come from this board.
-    Impostor,
+    AddressConflict,
 }
 
 /// Decoder and transmit queue of one board.
@@ -61,7 +61,7 @@ impl BusPort {
         let frame = self.decoder.next(bytes)?.ok()?;
         let envelope = Envelope::from(frame.header);
         if envelope.source == self.address {
-            return Some(Incoming::Impostor);
+            return Some(Incoming::AddressConflict);
         }
         // Only the master asks; an answer to anybody else would disturb the line.
         if envelope.source != Address::MASTER {

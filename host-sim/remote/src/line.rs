@@ -2,7 +2,7 @@
 
 use wheeleg_remote_link::{Reply, Request};
 
-use super::partner::{Partner, Stream};
+use super::transport::{Stream, Transport};
 use crate::RemoteError;
 
 /// One or several boards at the end of one stream. Requests are queued and
@@ -31,7 +31,7 @@ pub trait Line {
     fn receive(&mut self) -> Result<(u8, Reply), RemoteError>;
 }
 
-impl<S: Stream> Line for Partner<S> {
+impl<S: Stream> Line for Transport<S> {
     fn name(&self) -> String {
         self.name()
     }
@@ -92,8 +92,8 @@ mod tests {
 
     #[test]
     fn a_line_to_one_board_asks_again_when_the_last_answer_is_there() {
-        let mut partner = Partner::new(OneAtATime::default());
-        let line: &mut dyn Line = &mut partner;
+        let mut transport = Transport::new(OneAtATime::default());
+        let line: &mut dyn Line = &mut transport;
         for _ in 0..3 {
             line.queue(0, &Request::Bye).expect("queued");
         }
@@ -102,6 +102,6 @@ mod tests {
             assert_eq!(line.receive().expect("answered"), (0, Reply::Done));
         }
         line.flush().expect("nothing to send");
-        assert_eq!(partner.stream().asked, 3);
+        assert_eq!(transport.stream().asked, 3);
     }
 }

@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::partner::{Partner, Stream};
+use super::transport::{Stream, Transport};
 use crate::RemoteError;
 
 /// The emulator, unless the environment names another one.
@@ -216,8 +216,8 @@ impl Qemu {
     ///
     /// # Errors
     /// As [`Self::start`].
-    pub fn partner(options: &QemuOptions) -> Result<Partner<Self>, RemoteError> {
-        Self::start(options).map(Partner::new)
+    pub fn transport(options: &QemuOptions) -> Result<Transport<Self>, RemoteError> {
+        Self::start(options).map(Transport::new)
     }
 
     /// Process id of the emulator.

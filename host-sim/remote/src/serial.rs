@@ -34,7 +34,7 @@ use serialport::{ClearBuffer, SerialPort};
 use wheeleg_remote_link::Hello;
 
 use crate::RemoteError;
-use crate::{Partner, Stream};
+use crate::{Stream, Transport};
 
 /// Rate of the hardware-in-the-loop images on the debug probe's serial port.
 const BAUD: u32 = 1_000_000;
@@ -198,7 +198,7 @@ impl Stream for SerialLine {
 pub fn connect(
     options: &HilOptions,
     application: &str,
-) -> Result<(Partner<SerialLine>, Hello), RemoteError> {
+) -> Result<(Transport<SerialLine>, Hello), RemoteError> {
     let port = &options.port;
     let mut answer = call(options)?;
     for _ in 1..CALLS {
@@ -209,7 +209,7 @@ pub fn connect(
         // is opened anew, which drops what is still under way.
         answer = call(options)?;
     }
-    let (partner, hello) = answer.map_err(|e| {
+    let (transport, hello) = answer.map_err(|e| {
         RemoteError::new(
             format!("no hardware-in-the-loop image answers on {port}: {e}"),
             format!(
@@ -238,16 +238,16 @@ pub fn connect(
             format!("flash `{application}-hil` (firmware/board/BOARD.md)"),
         ));
     }
-    Ok((partner, hello))
+    Ok((transport, hello))
 }
 
 /// One call: a port that cannot be opened is the outer error, a board that does
 /// not answer well the inner one.
 fn call(
     options: &HilOptions,
-) -> Result<Result<(Partner<SerialLine>, Hello), RemoteError>, RemoteError> {
-    let mut partner = Partner::new(SerialLine::open(options)?);
-    Ok(partner.hello().map(|hello| (partner, hello)))
+) -> Result<Result<(Transport<SerialLine>, Hello), RemoteError>, RemoteError> {
+    let mut transport = Transport::new(SerialLine::open(options)?);
+    Ok(transport.hello().map(|hello| (transport, hello)))
 }
 
 #[cfg(test)]

@@ -61,7 +61,7 @@ pub fn identity(address: Address) -> NodeIdentity {
 }
 
 /// Another processor behind the same straps.
-pub(super) fn twin_identity(address: Address) -> NodeIdentity {
+pub(super) fn duplicate_identity(address: Address) -> NodeIdentity {
     NodeIdentity {
         address,
         unique_id: [!address.raw(); 12],

@@ -177,8 +177,8 @@ impl Bus {
             return None;
         }
         let delivery = self.under_way.pop_front();
-        if let (Some(kept), Some(delivery)) = (&mut self.delivered, &delivery) {
-            kept.push(delivery.clone());
+        if let (Some(replayed), Some(delivery)) = (&mut self.delivered, &delivery) {
+            replayed.push(delivery.clone());
         }
         delivery
     }
@@ -190,8 +190,8 @@ impl Bus {
 
     /// All boards have heard what ended at or before `heard_ns`.
     pub(super) fn forget_delivered(&mut self, heard_ns: u64) {
-        if let Some(kept) = &mut self.delivered {
-            kept.retain(|delivery| delivery.end_ns > heard_ns);
+        if let Some(replayed) = &mut self.delivered {
+            replayed.retain(|delivery| delivery.end_ns > heard_ns);
         }
     }
 
@@ -206,8 +206,11 @@ impl Bus {
     #[must_use]
     pub(super) fn heard(&self, listener: Driver, after_ns: u64, until_ns: u64) -> Vec<(u64, u8)> {
         let mut heard = Vec::new();
-        let kept = self.delivered.iter().flatten();
-        for delivery in kept.chain(&self.under_way).filter(|d| d.from != listener) {
+        let replayed = self.delivered.iter().flatten();
+        for delivery in replayed
+            .chain(&self.under_way)
+            .filter(|d| d.from != listener)
+        {
             let shared = |i: usize| delivery.shared.as_ref().is_some_and(|shared| shared[i]);
             for (i, byte) in delivery.bytes.iter().enumerate() {
                 let end_ns = delivery.start_ns + (i as u64 + 1) * self.byte_ns;

@@ -43,15 +43,15 @@ pub(super) enum Due {
 }
 
 impl DownTimes {
-    /// Nothing has happened to the boards that are `outside` (addresses from 1).
-    pub(super) fn new(outside: [bool; 8]) -> Self {
+    /// Nothing has happened to the boards that are `remote` (addresses from 1).
+    pub(super) fn new(remote: [bool; 8]) -> Self {
         Self {
-            entries: outside.map(|outside| outside.then(VecDeque::new)),
+            entries: remote.map(|remote| remote.then(VecDeque::new)),
         }
     }
 
     /// Whether the board at `address` keeps to these times instead of its own.
-    pub(super) fn rule(&self, address: u8) -> bool {
+    pub(super) fn is_replayed(&self, address: u8) -> bool {
         let i = usize::from(address).wrapping_sub(1);
         self.entries.get(i).is_some_and(Option::is_some)
     }
@@ -96,12 +96,17 @@ mod tests {
 
     #[test]
     fn changes_come_in_order_when_they_are_due_and_only_to_boards_that_are_down() {
-        let mut outside = [false; 8];
-        outside[1] = true;
-        let mut times = DownTimes::new(outside);
+        let mut remote = [false; 8];
+        remote[1] = true;
+        let mut times = DownTimes::new(remote);
         times.reset(5_000, 2, ResetCause::Watchdog);
         times.first_edge(9_000, 2, 10_000);
-        assert!(times.rule(2) && !times.rule(1) && !times.rule(0) && !times.rule(9));
+        assert!(
+            times.is_replayed(2)
+                && !times.is_replayed(1)
+                && !times.is_replayed(0)
+                && !times.is_replayed(9)
+        );
         assert_eq!(times.next(4_999, |_| true), None, "not yet");
         assert_eq!(times.next(5_000, |_| false), None, "nothing struck it");
         let reset = Due::Reset(2, ResetCause::Watchdog);
@@ -114,22 +119,22 @@ mod tests {
 
     #[test]
     fn a_board_that_resets_by_itself_does_not_keep_the_others_waiting() {
-        let mut outside = [false; 8];
-        (outside[1], outside[6]) = (true, true);
-        let mut times = DownTimes::new(outside);
+        let mut remote = [false; 8];
+        (remote[1], remote[6]) = (true, true);
+        let mut times = DownTimes::new(remote);
         let cause = ResetCause::Watchdog;
         // Nothing struck board 2; board 7 was struck later.
         times.reset(5_000, 2, cause);
         times.reset(6_000, 7, cause);
         times.first_edge(9_000, 2, 10_000);
         times.first_edge(9_500, 7, 10_400);
-        let struck = |address| address == 7;
-        assert_eq!(times.next(5_999, struck), None);
-        assert_eq!(times.next(6_000, struck), Some(Due::Reset(7, cause)));
-        assert_eq!(times.next(9_400, struck), None, "its own order is kept");
+        let affected = |address| address == 7;
+        assert_eq!(times.next(5_999, affected), None);
+        assert_eq!(times.next(6_000, affected), Some(Due::Reset(7, cause)));
+        assert_eq!(times.next(9_400, affected), None, "its own order is kept");
         let edge = Due::FirstEdge(7, 10_400);
-        assert_eq!(times.next(9_500, struck), Some(edge));
-        assert_eq!(times.next(u64::MAX, struck), None);
+        assert_eq!(times.next(9_500, affected), Some(edge));
+        assert_eq!(times.next(u64::MAX, affected), None);
         // Both at once: each gets its own.
         assert_eq!(times.next(u64::MAX, |_| true), Some(Due::Reset(2, cause)));
         let edge = Due::FirstEdge(2, 10_000);

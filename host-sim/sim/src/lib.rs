@@ -20,9 +20,9 @@ mod hal;
 mod memory;
 mod observe;
 mod operator;
+mod rogue_nodes;
 mod session;
 mod setup;
-mod strangers;
 mod world;
 
 use std::ops::ControlFlow;
@@ -44,7 +44,7 @@ pub use self::world::BOARD_START_UP_NS;
 
 use self::world::{Happened, World};
 use wheeleg_config::{RobotConfig, Scenario};
-use wheeleg_remote_host::{Nodes, Outside, PilSummary};
+use wheeleg_remote_host::{Nodes, PilSummary, RemoteBoards};
 use wheeleg_telemetry::Recorder;
 use wheeleg_telemetry::event::Cause;
 
@@ -54,7 +54,7 @@ const COMMISSION_S: f64 = 2.0;
 /// What a caller sees of one joint board and its cylinder after every tick, start-up
 /// included, when it asks to ([`run_watched`]).
 #[derive(Debug, Clone, Copy)]
-pub struct WatchedJoint<'a> {
+pub struct JointProbe<'a> {
     /// Time since power-up, s.
     pub now_s: f64,
     /// Joint 1..=6.
@@ -68,15 +68,15 @@ pub struct WatchedJoint<'a> {
 }
 
 /// Looks at every joint after every tick.
-pub type JointWatcher<'a> = &'a mut dyn FnMut(&WatchedJoint<'_>);
+pub type ProbeFn<'a> = &'a mut dyn FnMut(&JointProbe<'_>);
 
 /// Who is told of a run while it lasts.
-pub struct Onlookers<'a> {
+pub struct Observers<'a> {
     progress: &'a mut dyn FnMut(f64) -> Control,
-    watcher: Option<JointWatcher<'a>>,
+    watcher: Option<ProbeFn<'a>>,
 }
 
-impl<'a> Onlookers<'a> {
+impl<'a> Observers<'a> {
     /// One who is told the time, and can stop the run.
     pub fn new(progress: &'a mut dyn FnMut(f64) -> Control) -> Self {
         Self {
@@ -87,7 +87,7 @@ impl<'a> Onlookers<'a> {
 
     /// One more, who sees every joint board in every tick.
     #[must_use]
-    pub fn watching(self, watcher: JointWatcher<'a>) -> Self {
+    pub fn watching(self, watcher: ProbeFn<'a>) -> Self {
         Self {
             watcher: Some(watcher),
             ..self
@@ -149,8 +149,8 @@ pub fn run_with(
     progress: &mut dyn FnMut(f64) -> Control,
 ) -> Result<RunOutcome, SimError> {
     let boards = Boards::connect(nodes, robot)?;
-    let onlookers = Onlookers::new(progress);
-    run_on(boards, scenario, robot, seed, recorder, onlookers)
+    let observers = Observers::new(progress);
+    run_on(boards, scenario, robot, seed, recorder, observers)
 }
 
 /// As [`run`], with `watcher` called for every joint after every tick, in the time of
@@ -163,9 +163,9 @@ pub fn run_watched(
     robot: &RobotConfig,
     seed: u64,
     recorder: &mut Recorder,
-    watcher: JointWatcher<'_>,
+    watcher: ProbeFn<'_>,
 ) -> Result<RunOutcome, SimError> {
-    let onlookers = Onlookers {
+    let observers = Observers {
         progress: &mut |_| Control::Continue(()),
         watcher: Some(watcher),
     };
@@ -175,7 +175,7 @@ pub fn run_watched(
         robot,
         seed,
         recorder,
-        onlookers,
+        observers,
     )
 }
 
@@ -183,28 +183,28 @@ pub fn run_watched(
 #[derive(Default)]
 pub struct Boards {
     /// Those outside of this process; `None`: all are here.
-    outside: Option<Outside>,
+    remote: Option<RemoteBoards>,
     /// Of those here, when they are down after a fault, if not when they would be.
-    kept: DownTimes,
+    replayed: DownTimes,
 }
 
 impl Boards {
     /// Connects those that are outside.
     ///
     /// # Errors
-    /// As [`Outside::connect`].
+    /// As [`RemoteBoards::connect`].
     pub fn connect(nodes: &Nodes, robot: &RobotConfig) -> Result<Self, SimError> {
         Ok(Self {
-            outside: Outside::connect(nodes, robot)?,
-            kept: DownTimes::default(),
+            remote: RemoteBoards::connect(nodes, robot)?,
+            replayed: DownTimes::default(),
         })
     }
 
     /// All here, and down when the boards of another run were.
-    pub fn native_with(kept: DownTimes) -> Self {
+    pub fn native_with(replayed: DownTimes) -> Self {
         Self {
-            outside: None,
-            kept,
+            remote: None,
+            replayed,
         }
     }
 }
@@ -219,21 +219,21 @@ pub fn run_on(
     robot: &RobotConfig,
     seed: u64,
     recorder: &mut Recorder,
-    mut onlookers: Onlookers<'_>,
+    mut observers: Observers<'_>,
 ) -> Result<RunOutcome, SimError> {
     let mut session = Session::new(boards, scenario, robot, seed)?;
     let mut stopped = false;
     while !session.is_over() && !stopped {
         let happened = session.advance()?;
         if happened == Happened::JointTick
-            && let Some(watcher) = &mut onlookers.watcher
+            && let Some(watcher) = &mut observers.watcher
         {
             session.show(watcher);
         }
         session.handle(happened, recorder)?;
         if happened == Happened::MasterCycle {
             let t_s = session.scenario_s().unwrap_or(-1.0);
-            stopped = (onlookers.progress)(t_s).is_break();
+            stopped = (observers.progress)(t_s).is_break();
         }
     }
     Ok(session.finish(stopped, recorder))
@@ -256,7 +256,7 @@ pub fn commission(
     let master = setup::master(scenario, robot);
     let mut world = World::new(robot, &plant, master, seed, boards)?;
     for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
-        world.strike(fault, true)?;
+        world.inject(fault, true)?;
     }
     let mut ids = [[0; 12]; 8];
     let mut said: Vec<String> = Vec::new();

@@ -11,7 +11,7 @@ use crate::faults::Schedule;
 use crate::observe::Observer;
 use crate::operator::Operator;
 use crate::world::{Happened, World};
-use crate::{Boards, RunOutcome, SimError, WatchedJoint, setup};
+use crate::{Boards, JointProbe, RunOutcome, SimError, setup};
 
 /// One robot, from power-up on: boards, bus, master and plant on one clock, the operator who
 /// gets it ready and carries the scenario out, and the observer who samples it.
@@ -45,7 +45,7 @@ impl Session {
         let master = setup::master(scenario, robot);
         let mut world = World::new(robot, &plant, master, seed, boards)?;
         for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
-            world.strike(fault, true)?;
+            world.inject(fault, true)?;
         }
         Ok(Self {
             world,
@@ -115,7 +115,7 @@ impl Session {
         recorder: &mut Recorder,
     ) -> Result<(), SimError> {
         let t_ns = self.scenario_ns().unwrap_or(0);
-        self.world.strike(fault, begin)?;
+        self.world.inject(fault, begin)?;
         recorder.set_disk_full(!self.world.faults().can_record());
         let act = if begin {
             Act::FaultBegins(*fault)
@@ -127,11 +127,11 @@ impl Session {
     }
 
     /// Shows every joint board and its cylinder as they are after a tick.
-    pub(crate) fn show(&self, watcher: &mut dyn FnMut(&WatchedJoint<'_>)) {
+    pub(crate) fn show(&self, watcher: &mut dyn FnMut(&JointProbe<'_>)) {
         let world = &self.world;
         for ((joint, board), cylinder) in (1..).zip(world.joints()).zip(&world.outputs().cylinders)
         {
-            watcher(&WatchedJoint {
+            watcher(&JointProbe {
                 now_s: world.now_ns() as f64 * 1e-9,
                 joint,
                 board: board.snapshot(),
@@ -245,7 +245,7 @@ impl Session {
             recorded_s: self.scenario_s().unwrap_or(0.0),
             simulated_s: now_ns as f64 * 1e-9,
             stopped,
-            pil: self.world.outside().map(|outside| outside.summary(now_ns)),
+            pil: self.world.remote().map(|remote| remote.summary(now_ns)),
             line: self.world.audit(),
             link,
             down_times: self.world.take_down_times(),

@@ -7,8 +7,8 @@
 //! not touch it.
 
 mod edges;
+mod inject;
 mod power;
-mod strike;
 mod traffic;
 
 use wheeleg_master::command::Command;
@@ -26,13 +26,13 @@ use super::bus::Bus;
 use super::client::Client;
 use super::clock::NS_PER_US;
 use super::downtime::DownTimes;
-use super::strangers::Strangers;
+use super::rogue_nodes::RogueNodes;
 use crate::SimError;
 use crate::faults::Injector;
-use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
-use wheeleg_remote_host::Outside;
+use wheeleg_remote_host::RemoteBoards;
 use wheeleg_telemetry::Cause;
 
 pub use power::BOARD_START_UP_NS;
@@ -72,15 +72,15 @@ pub(super) struct World {
     pub(super) next_cycle_ns: u64,
     pub(super) tick_inputs: TickInputs,
     pub(super) faults: Injector,
-    pub(super) strangers: Strangers,
+    pub(super) rogue_nodes: RogueNodes,
     pub(super) config: MasterConfig,
     pub(super) master_back_ns: Option<u64>,
     pub(super) client: Client,
-    pub(super) outside: Option<Outside>,
+    pub(super) remote: Option<RemoteBoards>,
     /// When boards outside were down in this run.
     pub(super) down_times: DownTimes,
     /// When boards here are down after a fault, of those that do not find it themselves.
-    pub(super) kept: DownTimes,
+    pub(super) replayed: DownTimes,
     pub(super) stored: NodeParams,
 }
 
@@ -134,7 +134,7 @@ impl World {
         seed: u64,
         boards: Boards,
     ) -> Result<Self, SimError> {
-        let Boards { outside, kept } = boards;
+        let Boards { remote, replayed } = boards;
         let refused = |part: &str, e: &dyn std::fmt::Display| {
             SimError::simulation(
                 format!("the {part} refuses its parameters: {e}"),
@@ -158,7 +158,7 @@ impl World {
             .map_err(|_| SimError::simulation(format!("{count} boards, not eight"), ""))?;
         let outputs = plant.outputs(&state);
         let mut bus = Bus::new(robot.bus.baud_bit_s as u32);
-        if outside.is_some() {
+        if remote.is_some() {
             bus.keep_delivered();
         }
         // Both ends count speeds per sample, so the master must know the board's.
@@ -180,7 +180,7 @@ impl World {
             master: brain,
             config: master,
             master_back_ns: None,
-            strangers: Strangers::default(),
+            rogue_nodes: RogueNodes::default(),
             master_alive: true,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
             now_ns: 0,
@@ -191,11 +191,11 @@ impl World {
             tick_inputs: TickInputs::default(),
             faults: Injector::new(seed),
             down_times: DownTimes::new(std::array::from_fn(|i| {
-                let there = outside.as_ref();
+                let there = remote.as_ref();
                 there.is_some_and(|o| o.has(i as u8 + 1))
             })),
-            kept,
-            outside,
+            replayed,
+            remote,
             stored: robot.node.clone(),
         })
     }
@@ -219,12 +219,12 @@ impl World {
             && due <= tick_ns
         {
             self.now_ns = due;
-            self.keep_down_times()?;
+            self.replay_resets()?;
             self.deliver()?;
             return Ok(Happened::Delivery);
         }
         self.now_ns = tick_ns;
-        self.keep_down_times()?;
+        self.replay_resets()?;
         if self.next_joint_ns == tick_ns {
             self.joint_tick()?;
             return Ok(Happened::JointTick);
@@ -245,8 +245,8 @@ impl World {
 
     /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
     fn active_outputs(&self, address: u8) -> link::Outputs {
-        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
-        outside.unwrap_or_else(|| self.board(address).outputs())
+        let remote = self.remote.as_ref().and_then(|o| o.outputs(address));
+        remote.unwrap_or_else(|| self.board(address).outputs())
     }
 
     /// Positions and foot contacts as the joint boards read them now.
@@ -268,10 +268,10 @@ impl World {
         self.bring_up()?;
         // A board outside answers with the outputs that act from this edge on
         // when it is told the inputs of the edge. Neither depends on the other.
-        let sensed = if self.outside.is_some() {
+        let sensed = if self.remote.is_some() {
             self.outputs = self.plant.outputs(&self.state);
             let sensed = self.sense();
-            self.joint_edge_outside(&sensed)?;
+            self.joint_edge_remote(&sensed)?;
             Some(sensed)
         } else {
             None
@@ -294,7 +294,7 @@ impl World {
         for (address, inputs) in (1..).zip(&sensed) {
             self.tick_board(address, inputs);
         }
-        self.strangers.joint_tick(self.now_ns);
+        self.rogue_nodes.joint_tick(self.now_ns);
         self.next_joint_ns += JOINT_TICK_NS;
         self.babble(JOINT_TICK_NS);
         self.collect_transmissions();
@@ -326,13 +326,13 @@ impl World {
         self.start_wheel(wheel)?;
         self.start_counters();
         let (edges, switch) = self.wheel_inputs(wheel);
-        self.wheel_edge_outside(wheel)?;
+        self.wheel_edge_remote(wheel)?;
         self.wheel_edges[wheel] = [edges, self.wheel_edges[wheel][0]];
         let address = wheel as u8 + 7;
         // Only the bridge takes new inputs here: the valves keep their tick.
         let drives = self.drives(address);
-        let outside = self.outside.as_ref().and_then(|o| o.outputs(address));
-        self.inputs.bridge_duty[wheel] = match outside {
+        let remote = self.remote.as_ref().and_then(|o| o.outputs(address));
+        self.inputs.bridge_duty[wheel] = match remote {
             Some(outputs) => duty(&outputs),
             None if !drives => 0.0,
             // The program hands its newest output over at the next edge; stopped, it does not.
@@ -350,42 +350,42 @@ impl World {
             ..BoardInputs::default()
         };
         self.tick_board(address, &inputs);
-        self.strangers.wheel_sample(address, self.now_ns);
+        self.rogue_nodes.wheel_sample(address, self.now_ns);
         self.next_wheel_ns[wheel] += self.board(address).application.tick_ns();
         self.collect_transmissions();
         Ok(())
     }
 
     /// The boards outside of this process.
-    pub(super) fn outside(&mut self) -> Option<&mut Outside> {
-        self.outside.as_mut()
+    pub(super) fn remote(&mut self) -> Option<&mut RemoteBoards> {
+        self.remote.as_mut()
     }
 
     /// A fault begins, or ends.
     ///
     /// # Errors
     /// [`SimError`] if a board outside refuses it, or one that starts anew.
-    pub(super) fn strike(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
+    pub(super) fn inject(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
         let (plant, state) = (&mut self.plant, &mut self.state);
-        self.faults.strike(fault, begin, self.now_ns, plant, state);
-        match (fault.kind, fault.victim) {
-            (FaultKind::DuplicateAddress, Victim::Board(address)) if begin => {
-                self.strangers.plug_in(address, &self.stored)?;
+        self.faults.inject(fault, begin, self.now_ns, plant, state);
+        match (fault.kind, fault.target) {
+            (FaultKind::DuplicateAddress, FaultTarget::Board(address)) if begin => {
+                self.rogue_nodes.plug_in(address, &self.stored)?;
             }
-            (FaultKind::DuplicateAddress, Victim::Board(address)) => {
-                self.strangers.unplug(address);
+            (FaultKind::DuplicateAddress, FaultTarget::Board(address)) => {
+                self.rogue_nodes.unplug(address);
             }
-            (FaultKind::InvalidParameter, Victim::Board(address)) if begin => {
-                self.strangers.write_parameters(address);
+            (FaultKind::InvalidParameter, FaultTarget::Board(address)) if begin => {
+                self.rogue_nodes.write_parameters(address);
             }
             _ => {}
         }
-        self.strike_power(fault, begin)
+        self.inject_power(fault, begin)
     }
 
     /// What happened on the line beside the boards' own doing; each once.
     pub(super) fn take_notes(&mut self) -> Vec<Cause> {
-        self.strangers.take_notes()
+        self.rogue_nodes.take_notes()
     }
 
     /// What a listener says that knows what was sent.

@@ -15,7 +15,7 @@ const WORD: usize = 4;
 /// What stands where nothing may be written.
 const GUARD: u8 = 0xA5;
 
-wheeleg_board::ways_down!();
+wheeleg_board::exception_handlers!();
 
 unsafe extern "C" {
     fn this_image_can_panic() -> !;

@@ -19,7 +19,7 @@ const NEW: i32 = 5_000;
 /// Before the new set is saved, ms.
 const WAIT_MS: u32 = 150;
 
-wheeleg_board::ways_down!();
+wheeleg_board::exception_handlers!();
 
 unsafe extern "C" {
     fn this_image_can_panic() -> !;

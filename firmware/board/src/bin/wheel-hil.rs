@@ -27,5 +27,5 @@ fn main() -> ! {
     hil::run(&PINS, &SESSION)
 }
 
-wheeleg_board::ways_down!();
+wheeleg_board::exception_handlers!();
 wheeleg_board::image_record!(WheelHil);

@@ -2,7 +2,7 @@
 //! that hardware starts at their time, and a driver that hardware switches off.
 
 use super::{latch, pac, timebase};
-use crate::marks::{Mark, Marks};
+use crate::marks::{RxTimestamp, RxTimestamps};
 use crate::ring::{RING, end_of_first, stretches};
 use crate::same_core::Announce;
 use core::cell::UnsafeCell;
@@ -52,7 +52,7 @@ static FRAME: DmaBytes<MAX_ENCODED> = DmaBytes(UnsafeCell::new([0; MAX_ENCODED])
 /// CR3 with DMAT; DMA writes it to USART1 at the start of a transmission.
 static KICK: AtomicU32 = AtomicU32::new(0);
 
-static MARKS: Marks = Marks::new();
+static MARKS: RxTimestamps = RxTimestamps::new();
 static SENDING: AtomicBool = AtomicBool::new(false);
 /// When the driver is off again.
 static END: AtomicU32 = AtomicU32::new(0);
@@ -297,7 +297,7 @@ fn end_transmission() {
 
 #[inline]
 fn mark(time: u32) {
-    MARKS.push(Mark {
+    MARKS.push(RxTimestamp {
         position: position(),
         time: Micros(time),
     });

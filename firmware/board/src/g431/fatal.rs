@@ -38,9 +38,9 @@ pub fn on_nmi() {
 /// The handlers of all that ends in a reset, once in every image: the supply
 /// sags, the clock stops, the processor faults, an interrupt has no handler.
 #[macro_export]
-macro_rules! ways_down {
+macro_rules! exception_handlers {
     () => {
-        mod ways_down {
+        mod exception_handlers {
             use cortex_m_rt::exception;
             use $crate::g431::pac::interrupt;
             use $crate::g431::{fatal, power};

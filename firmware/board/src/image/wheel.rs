@@ -68,5 +68,5 @@ fn DMA1_CHANNEL1() {
     bus::on_ring();
 }
 
-wheeleg_board::ways_down!();
+wheeleg_board::exception_handlers!();
 wheeleg_board::image_record!(Wheel);

@@ -21,7 +21,7 @@ pub enum Enumerated {
     /// Another board than the one that was commissioned here.
     Foreign(Identity),
     /// Two boards answer at this address: their unique ids.
-    Twins([UniqueId; 2]),
+    DuplicateId([UniqueId; 2]),
 }
 
 /// One node.
@@ -30,7 +30,7 @@ pub struct Node {
     /// Who it is.
     pub enumerated: Enumerated,
     /// It did not answer the last question who it is.
-    pub in_vain: bool,
+    pub identify_failed: bool,
     /// Frames that it has counted since it started, when last asked.
     pub frames: Option<u32>,
     /// Its reply in the last cycle, if it answered.
@@ -44,7 +44,7 @@ impl Node {
     #[must_use]
     pub const fn unique_id(&self) -> Option<UniqueId> {
         match self.enumerated {
-            Enumerated::Unknown | Enumerated::Twins(_) => None,
+            Enumerated::Unknown | Enumerated::DuplicateId(_) => None,
             Enumerated::Ready(identity)
             | Enumerated::Foreign(identity)
             | Enumerated::Schema(identity)
@@ -55,7 +55,7 @@ impl Node {
     /// Whether two boards were heard at this address.
     #[must_use]
     pub const fn has_twin(&self) -> bool {
-        matches!(self.enumerated, Enumerated::Twins(_))
+        matches!(self.enumerated, Enumerated::DuplicateId(_))
     }
 }
 
@@ -152,7 +152,7 @@ impl Nodes {
         let known = node.and_then(Node::unique_id);
         let result = if let Some(known) = known.filter(|known| *known != identity.unique_id) {
             // Known and not lost since: this is another board.
-            Enumerated::Twins([known, identity.unique_id])
+            Enumerated::DuplicateId([known, identity.unique_id])
         } else if self
             .commissioned(from)
             .is_some_and(|id| id != identity.unique_id)
@@ -184,9 +184,9 @@ impl Nodes {
 
     /// A node did not answer the question who it is: it is missing, or it and a twin
     /// spoil each other's answers. It is asked by turns so that twins part.
-    pub fn in_vain(&mut self, from: Address) {
+    pub fn identify_failed(&mut self, from: Address) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
-            node.in_vain = !node.in_vain;
+            node.identify_failed = !node.identify_failed;
         }
     }
 
@@ -229,7 +229,7 @@ impl Nodes {
             }),
             Enumerated::Foreign(_) => Some(Refusal::ForeignBoard { node: address }),
             Enumerated::Role(_) => Some(Refusal::WrongRole { node: address }),
-            Enumerated::Twins(_) => Some(Refusal::DuplicateAddress { node: address }),
+            Enumerated::DuplicateId(_) => Some(Refusal::DuplicateAddress { node: address }),
             Enumerated::Unknown => Some(Refusal::NodeMissing { node: address }),
             Enumerated::Ready(_) => (!alive).then_some(Refusal::NodeMissing { node: address }),
         }
@@ -378,9 +378,9 @@ mod tests {
         let mut nodes = Nodes::default();
         let address = Address::of_slot(2).unwrap();
         for turn in [true, false, true] {
-            nodes.in_vain(address);
-            assert_eq!(nodes.get(2).unwrap().in_vain, turn);
-            assert!(!nodes.get(3).unwrap().in_vain);
+            nodes.identify_failed(address);
+            assert_eq!(nodes.get(2).unwrap().identify_failed, turn);
+            assert!(!nodes.get(3).unwrap().identify_failed);
         }
     }
 
@@ -396,7 +396,7 @@ mod tests {
                 "{again}: the same board"
             );
         }
-        let twins = Enumerated::Twins([[1; 12], [2; 12]]);
+        let twins = Enumerated::DuplicateId([[1; 12], [2; 12]]);
         assert_eq!(nodes.identify(address, identity(2), 7), twins);
         let node = nodes.get(2).unwrap();
         assert!(node.has_twin() && node.unique_id().is_none());

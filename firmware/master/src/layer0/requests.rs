@@ -70,7 +70,7 @@ impl Layer0 {
         let to = self.nodes.next_unknown(self.ask_from)?;
         self.ask_from = usize::from(to.raw());
         let node = to.slot().and_then(|index| self.nodes.get(index));
-        let message = if node.is_some_and(|node| node.in_vain) {
+        let message = if node.is_some_and(|node| node.identify_failed) {
             Discover {}.into()
         } else {
             Identify {}.into()
@@ -149,7 +149,7 @@ impl Layer0 {
         events: &mut Events,
     ) {
         let Ok(Message::Identity(identity)) = result else {
-            self.nodes.in_vain(from);
+            self.nodes.identify_failed(from);
             return;
         };
         let node = from.raw();
@@ -180,7 +180,7 @@ impl Layer0 {
                 }
             }
             Enumerated::Role(_) => events.push(now_us, Event::WrongRole(node)),
-            Enumerated::Twins(unique_ids) => {
+            Enumerated::DuplicateId(unique_ids) => {
                 events.push(now_us, Event::DuplicateAddress { node, unique_ids });
             }
             Enumerated::Unknown => {}

@@ -2,7 +2,7 @@
 //! next tick for what a tick changes, within a period of four for what the predictive law keeps
 //! (which has tests of its own), within [`PARTS`] ticks for the rest.
 
-use super::expectation::{MotionModel, MotionWatch};
+use super::no_motion_detector::{MotionModel, MotionWatch};
 use super::node::{JointNode, PARTS};
 use super::precharge::Precharge;
 use super::reference::Target;

@@ -2,7 +2,7 @@
 
 use core::hash::Hash;
 
-use super::expectation::{MotionAccount, MotionWatch};
+use super::no_motion_detector::{MotionAccount, MotionWatch};
 use super::precharge::Precharge;
 use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};

@@ -1,6 +1,6 @@
 //! From the mode and the control law to the four valve outputs of a tick.
 
-use super::expectation::Driven;
+use super::no_motion_detector::Driven;
 use super::node::JointNode;
 use super::precharge::{Filling, Precharge};
 use super::reference::{Target, TickReference, advance};

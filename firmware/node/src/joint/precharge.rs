@@ -23,7 +23,7 @@
 //! sensor either: without supply it counts air that does not come, for no longer than with it, and that
 //! nothing moves is found under control.
 
-use super::expectation::MotionWatch;
+use super::no_motion_detector::MotionWatch;
 use super::settings::TickSettings;
 use crate::JOINT_TICK;
 use wheeleg_control::pwm::OnTimes;

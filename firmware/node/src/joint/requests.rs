@@ -1,6 +1,6 @@
 //! What a joint board does with SYNC and with its own requests.
 
-use super::expectation::MotionWatch;
+use super::no_motion_detector::MotionWatch;
 use super::node::JointNode;
 use super::precharge::Precharge;
 use super::reference::Target;

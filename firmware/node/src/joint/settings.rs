@@ -3,7 +3,7 @@
 use core::hash::{Hash, Hasher};
 
 use super::air::SUPPLY;
-use super::expectation::MotionModel;
+use super::no_motion_detector::MotionModel;
 use crate::JOINT_TICK;
 use crate::parameters::JointParameters;
 use crate::sensor::SensorConfig;

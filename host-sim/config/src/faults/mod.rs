@@ -4,4 +4,4 @@ mod kind;
 mod spec;
 
 pub use kind::{FaultKind, KINDS, KindInfo, NOT_IMPLEMENTED, Place, ValueSpec};
-pub use spec::{FaultSpec, SpecError, Victim};
+pub use spec::{FaultSpec, FaultTarget, SpecError};

@@ -11,7 +11,7 @@ use super::kind::{FaultKind, KINDS, NOT_IMPLEMENTED, Place, ValueSpec};
 
 /// What a fault strikes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Victim {
+pub enum FaultTarget {
     /// The only one there is.
     Robot,
     /// A board by its bus address, 1 to 8.
@@ -28,7 +28,7 @@ pub struct FaultSpec {
     /// Which.
     pub kind: FaultKind,
     /// Where.
-    pub victim: Victim,
+    pub target: FaultTarget,
     /// Its number; the default where none was given, 0 where it takes none.
     pub value: f64,
     /// When it begins, s of scenario time.
@@ -132,9 +132,9 @@ impl Place {
         }
     }
 
-    fn victim(self, target: Option<&str>) -> Option<Victim> {
+    fn target(self, target: Option<&str>) -> Option<FaultTarget> {
         if self == Self::Robot {
-            return target.is_none().then_some(Victim::Robot);
+            return target.is_none().then_some(FaultTarget::Robot);
         }
         let target = target?;
         let board = |text: &str| -> Option<u8> {
@@ -145,13 +145,13 @@ impl Place {
         let index = |names: &[&str; 4], text: &str| names.iter().position(|n| *n == text);
         match self {
             Self::Robot => None,
-            Self::Board => board(target).map(Victim::Board),
-            Self::Joint => board(target).filter(|n| *n <= 6).map(Victim::Board),
-            Self::Wheel => board(target).filter(|n| *n >= 7).map(Victim::Board),
+            Self::Board => board(target).map(FaultTarget::Board),
+            Self::Joint => board(target).filter(|n| *n <= 6).map(FaultTarget::Board),
+            Self::Wheel => board(target).filter(|n| *n >= 7).map(FaultTarget::Board),
             Self::Valve => {
                 let (joint, valve) = target.split_once('.')?;
                 let joint = board(joint).filter(|n| *n <= 6)?;
-                Some(Victim::Valve(
+                Some(FaultTarget::Valve(
                     usize::from(joint) - 1,
                     index(&VALVES, valve)?,
                 ))
@@ -159,7 +159,7 @@ impl Place {
             Self::FootSwitch => {
                 let (leg, switch) = target.split_once('.')?;
                 let leg = LEGS.iter().position(|n| *n == leg)?;
-                Some(Victim::FootSwitch(leg, index(&SWITCHES, switch)?))
+                Some(FaultTarget::FootSwitch(leg, index(&SWITCHES, switch)?))
             }
         }
     }
@@ -187,7 +187,7 @@ impl FromStr for FaultSpec {
             .iter()
             .find(|k| k.name == name)
             .ok_or_else(|| no_such(text, name))?;
-        let victim = info.place.victim(target).ok_or_else(|| SpecError::Target {
+        let found = info.place.target(target).ok_or_else(|| SpecError::Target {
             text: owned(),
             name: info.name,
             expected: info.place.expected(),
@@ -224,7 +224,7 @@ impl FromStr for FaultSpec {
         }
         Ok(Self {
             kind: info.kind,
-            victim,
+            target: found,
             value,
             from_s,
             until_s,
@@ -286,7 +286,7 @@ fn times(text: &str) -> Result<(f64, Option<f64>), String> {
     }
 }
 
-impl fmt::Display for Victim {
+impl fmt::Display for FaultTarget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Robot => Ok(()),
@@ -300,7 +300,7 @@ impl fmt::Display for Victim {
 
 impl fmt::Display for FaultSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{}", self.kind.name(), self.victim)?;
+        write!(f, "{}{}", self.kind.name(), self.target)?;
         if self.kind.info().value.is_some() {
             write!(f, "={}", self.value)?;
         }

@@ -2,7 +2,7 @@
 //! in silence.
 
 use crate::SimError;
-use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::{NodeKind, Nodes};
 
@@ -21,7 +21,7 @@ pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<
                 format!(
                     "a board is built so: write `{}{}@0s`",
                     fault.kind.name(),
-                    fault.victim
+                    fault.target
                 ),
             ));
         }
@@ -44,7 +44,7 @@ pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<
 /// clock, a transmitter and an interface of its own; a board on QEMU has no watchdog that
 /// would end a stopped program, and a bench board a supply that nobody here can cut.
 fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
-    let Victim::Board(address) = fault.victim else {
+    let FaultTarget::Board(address) = fault.target else {
         return Ok(());
     };
     let number = usize::from(address).checked_sub(1);
@@ -100,7 +100,7 @@ pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimEr
     match scenario.faults.iter().find(on_line) {
         Some(fault) if !nodes.all_native() => Err(SimError::simulation(
             format!(
-                "with the fault `{fault}`, boards outside of this program may differ from its \
+                "with the fault `{fault}`, boards remote of this program may differ from its \
                  own: these get a frame as a whole, those byte by byte"
             ),
             "run without --compare-sil, which tells where boards differ at their pins",
@@ -139,7 +139,7 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
 /// Parts of the robot, each with where it is, that a fault takes for itself as long as it
 /// lasts: the simulation keeps one fault of such a part, and its end restores the sound part;
 /// or the two exclude each other, as a wiper that is open and one that jumps.
-fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
+fn parts(fault: &FaultSpec) -> Vec<(&'static str, FaultTarget)> {
     use FaultKind as F;
     let part = match fault.kind {
         F::MasterSilent | F::MasterFrozen => "transmitter of the master",
@@ -153,12 +153,12 @@ fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
         F::ValveStuckOpen | F::ValveStuckShut | F::ValveSlow => "valve",
         F::ValveLeak => "cylinder",
         F::SupplySag | F::SupplyLost => "air source",
-        F::InvalidParameter => return vec![("service tool", Victim::Robot)],
+        F::InvalidParameter => return vec![("service tool", FaultTarget::Robot)],
         _ => return Vec::new(),
     };
-    let mut parts = vec![(part, fault.victim)];
-    if let (F::ValveSlow, Victim::Valve(joint, _)) = (fault.kind, fault.victim) {
-        parts.push(("cylinder", Victim::Board(joint as u8 + 1)));
+    let mut parts = vec![(part, fault.target)];
+    if let (F::ValveSlow, FaultTarget::Valve(joint, _)) = (fault.kind, fault.target) {
+        parts.push(("cylinder", FaultTarget::Board(joint as u8 + 1)));
     }
     parts
 }
@@ -166,16 +166,16 @@ fn parts(fault: &FaultSpec) -> Vec<(&'static str, Victim)> {
 /// What two faults at a time cannot both act on, in words.
 fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
     let others = parts(b);
-    let of = |place: Victim| place.to_string().trim_start_matches(':').to_owned();
+    let of = |place: FaultTarget| place.to_string().trim_start_matches(':').to_owned();
     if let Some((part, place)) = parts(a).into_iter().find(|part| others.contains(part)) {
         return Some(match place {
-            Victim::Robot => format!("the {part}"),
+            FaultTarget::Robot => format!("the {part}"),
             _ => format!("the {part} of {}", of(place)),
         });
     }
     // Of those that combine with every other kind, one of a kind at a time.
-    (a.kind == b.kind && a.victim == b.victim).then(|| match a.victim {
-        Victim::Robot => whole(a.kind).to_owned(),
+    (a.kind == b.kind && a.target == b.target).then(|| match a.target {
+        FaultTarget::Robot => whole(a.kind).to_owned(),
         place => of(place),
     })
 }

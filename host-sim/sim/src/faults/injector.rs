@@ -18,7 +18,7 @@ use wheeleg_protocol::link::SlotTiming;
 use super::interface::of_other;
 use super::line::{LineErrors, record, rubbish};
 use rand::RngExt;
-use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 
 /// Half the side of the ground that falls away, m: further than a robot gets.
 const GROUND_M: f64 = 1e4;
@@ -50,7 +50,7 @@ impl Injector {
     }
 
     /// A fault begins, or ends if `begin` is false. Plant faults are done here.
-    pub(crate) fn strike(
+    pub(crate) fn inject(
         &mut self,
         fault: &FaultSpec,
         begin: bool,
@@ -58,7 +58,7 @@ impl Injector {
         plant: &mut Plant,
         state: &mut PlantState,
     ) {
-        if let (FaultKind::ClockDrift, Victim::Board(address)) = (fault.kind, fault.victim) {
+        if let (FaultKind::ClockDrift, FaultTarget::Board(address)) = (fault.kind, fault.target) {
             self.clock_from_ns[usize::from(address) - 1] = now_ns;
         }
         if begin {
@@ -75,8 +75,8 @@ impl Injector {
         on_sensors(fault, begin, plant, state);
         on_air(fault, begin, plant, state);
         on_ground(fault, begin, plant);
-        if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, Victim::Board(n)) =
-            (fault.kind, fault.victim)
+        if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, FaultTarget::Board(n)) =
+            (fault.kind, fault.target)
         {
             self.encoder_at[usize::from(n) - 7] = None;
         }
@@ -91,7 +91,8 @@ impl Injector {
     }
 
     fn strikes(&self, kind: FaultKind, address: u8) -> bool {
-        self.of(kind).any(|f| f.victim == Victim::Board(address))
+        self.of(kind)
+            .any(|f| f.target == FaultTarget::Board(address))
     }
 
     /// The value of a fault of which there is one at a time (`admission`); 0 without it.
@@ -190,7 +191,7 @@ impl Injector {
         let address = joint as u8 + 1;
         let noise_mm: f64 = self
             .of(FaultKind::PotNoisy)
-            .filter(|f| f.victim == Victim::Board(address))
+            .filter(|f| f.target == FaultTarget::Board(address))
             .map(|f| f.value)
             .sum();
         if noise_mm == 0.0 {
@@ -205,7 +206,7 @@ impl Injector {
     pub(crate) fn switches(&self, leg: usize, sound: [bool; 4]) -> [bool; 4] {
         let stuck = |kind, switch| {
             self.of(kind)
-                .any(|f| f.victim == Victim::FootSwitch(leg, switch))
+                .any(|f| f.target == FaultTarget::FootSwitch(leg, switch))
         };
         std::array::from_fn(|i| {
             (sound[i] || stuck(FaultKind::SwitchStuckOn, i)) && !stuck(FaultKind::SwitchStuckOff, i)
@@ -227,7 +228,7 @@ impl Injector {
     pub(crate) fn clock_ns(&self, address: u8, now_ns: u64) -> u64 {
         let drift = self
             .of(FaultKind::ClockDrift)
-            .filter(|f| f.victim == Victim::Board(address));
+            .filter(|f| f.target == FaultTarget::Board(address));
         // The drift begins with the fault; before it the clock was right.
         let since_ns = now_ns.saturating_sub(self.clock_from_ns[usize::from(address) - 1]);
         drift.fold(now_ns, |t, f| {
@@ -240,7 +241,7 @@ impl Injector {
         let ahead_ns = u64::from(ahead_us) * 1_000;
         let drift = self
             .of(FaultKind::ClockDrift)
-            .filter(|f| f.victim == Victim::Board(address));
+            .filter(|f| f.target == FaultTarget::Board(address));
         drift.fold(ahead_ns, |ns, f| {
             (ns as f64 / (1.0 + f.value * 1e-6)).round() as u64
         })
@@ -253,7 +254,7 @@ impl Injector {
 }
 
 fn on_sensors(fault: &FaultSpec, begin: bool, plant: &Plant, state: &mut PlantState) {
-    let Victim::Board(address @ 1..=6) = fault.victim else {
+    let FaultTarget::Board(address @ 1..=6) = fault.target else {
         return;
     };
     let joint = usize::from(address) - 1;
@@ -272,8 +273,11 @@ fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantSt
     let supply = plant.params().supply;
     let ambient = plant.params().gas.ambient_pressure_pa;
     let core = &mut state.core;
-    match (fault.kind, fault.victim) {
-        (FaultKind::ValveStuckOpen | FaultKind::ValveStuckShut, Victim::Valve(joint, valve)) => {
+    match (fault.kind, fault.target) {
+        (
+            FaultKind::ValveStuckOpen | FaultKind::ValveStuckShut,
+            FaultTarget::Valve(joint, valve),
+        ) => {
             let stuck = if fault.kind == FaultKind::ValveStuckOpen {
                 ValveFault::StuckOpen
             } else {
@@ -283,12 +287,12 @@ fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantSt
             cylinder.valves[valve].fault = if begin { stuck } else { ValveFault::None };
             cylinder.refresh();
         }
-        (FaultKind::ValveSlow, Victim::Valve(joint, valve)) => {
+        (FaultKind::ValveSlow, FaultTarget::Valve(joint, valve)) => {
             rebuild(plant, joint, begin, |c| {
                 c.timing_spread[valve] *= fault.value
             });
         }
-        (FaultKind::ValveLeak, Victim::Board(address @ 1..=6)) => {
+        (FaultKind::ValveLeak, FaultTarget::Board(address @ 1..=6)) => {
             rebuild(plant, usize::from(address) - 1, begin, |c| {
                 c.piston_leak_m3_s_pa *= fault.value;
                 c.rod_leak_m3_s_pa *= fault.value;
@@ -316,7 +320,7 @@ fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantSt
                 ValveFault::None
             };
         }
-        (FaultKind::LoadStep, Victim::Board(address @ 1..=6)) => {
+        (FaultKind::LoadStep, FaultTarget::Board(address @ 1..=6)) => {
             let force_n = if begin { fault.value } else { 0.0 };
             plant.assembly.mechanics.load_n[usize::from(address) - 1] = force_n;
         }
@@ -382,17 +386,17 @@ mod tests {
         let mut plant = Plant::new(&robot.plant).expect("a plant");
         let mut state = plant.initial_state(1).expect("a state");
         let mut injector = Injector::new(1);
-        let mut strike = |injector: &mut Injector, text: &str, begin| {
+        let mut inject = |injector: &mut Injector, text: &str, begin| {
             let fault = text.parse().expect(text);
-            injector.strike(&fault, begin, 0, &mut plant, &mut state);
+            injector.inject(&fault, begin, 0, &mut plant, &mut state);
         };
-        strike(&mut injector, "encoder-lost:wheel7@1s", true);
+        inject(&mut injector, "encoder-lost:wheel7@1s", true);
         assert_eq!(injector.edges(0, 100), 100);
-        strike(&mut injector, "node-silent:wheel7@2s..3s", true);
+        inject(&mut injector, "node-silent:wheel7@2s..3s", true);
         assert_eq!(injector.edges(0, 250), 100);
-        strike(&mut injector, "encoder-lost:wheel7@1s", false);
+        inject(&mut injector, "encoder-lost:wheel7@1s", false);
         assert_eq!(injector.edges(0, 300), 300);
-        strike(&mut injector, "encoder-reversed:wheel7@4s", true);
+        inject(&mut injector, "encoder-reversed:wheel7@4s", true);
         assert_eq!(injector.edges(0, 400), 400);
         assert_eq!(injector.edges(0, 430), 370);
     }

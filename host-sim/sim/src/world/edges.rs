@@ -7,12 +7,12 @@ use wheeleg_remote_link as link;
 use super::World;
 use crate::SimError;
 use crate::board::BoardInputs;
-use wheeleg_remote_host::Outside;
+use wheeleg_remote_host::RemoteBoards;
 
 impl World {
     /// The edge of all joint boards outside, and the comparison of the outputs
     /// that act from it on.
-    pub(super) fn joint_edge_outside(&mut self, sensed: &[BoardInputs; 6]) -> Result<(), SimError> {
+    pub(super) fn joint_edge_remote(&mut self, sensed: &[BoardInputs; 6]) -> Result<(), SimError> {
         // The dump valve acts at once: its board is brought to this instant.
         let mut edges: Vec<(u8, Option<link::Inputs>)> = vec![(7, None)];
         for (address, board) in (1..).zip(sensed) {
@@ -24,7 +24,7 @@ impl World {
             edges.push((address, Some(inputs)));
         }
         edges.rotate_left(1);
-        self.run_outside(&edges)?;
+        self.run_remote(&edges)?;
         for address in 1..=6 {
             self.compare_outputs(address);
         }
@@ -35,21 +35,21 @@ impl World {
     fn compare_outputs(&mut self, address: u8) {
         if self.runs(address) {
             let here = self.board(address).application.active_outputs();
-            if let Some(outside) = &mut self.outside {
-                outside.compare_outputs(self.now_ns, address, &here);
+            if let Some(remote) = &mut self.remote {
+                remote.compare_outputs(self.now_ns, address, &here);
             }
         }
     }
 
     /// The edge of a wheel board outside, and the comparison of its outputs. Boards
     /// whose edges fall on one instant work at the same time.
-    pub(super) fn wheel_edge_outside(&mut self, wheel: usize) -> Result<(), SimError> {
+    pub(super) fn wheel_edge_remote(&mut self, wheel: usize) -> Result<(), SimError> {
         let now_ns = self.now_ns;
         let mut edges = Vec::new();
         for i in 0..2 {
             let address = i as u8 + 7;
-            let fresh = |outside: &Outside| outside.edge_ns(address) != Some(now_ns);
-            if self.next_wheel_ns[i] == now_ns && self.outside.as_ref().is_some_and(fresh) {
+            let fresh = |remote: &RemoteBoards| remote.edge_ns(address) != Some(now_ns);
+            if self.next_wheel_ns[i] == now_ns && self.remote.as_ref().is_some_and(fresh) {
                 let (count, switch) = self.wheel_inputs(i);
                 let inputs = link::Inputs {
                     adc: 0,
@@ -61,7 +61,7 @@ impl World {
             }
         }
         if !edges.is_empty() {
-            self.run_outside(&edges)?;
+            self.run_remote(&edges)?;
         }
         self.compare_outputs(wheel as u8 + 7);
         Ok(())
@@ -69,31 +69,31 @@ impl World {
 
     /// Brings all boards outside to this instant, so that they answer what was
     /// delivered just now.
-    pub(super) fn deliver_outside(&mut self) -> Result<(), SimError> {
+    pub(super) fn deliver_remote(&mut self) -> Result<(), SimError> {
         let all: [(u8, Option<link::Inputs>); 8] = std::array::from_fn(|i| (i as u8 + 1, None));
-        self.run_outside(&all)
+        self.run_remote(&all)
     }
 
     /// Runs boards outside to this instant, with an edge those that have inputs.
-    pub(super) fn run_outside(
+    pub(super) fn run_remote(
         &mut self,
         edges: &[(u8, Option<link::Inputs>)],
     ) -> Result<(), SimError> {
         let (now_ns, bus) = (self.now_ns, &self.bus);
-        let Some(outside) = &mut self.outside else {
+        let Some(remote) = &mut self.remote else {
             return Ok(());
         };
-        outside.run(now_ns, edges, bus.byte_ns(), |address, after_ns| {
+        remote.run(now_ns, edges, bus.byte_ns(), |address, after_ns| {
             bus.heard(address, after_ns, now_ns)
         })?;
-        self.bus.forget_delivered(outside.heard_by_all_ns());
+        self.bus.forget_delivered(remote.heard_by_all_ns());
         self.restart_tripped()
     }
 
     /// A board outside that was reset: the application beside it starts anew.
     fn restart_tripped(&mut self) -> Result<(), SimError> {
         for raw in 1..=8_u8 {
-            let trip = self.outside.as_mut().and_then(|o| o.take_trip(raw));
+            let trip = self.remote.as_mut().and_then(|o| o.take_trip(raw));
             let Some((trip, address)) = trip.zip(Address::new(raw)) else {
                 continue;
             };
@@ -106,7 +106,7 @@ impl World {
             self.start_anew(address, cause)?;
         }
         for raw in 1..=8_u8 {
-            let first = self.outside.as_mut().and_then(|o| o.take_first_edge(raw));
+            let first = self.remote.as_mut().and_then(|o| o.take_first_edge(raw));
             if let Some(first_ns) = first {
                 self.down_times.first_edge(self.now_ns, raw, first_ns);
             }

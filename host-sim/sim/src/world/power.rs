@@ -52,8 +52,8 @@ impl World {
     /// First tick edge of the board at `address` since its newest start, ns; `None` if
     /// that is not known yet.
     fn started_ns(&self, address: u8) -> Option<u64> {
-        match self.outside.as_ref().filter(|o| o.has(address)) {
-            Some(outside) => outside.running_from_ns(address),
+        match self.remote.as_ref().filter(|o| o.has(address)) {
+            Some(remote) => remote.running_from_ns(address),
             None => Some(self.board(address).clock_zero_ns),
         }
     }
@@ -73,8 +73,8 @@ impl World {
     /// The clock of the board at `address` at `ns`: it counts from the first tick edge
     /// after its processor has started.
     pub(super) fn clock(&self, address: u8, ns: u64) -> Micros {
-        let outside = self.outside.as_ref();
-        let there = outside.and_then(|o| o.running_from_ns(address));
+        let remote = self.remote.as_ref();
+        let there = remote.and_then(|o| o.running_from_ns(address));
         let zero_ns = there.unwrap_or(self.board(address).clock_zero_ns);
         let now = micros(self.faults.clock_ns(address, ns));
         let zero = micros(self.faults.clock_ns(address, zero_ns));
@@ -86,15 +86,15 @@ impl World {
     ///
     /// # Errors
     /// [`SimError`] if the application refuses its parameters.
-    pub(super) fn keep_down_times(&mut self) -> Result<(), SimError> {
+    pub(super) fn replay_resets(&mut self) -> Result<(), SimError> {
         let now_ns = self.now_ns;
         loop {
             let boards = &self.boards;
-            let struck = |address: u8| match boards[usize::from(address) - 1].down {
+            let affected = |address: u8| match boards[usize::from(address) - 1].down {
                 Down::Off { .. } | Down::Starting { .. } | Down::Hung { .. } => true,
                 Down::No | Down::Storing { .. } => false,
             };
-            match self.kept.next(now_ns, struck) {
+            match self.replayed.next(now_ns, affected) {
                 None => return Ok(()),
                 Some(Due::Reset(raw, cause)) => {
                     if let Some(address) = Address::new(raw) {
@@ -129,12 +129,12 @@ impl World {
         address: Address,
         cause: ResetCause,
     ) -> Result<(), SimError> {
-        let outside = self.outside.as_ref();
-        let outside = outside.is_some_and(|o| o.has(address.raw()));
+        let remote = self.remote.as_ref();
+        let remote = remote.is_some_and(|o| o.has(address.raw()));
         let now_ns = self.now_ns;
         let board = self.board_mut(address.raw());
         // A board outside that has lost its power stays without until it is given back.
-        if !(outside && matches!(board.down, Down::Off { .. })) {
+        if !(remote && matches!(board.down, Down::Off { .. })) {
             board.down = Down::No;
         }
         board.restart(address, cause)?;
@@ -167,7 +167,7 @@ impl World {
                 Down::Starting { .. } if raw > 6 => continue,
                 Down::Starting { until_ns, .. } => until_ns.saturating_sub(JOINT_TICK_NS),
                 // How long that takes is known from the run that this one repeats.
-                Down::Off { .. } | Down::Hung { .. } if self.kept.rule(raw) => continue,
+                Down::Off { .. } | Down::Hung { .. } if self.replayed.is_replayed(raw) => continue,
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
                 // The tick of the last edge before the end is worked off then.
                 Down::Storing { until_ns } => {
@@ -181,15 +181,15 @@ impl World {
             let Some(address) = Address::new(raw).filter(|_| until_ns <= self.now_ns) else {
                 continue;
             };
-            match &mut self.outside {
+            match &mut self.remote {
                 // Its own watchdog and its own start-up end the fault.
-                Some(outside) if outside.has(raw) => {
-                    outside.set_power(raw, link::Power::Good);
+                Some(remote) if remote.has(raw) => {
+                    remote.set_power(raw, link::Power::Good);
                     if matches!(down, Down::Off { .. }) {
                         self.board_mut(raw).down = Down::No;
                     }
                     // From this very instant on.
-                    self.run_outside(&[(raw, None)])?;
+                    self.run_remote(&[(raw, None)])?;
                 }
                 _ => match down {
                     Down::Starting { cause, .. } => self.start_anew(address, cause)?,
@@ -240,8 +240,8 @@ impl World {
                 if let Application::Wheel(board) = &mut self.board_mut(address).application {
                     board.counts_from(edges);
                 }
-                if let Some(outside) = &mut self.outside {
-                    outside.counts_from(address, edges);
+                if let Some(remote) = &mut self.remote {
+                    remote.counts_from(address, edges);
                 }
             }
         }

@@ -9,7 +9,7 @@ use crate::audit::Audit;
 use crate::bus::{Bus, Driver};
 use crate::clock::{NS_PER_US, micros};
 use crate::faults::Injector;
-use crate::strangers;
+use crate::rogue_nodes;
 
 /// How far a start lies ahead on the board's own clock, µs, when that shows `now`.
 fn ahead_us(now: Micros, start_at: Micros) -> u32 {
@@ -84,13 +84,13 @@ impl World {
             {
                 self.master.on_bus_bytes(&bytes, end_ns / NS_PER_US);
             }
-            self.strangers.hear(&self.bus, &delivery);
-            if let Some((bytes, _)) = self.bus.heard_by(strangers::AUDITOR, &delivery) {
+            self.rogue_nodes.hear(&self.bus, &delivery);
+            if let Some((bytes, _)) = self.bus.heard_by(rogue_nodes::AUDITOR, &delivery) {
                 self.audit.heard(&bytes);
             }
         }
         if answerable {
-            self.deliver_outside()?;
+            self.deliver_remote()?;
         }
         self.collect_transmissions();
         self.offer_line();
@@ -103,17 +103,17 @@ impl World {
         let clocks: [Micros; 8] = std::array::from_fn(|i| self.clock(i as u8 + 1, now_ns));
         let clock = |address: u8| clocks[usize::from(address) - 1];
         let (bus, audit) = (&mut self.bus, &mut self.audit);
-        let (faults, outside) = (&mut self.faults, &mut self.outside);
+        let (faults, remote) = (&mut self.faults, &mut self.remote);
         // True if the guard of the board's driver cut it off.
         let mut send = |from: u8, t: wheeleg_node::Transmission| {
             // Start times are on the board's own clock.
             let ahead_us = ahead_us(clock(from), t.start_at);
             let start_ns = now_ns + faults.duration_ns(from, ahead_us);
-            match outside {
+            match remote {
                 // What goes on the line is what the board outside sends; what faults make
                 // of it on the way is none of the comparison's business.
-                Some(outside) if outside.has(from) => {
-                    outside.expect_frame(from, start_ns, t.bytes.to_vec());
+                Some(remote) if remote.has(from) => {
+                    remote.expect_frame(from, start_ns, t.bytes.to_vec());
                     false
                 }
                 _ => {
@@ -132,14 +132,14 @@ impl World {
                 }
             }
         }
-        while let Some((from, t)) = self.strangers.take_transmission() {
+        while let Some((from, t)) = self.rogue_nodes.take_transmission() {
             let ahead_us = ahead_us(micros(now_ns), t.start_at);
             let start_ns = now_ns + u64::from(ahead_us) * NS_PER_US;
             transmit(bus, audit, faults, from, start_ns, t.bytes.to_vec());
         }
-        if let Some(outside) = outside {
+        if let Some(remote) = remote {
             for address in 1..=8 {
-                for (start_ns, bytes) in outside.take_frames(address) {
+                for (start_ns, bytes) in remote.take_frames(address) {
                     if let Some(bytes) = faults.board_sends(address, bytes) {
                         transmit(bus, audit, faults, address, start_ns, bytes);
                     }
@@ -163,13 +163,13 @@ impl World {
             return;
         }
         let left_ns = self.next_cycle_ns.saturating_sub(self.now_ns);
-        if let Some(bytes) = self.strangers.service_request(now_us, left_ns) {
-            self.transmit(strangers::SERVICE, self.now_ns, bytes);
+        if let Some(bytes) = self.rogue_nodes.service_request(now_us, left_ns) {
+            self.transmit(rogue_nodes::SERVICE, self.now_ns, bytes);
             return;
         }
         let room = (left_ns / self.bus.byte_ns()) as usize;
         if let Some(bytes) = self.faults.stream(room) {
-            self.transmit(strangers::STREAM, self.now_ns, bytes);
+            self.transmit(rogue_nodes::STREAM, self.now_ns, bytes);
         }
     }
 

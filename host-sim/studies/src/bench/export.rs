@@ -7,7 +7,7 @@ use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_plant::chamber::GasModel;
 
 use super::suite::BenchError;
-use super::{Bench, Firmware, Kind, Motion, Trace, design};
+use super::{AxisSim, Firmware, Kind, Motion, Trace, design};
 
 /// Length of each sequence \[ms\].
 const TICKS: usize = 600;
@@ -99,7 +99,7 @@ fn closed_loop(params: &AxisParams, kind: Kind) -> Result<Value, BenchError> {
     let mut p = params.clone();
     p.initial_stroke_m = 0.25 * stroke_m;
     let board = Firmware::new(&design(&p, kind)).map_err(BenchError::Design)?;
-    let mut bench = Bench::new(&p, 5, board)?;
+    let mut bench = AxisSim::new(&p, 5, board)?;
     let step = Motion::Step {
         at_s: 0.02,
         from_m: 0.25 * stroke_m,

@@ -7,7 +7,7 @@ use wheeleg_protocol::FaultBits;
 use wheeleg_units::Micros;
 
 use super::firmware::{Design, Firmware};
-use super::run::{Action, Bench, Board, Sample};
+use super::run::{Action, AxisSim, Board, Sample};
 use super::{Kind, Motion, design};
 
 /// Longest search \[s\].
@@ -60,7 +60,7 @@ pub fn identify(
         probe: DelayProbe::new(),
         firmware,
     };
-    let mut bench = Bench::new(real, seed, board)?;
+    let mut bench = AxisSim::new(real, seed, board)?;
     let hold = Motion::hold(real.initial_stroke_m);
     let mut spent_s = 0.0;
     while !bench.board.probe.is_done() && spent_s < LIMIT_S {

@@ -8,22 +8,22 @@
 //! seed, motion and loads; a second of it takes about 2 ms.
 //!
 //! ```
-//! use wheeleg_sim::bench::{Bench, Firmware, Kind, Metrics, Motion, design};
+//! use wheeleg_sim::bench::{AxisSim, Firmware, Kind, Metrics, Motion, design};
 //! use wheeleg_sim::config::AxisConfig;
 //!
 //! let axis = AxisConfig::load("bench-vq110u")?.axis;
 //! let board = Firmware::new(&design(&axis, Kind::Predictive)).expect("a valid design");
-//! let mut bench = Bench::new(&axis, 1, board)?;
+//! let mut bench = AxisSim::new(&axis, 1, board)?;
 //! let step = Motion::Step { at_s: 0.05, from_m: 0.04, to_m: 0.14 };
 //! let first = Metrics::of(&bench.run(&step, &[], 1.5)?);
 //! assert!(first.steady_error_mm.abs() < 0.2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! * [`Bench::run`] keeps chamber pressures, noise and what the board has learnt
+//! * [`AxisSim::run`] keeps chamber pressures, noise and what the board has learnt
 //!   from one motion to the next; so a learning move is simply a motion before.
 //! * [`Metrics::of`] works out the figures; [`suite`] has the experiments of the
-//!   comparison; [`grain`] says whether valves are fine enough for a cylinder;
+//!   comparison; [`valve_resolution`] says whether valves are fine enough for a cylinder;
 //!   [`optimal`] the bound that perfect knowledge gives; [`identify`]
 //!   finds the valves' delays at start-up, as a board would.
 
@@ -32,7 +32,6 @@ mod design;
 mod error;
 pub mod export;
 mod firmware;
-pub mod grain;
 mod identify;
 mod metrics;
 mod motion;
@@ -42,12 +41,13 @@ pub mod plant_check;
 mod refusal;
 mod run;
 pub mod suite;
+pub mod valve_resolution;
 
 pub use design::{Kind, axis_data, design};
 pub use firmware::{Design, Firmware, Supervision, TICK};
-pub use grain::Grain;
 pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};
 pub use node::Node;
-pub use run::{Action, Bench, Board, Row, Sample, Trace};
+pub use run::{Action, AxisSim, Board, Row, Sample, Trace};
+pub use valve_resolution::ValveResolution;

@@ -84,7 +84,7 @@ pub struct Trace {
 /// Plant and board, with the state that carries over from run to run: chamber
 /// pressures, what the board has learnt, noise.
 #[derive(Debug, Clone)]
-pub struct Bench<B> {
+pub struct AxisSim<B> {
     axis: Axis,
     /// State of the plant; may be changed between runs.
     pub state: AxisState,
@@ -95,7 +95,7 @@ pub struct Bench<B> {
     pub notice_s: f64,
 }
 
-impl<B: Board> Bench<B> {
+impl<B: Board> AxisSim<B> {
     /// A bench at rest with its starting pressures. `seed` makes the noise of
     /// the converter.
     ///
@@ -131,7 +131,7 @@ impl<B: Board> Bench<B> {
         self.watch(motion, loads, duration_s, |_, _| {})
     }
 
-    /// As [`Bench::run`], and shows each row and the board to `watch`.
+    /// As [`AxisSim::run`], and shows each row and the board to `watch`.
     ///
     /// # Errors
     /// Any [`PlantError`]; the bench is not usable after one.

@@ -12,7 +12,7 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
 pub use super::error::BenchError;
-use super::{Bench, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
+use super::{AxisSim, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
 
 /// What differs from the data sheet.
@@ -149,26 +149,26 @@ pub fn designed(
 }
 
 /// A supervised board on its plant, moved from place to place.
-pub struct Rig {
-    bench: Bench<Node>,
+pub struct TestRig {
+    bench: AxisSim<Node>,
     at_m: f64,
 }
 
-impl Rig {
+impl TestRig {
     /// Power-up of a board with a design on a plant at rest.
     ///
     /// # Errors
     /// [`BenchError`].
     pub fn new(plant: &AxisParams, design: &Design, seed: u64) -> Result<Self, BenchError> {
         Ok(Self {
-            bench: Bench::new(plant, seed, Node::new(design)?)?,
+            bench: AxisSim::new(plant, seed, Node::new(design)?)?,
             at_m: plant.initial_stroke_m,
         })
     }
 
     /// Plant and board.
     #[must_use]
-    pub fn bench(&self) -> &Bench<Node> {
+    pub fn bench(&self) -> &AxisSim<Node> {
         &self.bench
     }
 
@@ -238,7 +238,7 @@ pub fn steps(
 ) -> Result<Vec<Trace>, BenchError> {
     let plant = factors.plant(sheet);
     let design = designed(sheet, &plant, kind, start, seed)?;
-    let mut rig = Rig::new(&plant, &design, seed)?;
+    let mut rig = TestRig::new(&plant, &design, seed)?;
     targets_m
         .iter()
         .map(|to_m| rig.step(*to_m, seconds))
@@ -262,7 +262,7 @@ pub fn home_retract(
     let mut start = plant.clone();
     let stroke_m = plant.cylinder.stroke_m;
     start.initial_stroke_m = 0.9 * stroke_m;
-    let mut bench = Bench::new(&start, seed, board)?;
+    let mut bench = AxisSim::new(&start, seed, board)?;
     // A little beyond the stop, so that a law without a settle band keeps pushing.
     let home_m = stroke_m + 1e-3;
     bench.run(

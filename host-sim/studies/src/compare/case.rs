@@ -10,7 +10,7 @@ use wheeleg_protocol::FaultBits;
 
 use super::moves::{CONTACT_S, Move, Played, RECOVERY_S};
 use super::variation::{UnknownVariation, Variation};
-use crate::bench::suite::{BenchError, Rig, StartUp};
+use crate::bench::suite::{BenchError, StartUp, TestRig};
 use crate::bench::{Delays, Kind, Metrics, Trace, design, design_with, identify};
 
 /// Smallest static margin of a feasible case: a quarter more force than the load.
@@ -173,7 +173,7 @@ impl Scene {
             StartUp::Identified => design_with(&self.sheet, self.delays, kind),
         };
         let plant = motion.plant(&self.plant, &self.sheet);
-        let mut rig = Rig::new(&plant, &design, self.seed)?;
+        let mut rig = TestRig::new(&plant, &design, self.seed)?;
         motion.play(&mut rig, &self.sheet, plant.load_n).map(Some)
     }
 

@@ -26,7 +26,7 @@ pub use single::{Single, play};
 pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 
 use crate::StudyError;
-use crate::bench::suite::{BenchError, Rig};
+use crate::bench::suite::{BenchError, TestRig};
 use crate::bench::{Kind, design, optimal};
 use crate::study::{self, Ended, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
@@ -117,7 +117,7 @@ pub(crate) fn axis_error(file: &str, e: &BenchError) -> StudyError {
 pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError> {
     let config = AxisConfig::load(name)?;
     for kind in kinds {
-        Rig::new(&config.axis, &design(&config.axis, *kind), 0)
+        TestRig::new(&config.axis, &design(&config.axis, *kind), 0)
             .map_err(|e| axis_error(name, &e))?;
     }
     Ok(config)
@@ -327,7 +327,7 @@ fn bounds(
     let pairs = [[low_m, high_m], [high_m - sizes.small_m, high_m]];
     let mut found = [None; 2];
     for (bound_s, [from_m, to_m]) in found.iter_mut().zip(pairs) {
-        let mut rig = Rig::new(sheet, &design(sheet, Kind::Predictive), 1)?;
+        let mut rig = TestRig::new(sheet, &design(sheet, Kind::Predictive), 1)?;
         rig.step(to_m, STEP_S)?;
         let mut fastest = |target_m: f64| -> Result<f64, BenchError> {
             let bench = rig.bench();

@@ -2,7 +2,7 @@
 
 use wheeleg_plant::axis::AxisParams;
 
-use crate::bench::suite::{BenchError, LEAD_S, Rig, force_left_n};
+use crate::bench::suite::{BenchError, LEAD_S, TestRig, force_left_n};
 use crate::bench::{LoadEvent, Motion, Trace};
 
 /// What a case asks of the axis.
@@ -148,7 +148,7 @@ impl Move {
     /// [`BenchError`].
     pub fn play(
         self,
-        rig: &mut Rig,
+        rig: &mut TestRig,
         sheet: &AxisParams,
         load_n: f64,
     ) -> Result<Played, BenchError> {

@@ -2,7 +2,7 @@
 
 use wheeleg_report::plot::Colour;
 
-use super::notice::Noticed;
+use super::preview::Previewed;
 use super::trial::{LEAD_S, Law, Outcome, Start};
 use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, PAPER_BAND_S, PAPER_DELAY_S, Study};
 use wheeleg_report::plot::{Axis, Content, Figure, Panel, RasterRow, Series, colour, line};
@@ -243,7 +243,7 @@ fn scaling(study: &Study) -> Figure {
 
 /// Delay and early motion over notice.
 fn notice(study: &Study) -> Figure {
-    let rows = |start: Start, load_n: f64, y: fn(&Noticed) -> Option<f64>| -> Points {
+    let rows = |start: Start, load_n: f64, y: fn(&Previewed) -> Option<f64>| -> Points {
         let list = study.notice.rows.iter();
         let of = list.filter(|r| r.law == Law::Default && r.start == start && r.load_n == load_n);
         of.filter_map(|r| Some((r.notice_s, y(r)?))).collect()
@@ -256,7 +256,7 @@ fn notice(study: &Study) -> Figure {
         (Start::StopHeld, 0.0, "stop, held", colour::DELAYED),
         (Start::MidRetract, 0.0, "mid-stroke", colour::SECOND),
     ];
-    let series = |y: fn(&Noticed) -> Option<f64>, named: bool| {
+    let series = |y: fn(&Previewed) -> Option<f64>, named: bool| {
         kinds
             .iter()
             .map(|(start, load, name, c)| {

@@ -15,15 +15,15 @@
 
 pub mod ablation;
 mod charts;
-mod hands;
 pub mod kinds;
-pub mod notice;
 mod page;
 pub mod predictions;
+pub mod preview;
 pub mod scaling;
 pub mod starts;
 mod tables;
 pub mod trial;
+mod valve_override;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -90,7 +90,7 @@ pub struct Study {
     /// Predictions.
     pub predictions: predictions::Predictions,
     /// Announced moves.
-    pub notice: notice::Notice,
+    pub notice: preview::Preview,
 }
 
 /// The vertical cylinder of the robot's left leg on a bench.
@@ -148,7 +148,7 @@ fn mean_delay(outcomes: &[Outcome]) -> Option<f64> {
 struct Collected {
     starts: starts::Starts,
     ablation: Option<ablation::Ablation>,
-    notice: Option<notice::Notice>,
+    notice: Option<preview::Preview>,
     predictions: Option<predictions::Predictions>,
 }
 
@@ -165,7 +165,7 @@ impl Collected {
         let starts = starts::measure(&axis, seeds, progress)?;
         let ablation = ablation::measure(&axis, bus, weight_n, seeds, progress);
         let ablation = Ended::kept(ablation)?;
-        let notice = Ended::kept(notice::measure(&axis, seeds.min(8), progress))?;
+        let notice = Ended::kept(preview::measure(&axis, seeds.min(8), progress))?;
         let predictions = match &notice {
             Some(notice) => Ended::kept(predictions::measure(
                 &axis, &starts, notice, seeds, progress,
@@ -254,7 +254,7 @@ pub struct Summary<'a> {
     /// Predictions.
     predictions: Option<&'a predictions::Predictions>,
     /// Announced moves.
-    notice: Option<&'a notice::Notice>,
+    notice: Option<&'a preview::Preview>,
 }
 
 impl study::Summary for Summary<'_> {

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::notice::Noticed;
 use super::predictions::Prediction;
+use super::preview::Previewed;
 use super::starts::Distribution;
 use super::trial::{Law, Start};
 use super::{PAPER_BAND_S, PAPER_DELAY_S, Study};
@@ -124,11 +124,11 @@ struct Announced<'a> {
     law: &'static str,
     start: &'static str,
     meets: bool,
-    row: &'a Noticed,
+    row: &'a Previewed,
 }
 
 impl<'a> Announced<'a> {
-    fn new(row: &'a Noticed) -> Self {
+    fn new(row: &'a Previewed) -> Self {
         Self {
             law: row.law.name(),
             start: row.start.name(),

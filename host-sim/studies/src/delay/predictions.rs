@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
-use super::notice::Notice;
+use super::preview::Preview;
 use super::scaling::{
     Bored, FACTORS, Line, SEEDS, Scaled, TUBES, Work, bores, delays, fit, home, never, scaling,
     spread, thrown,
@@ -80,7 +80,7 @@ pub struct Predictions {
 pub fn measure(
     axis: &AxisParams,
     starts: &Starts,
-    notice: &Notice,
+    notice: &Preview,
     seeds: u32,
     progress: &Progress,
 ) -> Result<Predictions, Ended> {
@@ -92,7 +92,7 @@ pub fn measure(
         before,
         ..home(axis)
     };
-    let hands = delays(
+    let valve_override = delays(
         &[prepared(Before::Vented), prepared(Before::Balanced)],
         work,
     )?;
@@ -159,15 +159,15 @@ pub fn measure(
         prediction(
             "vented before",
             "with the counter chamber vented before, the delay falls to about 0.05 s (0.03 to 0.07 s)",
-            format!("{:.3} s", hands[0]),
-            hands[0],
+            format!("{:.3} s", valve_override[0]),
+            valve_override[0],
             (0.03, 0.07),
         ),
         prediction(
             "balanced before",
             "with both chambers balanced before, the delay falls to about 0.05 s (0.03 to 0.07 s)",
-            format!("{:.3} s", hands[1]),
-            hands[1],
+            format!("{:.3} s", valve_override[1]),
+            valve_override[1],
             (0.03, 0.07),
         ),
         prediction(

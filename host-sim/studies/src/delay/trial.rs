@@ -13,10 +13,10 @@ use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_units::{Duty, PositionMm};
 
-use super::hands::Hands;
 pub use super::kinds::{Law, Start};
+use super::valve_override::ValveOverride;
 use crate::bench::suite::BenchError;
-use crate::bench::{Bench, Design, Firmware, Motion, Row, design};
+use crate::bench::{AxisSim, Design, Firmware, Motion, Row, design};
 
 /// A start counts from here: the first motion of this much from where the piston turned \[m\].
 pub const STARTED_M: f64 = 1e-3;
@@ -152,7 +152,7 @@ pub struct Outcome {
 pub const LEAD_S: f64 = 0.5;
 
 /// Pressures of the chambers as they are \[Pa\].
-fn pressures(bench: &Bench<Hands>) -> [f64; 2] {
+fn pressures(bench: &AxisSim<ValveOverride>) -> [f64; 2] {
     let model = &bench.axis().assembly.cylinders[0];
     let stroke_m = bench.state.core.motion.stroke_m;
     model.pressures_pa(&bench.state.core.cylinders[0], stroke_m)
@@ -204,16 +204,16 @@ impl Trial {
         params.initial_stroke_m = begin * stroke_m;
         params.cylinder.initial_pressure_a_pa = atmosphere_pa;
         params.cylinder.initial_pressure_b_pa = atmosphere_pa;
-        let board = Hands {
+        let board = ValveOverride {
             firmware: Firmware::new(&self.design()).map_err(BenchError::Design)?,
             forced: None,
             then: None,
             under_way: VecDeque::new(),
             late: 0,
         };
-        let mut bench = Bench::new(&params, self.seed, board)?;
+        let mut bench = AxisSim::new(&params, self.seed, board)?;
         self.history(&mut bench, params.initial_stroke_m, from_m)?;
-        self.by_hand(&mut bench, from_m)?;
+        self.overridden(&mut bench, from_m)?;
 
         let bus_s = self.bus.map_or(0.0, |b| b.cycle_s * draw.wait + b.frame_s);
         bench.board.late = (bus_s * 1e3).round() as usize;
@@ -249,7 +249,7 @@ impl Trial {
     /// To the place of the start, and to rest or to hold there.
     fn history(
         &self,
-        bench: &mut Bench<Hands>,
+        bench: &mut AxisSim<ValveOverride>,
         begin_m: f64,
         from_m: f64,
     ) -> Result<(), BenchError> {
@@ -285,7 +285,7 @@ impl Trial {
     }
 
     /// Valves opened by hand before the command.
-    fn by_hand(&self, bench: &mut Bench<Hands>, at_m: f64) -> Result<(), BenchError> {
+    fn overridden(&self, bench: &mut AxisSim<ValveOverride>, at_m: f64) -> Result<(), BenchError> {
         if self.before == Before::Nothing {
             return Ok(());
         }
@@ -327,7 +327,11 @@ impl Trial {
     }
 
     /// An extending move whose reference jumps back while the piston is on its way.
-    fn reversal(&self, bench: &mut Bench<Hands>, draw: &Draw) -> Result<Vec<Row>, BenchError> {
+    fn reversal(
+        &self,
+        bench: &mut AxisSim<ValveOverride>,
+        draw: &Draw,
+    ) -> Result<Vec<Row>, BenchError> {
         let stroke_m = self.axis.cylinder.stroke_m;
         let (low_m, high_m) = (0.15 * stroke_m, 0.85 * stroke_m);
         let out = Motion::Step {

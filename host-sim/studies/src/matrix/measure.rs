@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::row::{Expect, Row, Since};
 use super::run::Ran;
 use crate::analysis::{commanded_open, window};
-use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_telemetry::{Event, EventKind, JointSample, Recording, Row as Sample};
 
 const TICK_S: f64 = 1e-3;
@@ -88,16 +88,16 @@ impl Blind {
     fn of(faults: &[FaultSpec]) -> Self {
         let mut blind = Self::default();
         for fault in faults {
-            match (fault.kind, fault.victim) {
+            match (fault.kind, fault.target) {
                 (
                     FaultKind::NodeOff
                     | FaultKind::NodeReset
                     | FaultKind::NodeHang
                     | FaultKind::ProcessorFault
                     | FaultKind::BrownOut,
-                    Victim::Board(address),
+                    FaultTarget::Board(address),
                 ) => blind.dark[usize::from(address) - 1] = true,
-                (FaultKind::ValveStuckOpen, Victim::Valve(joint, valve)) => {
+                (FaultKind::ValveStuckOpen, FaultTarget::Valve(joint, valve)) => {
                     blind.stuck[joint] |= 1 << valve;
                 }
                 _ => {}
@@ -330,11 +330,11 @@ fn held_mm(r: &Recording, from_s: f64) -> Option<f64> {
 fn deviation_mm(r: &Recording, baseline: &Recording, from_s: f64) -> Option<f64> {
     let from_ns = (from_s * 1e9).round() as u64;
     let pairs = r.joints.iter().zip(&baseline.joints);
-    let pairs = pairs.flat_map(|(struck, baseline)| struck.iter().zip(baseline));
-    let after =
-        pairs.filter(|(struck, baseline)| struck.t_ns >= from_ns && struck.t_ns == baseline.t_ns);
+    let pairs = pairs.flat_map(|(affected, baseline)| affected.iter().zip(baseline));
+    let after = pairs
+        .filter(|(affected, baseline)| affected.t_ns >= from_ns && affected.t_ns == baseline.t_ns);
     after
-        .map(|(struck, baseline)| (struck.v.position_mm - baseline.v.position_mm).abs())
+        .map(|(affected, baseline)| (affected.v.position_mm - baseline.v.position_mm).abs())
         .max_by(f64::total_cmp)
 }
 

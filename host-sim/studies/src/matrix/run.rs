@@ -22,7 +22,7 @@ use wheeleg_config::{
 };
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults::check;
-use wheeleg_sim::{self as sil, Boards, LineAudit, Onlookers, WatchedJoint};
+use wheeleg_sim::{self as sil, Boards, JointProbe, LineAudit, Observers};
 use wheeleg_telemetry::{Recorder, Recording};
 
 /// E-stop after the instant, s.
@@ -230,7 +230,7 @@ fn simulate(
 ) -> Option<Ran> {
     let mut recorder = Recorder::in_memory();
     let mut outputs = Outputs::default();
-    let mut look = |joint: &WatchedJoint<'_>| {
+    let mut look = |joint: &JointProbe<'_>| {
         let driven = joint.board.pulses != [0; 4] || joint.board.mode.may_drive();
         outputs.ticks += 1;
         outputs.driven += u64::from(driven);
@@ -245,7 +245,7 @@ fn simulate(
         robot,
         seed,
         &mut recorder,
-        Onlookers::new(&mut progress).watching(&mut look),
+        Observers::new(&mut progress).watching(&mut look),
     );
     let (line, error) = match run {
         Ok(outcome) if outcome.stopped => return None,

@@ -153,7 +153,7 @@ fn run_on(
         &robot,
         seed,
         &mut recorder,
-        sil::Onlookers::new(&mut |t_s| {
+        sil::Observers::new(&mut |t_s| {
             job.progress.at((t_s * 1e3) as u64);
             if job.progress.is_stopped() {
                 ControlFlow::Break(())

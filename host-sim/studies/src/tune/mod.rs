@@ -16,8 +16,10 @@ use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 
 use crate::StudyError;
 use crate::bench::commission::{commission, toml_lines, value};
-use crate::bench::suite::{Factors, Rig};
-use crate::bench::{Delays, Design, Grain, Kind, Supervision, design, design_with, identify};
+use crate::bench::suite::{Factors, TestRig};
+use crate::bench::{
+    Delays, Design, Kind, Supervision, ValveResolution, design, design_with, identify,
+};
 use crate::compare::{Figures, MARGIN, Move, Played, axis_error};
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
@@ -105,7 +107,7 @@ pub struct Tuned {
     /// Force left over the load, at most 1000.
     pub margin: f64,
     /// How fine its valves are.
-    pub grain: Grain,
+    pub grain: ValveResolution,
     /// Delays found; `None` if the piston did not answer.
     pub delays: Option<Delays>,
     /// All tests.
@@ -130,7 +132,7 @@ pub struct Summary<'a> {
     /// Least margin of an axis that can be tuned.
     least_margin: f64,
     /// How fine its valves are.
-    valve_grain: Grain,
+    valve_grain: ValveResolution,
     /// What would make the valves finer, where they are coarse.
     advice: Option<String>,
     /// Opening delay of the data sheet \[ms\].
@@ -228,7 +230,7 @@ impl Tuned {
             .collect();
         let played = progress.each("tests", &runs, |&(motion, design)| {
             let loaded = motion.plant(plant, plant);
-            let mut rig = Rig::new(&loaded, design, seed).map_err(failed)?;
+            let mut rig = TestRig::new(&loaded, design, seed).map_err(failed)?;
             let played = motion.play(&mut rig, plant, loaded.load_n);
             played.map_err(failed)
         })?;
@@ -250,7 +252,7 @@ impl Tuned {
         Ok(Self {
             seed,
             margin: Factors::NONE.static_margin(plant).min(1e3),
-            grain: Grain::of(plant),
+            grain: ValveResolution::of(plant),
             delays,
             tests,
             stopped,

@@ -213,7 +213,7 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
         description: &tuned.config.description,
         seed: tuned.seed,
         grain: tuned.grain.ratio,
-        coarse: crate::bench::grain::COARSE,
+        coarse: crate::bench::valve_resolution::COARSE,
         advice: tuned.grain.advice(),
         margin: (tuned.margin < 1e3).then_some(tuned.margin),
         least: MARGIN,

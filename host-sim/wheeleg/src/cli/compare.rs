@@ -9,7 +9,7 @@ use clap::Args;
 use super::{Drawing, end, print, settings, whole};
 use wheeleg_config::axis::AXES;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::bench::{Grain, Kind};
+use wheeleg_studies::bench::{Kind, ValveResolution};
 use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
 
 /// So many false alarms are named; all of them are in the report.
@@ -156,7 +156,7 @@ fn text(comparison: &Comparison, report: &Path) -> String {
     let mut out = String::new();
     for axis in &comparison.axes {
         out.push_str(&axis_table(comparison, &axis.config.name));
-        if let Some(advice) = Grain::of(&axis.config.axis).advice() {
+        if let Some(advice) = ValveResolution::of(&axis.config.axis).advice() {
             let _ = writeln!(out, "  {advice}");
         }
     }

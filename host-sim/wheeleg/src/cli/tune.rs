@@ -10,7 +10,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use super::{Drawing, end, stop_on_signals};
 use wheeleg_report::number::or_dash;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::bench::grain::COARSE;
+use wheeleg_studies::bench::valve_resolution::COARSE;
 use wheeleg_studies::study::Settings;
 use wheeleg_studies::tune::{self, PARAMETERS, Section, Tuned};
 

@@ -317,7 +317,7 @@ impl<B: Board> Play<'_, B> {
                     let done = matches!(answers.as_slice(), [Message::Ack(_)]);
                     self.carried_out(message, done, &after);
                 }
-                Heard::Impostor if alone => {
+                Heard::AddressConflict if alone => {
                     assert!(after.faults.contains(Fault::DuplicateAddress));
                     assert!(!drives(after.mode));
                 }
@@ -360,7 +360,7 @@ impl<B: Board> Play<'_, B> {
                     }
                     (Heard::Request(sound, request), answer) => {
                         if matches!(request, Some(Message::Discover(_))) {
-                            // Twins part here: one of eight slots, by unique id and cycle.
+                            // DuplicateId part here: one of eight slots, by unique id and cycle.
                             let slots = SlotTiming::DEFAULT;
                             let pitch = slots.frame_us(MessageType::Identity) + GAP_US;
                             let late = start - TURNAROUND_US;
@@ -381,7 +381,7 @@ impl<B: Board> Play<'_, B> {
         }
         let concerned = heard
             .iter()
-            .filter(|(_, heard)| !matches!(heard, Heard::Impostor))
+            .filter(|(_, heard)| !matches!(heard, Heard::AddressConflict))
             .count();
         assert!(messages.len() <= concerned.min(2), "{messages:?}");
         if let [(_, Heard::Sync(_) | Heard::Request(..))] = heard {

@@ -20,7 +20,7 @@ pub(crate) enum Heard {
     /// A frame of the master to this board; the message if it is one.
     Request(Sound, Option<Message>),
     /// A frame that claims to come from this board.
-    Impostor,
+    AddressConflict,
 }
 
 /// Link supervision as the specification has it.
@@ -82,7 +82,7 @@ impl Observer {
 
     fn meaning(&mut self, sound: Sound, at: u32) -> Option<Heard> {
         if sound.source == self.address.raw() {
-            return Some(Heard::Impostor);
+            return Some(Heard::AddressConflict);
         }
         if sound.source != 0 {
             return None;

@@ -20,10 +20,10 @@ use super::cores::Cores;
 use super::figures::{BoardFigures, PilSummary};
 use super::images::{self, Image};
 use super::line::Line;
-use super::partner::unexpected;
 use super::qemu::{Qemu, QemuOptions};
 use super::serial::{self as hil, HilOptions};
 use super::store;
+use super::transport::unexpected;
 use super::unicorn::{Place, Unicorn};
 use crate::RemoteError;
 use wheeleg_config::RobotConfig;
@@ -63,7 +63,7 @@ struct Board {
 }
 
 /// All boards outside.
-pub struct Outside {
+pub struct RemoteBoards {
     /// Where each node runs.
     nodes: Nodes,
     lines: Vec<Box<dyn Line>>,
@@ -93,7 +93,7 @@ fn image_of(images: &[Image], kind: &NodeKind, address: u8) -> Result<PathBuf, R
     })
 }
 
-impl Outside {
+impl RemoteBoards {
     /// Starts the boards that do not run here, and powers them up. `None` when
     /// all do.
     ///
@@ -124,15 +124,15 @@ impl Outside {
                     let image = image_of(&images, kind, address)?;
                     let options = QemuOptions::new(image);
                     let line = outside.lines.len();
-                    outside.lines.push(Box::new(Qemu::partner(&options)?));
+                    outside.lines.push(Box::new(Qemu::transport(&options)?));
                     outside.adopt(address, line, 0)?;
                 }
                 NodeKind::Hil(port) => {
                     let line = outside.lines.len();
                     let options = HilOptions::parse(&port.display().to_string())?;
                     let application = if address <= 6 { "joint" } else { "wheel" };
-                    let (partner, _) = hil::connect(&options, application)?;
-                    outside.lines.push(Box::new(partner));
+                    let (transport, _) = hil::connect(&options, application)?;
+                    outside.lines.push(Box::new(transport));
                     outside.adopt(address, line, 0)?;
                 }
             }

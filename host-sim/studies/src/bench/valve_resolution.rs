@@ -20,7 +20,7 @@ pub const COARSE: f64 = 0.5;
 
 /// Smallest step of force, against what friction holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Grain {
+pub struct ValveResolution {
     /// Shortest opening of a valve \[ms\].
     pub shortest_opening_ms: f64,
     /// Change of force by it, from the supply into the piston side at mid stroke \[N\].
@@ -33,7 +33,7 @@ pub struct Grain {
     pub conductance_for_half_dm3_s_bar: f64,
 }
 
-impl Grain {
+impl ValveResolution {
     /// Of an axis, as its data sheet tells it.
     #[must_use]
     pub fn of(axis: &AxisParams) -> Self {
@@ -94,7 +94,7 @@ mod tests {
     fn axes_of_this_project_are_not_coarse_and_a_wide_valve_is() {
         for name in ["bench-vq110u", "small-12x50", "long-16x400", "heavy-40x250"] {
             let mut axis = AxisConfig::load(name).expect("built in").axis;
-            let fine = Grain::of(&axis);
+            let fine = ValveResolution::of(&axis);
             assert!((0.01..COARSE).contains(&fine.ratio), "{name}: {fine:?}");
             assert_eq!(fine.advice(), None);
             // Valves so wide that the advice is needed; what it says mends it.
@@ -103,7 +103,7 @@ mod tests {
             for valve in [&mut c.fill_valve, &mut c.vent_valve] {
                 valve.flow.conductance_m3_s_pa *= 1.5 / fine.ratio;
             }
-            let coarse = Grain::of(&axis);
+            let coarse = ValveResolution::of(&axis);
             assert!(coarse.ratio > 1.0, "{name}: {coarse:?}");
             let text = coarse.advice().expect("advice");
             assert!(text.contains("coarse valves"), "{text}");
@@ -111,7 +111,7 @@ mod tests {
             for valve in [&mut c.fill_valve, &mut c.vent_valve] {
                 valve.flow.conductance_m3_s_pa = coarse.conductance_for_half_dm3_s_bar * 1e-8;
             }
-            let mended = Grain::of(&axis);
+            let mended = ValveResolution::of(&axis);
             assert!((mended.ratio - COARSE).abs() < 1e-3, "{name}: {mended:?}");
         }
     }
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn the_step_is_that_of_choked_flow_into_the_chamber() {
         let axis = AxisConfig::load("bench-vq110u").expect("built in").axis;
-        let grain = Grain::of(&axis);
+        let grain = ValveResolution::of(&axis);
         let data = axis_data(&axis);
         let volume_mm3 = data.dead_a.to_f64() * 1e3 + 314.159 * 90.0;
         let flow_mm3_s = data.conductance.to_num::<f64>() * 997_162.0;

@@ -44,7 +44,7 @@ impl<S: Stream + ?Sized> Stream for Box<S> {
 /// are two calls, so that several boards can work at the same time: send to all,
 /// then receive from all.
 #[derive(Debug)]
-pub struct Partner<S> {
+pub struct Transport<S> {
     stream: S,
     deframer: Deframer,
     buffer: [u8; MAX_FRAME],
@@ -57,7 +57,7 @@ pub struct Partner<S> {
     queued: VecDeque<Request>,
 }
 
-impl<S: Stream> Partner<S> {
+impl<S: Stream> Transport<S> {
     /// Nothing said yet.
     pub fn new(stream: S) -> Self {
         Self {
@@ -253,12 +253,12 @@ mod tests {
             let mut frame = [0; MAX_FRAME];
             encode(0, reply, &mut frame).expect("fits").to_vec()
         });
-        let mut partner = Partner::new(Canned(said.into()));
-        assert!(partner.hello().is_ok());
-        assert_eq!(partner.ask(&Request::Bye).ok(), Some(Reply::Done));
+        let mut transport = Transport::new(Canned(said.into()));
+        assert!(transport.hello().is_ok());
+        assert_eq!(transport.ask(&Request::Bye).ok(), Some(Reply::Done));
         // A session may be opened anew, by anybody.
         let version = LINK_VERSION;
-        let answer = partner.ask(&Request::Hello { version });
+        let answer = transport.ask(&Request::Hello { version });
         assert_eq!(answer.ok(), Some(hello));
     }
 }

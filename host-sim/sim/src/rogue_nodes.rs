@@ -11,7 +11,7 @@ use wheeleg_protocol::{
 };
 
 use super::board::{Application, BoardInputs};
-use super::boards::twin_identity;
+use super::boards::duplicate_identity;
 use super::bus::{Bus, Delivery, Driver};
 use super::clock::{NS_PER_US, micros};
 use crate::SimError;
@@ -20,7 +20,7 @@ use wheeleg_config::timing::SERVICE_NS;
 use wheeleg_telemetry::event::{BadRequest, Cause, ServiceOutcome};
 
 /// A second board drives the line as this plus the address.
-const TWIN: Driver = 0x40;
+const DUPLICATE: Driver = 0x40;
 /// The service tool.
 pub(super) const SERVICE: Driver = 0x80;
 /// A stream that fills the line: the last wheel board sends it.
@@ -42,14 +42,14 @@ const NO_PARAMETER: u16 = 0x7FFF;
 
 /// Everybody else on the line.
 #[derive(Default)]
-pub(super) struct Strangers {
+pub(super) struct RogueNodes {
     /// Boards with the address of another one.
     boards: Vec<(Address, Application)>,
     service: Option<Service>,
     notes: Vec<Cause>,
 }
 
-impl Strangers {
+impl RogueNodes {
     /// Another board with the straps of `address` is plugged in, on the bench
     /// side of its sensors and valves.
     ///
@@ -59,7 +59,7 @@ impl Strangers {
         let Some(address) = Address::new(address) else {
             return Ok(());
         };
-        let (who, stored) = (twin_identity(address), stored.of(address));
+        let (who, stored) = (duplicate_identity(address), stored.of(address));
         let board = Application::new(who, Some(stored), ResetCause::PowerUp)?;
         self.boards.push((address, board));
         Ok(())
@@ -100,7 +100,7 @@ impl Strangers {
     /// Hears a delivery.
     pub(super) fn hear(&mut self, bus: &Bus, delivery: &Delivery) {
         for (address, board) in &mut self.boards {
-            if let Some((bytes, end_ns)) = bus.heard_by(TWIN | address.raw(), delivery) {
+            if let Some((bytes, end_ns)) = bus.heard_by(DUPLICATE | address.raw(), delivery) {
                 board.on_bus_bytes(&bytes, micros(end_ns));
             }
         }
@@ -115,7 +115,7 @@ impl Strangers {
     pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
         let boards = self.boards.iter_mut();
         let mut sent =
-            boards.filter_map(|(a, board)| Some((TWIN | a.raw(), board.take_transmission()?)));
+            boards.filter_map(|(a, board)| Some((DUPLICATE | a.raw(), board.take_transmission()?)));
         sent.next()
     }
 

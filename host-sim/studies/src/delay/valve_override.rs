@@ -7,7 +7,7 @@ use wheeleg_control::pwm::OnTimes;
 use crate::bench::{Action, Board, Firmware, Sample};
 
 /// The board with hands on its valves, at the end of a bus.
-pub(super) struct Hands {
+pub(super) struct ValveOverride {
     pub(super) firmware: Firmware,
     pub(super) forced: Option<OnTimes>,
     /// Ticks until hands let go, or throw valves open.
@@ -17,7 +17,7 @@ pub(super) struct Hands {
     pub(super) late: usize,
 }
 
-impl Board for Hands {
+impl Board for ValveOverride {
     fn tick(&mut self, sample: &Sample) -> Action {
         self.under_way.push_back(*sample);
         let mut seen = *sample;

@@ -7,7 +7,7 @@ use super::World;
 use crate::SimError;
 use crate::client::Client;
 use crate::down::Down;
-use wheeleg_config::faults::{FaultKind, FaultSpec, Victim};
+use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::{JOINT_TICK_NS, WATCHDOG_NS};
 
 impl World {
@@ -15,7 +15,7 @@ impl World {
     ///
     /// # Errors
     /// [`SimError`] if a board outside refuses it.
-    pub(super) fn strike_power(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
+    pub(super) fn inject_power(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
         let after_ns = |ms: f64| self.now_ns.saturating_add((ms * 1e6) as u64);
         match fault.kind {
             FaultKind::MasterReset if begin => {
@@ -25,7 +25,7 @@ impl World {
             FaultKind::ClientReset if begin => self.client = Client::connect(&mut self.master),
             _ => {}
         }
-        let Victim::Board(address) = fault.victim else {
+        let FaultTarget::Board(address) = fault.target else {
             return Ok(());
         };
         let down = match fault.kind {
@@ -48,15 +48,15 @@ impl World {
             self.board_mut(address).memory.power_fails(now_ns);
         }
         self.board_mut(address).down = down;
-        let Some(outside) = &mut self.outside else {
+        let Some(remote) = &mut self.remote else {
             return Ok(());
         };
         match down {
-            Down::Hung { .. } => Ok(outside.hook(address, link::Hook::StopProcessor)?),
+            Down::Hung { .. } => Ok(remote.hook(address, link::Hook::StopProcessor)?),
             _ => {
-                outside.set_power(address, link::Power::BrownOut);
+                remote.set_power(address, link::Power::BrownOut);
                 // At once: it may be back before the board is run otherwise.
-                self.run_outside(&[(address, None)])
+                self.run_remote(&[(address, None)])
             }
         }
     }
@@ -65,17 +65,17 @@ impl World {
     fn fault_processor(&mut self, address: u8) -> Result<(), SimError> {
         let now_ns = self.now_ns;
         self.board_mut(address).memory.power_fails(now_ns);
-        match &mut self.outside {
-            Some(outside) if outside.has(address) => {
+        match &mut self.remote {
+            Some(remote) if remote.has(address) => {
                 // Until its own reset.
-                outside.hook(address, link::Hook::FaultProcessor)?;
+                remote.hook(address, link::Hook::FaultProcessor)?;
                 self.board_mut(address).down = Down::Hung {
                     until_ns: now_ns.saturating_add(JOINT_TICK_NS),
                 };
-                self.run_outside(&[(address, None)])
+                self.run_remote(&[(address, None)])
             }
             // How long its start takes is known from the run that this one repeats.
-            _ if self.kept.rule(address) => {
+            _ if self.replayed.is_replayed(address) => {
                 self.board_mut(address).down = Down::Off { until_ns: u64::MAX };
                 Ok(())
             }

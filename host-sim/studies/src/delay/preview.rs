@@ -10,7 +10,7 @@ use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, run_all};
 use crate::study::{Ended, Progress};
 use wheeleg_report::stats::{largest, median};
 
-/// Notice \[s\].
+/// Preview \[s\].
 pub const NOTICES_S: [f64; 9] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4];
 /// Moves that are announced.
 const STARTS: [Start; 5] = [
@@ -25,14 +25,14 @@ const LOADS_N: [f64; 4] = [-30.0, -15.0, 15.0, 30.0];
 
 /// Starts of one kind at one notice, worst of all seeds.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Noticed {
+pub struct Previewed {
     /// Law; only the default one uses the notice.
     pub law: Law,
     /// Kind of move.
     pub start: Start,
     /// Load beside the axis's own \[N\].
     pub load_n: f64,
-    /// Notice \[s\].
+    /// Preview \[s\].
     pub notice_s: f64,
     /// Median start delay \[s\]; `None` if a start never came.
     pub median_s: Option<f64>,
@@ -42,7 +42,7 @@ pub struct Noticed {
     pub early_mm: f64,
 }
 
-impl Noticed {
+impl Previewed {
     /// Starts in time, and stands until then.
     #[must_use]
     pub fn meets(&self) -> bool {
@@ -52,19 +52,19 @@ impl Noticed {
 
 /// All of them.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Notice {
+pub struct Preview {
     /// Seeds of each row.
     pub seeds: u32,
     /// Rows in the order of law, kind, load and notice.
-    pub rows: Vec<Noticed>,
+    pub rows: Vec<Previewed>,
     /// Default law from the held home, announced by the longest notice; first seed.
     #[serde(skip)]
     pub home: Outcome,
 }
 
-impl Notice {
+impl Preview {
     /// Rows of a law and kind without load.
-    pub fn of(&self, law: Law, start: Start) -> impl Iterator<Item = &Noticed> {
+    pub fn of(&self, law: Law, start: Start) -> impl Iterator<Item = &Previewed> {
         self.rows
             .iter()
             .filter(move |r| r.law == law && r.start == start && r.load_n == 0.0)
@@ -73,7 +73,7 @@ impl Notice {
     /// Shortest notice from which on every longer one meets the bar, without load \[s\].
     #[must_use]
     pub fn enough_s(&self, start: Start) -> Option<f64> {
-        let rows: Vec<&Noticed> = self.of(Law::Default, start).collect();
+        let rows: Vec<&Previewed> = self.of(Law::Default, start).collect();
         let first = rows.iter().rposition(|r| !r.meets()).map_or(0, |i| i + 1);
         rows.get(first).map(|r| r.notice_s)
     }
@@ -83,7 +83,7 @@ impl Notice {
 ///
 /// # Errors
 /// [`Ended`] if the axis cannot be simulated, or the study is stopped.
-pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Notice, Ended> {
+pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Preview, Ended> {
     let mut cases = Vec::new();
     for start in STARTS {
         cases.extend(NOTICES_S.map(|notice_s| (Law::Default, start, 0.0, notice_s)));
@@ -109,7 +109,7 @@ pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Not
         .zip(outcomes.chunks(each))
         .map(|(&(law, start, load_n, notice_s), group)| {
             let delays: Option<Vec<f64>> = group.iter().map(|o| o.delay_s).collect();
-            Noticed {
+            Previewed {
                 law,
                 start,
                 load_n,
@@ -121,5 +121,5 @@ pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Not
         })
         .collect();
     let home = outcomes.swap_remove((NOTICES_S.len() - 1) * each);
-    Ok(Notice { seeds, rows, home })
+    Ok(Preview { seeds, rows, home })
 }
