@@ -266,7 +266,7 @@ mod tests {
                 svg.contains("time since the start of the motion [s]"),
                 "{id}"
             );
-            assert!(svg.len() > 5_000, "{id}: {}", svg.len());
+            assert!(svg.len() > 3_000, "{id}: {}", svg.len());
         }
     }
 
