@@ -82,10 +82,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         .into_iter()
         .map(|threads| {
             let out = folder.path().join(threads.to_string());
-            let settings = Settings {
-                png: true,
-                ..Settings::new(&out)
-            };
+            let settings = Settings::new(&out);
             compare::compare(&small(threads), &settings).expect("written");
             let mut files = files(&out);
             // It names the process.

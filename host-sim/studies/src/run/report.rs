@@ -65,7 +65,7 @@ mod tests {
     use wheeleg_telemetry::event::{Act, Cause};
     use wheeleg_telemetry::{Recording, Row};
 
-    /// Writes a run with this summary; figures as PNG, too.
+    /// Writes a run with this summary.
     fn written(
         folder: &Path,
         scenario: &Scenario,
@@ -74,10 +74,7 @@ mod tests {
         analysis: &Analysis,
         summary: &Summary,
     ) {
-        let settings = Settings {
-            png: true,
-            ..Settings::new(folder)
-        };
+        let settings = Settings::new(folder);
         let job = Job::begin("test", &settings).expect("a folder");
         let run = Run {
             summary: summary.clone(),
