@@ -204,7 +204,7 @@ mod tests {
     fn a_power_cut_in_the_first_save_leaves_a_blank_memory_a_damaged_one_or_the_set() {
         let mut left = [0; 3];
         for n in 0..=24 {
-            let cut_ns = 2 * ERASE_NS + n * PROGRAM_NS - PROGRAM_NS / 2;
+            let cut_ns = ERASE_NS + n * PROGRAM_NS - PROGRAM_NS / 2;
             let mut memory = Memory::new(&[]);
             memory.begin(set(100), 0);
             memory.power_fails(cut_ns);

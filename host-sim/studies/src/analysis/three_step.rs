@@ -86,8 +86,8 @@ impl SampledAcceleration {
             let i = self.recent.partition_point(|(at_ns, _)| *at_ns < t_ns);
             self.recent.get(i).filter(|(at_ns, _)| *at_ns == t_ns)
         };
-        let before = row.t_ns.checked_sub(2 * period_ns).and_then(at);
-        if let (Some((_, before_m)), Some((_, then_m))) = (before, at(row.t_ns - period_ns)) {
+        let ago = |periods: u64| row.t_ns.checked_sub(periods * period_ns).and_then(at);
+        if let (Some((_, before_m)), Some((_, then_m))) = (ago(2), ago(1)) {
             let difference_m = now_m - 2.0 * then_m + before_m;
             self.found_m_s2
                 .add(difference_m / (self.period_s * self.period_s));
