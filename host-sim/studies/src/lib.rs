@@ -17,7 +17,9 @@ pub mod export;
 pub mod figures;
 pub mod matrix;
 pub mod run;
+mod schemas;
 pub mod study;
 pub mod tune;
 
 pub use error::StudyError;
+pub use schemas::schemas;

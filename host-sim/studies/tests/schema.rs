@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use wheeleg_studies::study::schema::schemas;
+use wheeleg_studies::schemas;
 
 /// Set to anything, it has the files written instead of compared.
 const WRITE: &str = "WHEELEG_WRITE_SCHEMAS";

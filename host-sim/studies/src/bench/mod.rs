@@ -8,8 +8,8 @@
 //! seed, motion and loads; a second of it takes about 2 ms.
 //!
 //! ```
-//! use wheeleg_sim::bench::{AxisSim, Firmware, Kind, Metrics, Motion, design};
-//! use wheeleg_sim::config::AxisConfig;
+//! use wheeleg_studies::bench::{AxisSim, Firmware, Kind, Metrics, Motion, design};
+//! use wheeleg_config::AxisConfig;
 //!
 //! let axis = AxisConfig::load("bench-vq110u")?.axis;
 //! let board = Firmware::new(&design(&axis, Kind::Predictive)).expect("a valid design");

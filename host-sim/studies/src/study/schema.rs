@@ -38,8 +38,9 @@ pub fn json<T: Summary>(body: &T, stopped: Option<&Stopped>) -> String {
     text
 }
 
-/// The schema of a summary.
-fn schema<T: Summary + 'static>() -> (&'static str, Value) {
+/// The schema of a summary, with its name.
+#[must_use]
+pub fn schema<T: Summary + 'static>() -> (&'static str, Value) {
     let generator = SchemaSettings::draft2020_12()
         .for_serialize()
         .into_generator();
@@ -49,17 +50,4 @@ fn schema<T: Summary + 'static>() -> (&'static str, Value) {
     schema["title"] = T::SCHEMA.into();
     schema["properties"]["schema"]["const"] = T::SCHEMA.into();
     (T::SCHEMA, schema)
-}
-
-/// Every schema with its name. `docs/reference/schema` has them as files.
-#[must_use]
-pub fn schemas() -> Vec<(&'static str, Value)> {
-    vec![
-        schema::<crate::run::Summary>(),
-        schema::<crate::compare::Cases<'static>>(),
-        schema::<crate::tune::Summary<'static>>(),
-        schema::<crate::delay::Summary<'static>>(),
-        schema::<crate::matrix::Summary<'static>>(),
-        schema::<crate::figures::Summary<'static>>(),
-    ]
 }
