@@ -284,7 +284,7 @@ fn wandering_moves(axis: &AxisData) -> Vec<Trace> {
     let mut design = design(&sheet, Kind::Predictive);
     design.gains.axis = *axis;
     let mut traces = Vec::new();
-    for seed in 0..40_u32 {
+    for seed in 0..240_u32 {
         let mut rig = TestRig::new(&sheet, &design, u64::from(seed)).expect("valid");
         for k in 0..6 {
             // Multiples of the golden ratio leave no gap.
@@ -337,13 +337,13 @@ fn valve_times_of_another_cylinder_make_moves_late_but_rest_is_found() {
             without_alarm(trace, name);
         }
     }
-    // Of 200 moves 1 and 0 were measured with the right times, 13 and 3 with the wrong
-    // ones, with the gains of an earlier law; of 300 and 1500 other moves 1 and 0 %, 6 and 1.3 %.
+    // Of 1,200 moves 7 are late and none is restless with the right times, 17 and 8 with the
+    // wrong ones. Of 200 alone, as many as this test once had, both were 1 with some seeds.
     let (late, restless) = late_and_restless(&right);
-    assert!(late <= 6 && restless == 0, "{late}, {restless}");
+    assert!(late <= 18 && restless == 0, "{late}, {restless}");
     let (later, more_restless) = late_and_restless(&wrong);
-    assert!(later > late && later <= 20, "{later}, {late}");
-    assert!(more_restless <= 5, "{more_restless}");
+    assert!(later > late && later <= 60, "{later}, {late}");
+    assert!(more_restless <= 20, "{more_restless}");
 }
 
 #[test]

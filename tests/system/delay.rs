@@ -245,7 +245,7 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
         let out = dir.path().join(name);
         let assert = Command::new(program::path())
             .env("NO_COLOR", "1")
-            .args(["delay", "--json", "--png", "--seeds", "1", "--out"])
+            .args(["delay", "--json", "--seeds", "1", "--out"])
             .arg(&out)
             .assert()
             .success();

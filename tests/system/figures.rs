@@ -10,7 +10,7 @@ use serde_json::Value;
 fn figures(out: &Path) -> Value {
     let assert = Command::new(program::path())
         .env("NO_COLOR", "1")
-        .args(["figures", "--json", "--png", "--out"])
+        .args(["figures", "--json", "--out"])
         .arg(out)
         .assert()
         .success();

@@ -199,9 +199,10 @@ mod tests {
         assert!(news > 0);
     }
 
-    /// Without an old set there is nothing to go back to: what the cut leaves is damaged.
+    /// Without an old set there is nothing to go back to: what the cut leaves is damaged, from the
+    /// first word of the save on, which voids the other page.
     #[test]
-    fn a_power_cut_in_the_first_save_leaves_a_blank_memory_a_damaged_one_or_the_set() {
+    fn a_power_cut_in_the_first_save_leaves_a_damaged_memory_or_the_set() {
         let mut left = [0; 3];
         for n in 0..=24 {
             let cut_ns = ERASE_NS + n * PROGRAM_NS - PROGRAM_NS / 2;
@@ -217,7 +218,7 @@ mod tests {
                 }
             }
         }
-        // Before the header, within the 22 words, after them.
-        assert_eq!(left, [1, 22, 2]);
+        // Before the save, while the page is erased and the 23 words are written, after them.
+        assert_eq!(left, [0, 24, 1]);
     }
 }
