@@ -54,13 +54,13 @@ impl Stream for BoardEnd {
 }
 
 /// A board on a pseudo-terminal of its own.
-struct AxisSim {
+struct BoardBench {
     options: HilOptions,
     requests_left: Arc<AtomicU64>,
     board: Option<JoinHandle<()>>,
 }
 
-impl AxisSim {
+impl BoardBench {
     /// What `run` makes of the board's end; it answers `requests` requests
     /// before its port vanishes.
     fn new(requests: u64, run: impl FnOnce(BoardEnd) + Send + 'static) -> Self {
@@ -93,7 +93,7 @@ impl AxisSim {
     }
 }
 
-impl Drop for AxisSim {
+impl Drop for BoardBench {
     fn drop(&mut self) {
         self.requests_left.store(0, Ordering::Relaxed);
         if let Some(board) = self.board.take() {
@@ -127,7 +127,7 @@ fn said(error: &RemoteError) -> String {
 
 #[test]
 fn the_loop_over_the_port_gives_the_bits_of_the_loop_without_it() {
-    let bench = AxisSim::new(u64::MAX, joint_board);
+    let bench = BoardBench::new(u64::MAX, joint_board);
     let (mut partner, hello) = connect(&bench.options, "joint").expect("a joint board");
     assert!(hello.outputs_are_virtual);
     let trace = closed_loop_as_the_host(|request| ask(&mut partner, request));
@@ -139,7 +139,7 @@ fn the_loop_over_the_port_gives_the_bits_of_the_loop_without_it() {
 
 #[test]
 fn a_board_can_be_asked_anew_after_its_partner_has_gone() {
-    let bench = AxisSim::new(u64::MAX, joint_board);
+    let bench = BoardBench::new(u64::MAX, joint_board);
     let first = {
         let (mut partner, _) = connect(&bench.options, "joint").expect("a joint board");
         closed_loop(50, |request| ask(&mut partner, request))
@@ -161,7 +161,7 @@ fn a_board_can_be_asked_anew_after_its_partner_has_gone() {
 
 #[test]
 fn a_port_that_vanishes_in_mid_run_ends_it_with_an_error_that_names_it() {
-    let bench = AxisSim::new(100, joint_board);
+    let bench = BoardBench::new(100, joint_board);
     let (mut partner, _) = connect(&bench.options, "joint").expect("a joint board");
     let mut answered = 0;
     let error = loop {
@@ -186,7 +186,7 @@ fn a_port_that_vanishes_in_mid_run_ends_it_with_an_error_that_names_it() {
 
 #[test]
 fn a_board_that_falls_silent_is_given_up_after_the_patience() {
-    let bench = AxisSim::new(u64::MAX, |mut end| {
+    let bench = BoardBench::new(u64::MAX, |mut end| {
         let pins = JointPins::default();
         let mut session = Session::<RemoteJoint<'_>>::new(&pins, "bench", 0);
         let mut some = Few {
@@ -229,7 +229,7 @@ impl Stream for Few<'_> {
 #[test]
 fn other_images_are_refused_by_the_handshake() {
     // Another application.
-    let bench = AxisSim::new(u64::MAX, wheel_board);
+    let bench = BoardBench::new(u64::MAX, wheel_board);
     let error = said(&connect(&bench.options, "joint").expect_err("a wheel"));
     assert!(
         error.contains("`wheel`") && error.contains("joint-hil"),
@@ -238,7 +238,7 @@ fn other_images_are_refused_by_the_handshake() {
     drop(bench);
 
     // A plain image: nobody listens on this port.
-    let bench = AxisSim::new(u64::MAX, |mut end| {
+    let bench = BoardBench::new(u64::MAX, |mut end| {
         let mut swallowed = [0; 64];
         while end.read(&mut swallowed) > 0 {}
     });
@@ -248,7 +248,7 @@ fn other_images_are_refused_by_the_handshake() {
     drop(bench);
 
     // Something else altogether, talking.
-    let bench = AxisSim::new(u64::MAX, |mut end| {
+    let bench = BoardBench::new(u64::MAX, |mut end| {
         let mut swallowed = [0; 64];
         while end.read(&mut swallowed) > 0 && end.write(b"login: \0\0") {}
     });
@@ -261,7 +261,7 @@ fn other_images_are_refused_by_the_handshake() {
         (LINK_VERSION + 1, true, "version"),
         (LINK_VERSION, false, "drives real outputs"),
     ] {
-        let bench = AxisSim::new(u64::MAX, move |end| {
+        let bench = BoardBench::new(u64::MAX, move |end| {
             answer_hello(end, version, virtual_outputs);
         });
         let error = said(&connect(&bench.options, "joint").expect_err(expected));

@@ -18,14 +18,14 @@ const TICK_NS: u64 = 1_000_000;
 const SAMPLE_NS: u64 = 520_000;
 
 /// One emulated joint board, alone on its bus.
-struct AxisSim {
+struct BoardBench {
     board: Board,
     now_ns: u64,
     /// Every reply so far, to compare sessions.
     replies: Vec<Reply>,
 }
 
-impl AxisSim {
+impl BoardBench {
     fn new(address: u8) -> Self {
         Self::with_crystal(address, true)
     }
@@ -85,7 +85,7 @@ impl AxisSim {
 
 #[test]
 fn a_board_comes_up_ticks_and_sees_what_is_latched() {
-    let mut bench = AxisSim::new(2);
+    let mut bench = BoardBench::new(2);
     let mut last = Ran::default();
     for _ in 0..100 {
         last = bench.tick(Power::Good);
@@ -109,8 +109,8 @@ fn a_board_comes_up_ticks_and_sees_what_is_latched() {
 #[test]
 fn outputs_are_driven_low_within_the_first_instructions_after_every_reset() {
     for (address, period_ns) in [(2, TICK_NS), (7, SAMPLE_NS)] {
-        let mut bench = AxisSim::new(address);
-        let low_after = |bench: &mut AxisSim| {
+        let mut bench = BoardBench::new(address);
+        let low_after = |bench: &mut BoardBench| {
             let last = (0..50)
                 .map(|_| bench.tick_of(period_ns, Power::Good))
                 .last();
@@ -131,7 +131,7 @@ fn outputs_are_driven_low_within_the_first_instructions_after_every_reset() {
 
 #[test]
 fn the_watchdog_bites_when_the_main_loop_or_the_processor_stops_and_only_then() {
-    let mut bench = AxisSim::new(1);
+    let mut bench = BoardBench::new(1);
     assert_eq!(bench.until_reset(200), None, "a sound board");
     for hook in [Hook::StopMainLoop, Hook::StopProcessor] {
         assert_eq!(bench.ask(&Request::Hook(hook)), Reply::Done);
@@ -152,7 +152,7 @@ fn the_watchdog_bites_when_the_main_loop_or_the_processor_stops_and_only_then() 
 
 #[test]
 fn a_processor_that_faults_is_reset_by_its_handler_at_once() {
-    let mut bench = AxisSim::new(1);
+    let mut bench = BoardBench::new(1);
     assert_eq!(bench.until_reset(200), None, "a sound board");
     let hook = Request::Hook(Hook::FaultProcessor);
     assert_eq!(bench.ask(&hook), Reply::Done);
@@ -172,7 +172,7 @@ fn a_processor_that_faults_is_reset_by_its_handler_at_once() {
 
 #[test]
 fn a_brown_out_resets_with_outputs_off_and_the_board_returns_with_the_supply() {
-    let mut bench = AxisSim::new(3);
+    let mut bench = BoardBench::new(3);
     for _ in 0..50 {
         bench.tick(Power::Good);
     }
@@ -193,14 +193,14 @@ fn a_brown_out_resets_with_outputs_off_and_the_board_returns_with_the_supply() {
 
 #[test]
 fn a_board_starts_in_the_time_that_the_simulator_takes_it_for() {
-    const STEP_NS: u64 = 100_000;
+    const STEP_NS: u64 = 20_000;
     for (address, period_ns, start_up_ns) in [
         (3, TICK_NS, BOARD_START_UP_NS[0]),
         (8, SAMPLE_NS, BOARD_START_UP_NS[1]),
     ] {
         // Power comes back later and later after a tick edge.
         for later_ns in (0..period_ns).step_by(STEP_NS as usize) {
-            let mut bench = AxisSim::new(address);
+            let mut bench = BoardBench::new(address);
             for _ in 0..50 {
                 bench.tick_of(period_ns, Power::Good);
             }
@@ -237,7 +237,7 @@ const CRYSTAL_POLLS: u32 = 40_000;
 fn without_its_crystal_a_board_runs_on_the_internal_oscillator_at_the_same_speed() {
     for (address, period_us) in [(2, 1000), (8, 520)] {
         let run = |crystal: bool| {
-            let mut bench = AxisSim::with_crystal(address, crystal);
+            let mut bench = BoardBench::with_crystal(address, crystal);
             for _ in 0..100 {
                 bench.tick_of(u64::from(period_us) * 1_000, Power::Good);
             }
@@ -277,7 +277,7 @@ fn without_figures(reply: &Reply) -> Ran {
 #[test]
 fn the_answer_to_a_request_that_ends_with_a_tick_edge_is_told_with_that_edge() {
     for (address, tick_ns) in [(2, TICK_NS), (7, SAMPLE_NS)] {
-        let mut bench = AxisSim::new(address);
+        let mut bench = BoardBench::new(address);
         let mut at_ns = 0;
         for _ in 0..60 {
             at_ns += tick_ns;
@@ -312,7 +312,7 @@ fn straps_of_another_kind_of_board_leave_it_silent() {
 #[test]
 fn equal_sessions_give_equal_replies_to_the_bit() {
     let session = || {
-        let mut bench = AxisSim::new(5);
+        let mut bench = BoardBench::new(5);
         for _ in 0..150 {
             bench.tick(Power::Good);
         }

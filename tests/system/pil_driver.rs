@@ -26,7 +26,7 @@ const BYTE_US: u32 = 10;
 const MARGIN_US: u32 = 3;
 
 /// An emulated joint board on a bus of its own.
-struct AxisSim {
+struct BoardBench {
     board: Board,
     kind: Kind,
     now_ns: u64,
@@ -35,7 +35,7 @@ struct AxisSim {
     figures: Figures,
 }
 
-impl AxisSim {
+impl BoardBench {
     fn new(image: PathBuf, kind: Kind) -> Self {
         let mut bench = Self {
             board: Board::new(image),
@@ -102,10 +102,10 @@ impl AxisSim {
 /// Whether the driver of an image ends with the frame that was asked for, and the board
 /// says so, when its transmitter takes `times` as long; or what is wrong.
 fn limit(image: &Path, kind: Kind, times: u8) -> Result<(), String> {
-    let mut bench = AxisSim::new(image.to_path_buf(), kind);
+    let mut bench = BoardBench::new(image.to_path_buf(), kind);
     let length = bench.answer().len() as u32;
     let on_us = length * BYTE_US + MARGIN_US;
-    let ensure = |bench: &AxisSim, timeouts: u16| {
+    let ensure = |bench: &BoardBench, timeouts: u16| {
         let figures = bench.figures;
         let found = (figures.driver_on_us, figures.driver_timeouts);
         if found == (on_us, timeouts) {
@@ -147,7 +147,7 @@ fn hardware_ends_the_drive_of_a_transmission_that_takes_too_long_and_the_board_l
 #[test]
 fn a_sound_transmission_is_no_fault() {
     for kind in [JOINT, WHEEL] {
-        let mut bench = AxisSim::new(image(kind.0).expect("an image"), kind);
+        let mut bench = BoardBench::new(image(kind.0).expect("an image"), kind);
         for _ in 0..3 {
             let record = bench.faults();
             assert!(record.active.is_empty(), "{record:?}");

@@ -23,12 +23,12 @@ use wheeleg_remote_link::{Inputs, Outputs, Ran, Reply, Request, Run};
 use wheeleg_telemetry::Recorder;
 
 /// A bench board that is emulated.
-struct AxisSim {
+struct BoardBench {
     emulator: Child,
     port: String,
 }
 
-impl AxisSim {
+impl BoardBench {
     fn new(name: &str) -> Self {
         let mut emulator = Command::new(unicorn::program().expect("the emulator"))
             .arg("--bench")
@@ -59,7 +59,7 @@ impl AxisSim {
     }
 }
 
-impl Drop for AxisSim {
+impl Drop for BoardBench {
     fn drop(&mut self) {
         let _ = self.emulator.kill();
         let _ = self.emulator.wait();
@@ -68,7 +68,7 @@ impl Drop for AxisSim {
 
 #[test]
 fn the_joint_image_for_the_bench_closes_the_loop_as_the_host_does_bit_for_bit() {
-    let bench = AxisSim::new("joint-hil");
+    let bench = BoardBench::new("joint-hil");
     let (mut partner, hello) = connect(&bench.options(), "joint").expect("a joint board");
     assert!(hello.outputs_are_virtual && hello.host.contains("STM32G431"));
     assert_eq!(hello.image.clock_hz, 170_000_000);
@@ -77,7 +77,7 @@ fn the_joint_image_for_the_bench_closes_the_loop_as_the_host_does_bit_for_bit() 
 
 #[test]
 fn the_wheel_image_for_the_bench_answers_as_the_host_does_bit_for_bit() {
-    let bench = AxisSim::new("wheel-hil");
+    let bench = BoardBench::new("wheel-hil");
     let refused = connect(&bench.options(), "joint").expect_err("a wheel");
     assert!(format!("{refused:?}").contains("joint-hil"), "{refused:?}");
     let (mut partner, _) = connect(&bench.options(), "wheel").expect("a wheel board");
@@ -107,7 +107,7 @@ fn the_wheel_image_for_the_bench_answers_as_the_host_does_bit_for_bit() {
 
 #[test]
 fn the_robot_walks_with_a_joint_and_a_wheel_on_the_bench() {
-    let (joint, wheel) = (AxisSim::new("joint-hil"), AxisSim::new("wheel-hil"));
+    let (joint, wheel) = (BoardBench::new("joint-hil"), BoardBench::new("wheel-hil"));
     let choices = [joint.choice("joint2"), wheel.choice("wheel7")];
     let nodes = Nodes::new(&NodeKind::Sil, &choices).expect("one each");
     let (recording, pil) = run_with(&gait(LegChoice::Left, 1.2, &[]), &nodes);
@@ -126,7 +126,7 @@ fn the_robot_walks_with_a_joint_and_a_wheel_on_the_bench() {
 
 #[test]
 fn a_cable_pulled_in_mid_run_ends_it_with_an_error_that_names_the_port() {
-    let mut bench = AxisSim::new("joint-hil");
+    let mut bench = BoardBench::new("joint-hil");
     let nodes = Nodes::new(&NodeKind::Sil, &[bench.choice("joint1")]).expect("one each");
     let port = bench.port.clone();
     let mut recorder = Recorder::in_memory();

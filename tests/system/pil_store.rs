@@ -29,7 +29,7 @@ const SAVE_MS: u64 = 35;
 const PARAMETER: JointParam = JointParam::FollowingError;
 
 /// An emulated joint board and its partner on the bus.
-struct AxisSim {
+struct BoardBench {
     board: Board,
     now_ns: u64,
     sequence: u16,
@@ -37,7 +37,7 @@ struct AxisSim {
     sent: Vec<Message>,
 }
 
-impl AxisSim {
+impl BoardBench {
     fn new() -> Self {
         let mut bench = Self {
             board: Board::new(image("joint").expect("an image")),
@@ -129,7 +129,7 @@ impl AxisSim {
 #[test]
 fn parameters_that_were_saved_are_back_after_a_loss_of_power_and_others_are_not() {
     let default = PARAMETER.info().default;
-    let mut bench = AxisSim::new();
+    let mut bench = BoardBench::new();
     assert_eq!(bench.get(), default);
     bench.set(default + 1000);
     let record = bench.restart();
@@ -155,7 +155,7 @@ fn a_power_cut_in_any_unit_of_a_save_leaves_the_old_value_or_the_new_one_and_a_d
     let (old, new) = (default + 2000, default + 3000);
     let mut found = Vec::new();
     for after in 0..=UNITS {
-        let mut bench = AxisSim::new();
+        let mut bench = BoardBench::new();
         bench.set(old);
         bench.save();
         assert!(bench.saved());
