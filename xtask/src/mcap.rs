@@ -34,16 +34,18 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
         || {
             let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
             let folder = target_dir().join("xtask").join("recovered");
+            // The checker wants one log in a folder.
+            let cut = folder.with_extension("cut.mcap");
             if folder.exists() {
                 fs::remove_dir_all(&folder)?;
             }
             fs::create_dir_all(&folder)?;
             let log = fs::read(std::path::absolute(run_dir)?.join("log.mcap"))?;
-            fs::write(folder.join("cut.mcap"), &log[..log.len() * 3 / 5])?;
+            fs::write(&cut, &log[..log.len() * 3 / 5])?;
             rust::build(&["--bin", "wheeleg"])?;
             run(command(target_dir().join("release").join("wheeleg"))
                 .args(["log", "recover"])
-                .arg(folder.join("cut.mcap"))
+                .arg(&cut)
                 .arg("--out")
                 .arg(folder.join("log.mcap")))?;
             run(command(tools::python()?)
