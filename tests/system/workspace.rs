@@ -64,7 +64,6 @@ const ARROWS: [(&str, &[&str]); 26] = [
     (
         "wheeleg-config",
         &[
-            "wheeleg-kinematics",
             "wheeleg-master",
             "wheeleg-node",
             "wheeleg-plant",
@@ -88,10 +87,8 @@ const ARROWS: [(&str, &[&str]); 26] = [
             "wheeleg-config",
             "wheeleg-identity",
             "wheeleg-interface",
-            "wheeleg-node",
             "wheeleg-protocol",
             "wheeleg-remote-link",
-            "wheeleg-units",
         ],
     ),
     ("wheeleg-sim", &SIM),
@@ -126,11 +123,9 @@ const ARROWS: [(&str, &[&str]); 26] = [
     ("insn-plugin", &[]),
 ];
 
-const SIM: [&str; 12] = [
+const SIM: [&str; 10] = [
     "wheeleg-config",
-    "wheeleg-control",
     "wheeleg-interface",
-    "wheeleg-kinematics",
     "wheeleg-master",
     "wheeleg-node",
     "wheeleg-plant",
@@ -157,12 +152,11 @@ const STUDIES: [&str; 13] = [
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 11] = [
+const PROGRAM: [&str; 10] = [
     "wheeleg-config",
     "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",
-    "wheeleg-plant",
     "wheeleg-protocol",
     "wheeleg-remote-host",
     "wheeleg-report",

@@ -165,10 +165,8 @@ pub fn run_watched(
     recorder: &mut Recorder,
     watcher: ProbeFn<'_>,
 ) -> Result<RunOutcome, SimError> {
-    let observers = Observers {
-        progress: &mut |_| Control::Continue(()),
-        watcher: Some(watcher),
-    };
+    let mut go_on = |_| Control::Continue(());
+    let observers = Observers::new(&mut go_on).watching(watcher);
     run_on(
         Boards::default(),
         scenario,

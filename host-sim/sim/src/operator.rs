@@ -201,16 +201,13 @@ impl Operator {
     }
 
     /// Gives a command in mid-run. A refusal is an event, as on the real console.
-    ///
-    /// # Errors
-    /// Never at present; kept for commands that cannot be given at all.
     pub(super) fn submit(
         &self,
         world: &mut World,
         command: Command,
         t_ns: u64,
         recorder: &mut Recorder,
-    ) -> Result<(), SimError> {
+    ) {
         let code = command.code();
         let answer = if world.master_alive() {
             world
@@ -220,7 +217,6 @@ impl Operator {
             Answer::Nothing
         };
         recorder.event(t_ns, Cause::Command { code, answer });
-        Ok(())
     }
 
     /// A user who gives commands without end, as a fault of the run. The first

@@ -95,13 +95,10 @@ impl Session {
     }
 
     /// A user command, now. A refusal is an event of the recording, as on the real console.
-    ///
-    /// # Errors
-    /// Never at present; kept for commands that cannot be given at all.
-    pub fn submit(&mut self, command: Command, recorder: &mut Recorder) -> Result<(), SimError> {
+    pub fn submit(&mut self, command: Command, recorder: &mut Recorder) {
         let t_ns = self.scenario_ns().unwrap_or(0);
         self.operator
-            .submit(&mut self.world, command, t_ns, recorder)
+            .submit(&mut self.world, command, t_ns, recorder);
     }
 
     /// A fault begins, or ends, now.
@@ -187,7 +184,7 @@ impl Session {
             self.inject(&fault, begin, recorder)?;
         }
         for event in self.operator.due(t_ns) {
-            self.act(&event.action, t_ns, recorder)?;
+            self.act(&event.action, t_ns, recorder);
         }
         self.operator.listen(&mut self.world, t_ns, recorder);
         for note in self.world.take_notes() {
@@ -211,17 +208,12 @@ impl Session {
     }
 
     /// Carries out one event of the scenario.
-    fn act(
-        &mut self,
-        action: &EventAction,
-        t_ns: u64,
-        recorder: &mut Recorder,
-    ) -> Result<(), SimError> {
+    fn act(&mut self, action: &EventAction, t_ns: u64, recorder: &mut Recorder) {
         let command = match action {
             EventAction::KillMaster => {
                 self.world.kill_master();
                 recorder.event(t_ns, Cause::Scenario(Act::KillMaster));
-                return Ok(());
+                return;
             }
             EventAction::EStop => {
                 recorder.event(t_ns, Cause::Scenario(Act::EStop));
@@ -230,7 +222,7 @@ impl Session {
             EventAction::ClearFault => Command::ClearFault,
             EventAction::Command(command) => *command,
         };
-        self.submit(command, recorder)
+        self.submit(command, recorder);
     }
 
     /// Ends the session; `stopped` says that its driver wanted that before the scenario's end.

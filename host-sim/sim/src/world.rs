@@ -200,10 +200,16 @@ impl World {
         })
     }
 
+    /// When the next tick, sample or cycle begins, ns.
+    fn next_tick_ns(&self) -> u64 {
+        let [left_ns, right_ns] = self.next_wheel_ns;
+        let sample_ns = left_ns.min(right_ns);
+        self.next_joint_ns.min(sample_ns).min(self.next_cycle_ns)
+    }
+
     /// When the next event is, ns.
     pub(super) fn next_ns(&self) -> u64 {
-        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
-        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        let tick_ns = self.next_tick_ns();
         let due_ns = self.bus.next_delivery_ns();
         due_ns.map_or(tick_ns, |due_ns| due_ns.min(tick_ns))
     }
@@ -213,8 +219,7 @@ impl World {
     /// # Errors
     /// [`SimError::Simulation`] when the plant leaves the range of its model.
     pub(super) fn step(&mut self) -> Result<Happened, SimError> {
-        let wheel_ns = self.next_wheel_ns[0].min(self.next_wheel_ns[1]);
-        let tick_ns = self.next_joint_ns.min(wheel_ns).min(self.next_cycle_ns);
+        let tick_ns = self.next_tick_ns();
         if let Some(due) = self.bus.next_delivery_ns()
             && due <= tick_ns
         {
@@ -229,8 +234,8 @@ impl World {
             self.joint_tick()?;
             return Ok(Happened::JointTick);
         }
-        if wheel_ns == tick_ns {
-            self.wheel_sample(usize::from(self.next_wheel_ns[0] != tick_ns))?;
+        if let Some(wheel) = self.next_wheel_ns.iter().position(|ns| *ns == tick_ns) {
+            self.wheel_sample(wheel)?;
             return Ok(Happened::WheelSample);
         }
         self.master_cycle();
@@ -312,22 +317,25 @@ impl World {
     }
 
     /// What a wheel board reads now: encoder edges and the supply switch.
-    pub(super) fn wheel_inputs(&mut self, wheel: usize) -> (i64, bool) {
+    pub(super) fn wheel_inputs(&mut self, wheel: usize) -> BoardInputs {
         let core = &self.state.core;
         let mechanics = &self.plant.assembly.mechanics;
         let angle_rad = mechanics.wheel_angle_rad(&core.motion);
         let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
-        let edges = self.faults.edges(wheel, edges);
-        (edges, core.supply.pressure_switch())
+        BoardInputs {
+            edges: self.faults.edges(wheel, edges),
+            supply: core.supply.pressure_switch(),
+            ..BoardInputs::default()
+        }
     }
 
     fn wheel_sample(&mut self, wheel: usize) -> Result<(), SimError> {
         self.advance_plant()?;
         self.start_wheel(wheel)?;
         self.start_counters();
-        let (edges, switch) = self.wheel_inputs(wheel);
+        let inputs = self.wheel_inputs(wheel);
         self.wheel_edge_remote(wheel)?;
-        self.wheel_edges[wheel] = [edges, self.wheel_edges[wheel][0]];
+        self.wheel_edges[wheel] = [inputs.edges, self.wheel_edges[wheel][0]];
         let address = wheel as u8 + 7;
         // Only the bridge takes new inputs here: the valves keep their tick.
         let drives = self.drives(address);
@@ -344,11 +352,6 @@ impl World {
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];
-        let inputs = BoardInputs {
-            edges,
-            supply: switch,
-            ..BoardInputs::default()
-        };
         self.tick_board(address, &inputs);
         self.rogue_nodes.wheel_sample(address, self.now_ns);
         self.next_wheel_ns[wheel] += self.board(address).application.tick_ns();

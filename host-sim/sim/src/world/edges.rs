@@ -50,12 +50,12 @@ impl World {
             let address = i as u8 + 7;
             let fresh = |remote: &RemoteBoards| remote.edge_ns(address) != Some(now_ns);
             if self.next_wheel_ns[i] == now_ns && self.remote.as_ref().is_some_and(fresh) {
-                let (count, switch) = self.wheel_inputs(i);
+                let board = self.wheel_inputs(i);
                 let inputs = link::Inputs {
                     adc: 0,
-                    switches: link::Switches::from_supply(switch),
+                    switches: link::Switches::from_supply(board.supply),
                     // The counter wraps, as the board's does.
-                    encoder: count as i32,
+                    encoder: board.edges as i32,
                 };
                 edges.push((address, Some(inputs)));
             }

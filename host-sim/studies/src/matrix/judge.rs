@@ -5,6 +5,7 @@ use super::measure::{Measured, line, lost_messages, messages};
 use super::row::{Expect, Row, Stop};
 use super::run::Ran;
 use wheeleg_config::RobotConfig;
+use wheeleg_config::faults::FaultKind;
 use wheeleg_telemetry::event::{Cause, ServiceOutcome};
 
 /// Mode of a board that is disarmed.
@@ -151,7 +152,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
     f.check(m.replies >= answering, || {
         format!("only {} boards answer, {answering} must", m.replies)
     });
-    if row.strikes.iter().any(|s| s.what == "bus-full") {
+    if ran.faults.iter().any(|f| f.kind == FaultKind::BusFull) {
         f.check(m.bus_load >= FULL, || {
             format!("the line is loaded to {:.2} only", m.bus_load)
         });
