@@ -362,15 +362,15 @@ fn contact_lost_and_found() {
 }
 
 #[test]
-fn the_start_from_home_and_what_notice_does() {
+fn the_start_from_home_and_what_a_preview_does() {
     let axis = wheeleg_2003_axis();
     // The paper's law, its settle band off, pushing against the stop.
     let mut paper = design(&axis, Kind::FuzzyPd);
     paper.gains.stroke_max = PositionMm::from_int(185);
     paper.gains.settle_band = PositionMm::ZERO;
     paper.gains.minimum_duty = Duty::ZERO;
-    let home = |design, notice_s| {
-        let trace = suite::home_retract(&axis, design, 1, notice_s).expect("runs");
+    let home = |design, preview_s| {
+        let trace = suite::home_retract(&axis, design, 1, preview_s).expect("runs");
         // The row before the step.
         let pressure = trace.rows[699].pressure_pa;
         (Metrics::of(&trace), pressure)

@@ -75,30 +75,30 @@ fn the_papers_delay_is_reached_from_the_held_home_and_explained() {
 
 #[test]
 fn an_announced_move_starts_at_once_and_not_before() {
-    let notice = &measured().notice;
-    for row in notice.of(Law::Default, Start::HomeHeld) {
+    let preview = &measured().preview;
+    for row in preview.of(Law::Default, Start::HomeHeld) {
         let delay_s = row.delay_s.expect("moves");
-        if row.notice_s >= 0.4 {
+        if row.preview_s >= 0.4 {
             assert!(delay_s <= NOTICED_LIMIT_S, "{row:?}");
             // A tick, t_on and the wave are 9 ms; nothing starts before the command.
             assert!(delay_s > 0.009, "{row:?}");
-        } else if row.notice_s == 0.0 {
+        } else if row.preview_s == 0.0 {
             // It is the notice that does it.
             assert!(row.median_s.is_some_and(|m| m > 0.1), "{row:?}");
         }
         assert!(row.early_mm <= EARLY_LIMIT_MM, "{row:?}");
     }
     // Measured 0.2 s; the air of a full chamber cannot leave in less than 0.1 s.
-    let enough = notice.enough_s(Start::HomeHeld).expect("some is enough");
+    let enough = preview.enough_s(Start::HomeHeld).expect("some is enough");
     assert!((0.1..=0.3).contains(&enough), "{enough}");
     // From a settled rest no notice is needed.
-    assert_eq!(notice.enough_s(Start::HomeRest), Some(0.0));
+    assert_eq!(preview.enough_s(Start::HomeRest), Some(0.0));
     // Under loads of 30 N either way 0.4 s are enough too.
-    for row in notice.rows.iter().filter(|r| r.law == Law::Default) {
-        assert!(row.notice_s < 0.4 || row.meets(), "{row:?}");
+    for row in preview.rows.iter().filter(|r| r.law == Law::Default) {
+        assert!(row.preview_s < 0.4 || row.meets(), "{row:?}");
     }
     // The paper's law does not look ahead: notice changes nothing.
-    let paper: Vec<_> = notice.of(Law::Paper, Start::HomeHeld).collect();
+    let paper: Vec<_> = preview.of(Law::Paper, Start::HomeHeld).collect();
     assert_eq!(paper.len(), 2);
     assert_eq!(paper[0].delay_s, paper[1].delay_s);
 }

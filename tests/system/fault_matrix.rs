@@ -110,9 +110,9 @@ fn every_fault_of_the_catalogue_is_in_a_row() {
     // Restarts have tests of their own (restart.rs).
     let elsewhere = [FaultKind::MasterReset, FaultKind::ClientReset];
     for kind in KINDS.iter().filter(|k| !elsewhere.contains(&k.kind)) {
-        let strikes = ROWS.iter().flat_map(|row| row.strikes);
+        let faults = ROWS.iter().flat_map(|row| row.faults);
         let name = |what: &str| what.split([':', '=']).next().unwrap_or("").to_owned();
-        let found = strikes.map(|s| name(s.what)).any(|n| n == kind.name);
+        let found = faults.map(|s| name(s.what)).any(|n| n == kind.name);
         assert!(found, "no row injects {}", kind.name);
     }
 }

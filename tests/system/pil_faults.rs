@@ -245,7 +245,7 @@ fn a_brown_out_in_mid_move_turns_the_outputs_off_and_the_board_comes_back_disarm
     let (recording, pil) = run_with(&scenario, &one("joint2=pil"));
     let rows = &recording.joints[1];
     let commanded = last(rows, t, energised);
-    // The fault strikes within the tick of its instant; the next one has none.
+    // The fault begins within the tick of its instant; the next one has none.
     assert!(commanded <= 2.0 * TICK_S, "off after {commanded} s");
     assert_shut_after_one_reset("supply fails", &recording, &pil, t, commanded);
 }

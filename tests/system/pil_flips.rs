@@ -1,6 +1,6 @@
 //! Flipped bits in the state of the firmware images on emulated boards: what a flip
 //! changes is found within the ticks that the application promises, at whatever
-//! instant it strikes, on a joint and on a wheel. `cargo xtask pil` runs this,
+//! instant it happens, on a joint and on a wheel. `cargo xtask pil` runs this,
 //! `cargo xtask deep state-flips` runs many more.
 
 use crate::bench;
@@ -32,7 +32,7 @@ struct Subject {
     address: u8,
     /// Runs it, with all requests through the function.
     course: fn(&mut Ask<'_>),
-    /// Edges at which flips strike: from arming until there is too little left to see.
+    /// Edges at which flips happen: from arming until there is too little left to see.
     struck: Range<u64>,
     /// Ticks in which all seals of its configuration are looked at once.
     round: usize,
@@ -44,7 +44,7 @@ struct Subject {
     reset: usize,
     /// Flips in the suite.
     flips: u64,
-    /// Share of the flips that strike sealed state which holds the board within two ticks, as
+    /// Share of the flips that hit sealed state which holds the board within two ticks, as
     /// `cargo xtask deep state-flips` has measured it; the rest of the bytes is copied, waits,
     /// or is sealed in parts.
     sealed: f64,
@@ -408,7 +408,7 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
         count(Came::FrameLost),
         changed.len()
     );
-    // At most three standard deviations of so many draws below: the flips do strike what is
+    // At most three standard deviations of so many draws below: the flips do hit what is
     // sealed.
     let (draws, share) = (flips as f64, subject.sealed);
     let spread = 3.0 * (draws * share * (1.0 - share)).sqrt();

@@ -2,6 +2,7 @@
 //! same times give the same recording, and commands and faults act.
 
 use wheeleg_config::builtin;
+use wheeleg_config::faults::{FaultSpec, FaultTarget};
 use wheeleg_master::command::Command;
 use wheeleg_sim::{Boards, Session};
 use wheeleg_telemetry::{Recorder, Recording};
@@ -68,6 +69,51 @@ fn inputs_from_outside_act_and_repeat() {
     assert_eq!(at(2, 0.60).mode, hold);
     assert_eq!(at(3, 0.95).faults, 0);
     assert_ne!(at(3, 1.10).faults, 0);
+}
+
+/// What cannot begin or end changes nothing, and what ends by itself can begin again.
+#[test]
+fn a_fault_that_cannot_be_injected_is_refused() {
+    let fault = |text: &str| text.parse().expect("a fault");
+    let scenario = builtin::scenario("stand").expect("built in");
+    let mut recorder = Recorder::in_memory();
+    let mut session = Session::new(Boards::default(), &scenario, &robot(), 1).expect("it starts");
+    session.step_to(1_500 * MS, &mut recorder).expect("it runs");
+    assert!(session.scenario_s().is_some(), "the scenario has begun");
+    let mut inject = |fault: &FaultSpec, begin| {
+        let answer = session.inject(fault, begin, &mut recorder);
+        answer.map_err(|why| why.to_string())
+    };
+
+    let open = fault("pot-open:joint3@0s");
+    let not_active = inject(&open, false).expect_err("it has not begun");
+    assert!(not_active.contains("not under way"), "{not_active}");
+    inject(&open, true).expect("it can begin");
+    let rival = inject(&fault("pot-short:joint3@0s"), true).expect_err("one wiper");
+    assert!(rival.contains("potentiometer of joint3"), "{rival}");
+    assert!(inject(&open, true).is_err(), "it has begun");
+    inject(&open, false).expect("it can end");
+    inject(&fault("pot-short:joint3@0s"), true).expect("the wiper is free");
+
+    let encoder = FaultSpec {
+        target: FaultTarget::Board(3),
+        ..fault("encoder-lost:wheel7@0s")
+    };
+    let no_wheel = inject(&encoder, true).expect_err("a joint has no encoder");
+    assert!(no_wheel.contains("one wheel"), "{no_wheel}");
+    let sag = FaultSpec {
+        value: 1e9,
+        ..fault("supply-sag=3@0s")
+    };
+    assert!(inject(&sag, true).is_err(), "beyond its range");
+    assert!(inject(&fault("other-interface:joint1@0s"), true).is_err());
+
+    let reset = fault("node-reset:joint5@0s");
+    inject(&reset, true).expect("it can begin");
+    assert!(inject(&reset, true).is_err(), "it is down");
+    session.step_to(1_800 * MS, &mut recorder).expect("it runs");
+    let again = session.inject(&reset, true, &mut recorder);
+    assert!(again.is_ok(), "it has started anew long ago");
 }
 
 #[test]

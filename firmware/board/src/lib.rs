@@ -7,7 +7,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`executive`] | the main loop: events in the order of their time stamps |
-//! | [`marks`], [`ring`] | received bytes from interrupt to main loop |
+//! | [`rx_timestamps`], [`ring`] | received bytes from interrupt to main loop |
 //! | [`straps`], [`reset`], [`led`] | address, cause of reset, status light |
 //! | [`store`] | parameters in two flash pages (of `wheeleg-node`) |
 //! | `g431` | the STM32G431CB: the only place with registers and `unsafe` |
@@ -27,9 +27,9 @@ pub mod executive;
 #[cfg(all(target_os = "none", feature = "g431"))]
 pub mod g431;
 pub mod led;
-pub mod marks;
 pub mod reset;
 pub mod ring;
+pub mod rx_timestamps;
 mod same_core;
 pub mod straps;
 

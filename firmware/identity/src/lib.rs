@@ -90,7 +90,7 @@ impl Kind {
 
     /// What it is, for people.
     #[must_use]
-    pub const fn describe(self) -> &'static str {
+    pub const fn title(self) -> &'static str {
         match self {
             Self::Joint => "a joint board's (STM32G431)",
             Self::Wheel => "a wheel board's (STM32G431)",

@@ -79,7 +79,7 @@ pub fn digest(root: &Path, images: Images) -> io::Result<(Digest, Vec<PathBuf>)>
     named.sort();
     let mut hasher = blake3::Hasher::new();
     for (name, path) in &named {
-        let mut text = fs::read(path).map_err(|e| told(path, &e))?;
+        let mut text = fs::read(path).map_err(|e| with_path(path, &e))?;
         text.retain(|byte| *byte != b'\r');
         for part in [name.as_bytes(), &text] {
             hasher.update(&(part.len() as u64).to_le_bytes());
@@ -113,13 +113,13 @@ pub fn emit(root: &Path, images: Images, name: &str) -> io::Result<()> {
 }
 
 /// The error, and which file it is about.
-fn told(path: &Path, error: &io::Error) -> io::Error {
+fn with_path(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
 /// Rust sources below a folder.
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
-    for entry in fs::read_dir(folder).map_err(|e| told(folder, &e))? {
+    for entry in fs::read_dir(folder).map_err(|e| with_path(folder, &e))? {
         let path = entry?.path();
         if path.is_dir() {
             walk(&path, files)?;

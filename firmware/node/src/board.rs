@@ -141,13 +141,13 @@ impl BoardCore {
         at: Micros,
     ) {
         let disarmed = self.mode().is_disarmed();
-        let stored = disarmed && store.save(records).is_ok();
-        // What was not tried did not fail either: who asks again has it done.
-        self.save = if disarmed {
-            Save::Done(stored)
-        } else {
-            Save::Idle
-        };
+        if !disarmed {
+            // What was not tried did not fail either: who asks again has it done.
+            self.save = Save::Idle;
+            return;
+        }
+        let stored = store.save(records).is_ok();
+        self.save = Save::Done(stored);
         self.supervisor
             .note(LogEvent::Saved, u8::from(stored), 0, at);
         self.supervisor.restart_timing();

@@ -43,8 +43,8 @@ pub(super) fn read(r: &mut Reader) -> [Option<UniqueId>; 8] {
         }
     }
     for (i, name) in NODE_NAMES.iter().enumerate() {
-        let twin = (0..i).find(|j| ids[i].is_some() && ids[*j] == ids[i]);
-        if let (Some(j), Some((span, _))) = (twin, table.get(name)) {
+        let duplicate = (0..i).find(|j| ids[i].is_some() && ids[*j] == ids[i]);
+        if let (Some(j), Some((span, _))) = (duplicate, table.get(name)) {
             r.problem(
                 Some(span),
                 format!(

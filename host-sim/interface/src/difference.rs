@@ -92,7 +92,7 @@ impl Change {
     }
 
     /// The first differing line in words; the two are told by their names.
-    pub(crate) fn told(&self, here_name: &str, there_name: &str) -> String {
+    pub(crate) fn message(&self, here_name: &str, there_name: &str) -> String {
         let (here, there) = self.first();
         let place = here.or(there).map_or("", |line| line.place.as_str());
         let says = |line: Option<&Line>| {
@@ -132,11 +132,11 @@ mod tests {
         enum Mode\nvalue 0 Off\nvalue 1 On\nenum Cause\nvalue 0 Off\n\
         fault 1 0 LinkLost\nlimit 96 0 Slew\nparameter 257 gain 1 I8F24 0 2 1\ntiming baud 9\n";
 
-    fn told(from: &str, to: &str) -> String {
+    fn message(from: &str, to: &str) -> String {
         let other = BASE.replace(from, to);
         assert_ne!(other, BASE);
         let changes = changes(BASE, &other);
-        changes.first().expect("one").told("A", "B")
+        changes.first().expect("one").message("A", "B")
     }
 
     #[test]
@@ -190,7 +190,7 @@ mod tests {
             ),
         ] {
             assert_eq!(
-                told(from, to),
+                message(from, to),
                 format!("The first difference is in {expected}")
             );
         }
@@ -201,12 +201,12 @@ mod tests {
     fn lines_of_two_places_are_not_told_as_a_pair() {
         let gone = "message 17 Arm Request\nfield hash u64 8 hash\n";
         assert_eq!(
-            told(gone, "field more u8 1 -\n"),
+            message(gone, "field more u8 1 -\n"),
             "The first difference is in the message Sync (1): A has no such line, \
              B has `field more u8 1 -`."
         );
         assert_eq!(
-            told(gone, "message 18 Disarm Request\n"),
+            message(gone, "message 18 Disarm Request\n"),
             "The first difference is in the message Arm (17): A has `message 17 Arm Request`, \
              B has no such line."
         );
@@ -215,7 +215,7 @@ mod tests {
     /// Both sets of lines are the same then; bytes are not.
     #[test]
     fn an_order_is_a_difference() {
-        let told = told("value 0 Off\nvalue 1 On", "value 1 On\nvalue 0 Off");
+        let told = message("value 0 Off\nvalue 1 On", "value 1 On\nvalue 0 Off");
         assert!(told.contains("in the enumeration Mode"), "{told}");
     }
 

@@ -44,7 +44,7 @@ pub fn first_difference(here: Side<'_>, there: Side<'_>) -> String {
         Err(hash) => format!("{}.", not_archived(hash)),
         Ok(changes) => changes.first().map_or_else(
             || "The interfaces are the same.".to_owned(),
-            |change| change.told(here.name, there.name),
+            |change| change.message(here.name, there.name),
         ),
     }
 }
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
     use wheeleg_protocol::SCHEMA_HASH;
 
-    fn told(here: u64, there: u64) -> String {
+    fn message(here: u64, there: u64) -> String {
         let side = |name, hash| Side { name, hash };
         first_difference(side("the master", here), side("the board", there))
     }
@@ -63,17 +63,17 @@ mod tests {
     #[test]
     fn first_differences_of_real_interfaces() {
         assert_eq!(
-            told(0x2915_e091_a195_b5c9, 0xb6de_87f3_bac1_3d19),
+            message(0x2915_e091_a195_b5c9, 0xb6de_87f3_bac1_3d19),
             "The first difference is in the message Discover (23): the master has \
              `message 23 Discover Request`, the board has no such line."
         );
         assert_eq!(
-            told(0x2915_e091_a195_b5c9, 0x2595_7592_0114_d3d2),
+            message(0x2915_e091_a195_b5c9, 0x2595_7592_0114_d3d2),
             "The first difference is in the enumeration LogEvent: the master has no such line, \
              the board has `value 6 Precharged`."
         );
         assert_eq!(
-            told(0x2595_7592_0114_d3d2, 0x37a2_c972_7336_e2d2),
+            message(0x2595_7592_0114_d3d2, 0x37a2_c972_7336_e2d2),
             "The first difference is in the times of the line: the master has no such line, \
              the board has `timing baud 1000000`."
         );
@@ -82,11 +82,11 @@ mod tests {
     #[test]
     fn what_is_not_archived_or_the_same_is_told() {
         assert_eq!(
-            told(SCHEMA_HASH, SCHEMA_HASH),
+            message(SCHEMA_HASH, SCHEMA_HASH),
             "The interfaces are the same."
         );
         for (here, there) in [(SCHEMA_HASH, 0x1234), (0x1234, SCHEMA_HASH)] {
-            let told = told(here, there);
+            let told = message(here, there);
             assert!(
                 told.starts_with("0000000000001234 is not an interface"),
                 "{told}"
@@ -98,7 +98,7 @@ mod tests {
     fn all_changes_begin_with_the_first() {
         let earlier = archive::newest_earlier().expect("one");
         let all = changes(SCHEMA_HASH, earlier).expect("both are archived");
-        let first = all.first().expect("one").told("the master", "the board");
-        assert_eq!(first, told(SCHEMA_HASH, earlier));
+        let first = all.first().expect("one").message("the master", "the board");
+        assert_eq!(first, message(SCHEMA_HASH, earlier));
     }
 }

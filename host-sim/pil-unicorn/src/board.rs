@@ -1,7 +1,7 @@
 //! One emulated board: requests in, replies out.
 
-mod course;
-mod shown;
+mod outputs;
+mod timeline;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -263,8 +263,8 @@ impl Board {
         if let Stop::Reset(cause) = stop {
             return Err(format!("reset {cause:#x} in the start-up code"));
         }
-        let shown = self.shown();
-        self.reply(shown)
+        let ran = self.take_ran();
+        self.reply(ran)
     }
 
     fn machine(&mut self) -> Result<&mut Machine, String> {

@@ -108,7 +108,7 @@ mod tests {
                 && !times.is_replayed(9)
         );
         assert_eq!(times.next(4_999, |_| true), None, "not yet");
-        assert_eq!(times.next(5_000, |_| false), None, "nothing struck it");
+        assert_eq!(times.next(5_000, |_| false), None, "nothing reset it");
         let reset = Due::Reset(2, ResetCause::Watchdog);
         assert_eq!(times.next(5_000, |address| address == 2), Some(reset));
         assert_eq!(times.next(5_000, |_| true), None);
@@ -123,7 +123,7 @@ mod tests {
         (remote[1], remote[6]) = (true, true);
         let mut times = DownTimes::new(remote);
         let cause = ResetCause::Watchdog;
-        // Nothing struck board 2; board 7 was struck later.
+        // Nothing reset board 2; board 7 was reset later.
         times.reset(5_000, 2, cause);
         times.reset(6_000, 7, cause);
         times.first_edge(9_000, 2, 10_000);

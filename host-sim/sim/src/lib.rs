@@ -99,14 +99,17 @@ impl<'a> Observers<'a> {
 pub type Control = ControlFlow<()>;
 
 /// How a run ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct RunOutcome {
     /// Scenario time simulated and recorded, s.
     pub recorded_s: f64,
     /// All simulated time, start-up included, s.
     pub simulated_s: f64,
-    /// The caller stopped the run before its end.
+    /// The caller stopped the run before its end, or it failed.
     pub stopped: bool,
+    /// What ended the run early: the robot did not get ready, the plant left the range of its
+    /// model, a board elsewhere failed. What was simulated until then is recorded.
+    pub failure: Option<SimError>,
     /// What boards outside of this process did, if there were any.
     pub pil: Option<PilSummary>,
     /// Frames that were sent and accepted.
@@ -150,7 +153,7 @@ pub fn run_with(
 ) -> Result<RunOutcome, SimError> {
     let boards = Boards::connect(nodes, robot)?;
     let observers = Observers::new(progress);
-    run_on(boards, scenario, robot, seed, recorder, observers)
+    run_on(boards, scenario, robot, seed, recorder, observers)?.whole()
 }
 
 /// As [`run`], with `watcher` called for every joint after every tick, in the time of
@@ -167,19 +170,15 @@ pub fn run_watched(
 ) -> Result<RunOutcome, SimError> {
     let mut go_on = |_| Control::Continue(());
     let observers = Observers::new(&mut go_on).watching(watcher);
-    run_on(
-        Boards::default(),
-        scenario,
-        robot,
-        seed,
-        recorder,
-        observers,
-    )
+    let boards = Boards::default();
+    run_on(boards, scenario, robot, seed, recorder, observers)?.whole()
 }
 
 /// What a run has in place of boards that find their own way.
 #[derive(Default)]
 pub struct Boards {
+    /// Where each of them runs.
+    nodes: Nodes,
     /// Those outside of this process; `None`: all are here.
     remote: Option<RemoteBoards>,
     /// Of those here, when they are down after a fault, if not when they would be.
@@ -193,6 +192,7 @@ impl Boards {
     /// As [`RemoteBoards::connect`].
     pub fn connect(nodes: &Nodes, robot: &RobotConfig) -> Result<Self, SimError> {
         Ok(Self {
+            nodes: nodes.clone(),
             remote: RemoteBoards::connect(nodes, robot)?,
             replayed: DownTimes::default(),
         })
@@ -201,16 +201,18 @@ impl Boards {
     /// All here, and down when the boards of another run were.
     pub fn native_with(replayed: DownTimes) -> Self {
         Self {
+            nodes: Nodes::default(),
             remote: None,
             replayed,
         }
     }
 }
 
-/// As [`run_with`], on boards that are connected already.
+/// As [`run_with`], on boards that are connected already; a run that fails on its way is an
+/// outcome with what there is of it ([`RunOutcome::failure`]).
 ///
 /// # Errors
-/// As [`run_with`].
+/// [`SimError::Simulation`] when a part refuses its parameters.
 pub fn run_on(
     boards: Boards,
     scenario: &Scenario,
@@ -220,8 +222,22 @@ pub fn run_on(
     mut observers: Observers<'_>,
 ) -> Result<RunOutcome, SimError> {
     let mut session = Session::new(boards, scenario, robot, seed)?;
-    let mut stopped = false;
-    while !session.is_over() && !stopped {
+    let driven = drive(&mut session, recorder, &mut observers);
+    let stopped = !session.is_over();
+    let outcome = session.finish(stopped, recorder);
+    Ok(RunOutcome {
+        failure: driven.err(),
+        ..outcome
+    })
+}
+
+/// Simulates to the end of the scenario, or until an observer breaks it off.
+fn drive(
+    session: &mut Session,
+    recorder: &mut Recorder,
+    observers: &mut Observers<'_>,
+) -> Result<(), SimError> {
+    while !session.is_over() {
         let happened = session.advance()?;
         if happened == Happened::JointTick
             && let Some(watcher) = &mut observers.watcher
@@ -231,10 +247,25 @@ pub fn run_on(
         session.handle(happened, recorder)?;
         if happened == Happened::MasterCycle {
             let t_s = session.scenario_s().unwrap_or(-1.0);
-            stopped = (observers.progress)(t_s).is_break();
+            if (observers.progress)(t_s).is_break() {
+                break;
+            }
         }
     }
-    Ok(session.finish(stopped, recorder))
+    Ok(())
+}
+
+impl RunOutcome {
+    /// The outcome of a run that did not fail.
+    ///
+    /// # Errors
+    /// [`RunOutcome::failure`].
+    fn whole(mut self) -> Result<Self, SimError> {
+        match self.failure.take() {
+            Some(failure) => Err(failure),
+            None => Ok(self),
+        }
+    }
 }
 
 /// Powers the robot up and takes its boards over for the commissioned ones; gives

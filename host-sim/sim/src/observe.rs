@@ -69,7 +69,7 @@ impl Observer {
                     switches: vertical.map_or(0, |board| switch_bits(board.snapshot().switches)),
                 },
             );
-            self.notice_contact(foot, out.foot_switches[foot], t_ns, recorder);
+            self.record_contact(foot, out.foot_switches[foot], t_ns, recorder);
         }
         recorder.body(
             t_ns,
@@ -135,7 +135,7 @@ impl Observer {
                     faults: u32::from(node.faults.raw()),
                 },
             );
-            self.notice(i, node.mode, node.faults, t_ns, recorder);
+            self.record_mode(i, node.mode, node.faults, t_ns, recorder);
         }
     }
 
@@ -164,13 +164,13 @@ impl Observer {
                     faults: u32::from(node.faults.raw()),
                 },
             );
-            self.notice(6 + i, node.mode, node.faults, t_ns, recorder);
+            self.record_mode(6 + i, node.mode, node.faults, t_ns, recorder);
         }
     }
 
     /// Touchdowns and lifts as they physically are become events; what the master made of
     /// its switches stands beside them.
-    fn notice_contact(
+    fn record_contact(
         &mut self,
         foot: usize,
         switches: [bool; 4],
@@ -187,7 +187,7 @@ impl Observer {
     }
 
     /// Changes of mode and fault become events; `index` is 0 to 7 for addresses 1 to 8.
-    fn notice(
+    fn record_mode(
         &mut self,
         index: usize,
         mode: Mode,

@@ -4,10 +4,11 @@
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, RobotConfig, Scenario};
 use wheeleg_master::command::Command;
+use wheeleg_remote_host::Nodes;
 use wheeleg_telemetry::Recorder;
 use wheeleg_telemetry::event::{Act, Cause};
 
-use crate::faults::Schedule;
+use crate::faults::{ActiveFaults, Schedule};
 use crate::observe::Observer;
 use crate::operator::Operator;
 use crate::world::{Happened, World};
@@ -23,6 +24,9 @@ pub struct Session {
     operator: Operator,
     observer: Observer,
     schedule: Schedule,
+    active: ActiveFaults,
+    robot: RobotConfig,
+    nodes: Nodes,
     cycle_ns: u64,
     duration_ns: u64,
     /// Simulated time at which the scenario began, once it has.
@@ -43,6 +47,7 @@ impl Session {
     ) -> Result<Self, SimError> {
         let plant = setup::plant(scenario, robot);
         let master = setup::master(scenario, robot);
+        let nodes = boards.nodes.clone();
         let mut world = World::new(robot, &plant, master, seed, boards)?;
         for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
             world.inject(fault, true)?;
@@ -52,6 +57,9 @@ impl Session {
             operator: Operator::new(scenario, &robot.start_up),
             observer: Observer::default(),
             schedule: Schedule::new(&scenario.faults),
+            active: ActiveFaults::default(),
+            robot: robot.clone(),
+            nodes,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
             duration_ns: (scenario.duration_s * 1e9).round() as u64,
             start_ns: None,
@@ -101,10 +109,12 @@ impl Session {
             .submit(&mut self.world, command, t_ns, recorder);
     }
 
-    /// A fault begins, or ends, now.
+    /// A fault begins, or ends, now; its own times are not looked at.
     ///
     /// # Errors
-    /// [`SimError`] if a board elsewhere refuses it, or one that starts anew.
+    /// [`SimError::Simulation`] if the fault cannot begin beside those under way, or is to end
+    /// and is not under way; nothing has changed then. [`SimError::Remote`] if a board elsewhere
+    /// refuses it, or one that starts anew.
     pub fn inject(
         &mut self,
         fault: &FaultSpec,
@@ -112,6 +122,12 @@ impl Session {
         recorder: &mut Recorder,
     ) -> Result<(), SimError> {
         let t_ns = self.scenario_ns().unwrap_or(0);
+        if begin {
+            let now_ns = self.now_ns();
+            self.active.begin(fault, now_ns, &self.robot, &self.nodes)?;
+        } else {
+            self.active.end(fault)?;
+        }
         self.world.inject(fault, begin)?;
         recorder.set_disk_full(!self.world.faults().can_record());
         let act = if begin {
@@ -237,6 +253,7 @@ impl Session {
             recorded_s: self.scenario_s().unwrap_or(0.0),
             simulated_s: now_ns as f64 * 1e-9,
             stopped,
+            failure: None,
             pil: self.world.remote().map(|remote| remote.summary(now_ns)),
             line: self.world.audit(),
             link,

@@ -134,7 +134,9 @@ impl World {
         seed: u64,
         boards: Boards,
     ) -> Result<Self, SimError> {
-        let Boards { remote, replayed } = boards;
+        let Boards {
+            remote, replayed, ..
+        } = boards;
         let refused = |part: &str, e: &dyn std::fmt::Display| {
             SimError::simulation(
                 format!("the {part} refuses its parameters: {e}"),

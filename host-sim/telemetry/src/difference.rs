@@ -40,7 +40,7 @@ fn field(here: &Logged, there: &Logged) -> Option<(&'static str, Value, Value)> 
     })
 }
 
-fn describe(here: Option<Logged>, there: Option<Logged>) -> String {
+fn message(here: Option<Logged>, there: Option<Logged>) -> String {
     let at = |m: &Logged| format!("{:.6} s, {}", m.t_ns as f64 * 1e-9, m.topic);
     match (here, there) {
         (Some(here), Some(there)) if (here.t_ns, &here.topic) == (there.t_ns, &there.topic) => {
@@ -81,7 +81,7 @@ pub fn first_difference(here: &Path, there: &Path) -> Result<Option<String>, Log
             (None, None) => return Ok(None),
             (Some(a), Some(b))
                 if a.t_ns == b.t_ns && a.topic == b.topic && a.payload == b.payload => {}
-            (a, b) => return Ok(Some(describe(a, b))),
+            (a, b) => return Ok(Some(message(a, b))),
         }
     }
 }

@@ -24,7 +24,7 @@ pub enum LogError {
     },
 
     /// The log writer failed after the file had been opened.
-    #[error("cannot write the log: {}", words(.0))]
+    #[error("cannot write the log: {}", message(.0))]
     #[diagnostic(
         code(wheeleg::log),
         help("the disk may be full; `wheeleg log recover` makes a whole log of what was written")
@@ -47,7 +47,7 @@ pub enum LogError {
     },
 
     /// A recovered log that cannot be read back.
-    #[error("`{}` was written and cannot be read back: {}", path.display(), words(.reason))]
+    #[error("`{}` was written and cannot be read back: {}", path.display(), message(.reason))]
     #[diagnostic(
         code(wheeleg::log),
         help("the disk may be at fault; write to another one")
@@ -98,7 +98,7 @@ pub enum LogError {
 }
 
 /// What went wrong, without a word of the layers between.
-fn words(error: &mcap::McapError) -> String {
+fn message(error: &mcap::McapError) -> String {
     match error {
         mcap::McapError::Io(reason) => reason.to_string(),
         other => other.to_string(),

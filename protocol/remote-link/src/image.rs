@@ -46,7 +46,7 @@ pub fn identify(
 ) -> Result<Identity, WrongImage> {
     let names: Vec<String> = kinds
         .iter()
-        .map(|kind| format!("`{}`, {}", kind.name(), kind.describe()))
+        .map(|kind| format!("`{}`, {}", kind.name(), kind.title()))
         .collect();
     let build = kinds.first().map_or("", |kind| kind.build_command());
     let wrong = |what: String, wanted: String| WrongImage {
@@ -58,7 +58,7 @@ pub fn identify(
     let kind_wanted = || names.join(" or ");
     let identity = read(path).map_err(|what| wrong(what, kind_wanted()))?;
     if !kinds.contains(&identity.kind) {
-        let (name, what) = (identity.kind.name(), identity.kind.describe());
+        let (name, what) = (identity.kind.name(), identity.kind.title());
         return Err(wrong(
             format!("is the image `{name}`, {what}"),
             kind_wanted(),

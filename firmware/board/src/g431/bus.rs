@@ -2,8 +2,8 @@
 //! that hardware starts at their time, and a driver that hardware switches off.
 
 use super::{latch, pac, timebase};
-use crate::marks::{RxTimestamp, RxTimestamps};
 use crate::ring::{RING, end_of_first, stretches};
+use crate::rx_timestamps::{RxTimestamp, RxTimestamps};
 use crate::same_core::Announce;
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};

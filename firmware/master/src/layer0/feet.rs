@@ -77,7 +77,7 @@ mod tests {
     use crate::contact::{FRONT, INNER, OUTER, REAR};
 
     /// What is told over cycles with these switches, each pattern for so many.
-    fn told(patterns: &[(u8, u32)]) -> Vec<Stuck> {
+    fn stuck_switches(patterns: &[(u8, u32)]) -> Vec<Stuck> {
         let mut watch = FootWatch::default();
         let cycles = patterns.iter().flat_map(|(raw, n)| (0..*n).map(|_| *raw));
         cycles
@@ -95,15 +95,18 @@ mod tests {
                     switch: FootSwitches(bit),
                     closed,
                 };
-                assert_eq!(told(&[step, step, step].concat()), [stuck]);
+                assert_eq!(stuck_switches(&[step, step, step].concat()), [stuck]);
                 // Not before the other three have been both.
-                assert_eq!(told(&[(stick(0), 500)]), []);
-                assert_eq!(told(&[(stick(ALL), 500)]), []);
-                assert_eq!(told(&[(stick(0), 100), (stick(ALL), 19)]), []);
-                assert_eq!(told(&[(stick(0), 100), (stick(ALL), 20)]), [stuck]);
+                assert_eq!(stuck_switches(&[(stick(0), 500)]), []);
+                assert_eq!(stuck_switches(&[(stick(ALL), 500)]), []);
+                assert_eq!(stuck_switches(&[(stick(0), 100), (stick(ALL), 19)]), []);
+                assert_eq!(
+                    stuck_switches(&[(stick(0), 100), (stick(ALL), 20)]),
+                    [stuck]
+                );
                 // Mended, and stuck again.
                 let again = [&step[..], &[(0, 50), (ALL, 50)], &step[..]].concat();
-                assert_eq!(told(&again), [stuck, stuck]);
+                assert_eq!(stuck_switches(&again), [stuck, stuck]);
             }
         }
     }
@@ -117,10 +120,14 @@ mod tests {
             (ALL, 200),
             (REAR, 10),
         ];
-        assert_eq!(told(&[walk, walk, walk].concat()), []);
+        assert_eq!(stuck_switches(&[walk, walk, walk].concat()), []);
         for touching in [FRONT, FRONT | OUTER, OUTER, REAR] {
             let step = [(0, 100), (touching, 200)];
-            assert_eq!(told(&[step, step, step].concat()), [], "{touching}");
+            assert_eq!(
+                stuck_switches(&[step, step, step].concat()),
+                [],
+                "{touching}"
+            );
         }
     }
 }

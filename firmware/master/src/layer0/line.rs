@@ -336,10 +336,10 @@ mod tests {
     fn a_spoilt_slot_names_its_board_unless_others_are_spoilt_too() {
         let slot_end = |slot: u64| 1020 + 100 + slot * 310 + 310;
         let mut line = Line::default();
-        let mut twins = [7; REPLY_BYTES];
-        [twins[0], twins[REPLY_BYTES - 1]] = [0; 2];
+        let mut garbled = [7; REPLY_BYTES];
+        [garbled[0], garbled[REPLY_BYTES - 1]] = [0; 2];
         for _ in 0..5 {
-            line.stretch(&twins, slot_end(4));
+            line.stretch(&garbled, slot_end(4));
             line.end_cycle(|index| index != 4, |_| {});
             assert_eq!(line.spoilt(4), None, "two replies at once");
         }

@@ -54,7 +54,7 @@ impl Node {
 
     /// Whether two boards were heard at this address.
     #[must_use]
-    pub const fn has_twin(&self) -> bool {
+    pub const fn has_duplicate(&self) -> bool {
         matches!(self.enumerated, Enumerated::DuplicateId(_))
     }
 }
@@ -146,8 +146,8 @@ impl Nodes {
     /// Stores an identity after checking it against the master's schema hash.
     pub fn identify(&mut self, from: Address, identity: Identity, schema_hash: u64) -> Enumerated {
         let node = from.slot().and_then(|index| self.get(index));
-        if let Some(twins) = node.filter(|node| node.has_twin()) {
-            return twins.enumerated;
+        if let Some(duplicates) = node.filter(|node| node.has_duplicate()) {
+            return duplicates.enumerated;
         }
         let known = node.and_then(Node::unique_id);
         let result = if let Some(known) = known.filter(|known| *known != identity.unique_id) {
@@ -182,8 +182,8 @@ impl Nodes {
         }
     }
 
-    /// A node did not answer the question who it is: it is missing, or it and a twin
-    /// spoil each other's answers. It is asked by turns so that twins part.
+    /// A node did not answer the question who it is: it is missing, or it and a duplicate
+    /// spoil each other's answers. It is asked by turns so that duplicates part.
     pub fn identify_failed(&mut self, from: Address) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.identify_failed = !node.identify_failed;
@@ -396,13 +396,13 @@ mod tests {
                 "{again}: the same board"
             );
         }
-        let twins = Enumerated::DuplicateId([[1; 12], [2; 12]]);
-        assert_eq!(nodes.identify(address, identity(2), 7), twins);
+        let duplicates = Enumerated::DuplicateId([[1; 12], [2; 12]]);
+        assert_eq!(nodes.identify(address, identity(2), 7), duplicates);
         let node = nodes.get(2).unwrap();
-        assert!(node.has_twin() && node.unique_id().is_none());
+        assert!(node.has_duplicate() && node.unique_id().is_none());
         assert_eq!(
             nodes.identify(address, identity(1), 7),
-            twins,
+            duplicates,
             "until it is lost"
         );
         for index in [0, 1, 3, 4, 5, 6, 7] {

@@ -226,8 +226,8 @@ impl Layer0 {
                     }
                 }
                 Some(Change::Back) => {
-                    if self.nodes.get(index).is_some_and(Node::has_twin) {
-                        // It is heard again: its twin is gone. Who is left?
+                    if self.nodes.get(index).is_some_and(Node::has_duplicate) {
+                        // It is heard again: its duplicate is gone. Who is left?
                         self.nodes.forget(index);
                     }
                     events.push(now_us, Event::NodeBack(address));

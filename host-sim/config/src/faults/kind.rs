@@ -3,7 +3,7 @@
 use crate::pretty;
 use crate::timing::{JOINT_TICK_NS, SERVICE_NS, WATCHDOG_NS};
 
-/// Where a fault strikes, and so what its target is called.
+/// Where a fault acts, and so what its target is called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// Master, line, supply, clock or host: there is only one, no target is named.
@@ -67,7 +67,7 @@ pub struct KindInfo {
     pub kind: FaultKind,
     /// Name on the command line and in scenario files.
     pub name: &'static str,
-    /// Where it strikes.
+    /// Where it acts.
     pub place: Place,
     /// Its number, if it takes one.
     pub value: Option<ValueSpec>,
@@ -230,7 +230,7 @@ impl FaultKind {
 
     /// How long it lasts with this value where no end is given, s; infinite: for good.
     #[must_use]
-    pub(super) fn lasts_s(self, value: f64) -> f64 {
+    pub fn lasts_s(self, value: f64) -> f64 {
         let seconds = |ns: u64| ns as f64 * 1e-9;
         match self {
             Self::MasterReset | Self::BrownOut => value * 1e-3,

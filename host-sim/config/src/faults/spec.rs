@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::kind::{FaultKind, KINDS, NOT_IMPLEMENTED, Place, ValueSpec};
 
-/// What a fault strikes.
+/// What a fault affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultTarget {
     /// The only one there is.
@@ -70,7 +70,7 @@ pub enum SpecError {
         reason: &'static str,
     },
     /// The target is missing or not of the right kind.
-    #[error("`{text}`: `{name}` strikes {expected}{}", got(.found))]
+    #[error("`{text}`: `{name}` affects {expected}{}", got(.found))]
     Target {
         /// The whole text.
         text: String,
@@ -129,6 +129,20 @@ impl Place {
             Self::FootSwitch => {
                 "one switch of a foot: `:left.front`, with left or right and front, left, back or right"
             }
+        }
+    }
+
+    /// Whether a target is of this kind and exists.
+    #[must_use]
+    pub fn accepts(self, target: FaultTarget) -> bool {
+        match (self, target) {
+            (Self::Robot, FaultTarget::Robot) => true,
+            (Self::Board, FaultTarget::Board(n)) => (1..=8).contains(&n),
+            (Self::Joint, FaultTarget::Board(n)) => (1..=6).contains(&n),
+            (Self::Wheel, FaultTarget::Board(n)) => (7..=8).contains(&n),
+            (Self::Valve, FaultTarget::Valve(joint, valve)) => joint < 6 && valve < 4,
+            (Self::FootSwitch, FaultTarget::FootSwitch(leg, switch)) => leg < 2 && switch < 4,
+            _ => false,
         }
     }
 

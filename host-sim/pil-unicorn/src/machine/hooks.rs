@@ -115,7 +115,7 @@ impl Machine {
             state.trace[state.trace_at % TRACE] = address as u32;
             state.trace_at = state.trace_at.wrapping_add(1);
             if let Some(profile) = &mut state.profile {
-                profile.course.push((address as u32, size));
+                profile.trace.push((address as u32, size));
             }
         })?;
         // Around RAM: where a hook of memory stands, every store takes the slow way.

@@ -36,7 +36,7 @@ pub(crate) struct Seen {
 #[derive(Debug, Default)]
 pub(crate) struct Profile {
     /// Address and size of each block since the processor woke.
-    pub(super) course: Vec<(u32, u32)>,
+    pub(super) trace: Vec<(u32, u32)>,
     /// The same of the worst tick.
     worst: Vec<(u32, u32)>,
     /// Its instructions.
@@ -49,7 +49,7 @@ impl Profile {
     fn tick(&mut self, instructions: u64) {
         if instructions > self.instructions {
             self.instructions = instructions;
-            self.worst.clone_from(&self.course);
+            self.worst.clone_from(&self.trace);
             self.fresh = true;
         }
     }
@@ -214,7 +214,7 @@ impl State {
     pub(super) fn sleep(&mut self) {
         self.longest_awake = self.longest_awake.max(self.awake_instructions());
         if let Some(profile) = &mut self.profile {
-            profile.course.clear();
+            profile.trace.clear();
         }
         let since = self.retired();
         let fresh = Awake {

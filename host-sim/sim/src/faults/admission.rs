@@ -16,14 +16,7 @@ pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<
         can_be_there(fault, nodes)?;
         does_something(fault, robot)?;
         if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
-            return Err(SimError::simulation(
-                format!("the fault `{fault}` cannot begin or end while the robot runs"),
-                format!(
-                    "a board is built so: write `{}{}@0s`",
-                    fault.kind.name(),
-                    fault.target
-                ),
-            ));
+            return Err(cannot_begin(fault));
         }
         if fault.from_s >= scenario.duration_s {
             let end_s = scenario.duration_s;
@@ -40,7 +33,63 @@ pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<
     no_rivals(&scenario.faults)
 }
 
-/// What strikes a board itself must be possible where that board runs: an image has a
+/// Checks a fault that begins now, beside those that are active.
+///
+/// # Errors
+/// [`SimError::Simulation`] with why it cannot be.
+pub(crate) fn check_now(
+    fault: &FaultSpec,
+    active: &[FaultSpec],
+    robot: &RobotConfig,
+    nodes: &Nodes,
+) -> Result<(), SimError> {
+    let info = fault.kind.info();
+    if !info.place.accepts(fault.target) {
+        return Err(SimError::simulation(
+            format!(
+                "the fault `{}` affects {}",
+                info.name,
+                info.place.expected()
+            ),
+            "name such a target",
+        ));
+    }
+    if let Some(value) = info.value.filter(|value| !value.allows(fault.value)) {
+        return Err(SimError::simulation(
+            format!("the fault `{fault}` has a value outside {}", value.range()),
+            "choose a value within that range",
+        ));
+    }
+    if fault.kind.is_built_in() {
+        return Err(cannot_begin(fault));
+    }
+    can_be_there(fault, nodes)?;
+    does_something(fault, robot)?;
+    for other in active {
+        if let Some(part) = contested(fault, other) {
+            return Err(SimError::simulation(
+                format!(
+                    "the fault `{fault}` cannot begin while `{other}` lasts: both act on {part}"
+                ),
+                "end that one first",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn cannot_begin(fault: &FaultSpec) -> SimError {
+    SimError::simulation(
+        format!("the fault `{fault}` cannot begin or end while the robot runs"),
+        format!(
+            "a board is built so: write `{}{}@0s`",
+            fault.kind.name(),
+            fault.target
+        ),
+    )
+}
+
+/// What affects a board itself must be possible where that board runs: an image has a
 /// clock, a transmitter and an interface of its own; a board on QEMU has no watchdog that
 /// would end a stopped program, and a bench board a supply that nobody here can cut.
 fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
@@ -74,7 +123,7 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
         _ => return Ok(()),
     };
     Err(SimError::simulation(
-        format!("the fault `{fault}` cannot strike a board that runs on `{there}`: {why}"),
+        format!("the fault `{fault}` cannot act on a board that runs on `{there}`: {why}"),
         format!("let that node run as {elsewhere}"),
     ))
 }
@@ -180,7 +229,7 @@ fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
     })
 }
 
-/// What a fault strikes of which there is only one.
+/// What a fault affects of which there is only one.
 fn whole(kind: FaultKind) -> &'static str {
     use FaultKind as F;
     match kind {

@@ -1,10 +1,10 @@
 //! The faults under way: what they do to the plant, to signals and to the line.
 //!
 //! A fault acts at one of three places. On the plant it is done once, when it
-//! begins, and undone when it ends ([`Injector::strike`]). On a signal between
+//! begins, and undone when it ends ([`Injector::inject`]). On a signal between
 //! plant and board, or on the line, it stands in the way as long as it lasts;
 //! the simulation asks at every passage. All chance comes from one random
-//! stream of the run's seed, which sound runs never draw from.
+//! stream of the run's seed, which runs without faults never draw from.
 
 use rand_pcg::Pcg64Mcg;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
@@ -90,7 +90,7 @@ impl Injector {
         self.of(kind).next().is_some()
     }
 
-    fn strikes(&self, kind: FaultKind, address: u8) -> bool {
+    fn affects(&self, kind: FaultKind, address: u8) -> bool {
         self.of(kind)
             .any(|f| f.target == FaultTarget::Board(address))
     }
@@ -140,17 +140,17 @@ impl Injector {
 
     /// What the board's driver puts on the line of a frame; `None`: nothing.
     pub(crate) fn board_sends(&mut self, address: u8, bytes: Vec<u8>) -> Option<Vec<u8>> {
-        if self.strikes(FaultKind::NodeSilent, address)
-            || self.strikes(FaultKind::BabbleUnguarded, address)
+        if self.affects(FaultKind::NodeSilent, address)
+            || self.affects(FaultKind::BabbleUnguarded, address)
         {
             return None;
         }
-        if self.strikes(FaultKind::Babble, address) {
+        if self.affects(FaultKind::Babble, address) {
             // A byte more would end behind the limit.
             let limit = SlotTiming::DEFAULT.driver_limit_us() / SlotTiming::DEFAULT.bytes_us(1);
             return Some(rubbish(limit as usize, &mut self.rng));
         }
-        if self.strikes(FaultKind::OtherInterface, address) {
+        if self.affects(FaultKind::OtherInterface, address) {
             return Some(of_other(bytes));
         }
         Some(bytes)
@@ -158,12 +158,12 @@ impl Injector {
 
     /// Whether the guard of the board's driver cuts its transmissions off.
     pub(crate) fn cuts_off(&self, address: u8) -> bool {
-        self.strikes(FaultKind::Babble, address)
+        self.affects(FaultKind::Babble, address)
     }
 
     /// What a driver that is stuck on sends in the time of so many bytes.
     pub(crate) fn babble(&mut self, address: u8, bytes: usize) -> Option<Vec<u8>> {
-        let stuck = self.strikes(FaultKind::BabbleUnguarded, address);
+        let stuck = self.affects(FaultKind::BabbleUnguarded, address);
         stuck.then(|| rubbish(bytes, &mut self.rng))
     }
 
@@ -216,8 +216,8 @@ impl Injector {
     /// Encoder edges as the board counts them.
     pub(crate) fn edges(&mut self, wheel: usize, edges: i64) -> i64 {
         let address = wheel as u8 + 7;
-        let lost = self.strikes(FaultKind::EncoderLost, address);
-        if !lost && !self.strikes(FaultKind::EncoderReversed, address) {
+        let lost = self.affects(FaultKind::EncoderLost, address);
+        if !lost && !self.affects(FaultKind::EncoderReversed, address) {
             return edges;
         }
         let at = *self.encoder_at[wheel].get_or_insert(edges);
@@ -379,7 +379,7 @@ mod tests {
     use super::*;
     use wheeleg_config::builtin;
 
-    /// An encoder counts from where its own fault began, whatever else strikes its board.
+    /// An encoder counts from where its own fault began, whatever else affects its board.
     #[test]
     fn another_fault_of_the_board_leaves_a_faulty_encoder_where_it_stood() {
         let robot = builtin::robot("wheeleg-2003").expect("built in");

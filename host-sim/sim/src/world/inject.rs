@@ -1,4 +1,4 @@
-//! Faults that stop boards or programs: what they do at the instant at which they strike.
+//! Faults that stop boards or programs: what they do at the instant at which they begin.
 
 use wheeleg_protocol::ResetCause;
 use wheeleg_remote_link as link;

@@ -15,7 +15,7 @@ pub enum BenchError {
     )]
     Plant(#[from] PlantError),
     /// The design is not one the board accepts.
-    #[error("the board refuses the design for this axis: {}", super::refusal::words(.0))]
+    #[error("the board refuses the design for this axis: {}", super::refusal::message(.0))]
     #[diagnostic(
         code(wheeleg::bench::design),
         help(

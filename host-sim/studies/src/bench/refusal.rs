@@ -4,7 +4,7 @@ use wheeleg_control::axis::AxisField;
 use wheeleg_control::joint::{ConfigError, JointParameter};
 
 /// What is wrong, and of which parameter.
-pub(super) fn words(error: &ConfigError) -> String {
+pub(super) fn message(error: &ConfigError) -> String {
     match error {
         ConfigError::OutOfRange(which) => format!("{} is out of its range", name(which)),
         ConfigError::Inconsistent(which) => format!("{} contradicts another value", name(which)),
@@ -69,8 +69,8 @@ mod tests {
     #[test]
     fn a_refusal_names_the_parameter() {
         let bore = ConfigError::OutOfRange(JointParameter::Axis(AxisField::Bore));
-        assert_eq!(words(&bore), "the bore is out of its range");
+        assert_eq!(message(&bore), "the bore is out of its range");
         let band = ConfigError::Inconsistent(JointParameter::ReleaseBand);
-        assert_eq!(words(&band), "`release_band` contradicts another value");
+        assert_eq!(message(&band), "`release_band` contradicts another value");
     }
 }

@@ -92,7 +92,7 @@ pub struct AxisSim<B> {
     pub board: B,
     pending: OnTimes,
     /// Notice that the board gets of a step \[s\]; none if zero.
-    pub notice_s: f64,
+    pub preview_s: f64,
 }
 
 impl<B: Board> AxisSim<B> {
@@ -108,7 +108,7 @@ impl<B: Board> AxisSim<B> {
             axis,
             board,
             pending: [0; 4],
-            notice_s: 0.0,
+            preview_s: 0.0,
         })
     }
 
@@ -157,7 +157,7 @@ impl<B: Board> AxisSim<B> {
             let (reference_m, rate_m_s) = motion.at(t);
             let code = AdcCode::new(self.axis.read_position(&mut self.state));
             let wait = motion.start_s() - t;
-            let announced = (wait > 0.0 && wait <= self.notice_s).then(|| {
+            let announced = (wait > 0.0 && wait <= self.preview_s).then(|| {
                 (
                     PositionMm::from_f64(motion.to_m() * 1e3),
                     (wait * 1e3).round() as u32,

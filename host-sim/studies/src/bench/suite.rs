@@ -247,7 +247,7 @@ pub fn steps(
 
 /// The retract move from the extended end stop, after the controller has pushed
 /// against the stop for 3 s: the start from home of the paper's test. Chamber
-/// pressures come from the simulation alone. `notice_s` is how long before the
+/// pressures come from the simulation alone. `preview_s` is how long before the
 /// move the board is told of it.
 ///
 /// # Errors
@@ -256,7 +256,7 @@ pub fn home_retract(
     plant: &AxisParams,
     design: &Design,
     seed: u64,
-    notice_s: f64,
+    preview_s: f64,
 ) -> Result<Trace, BenchError> {
     let board = Firmware::new(design).map_err(BenchError::Design)?;
     let mut start = plant.clone();
@@ -274,7 +274,7 @@ pub fn home_retract(
         &[],
         3.0,
     )?;
-    bench.notice_s = notice_s;
+    bench.preview_s = preview_s;
     let motion = Motion::Step {
         at_s: 0.7,
         from_m: home_m,

@@ -40,7 +40,7 @@ pub(super) fn figures(study: &Study) -> Vec<Figure> {
         home(study),
         ablation(study),
         scaling(study),
-        notice(study),
+        preview(study),
     ]
 }
 
@@ -99,7 +99,7 @@ fn home(study: &Study) -> Figure {
     let runs: [(&str, &Outcome); 3] = [
         ("paper's law", &study.starts.home[0]),
         ("default law", &study.starts.home[1]),
-        ("default law, 0.4 s notice", &study.notice.home),
+        ("default law, 0.4 s notice", &study.preview.home),
     ];
     let time = ("time since the command [s]", (-0.45, 0.8));
     let points = |o: &Outcome, y: &dyn Fn(&crate::bench::Row) -> f64| -> Points {
@@ -242,11 +242,11 @@ fn scaling(study: &Study) -> Figure {
 }
 
 /// Delay and early motion over notice.
-fn notice(study: &Study) -> Figure {
+fn preview(study: &Study) -> Figure {
     let rows = |start: Start, load_n: f64, y: fn(&Previewed) -> Option<f64>| -> Points {
-        let list = study.notice.rows.iter();
+        let list = study.preview.rows.iter();
         let of = list.filter(|r| r.law == Law::Default && r.start == start && r.load_n == load_n);
-        of.filter_map(|r| Some((r.notice_s, y(r)?))).collect()
+        of.filter_map(|r| Some((r.preview_s, y(r)?))).collect()
     };
     let kinds = [
         (Start::HomeHeld, 0.0, "home, held", colour::ROBOT),
@@ -270,7 +270,7 @@ fn notice(study: &Study) -> Figure {
         title: "What an announced move gains".to_owned(),
         caption: format!(
             "Default law, worst of {} seeds. Red: at most {NOTICED_LIMIT_S} s, and at most {EARLY_LIMIT_MM} mm before the command.",
-            study.notice.seeds
+            study.preview.seeds
         ),
         panels: vec![
             curves(

@@ -8,7 +8,7 @@
 //! * [`starts`] measures how long a move takes to start, per kind of move;
 //! * [`ablation`] takes the contributions away, each alone and one after the other;
 //! * [`predictions`] tests what the explanation foretells, and its rivals;
-//! * [`notice`] shows what an announced move gains.
+//! * [`preview`] shows what an announced move gains.
 //!
 //! Nothing in the plant is fitted to a delay: the valves' conductance follows from
 //! the stroke time alone. Every trial is a pure function of axis, law and seed.
@@ -90,7 +90,7 @@ pub struct Study {
     /// Predictions.
     pub predictions: predictions::Predictions,
     /// Announced moves.
-    pub notice: preview::Preview,
+    pub preview: preview::Preview,
 }
 
 /// The vertical cylinder of the robot's left leg on a bench.
@@ -148,7 +148,7 @@ fn mean_delay(outcomes: &[Outcome]) -> Option<f64> {
 struct Collected {
     starts: starts::Starts,
     ablation: Option<ablation::Ablation>,
-    notice: Option<preview::Preview>,
+    preview: Option<preview::Preview>,
     predictions: Option<predictions::Predictions>,
 }
 
@@ -165,17 +165,17 @@ impl Collected {
         let starts = starts::measure(&axis, seeds, progress)?;
         let ablation = ablation::measure(&axis, bus, weight_n, seeds, progress);
         let ablation = Ended::kept(ablation)?;
-        let notice = Ended::kept(preview::measure(&axis, seeds.min(8), progress))?;
-        let predictions = match &notice {
-            Some(notice) => Ended::kept(predictions::measure(
-                &axis, &starts, notice, seeds, progress,
+        let preview = Ended::kept(preview::measure(&axis, seeds.min(8), progress))?;
+        let predictions = match &preview {
+            Some(preview) => Ended::kept(predictions::measure(
+                &axis, &starts, preview, seeds, progress,
             ))?,
             None => None,
         };
         Ok(Self {
             starts,
             ablation,
-            notice,
+            preview,
             predictions,
         })
     }
@@ -193,7 +193,7 @@ impl Collected {
             .collect();
         parts.extend([
             ("ablation".to_owned(), self.ablation.is_some()),
-            ("announced moves".to_owned(), self.notice.is_some()),
+            ("announced moves".to_owned(), self.preview.is_some()),
             ("predictions".to_owned(), self.predictions.is_some()),
         ]);
         parts
@@ -211,7 +211,7 @@ impl Collected {
             starts: &self.starts,
             ablation: self.ablation.as_ref(),
             predictions: self.predictions.as_ref(),
-            notice: self.notice.as_ref(),
+            preview: self.preview.as_ref(),
         }
     }
 
@@ -227,7 +227,7 @@ impl Collected {
             starts: self.starts,
             ablation: self.ablation?,
             predictions: self.predictions?,
-            notice: self.notice?,
+            preview: self.preview?,
         })
     }
 }
@@ -254,7 +254,7 @@ pub struct Summary<'a> {
     /// Predictions.
     predictions: Option<&'a predictions::Predictions>,
     /// Announced moves.
-    notice: Option<&'a preview::Preview>,
+    preview: Option<&'a preview::Preview>,
 }
 
 impl study::Summary for Summary<'_> {

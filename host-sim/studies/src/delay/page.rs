@@ -59,16 +59,16 @@ pub(super) fn findings(study: &Study) -> Vec<String> {
         seconds(a.without_swap_s)
     ));
     for start in [Start::HomeHeld, Start::HomeRest] {
-        let last = study.notice.of(Law::Default, start).last();
-        list.push(match (study.notice.enough_s(start), last) {
+        let last = study.preview.of(Law::Default, start).last();
+        list.push(match (study.preview.enough_s(start), last) {
             (Some(0.0), Some(last)) => format!(
                 "Default law, {}: it starts within {} s without any notice; with 0.4 s within {} s.",
                 start.name(),
                 super::NOTICED_LIMIT_S,
                 maybe(last.delay_s)
             ),
-            (Some(notice_s), _) => format!(
-                "Default law, {}: announced {notice_s} s before or earlier, it starts within {} s, and has not moved 1 mm before.",
+            (Some(preview_s), _) => format!(
+                "Default law, {}: announced {preview_s} s before or earlier, it starts within {} s, and has not moved 1 mm before.",
                 start.name(),
                 super::NOTICED_LIMIT_S
             ),
@@ -161,11 +161,11 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
         rival: prediction.id.starts_with("rival"),
         prediction,
     });
-    let notices = study.notice.rows.iter().map(Announced::new);
+    let notices = study.preview.rows.iter().map(Announced::new);
     let home = |law| study.starts.of(law, Start::HomeHeld).map(|d| d.median_s);
     let announced = |start| {
         study
-            .notice
+            .preview
             .of(Law::Default, start)
             .last()
             .map(Announced::new)

@@ -80,7 +80,7 @@ pub struct Predictions {
 pub fn measure(
     axis: &AxisParams,
     starts: &Starts,
-    notice: &Preview,
+    preview: &Preview,
     seeds: u32,
     progress: &Progress,
 ) -> Result<Predictions, Ended> {
@@ -124,10 +124,10 @@ pub fn measure(
     let growing = FACTORS
         .iter()
         .all(|f| TUBES.windows(2).all(|w| at(*f, w[0]) < at(*f, w[1])));
-    let announced = |notice_s: f64| {
-        notice
+    let announced = |preview_s: f64| {
+        preview
             .of(Law::Default, Start::HomeHeld)
-            .find(|r| r.notice_s == notice_s)
+            .find(|r| r.preview_s == preview_s)
             .and_then(|r| r.median_s)
             .unwrap_or(f64::NAN)
     };

@@ -11,7 +11,7 @@ use crate::study::{Ended, Progress};
 use wheeleg_report::stats::{largest, median};
 
 /// Preview \[s\].
-pub const NOTICES_S: [f64; 9] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4];
+pub const PREVIEWS_S: [f64; 9] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4];
 /// Moves that are announced.
 const STARTS: [Start; 5] = [
     Start::HomeHeld,
@@ -23,22 +23,22 @@ const STARTS: [Start; 5] = [
 /// Force beside the axis's own on the move from home \[N\], positive extends.
 const LOADS_N: [f64; 4] = [-30.0, -15.0, 15.0, 30.0];
 
-/// Starts of one kind at one notice, worst of all seeds.
+/// Starts of one kind at one preview, worst of all seeds.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Previewed {
-    /// Law; only the default one uses the notice.
+    /// Law; only the default one uses the preview.
     pub law: Law,
     /// Kind of move.
     pub start: Start,
     /// Load beside the axis's own \[N\].
     pub load_n: f64,
     /// Preview \[s\].
-    pub notice_s: f64,
+    pub preview_s: f64,
     /// Median start delay \[s\]; `None` if a start never came.
     pub median_s: Option<f64>,
     /// Largest start delay \[s\]; `None` if a start never came.
     pub delay_s: Option<f64>,
-    /// Largest motion between notice and command \[mm\].
+    /// Largest motion between preview and command \[mm\].
     pub early_mm: f64,
 }
 
@@ -55,9 +55,9 @@ impl Previewed {
 pub struct Preview {
     /// Seeds of each row.
     pub seeds: u32,
-    /// Rows in the order of law, kind, load and notice.
+    /// Rows in the order of law, kind, load and preview time.
     pub rows: Vec<Previewed>,
-    /// Default law from the held home, announced by the longest notice; first seed.
+    /// Default law from the held home, announced by the longest preview; first seed.
     #[serde(skip)]
     pub home: Outcome,
 }
@@ -70,12 +70,12 @@ impl Preview {
             .filter(move |r| r.law == law && r.start == start && r.load_n == 0.0)
     }
 
-    /// Shortest notice from which on every longer one meets the bar, without load \[s\].
+    /// Shortest preview from which on every longer one meets the bar, without load \[s\].
     #[must_use]
     pub fn enough_s(&self, start: Start) -> Option<f64> {
         let rows: Vec<&Previewed> = self.of(Law::Default, start).collect();
         let first = rows.iter().rposition(|r| !r.meets()).map_or(0, |i| i + 1);
-        rows.get(first).map(|r| r.notice_s)
+        rows.get(first).map(|r| r.preview_s)
     }
 }
 
@@ -86,19 +86,20 @@ impl Preview {
 pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Preview, Ended> {
     let mut cases = Vec::new();
     for start in STARTS {
-        cases.extend(NOTICES_S.map(|notice_s| (Law::Default, start, 0.0, notice_s)));
+        cases.extend(PREVIEWS_S.map(|preview_s| (Law::Default, start, 0.0, preview_s)));
     }
     for load_n in LOADS_N {
-        cases.extend(NOTICES_S.map(|notice_s| (Law::Default, Start::HomeHeld, load_n, notice_s)));
+        cases
+            .extend(PREVIEWS_S.map(|preview_s| (Law::Default, Start::HomeHeld, load_n, preview_s)));
     }
-    cases.extend([0.0, 0.4].map(|notice_s| (Law::Paper, Start::HomeHeld, 0.0, notice_s)));
+    cases.extend([0.0, 0.4].map(|preview_s| (Law::Paper, Start::HomeHeld, 0.0, preview_s)));
     let trials: Vec<Trial> = cases
         .iter()
         .flat_map(|case| (1..=u64::from(seeds)).map(move |seed| (case, seed)))
-        .map(|(&(law, start, load_n, notice_s), seed)| {
+        .map(|(&(law, start, load_n, preview_s), seed)| {
             let mut trial = Trial::new(axis, law, start, seed);
             trial.axis.load_n += load_n;
-            trial.notice_s = notice_s;
+            trial.preview_s = preview_s;
             trial
         })
         .collect();
@@ -107,19 +108,19 @@ pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Pre
     let rows = cases
         .iter()
         .zip(outcomes.chunks(each))
-        .map(|(&(law, start, load_n, notice_s), group)| {
+        .map(|(&(law, start, load_n, preview_s), group)| {
             let delays: Option<Vec<f64>> = group.iter().map(|o| o.delay_s).collect();
             Previewed {
                 law,
                 start,
                 load_n,
-                notice_s,
+                preview_s,
                 median_s: delays.as_deref().and_then(median),
                 delay_s: delays.as_deref().and_then(largest),
                 early_mm: group.iter().map(|o| o.early_mm).fold(0.0, f64::max),
             }
         })
         .collect();
-    let home = outcomes.swap_remove((NOTICES_S.len() - 1) * each);
+    let home = outcomes.swap_remove((PREVIEWS_S.len() - 1) * each);
     Ok(Preview { seeds, rows, home })
 }

@@ -97,12 +97,12 @@ pub(super) fn write(folder: &Path, study: &Study) -> Result<(), StudyError> {
         "delay [s]",
     ];
     table(folder, "bores", &header, rows)?;
-    let rows = study.notice.rows.iter().map(|r| {
+    let rows = study.preview.rows.iter().map(|r| {
         vec![
             r.law.name().to_owned(),
             r.start.name().to_owned(),
             r.load_n.to_string(),
-            r.notice_s.to_string(),
+            r.preview_s.to_string(),
             optional(r.median_s),
             optional(r.delay_s),
             r.early_mm.to_string(),

@@ -61,7 +61,7 @@ pub struct Trial {
     /// Noise, time of the command, place in mid-stroke.
     pub seed: u64,
     /// How long before the command the board is told of it \[s\].
-    pub notice_s: f64,
+    pub preview_s: f64,
     /// Whether the command waits for the next bus cycle and its SYNC frame, drawn
     /// from the seed. `None` counts from the set-point in the board.
     pub bus: Option<BusPath>,
@@ -96,7 +96,7 @@ impl Trial {
             law,
             start,
             seed,
-            notice_s: 0.0,
+            preview_s: 0.0,
             bus: None,
             before: Before::Nothing,
             thrown: false,
@@ -217,7 +217,7 @@ impl Trial {
 
         let bus_s = self.bus.map_or(0.0, |b| b.cycle_s * draw.wait + b.frame_s);
         bench.board.late = (bus_s * 1e3).round() as usize;
-        bench.notice_s = self.notice_s;
+        bench.preview_s = self.preview_s;
         let at_ms = (WAIT_S * 1e3) as u32 + draw.phase_ms;
         let at_s = f64::from(at_ms) * 1e-3;
         let open = if self.start.sign() > 0.0 {
@@ -355,7 +355,7 @@ impl Trial {
         let (before, after) = rows.split_at(command);
         let noticed = before
             .len()
-            .saturating_sub((self.notice_s * 1e3).round() as usize);
+            .saturating_sub((self.preview_s * 1e3).round() as usize);
         let stood_m = before
             .get(noticed)
             .or(after.first())

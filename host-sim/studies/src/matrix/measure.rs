@@ -34,7 +34,7 @@ pub struct Measured {
     pub since_s: f64,
     /// First latched fault of a board, or the master's HOLD.
     pub detected_ms: Option<f64>,
-    /// Valves of the struck axis commanded shut for good (a wheel: ramp begun).
+    /// Valves of the affected axis commanded shut for good (a wheel: ramp begun).
     pub own_commanded_ms: Option<f64>,
     /// The same of the slowest axis.
     pub commanded_ms: Option<f64>,
@@ -75,7 +75,7 @@ pub struct Measured {
     pub reads: Vec<String>,
 }
 
-/// A struck axis, 0 to 7, and what cannot be seen of it.
+/// A affected axis, 0 to 7, and what cannot be seen of it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Blind {
     /// Boards without power or program: their telemetry stands still.

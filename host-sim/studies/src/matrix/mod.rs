@@ -19,7 +19,7 @@ mod summary;
 pub use expected::Expected;
 pub use judge::{AfterAll, Outcome, Verdict};
 pub use measure::Measured;
-pub use row::{Expect, Phase, Row, Since, Stop, Strike, Variant};
+pub use row::{Expect, Phase, Row, RowFault, Since, Stop, Variant};
 pub use rows::ROWS;
 pub use run::{run, select};
 pub use summary::Summary;

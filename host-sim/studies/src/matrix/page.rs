@@ -134,12 +134,12 @@ impl<'a> Shown<'a> {
         Self {
             id: o.row.id,
             faults: what_goes_wrong(o),
-            phase: o.row.phase.words(),
+            phase: o.row.phase.label(),
             reaction: reaction(&o.row),
             limits: limits(o),
             run: o.verdict != Verdict::NotImplemented,
             measured: &o.measured,
-            verdict: o.verdict.words(),
+            verdict: o.verdict.label(),
             class: match o.verdict {
                 Verdict::Pass => "pass",
                 Verdict::Fail => "fail",

@@ -31,7 +31,7 @@ pub enum Phase {
 impl Phase {
     /// In words.
     #[must_use]
-    pub fn words(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Self::PowerUp => "from power-up on",
             Self::Stand => "standing",
@@ -49,7 +49,7 @@ impl Phase {
 
 /// A fault of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strike {
+pub struct RowFault {
     /// As on the command line, without the time.
     pub what: &'static str,
     /// Begin after the row's instant, s.
@@ -85,7 +85,7 @@ pub enum Expect {
 /// Limits of a stop, ms after the instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stop {
-    /// The axis that the fault strikes, by bus address; 0: none, or all.
+    /// The axis that the fault affects, by bus address; 0: none, or all.
     pub axis: u8,
     /// First latched fault or the master's HOLD: not before, not after.
     pub detected_ms: [f64; 2],
@@ -137,7 +137,7 @@ pub struct Row {
     /// Its name.
     pub id: &'static str,
     /// What goes wrong.
-    pub strikes: &'static [Strike],
+    pub faults: &'static [RowFault],
     /// What the user asks, s after the instant.
     pub asks: &'static [(f64, Ask)],
     /// Whether the E-stop is pressed 100 ms after the instant; latencies count from then.
@@ -181,14 +181,14 @@ pub(super) const FOR_GOOD: f64 = f64::INFINITY;
 /// A row of the matrix.
 pub(super) const fn row(
     id: &'static str,
-    strikes: &'static [Strike],
+    faults: &'static [RowFault],
     phase: Phase,
     expect: Expect,
     reads: &'static [Expected],
 ) -> Row {
     Row {
         id,
-        strikes,
+        faults,
         asks: &[],
         estop: false,
         phase,
@@ -251,15 +251,15 @@ impl Row {
 }
 
 /// A fault that begins at the instant.
-pub(super) const fn at(what: &'static str, lasts_s: f64) -> Strike {
-    Strike {
+pub(super) const fn at(what: &'static str, lasts_s: f64) -> RowFault {
+    RowFault {
         what,
         after_s: 0.0,
         lasts_s,
     }
 }
 
-/// A stop of all axes, none of them struck itself.
+/// A stop of all axes, none of them affected itself.
 pub(super) const fn stop(detected_ms: [f64; 2], all_ms: f64) -> Expect {
     Expect::Stop(Stop {
         axis: 0,

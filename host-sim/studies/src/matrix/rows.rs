@@ -6,7 +6,7 @@ use super::expected::Expected::{
     SaysFault, SaysReset, ServiceRefused, ServiceUnchanged,
 };
 use super::row::{
-    Ask, Expect, FOR_GOOD, Phase, Row, Strike, Variant, at, missing, row, stop, stop_axis,
+    Ask, Expect, FOR_GOOD, Phase, Row, RowFault, Variant, at, missing, row, stop, stop_axis,
     stop_moving,
 };
 use wheeleg_master::command::{CommandCode, Layer};
@@ -57,8 +57,8 @@ const LEFT_REAR_OPEN: Expected = FootSwitch(Side::Left, Sector::Rear, Warning::S
 /// A parameter that no board has.
 const NO_PARAMETER: u16 = 0x7FFF;
 
-const fn later(what: &'static str, after_s: f64, lasts_s: f64) -> Strike {
-    Strike {
+const fn later(what: &'static str, after_s: f64, lasts_s: f64) -> RowFault {
+    RowFault {
         what,
         after_s,
         lasts_s,

@@ -248,8 +248,11 @@ fn simulate(
         Observers::new(&mut progress).watching(&mut look),
     );
     let (line, error) = match run {
-        Ok(outcome) if outcome.stopped => return None,
-        Ok(outcome) => (outcome.line, None),
+        Ok(outcome) => match outcome.failure {
+            Some(failure) => (LineAudit::default(), Some(failure.to_string())),
+            None if outcome.stopped => return None,
+            None => (outcome.line, None),
+        },
         Err(e) => (LineAudit::default(), Some(e.to_string())),
     };
     let (recording, error) = match recorder.finish() {
@@ -295,13 +298,13 @@ fn instant_s(row: &Row, robot: &RobotConfig, seed: u64) -> f64 {
 
 /// The faults of a row at its instant.
 fn faults(row: &Row, at_s: f64) -> Result<Vec<FaultSpec>, StudyError> {
-    row.strikes
+    row.faults
         .iter()
-        .map(|strike| {
-            let from_s = at_s + strike.after_s;
-            let mut text = format!("{}@{from_s:.3}s", strike.what);
-            if strike.lasts_s.is_finite() {
-                text.push_str(&format!("..{:.3}s", from_s + strike.lasts_s));
+        .map(|fault| {
+            let from_s = at_s + fault.after_s;
+            let mut text = format!("{}@{from_s:.3}s", fault.what);
+            if fault.lasts_s.is_finite() {
+                text.push_str(&format!("..{:.3}s", from_s + fault.lasts_s));
             }
             text.parse()
                 .map_err(|e: wheeleg_config::faults::SpecError| {

@@ -138,7 +138,7 @@ impl<'a> RowSummary<'a> {
         Self {
             row: row.id,
             faults: &outcome.faults,
-            phase: row.phase.words(),
+            phase: row.phase.label(),
             expected: Expected {
                 reaction: reaction(row),
                 limits: Limits::new(outcome),
@@ -147,7 +147,7 @@ impl<'a> RowSummary<'a> {
             measured: run.then_some(&outcome.measured),
             latched: run.then_some(outcome.measured.latched),
             pass: run.then_some(outcome.verdict == Verdict::Pass),
-            verdict: outcome.verdict.words(),
+            verdict: outcome.verdict.label(),
             failures: &outcome.failures,
             note: row.note,
         }

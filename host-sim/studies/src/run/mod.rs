@@ -22,7 +22,7 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
-use wheeleg_sim::{self as sil, Boards, DownTimes};
+use wheeleg_sim::{self as sil, Boards, DownTimes, SimError};
 use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
 
 /// What to run.
@@ -53,6 +53,8 @@ pub struct Run {
     pub summary: Summary,
     /// What could not be written, in order; everything else is there.
     pub unwritten: Vec<StudyError>,
+    /// What ended the run before its end; everything until then is recorded and judged.
+    pub failure: Option<SimError>,
     /// When boards outside were down.
     pub down_times: DownTimes,
 }
@@ -76,12 +78,13 @@ const RESERVE_BYTES: usize = 256 * 1024;
 /// # Errors
 /// Any [`StudyError`]. A log that was begun is closed and stays readable. A file that cannot be
 /// written once the run has begun is no error: the run is judged all the same, and
-/// [`Run::unwritten`] names the file.
+/// [`Run::unwritten`] names the file. A simulation that fails on its way is none, either:
+/// [`Run::failure`] says what ended it.
 pub fn run(options: &Options, stop: &Stop) -> Result<Finished<Run>, StudyError> {
     run_on(options, stop, None)
 }
 
-/// Runs a scenario once more with all nodes in this program. Boards that a fault strikes
+/// Runs a scenario once more with all nodes in this program. Boards that a fault affects
 /// are down when those of the run before were: how long a processor takes to start is no
 /// part of what is compared.
 ///
@@ -169,6 +172,7 @@ fn run_on(
 
     let info = RunInfo {
         seed,
+        failure: outcome.failure.as_ref().map(ToString::to_string),
         simulated_s: outcome.simulated_s,
         recorded_s: outcome.recorded_s,
         wall_s,
@@ -193,6 +197,7 @@ fn run_on(
     let run = Run {
         summary,
         unwritten,
+        failure: outcome.failure,
         down_times: outcome.down_times,
     };
     Ok(report::write(job, &source, run, stopped))
@@ -281,5 +286,35 @@ mod tests {
         let kept = std::fs::read_to_string(folder.join("summary.json"));
         assert_eq!(kept.expect("kept"), "earlier");
         assert!(!folder.join("previous").exists() && !folder.join("log.mcap").exists());
+    }
+
+    /// A board of another interface keeps the robot from getting ready.
+    #[test]
+    fn a_run_that_fails_leaves_log_summary_and_page() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path().join("results");
+        let options = Options {
+            scenario: "stand".to_owned(),
+            robot: None,
+            seed: None,
+            nodes: Nodes::default(),
+            faults: vec!["other-interface:joint3@0s".parse().expect("a fault")],
+            out: Some(folder.clone()),
+            png: false,
+            compared: false,
+        };
+        let finished = run(&options, &Stop::default()).expect("a run with results");
+        let failure = finished.result.failure.expect("it does not get ready");
+        assert!(
+            failure.to_string().contains("did not get ready"),
+            "{failure}"
+        );
+        let summary = std::fs::read_to_string(folder.join("summary.json")).expect("written");
+        let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+        assert_eq!(summary["failure"], failure.to_string());
+        assert_eq!(summary["complete"], false);
+        let page = std::fs::read_to_string(&finished.report).expect("written");
+        assert!(page.contains("did not get ready"));
+        assert!(folder.join("log.mcap").exists());
     }
 }

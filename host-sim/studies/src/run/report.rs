@@ -79,6 +79,7 @@ mod tests {
         let run = Run {
             summary: summary.clone(),
             unwritten: Vec::new(),
+            failure: None,
             down_times: wheeleg_sim::DownTimes::default(),
         };
         let source = Source {
@@ -101,6 +102,7 @@ mod tests {
         let analysis = analysis::analyse(&scenario, &robot, &recording);
         let info = RunInfo {
             seed: 7,
+            failure: None,
             simulated_s: 10.0,
             recorded_s: 10.0,
             wall_s: 0.25,

@@ -16,6 +16,8 @@ use wheeleg_telemetry::{Cause, EventKind, Recording};
 pub struct RunInfo {
     /// Seed used.
     pub seed: u64,
+    /// What ended the run before its end.
+    pub failure: Option<String>,
     /// Simulated time, start-up included, s.
     pub simulated_s: f64,
     /// Scenario time in the record, s.
@@ -54,6 +56,10 @@ pub struct Summary {
     /// Log and tables that could not be written to their end, and why; not there if all were.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unwritten: Vec<String>,
+    /// What ended the run before its end, such as a robot that does not get ready; not there if
+    /// nothing did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
     /// Simulated time, start-up included, s.
     pub simulated_s: f64,
     /// Scenario time in the record, s.
@@ -143,6 +149,7 @@ impl Summary {
             hash: recording.hash.clone(),
             dropped_messages: recording.dropped,
             unwritten: Vec::new(),
+            failure: info.failure,
             simulated_s: info.simulated_s,
             recorded_s: info.recorded_s,
             wall_s: info.wall_s,

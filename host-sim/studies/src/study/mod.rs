@@ -70,7 +70,7 @@ impl fmt::Display for Stopped {
             of,
             unit,
         } = self;
-        write!(f, "{} after {done} of {of} {unit}", signal.words())
+        write!(f, "{} after {done} of {of} {unit}", signal.label())
     }
 }
 

@@ -47,7 +47,7 @@ impl Signal {
 
     /// What happened to the program, in words.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub const fn label(self) -> &'static str {
         match self {
             Self::Interrupt => "interrupted",
             Self::Terminate => "terminated",

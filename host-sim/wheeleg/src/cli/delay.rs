@@ -117,15 +117,15 @@ fn text(study: &Study) -> String {
         let _ = writeln!(out, "  {:18} {verdict:4} {}", p.id, p.measured);
     }
     for start in [Start::HomeHeld, Start::HomeRest] {
-        for row in study.notice.of(Law::Default, start) {
+        for row in study.preview.of(Law::Default, start) {
             let worst = row
                 .delay_s
                 .map_or_else(|| "never".to_owned(), |d| format!("{d:.3} s"));
             let _ = writeln!(
                 out,
-                "notice     {:14} {:.2} s: worst {worst}, early {:.2} mm{}",
+                "preview    {:14} {:.2} s: worst {worst}, early {:.2} mm{}",
                 start.name(),
-                row.notice_s,
+                row.preview_s,
                 row.early_mm,
                 if row.meets() { "  meets 0.08 s" } else { "" }
             );

@@ -71,13 +71,13 @@ fn rows() -> String {
     let mut out = String::from("Rows of the fault matrix (wheeleg faults run --row ID):\n\n");
     let width = id_width();
     for row in matrix::ROWS {
-        let mut strikes: Vec<&str> = row.strikes.iter().map(|s| s.what).collect();
+        let mut faults: Vec<&str> = row.faults.iter().map(|s| s.what).collect();
         if row.estop {
-            strikes.push("E-stop");
+            faults.push("E-stop");
         }
         let what = match row.not_implemented() {
             Some(reason) => format!("not implemented: {reason}"),
-            None => format!("{}; {}", strikes.join(", "), row.phase.words()),
+            None => format!("{}; {}", faults.join(", "), row.phase.label()),
         };
         let _ = writeln!(out, "  {:width$}  {what}", row.id);
     }
@@ -107,7 +107,7 @@ fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
     let ms = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} ms"));
     for o in outcomes {
         let m = &o.measured;
-        let _ = write!(out, "{:15}  {:width$}", o.verdict.words(), o.row.id);
+        let _ = write!(out, "{:15}  {:width$}", o.verdict.label(), o.row.id);
         if o.verdict != Verdict::NotImplemented {
             let times = [m.detected_ms, m.commanded_ms, m.sensed_ms, m.physical_ms].map(ms);
             let _ = write!(
@@ -150,7 +150,7 @@ fn listing(json: bool) -> String {
     for row in KINDS {
         let _ = writeln!(out, "\n  {}", row.name);
         let _ = writeln!(out, "      {}", row.doc);
-        let _ = writeln!(out, "      strikes {}", row.place.expected());
+        let _ = writeln!(out, "      affects {}", row.place.expected());
         if let Some(v) = row.value {
             let _ = writeln!(
                 out,
@@ -173,7 +173,7 @@ fn row_json(row: &KindInfo) -> serde_json::Value {
     serde_json::json!({
         "name": row.name,
         "description": row.doc,
-        "strikes": row.place.expected(),
+        "affects": row.place.expected(),
         "value": row.value.map(|v| serde_json::json!({
             "unit": v.unit, "min": v.min, "max": v.max, "gap": v.gap, "default": v.default, "description": v.doc,
         })),

@@ -107,7 +107,15 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     if differ && finished.stopped.is_none() {
         tell("boards differ from the native application beside them");
     }
-    let unwritten = finished.result.unwritten;
+    let report = finished.report.display().to_string();
+    let Run {
+        unwritten, failure, ..
+    } = finished.result;
+    if let Some(failure) = failure {
+        let error = StudyError::from(failure);
+        tell(&format!("what was recorded until then: {report}"));
+        return Err(error);
+    }
     if unwritten.is_empty() {
         return Ok(native.map_or(code, |stopped| ExitCode::from(stopped.signal.exit_code())));
     }

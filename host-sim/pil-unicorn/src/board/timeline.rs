@@ -1,4 +1,4 @@
-//! A board's course through time: edges, received bytes, supply, resets.
+//! A board's timeline: edges, received bytes, supply, resets.
 
 use wheeleg_remote_link::{Inputs, Power, Ran, Run, Trip};
 
@@ -81,15 +81,15 @@ impl Board {
             self.advance(run.until_ns + BEYOND_EDGE_NS, Until::Cycle)?;
             self.edges = self.edges.wrapping_add(1);
             self.check_edge(run.until_ns)?;
-            let shown = self.shown();
+            let ran = self.take_ran();
             self.work_off(run.until_ns)?;
-            self.reply(shown)
+            self.reply(ran)
         } else {
             let cap = self.before_next_edge()?;
             self.advance(cap.min(run.until_ns), Until::Cycle)?;
             self.work_off(run.until_ns)?;
-            let shown = self.shown();
-            self.reply(shown)
+            let ran = self.take_ran();
+            self.reply(ran)
         }
     }
 

@@ -82,7 +82,7 @@ impl Board {
     }
 
     /// What the board shows now: outputs, and the newest tick that was worked off.
-    pub(super) fn shown(&mut self) -> Ran {
+    pub(super) fn take_ran(&mut self) -> Ran {
         let (seen, seen_at_ns) = self.seen();
         let state = self.machine.as_ref().map(Machine::state);
         Ran {
@@ -97,8 +97,8 @@ impl Board {
         }
     }
 
-    /// What the board has shown at an edge, and the rest of the reply as of now.
-    pub(super) fn reply(&mut self, shown: Ran) -> Result<Ran, String> {
+    /// What the board has put out at an edge, and the rest of the reply as of now.
+    pub(super) fn reply(&mut self, ran: Ran) -> Result<Ran, String> {
         let sent = self.sent()?;
         let period_us = self.period_us() as u32;
         self.measure()?;
@@ -110,11 +110,11 @@ impl Board {
             period_us,
             sent,
             figures: Figures {
-                tick_instructions: shown.figures.tick_instructions,
+                tick_instructions: ran.figures.tick_instructions,
                 ..self.figures
             },
             trip,
-            ..shown
+            ..ran
         })
     }
 

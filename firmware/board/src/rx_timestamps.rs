@@ -19,8 +19,8 @@ pub struct RxTimestamp {
 
 /// Queue with one producer and one consumer.
 ///
-/// When full, a new mark replaces none and is counted: its bytes are handed over
-/// with the next mark, and the frame check decides about them.
+/// When full, a new stamp replaces none and is counted: its bytes are handed over
+/// with the next stamp, and the frame check decides about them.
 #[derive(Debug)]
 pub struct RxTimestamps {
     times: [AtomicU32; CAPACITY],
@@ -53,8 +53,8 @@ impl RxTimestamps {
         counter as usize % CAPACITY
     }
 
-    /// Adds a mark; the interrupt handler alone calls this.
-    pub fn push(&self, mark: RxTimestamp) {
+    /// Adds a stamp; the interrupt handler alone calls this.
+    pub fn push(&self, stamp: RxTimestamp) {
         let head = self.head.load(Ordering::Relaxed);
         if head.wrapping_sub(self.tail.seen()) >= CAPACITY as u32 {
             let lost = self.lost.load(Ordering::Relaxed);
@@ -63,13 +63,13 @@ impl RxTimestamps {
         }
         let index = Self::index(head);
         if let (Some(time), Some(position)) = (self.times.get(index), self.positions.get(index)) {
-            time.store(mark.time.get(), Ordering::Relaxed);
-            position.store(u32::from(mark.position), Ordering::Relaxed);
+            time.store(stamp.time.get(), Ordering::Relaxed);
+            position.store(u32::from(stamp.position), Ordering::Relaxed);
         }
         self.head.announce(head.wrapping_add(1));
     }
 
-    /// The oldest mark; the main loop alone calls this and [`RxTimestamps::pop`].
+    /// The oldest stamp; the main loop alone calls this and [`RxTimestamps::pop`].
     #[must_use]
     pub fn peek(&self) -> Option<RxTimestamp> {
         let tail = self.tail.load(Ordering::Relaxed);
@@ -85,15 +85,15 @@ impl RxTimestamps {
         })
     }
 
-    /// Takes the oldest mark.
+    /// Takes the oldest stamp.
     pub fn pop(&self) -> Option<RxTimestamp> {
-        let mark = self.peek()?;
+        let stamp = self.peek()?;
         let tail = self.tail.load(Ordering::Relaxed);
         self.tail.announce(tail.wrapping_add(1));
-        Some(mark)
+        Some(stamp)
     }
 
-    /// Forgets all marks.
+    /// Forgets all stamps.
     pub fn clear(&self) {
         self.tail.announce(self.head.seen());
     }
@@ -109,7 +109,7 @@ impl RxTimestamps {
 mod tests {
     use super::*;
 
-    fn mark(n: u32) -> RxTimestamp {
+    fn stamp(n: u32) -> RxTimestamp {
         RxTimestamp {
             position: (n % 256) as u16,
             time: Micros(n.wrapping_mul(0x0101_0101)),
@@ -118,37 +118,37 @@ mod tests {
 
     #[test]
     fn first_in_first_out_over_many_laps() {
-        let marks = RxTimestamps::new();
-        assert_eq!(marks.pop(), None);
+        let stamps = RxTimestamps::new();
+        assert_eq!(stamps.pop(), None);
         let (mut pushed, mut popped) = (0, 0);
         for round in 0..1000_u32 {
             for _ in 0..=round % CAPACITY as u32 {
-                marks.push(mark(pushed));
+                stamps.push(stamp(pushed));
                 pushed += 1;
             }
-            while let Some(seen) = marks.peek() {
-                assert_eq!(seen, mark(popped));
-                assert_eq!(marks.pop(), Some(seen));
+            while let Some(seen) = stamps.peek() {
+                assert_eq!(seen, stamp(popped));
+                assert_eq!(stamps.pop(), Some(seen));
                 popped += 1;
             }
         }
-        assert_eq!((pushed, marks.lost()), (popped, 0));
-        marks.push(mark(1));
-        marks.push(mark(2));
-        marks.clear();
-        assert_eq!(marks.pop(), None);
-        marks.push(mark(3));
-        assert_eq!(marks.pop(), Some(mark(3)));
+        assert_eq!((pushed, stamps.lost()), (popped, 0));
+        stamps.push(stamp(1));
+        stamps.push(stamp(2));
+        stamps.clear();
+        assert_eq!(stamps.pop(), None);
+        stamps.push(stamp(3));
+        assert_eq!(stamps.pop(), Some(stamp(3)));
     }
 
     #[test]
     fn a_full_queue_keeps_the_old_and_counts_the_new() {
-        let marks = RxTimestamps::new();
+        let stamps = RxTimestamps::new();
         for n in 0..CAPACITY as u32 + 3 {
-            marks.push(mark(n));
+            stamps.push(stamp(n));
         }
-        assert_eq!(marks.lost(), 3);
-        let kept: Vec<RxTimestamp> = std::iter::from_fn(|| marks.pop()).collect();
-        assert_eq!(kept, (0..CAPACITY as u32).map(mark).collect::<Vec<_>>());
+        assert_eq!(stamps.lost(), 3);
+        let kept: Vec<RxTimestamp> = std::iter::from_fn(|| stamps.pop()).collect();
+        assert_eq!(kept, (0..CAPACITY as u32).map(stamp).collect::<Vec<_>>());
     }
 }
