@@ -30,6 +30,17 @@
 //! assert_eq!(received, Some(Message::Disarm(Disarm {})));
 //! # Ok::<(), wheeleg_protocol::EncodeError>(())
 //! ```
+//!
+//! # Glossary
+//!
+//! * **frame**: addresses, sequence number, type and body between two delimiters, with a check
+//!   sum
+//! * **delimiter**: the byte 0: COBS leaves no other zero on the line
+//! * **COBS**: consistent overhead byte stuffing: takes the zeros out of a frame
+//! * **SYNC**: the frame that begins a bus cycle, with a slot for each node
+//! * **acyclic**: what is sent after the slots: requests and their answers
+//! * **Ack, Nack**: done; refused, with a reason
+//! * **interface hash**: hash of this definition; nodes of another one are refused
 #![no_std]
 #![cfg_attr(
     not(test),

@@ -1,4 +1,10 @@
 //! System tests across crates; see the folder `tests` beside this one.
+//!
+//! # Glossary
+//!
+//! * **bracket**: two bounds of a value, one from below and one from above
+//! * **mutant**: an image or source with one mistake, which a check must find
+//! * **baseline**: the same run without the fault
 
 /// Numbers that look random and are the same every time: the last step of SplitMix64
 /// (public domain), a bijection.

@@ -307,17 +307,61 @@ fn arrows_point_one_way() {
         ours, listed,
         "a crate without a line in the table of arrows"
     );
-    for (name, allowed) in ARROWS {
-        let allowed: BTreeSet<&str> = allowed.iter().copied().collect();
-        let found = dependencies(&packages[name]);
-        let found: BTreeSet<&str> = found
-            .iter()
-            .map(String::as_str)
-            .filter(|dependency| ours.contains(dependency))
-            .collect();
-        let extra: Vec<_> = found.difference(&allowed).collect();
+    for (name, _) in ARROWS {
+        let extra = upward(name, &dependencies(&packages[name]));
         assert!(extra.is_empty(), "{name} must not depend on {extra:?}");
     }
+}
+
+/// Of the crates that `name` depends on, those that its line in the table does not allow.
+fn upward(name: &str, dependencies: &BTreeSet<String>) -> Vec<String> {
+    let line = ARROWS.iter().find(|(listed, _)| *listed == name);
+    let (_, allowed) = line.expect("a line in the table");
+    let ours = |dependency: &&String| ARROWS.iter().any(|(listed, _)| listed == dependency);
+    let found = dependencies.iter().filter(ours);
+    found
+        .filter(|dependency| !allowed.contains(&dependency.as_str()))
+        .cloned()
+        .collect()
+}
+
+/// A `use` of a crate above needs a dependency on it, and that is what is found.
+#[test]
+fn an_arrow_that_points_up_is_found() {
+    let packages = packages();
+    for (below, above) in [
+        ("wheeleg-plant", "wheeleg-sim"),
+        ("wheeleg-telemetry", "wheeleg-report"),
+        ("wheeleg-control", "wheeleg-protocol"),
+        ("wheeleg-sim", "wheeleg-studies"),
+    ] {
+        let mut dependencies = dependencies(&packages[below]);
+        dependencies.insert(above.to_owned());
+        assert_eq!(upward(below, &dependencies), [above], "{below}");
+    }
+}
+
+/// Each crate explains the terms that it uses, where its documentation begins.
+#[test]
+fn every_crate_opens_with_its_glossary() {
+    let mut without = Vec::new();
+    for (name, package) in packages() {
+        let targets = package["targets"].as_array().expect("targets").iter();
+        let mut roots = targets.filter(|t| {
+            ["lib", "cdylib", "bin"]
+                .iter()
+                .any(|kind| t["kind"][0] == *kind)
+        });
+        let explains = roots.any(|target| {
+            let source = fs::read_to_string(text(&target["src_path"])).expect("readable");
+            let mut opening = source.lines().take_while(|line| line.starts_with("//!"));
+            opening.any(|line| line == "//! # Glossary")
+        });
+        if !explains {
+            without.push(name);
+        }
+    }
+    assert!(without.is_empty(), "{without:?}");
 }
 
 /// A crate of ours and all of ours that it is built from, optional ones and those of build

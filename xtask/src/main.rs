@@ -4,6 +4,13 @@
 //! parts, so that what fails in one place can be repeated alone. A step either
 //! passed, failed, or was NOT RUN because a tool is missing; the last two both
 //! end the program with a non-zero status.
+//!
+//! # Glossary
+//!
+//! * **step**: one part of the suite
+//! * **image**: a linked program for a board
+//! * **deep**: checks that take longer than the suite may
+//! * **peer**: another implementation of the same work, for the benchmark
 
 mod bench;
 mod conformance;

@@ -13,6 +13,12 @@
 //!
 //! An image in which a panic can be reached does not link: the panic handler
 //! calls a function that exists nowhere.
+//!
+//! # Glossary
+//!
+//! * **semihosting**: an instruction by which a program on an emulator calls the host
+//! * **hil**: hardware in the loop: an image on a bench board, with sensors and valves simulated
+//! * **partner**: the simulator that sends requests and gets one reply each
 #![no_std]
 #![allow(
     unsafe_code,

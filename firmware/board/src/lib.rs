@@ -11,6 +11,17 @@
 //! | [`straps`], [`reset`], [`led`] | address, cause of reset, status light |
 //! | [`store`] | parameters in two flash pages (of `wheeleg-node`) |
 //! | `g431` | the STM32G431CB: the only place with registers and `unsafe` |
+//!
+//! # Glossary
+//!
+//! * **executive**: the main loop of a board: takes what the interrupts latched, in the order of
+//!   their time stamps
+//! * **strap**: a pin tied to ground or supply on the board; four of them are its bus address
+//! * **tick**: one run of the application: every 1 ms on a joint board
+//! * **preload**: a timer register that takes effect at the next tick edge, not when it is
+//!   written
+//! * **break**: the input by which a timer turns its outputs off without the processor
+//! * **store**: two flash pages in which parameters survive a power failure
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),

@@ -20,6 +20,19 @@
 //! is no clock: the length of a tick enters a configuration once, and every
 //! call is one tick. No function of this crate panics, allocates or loops more
 //! than its arrays are long.
+//!
+//! # Glossary
+//!
+//! * **duty**: signed share of a PWM period, −1 to 1; positive extends the cylinder
+//! * **correction**: what the fuzzy inference adds to the proportional term
+//! * **PD, ID**: the two fuzzy corrections of the paper: of error and its rate, of error and its
+//!   integral
+//! * **valve delay**: from the command to the flow: on-delay t_on, off-delay t_off
+//! * **chamber A, B**: extends the piston, retracts it
+//! * **predictive law**: law 5: plans single valve pulses from estimated pressures, with no PWM
+//! * **observer**: estimate of pressures, motion and load from the potentiometer and the valve
+//!   commands
+//! * **Q-format**: fixed point: I16F16 has 16 integer and 16 fractional bits
 #![no_std]
 #![cfg_attr(
     not(test),

@@ -12,6 +12,13 @@
 //!
 //! The record stands in the section [`SECTION`], which the linker scripts keep and do
 //! not load: it takes no flash. It goes with the ELF file, not with a raw binary.
+//!
+//! # Glossary
+//!
+//! * **image**: a linked program for a board, as an ELF file
+//! * **interface hash**: hash of the definition of the bus messages; equal on master and boards
+//!   that understand each other
+//! * **digest**: hash of the sources from which an image was built
 #![cfg_attr(not(any(test, feature = "sources")), no_std)]
 #![cfg_attr(
     not(test),

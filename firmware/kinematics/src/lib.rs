@@ -34,6 +34,14 @@
 //! Wheeleg*, Robotics and Autonomous Systems 45 (2003) 161–180, equations (1)–(39), corrected
 //! where the printed form contradicts the paper's own tables. A star marks a corrected equation.
 //! [`printed`] keeps the printed forms for diagnostics.
+//!
+//! # Glossary
+//!
+//! * **b2, b5, b6**: yaw, horizontal and vertical cylinder of a leg
+//! * **stroke**: how far a piston is out of its fully retracted place
+//! * **crank**: the part of the leg that the yaw cylinder turns about O4
+//! * **posture**: angles and lengths of a leg for one set of strokes
+//! * **closure**: the condition that a loop of links closes
 #![no_std]
 #![cfg_attr(
     not(test),

@@ -14,6 +14,18 @@
 //! argument: the low 32 bits of a microsecond counter, compared modulo 2^32.
 //!
 //! Nothing here panics for any input, allocates, blocks or uses floating point.
+//!
+//! # Glossary
+//!
+//! * **node**: the application of one board: sense, control, actuate, supervise, talk
+//! * **mode**: what a node may do: DISARMED, ARMED, HOLD, EXHAUST, FAULT, …; one table says which
+//!   follows which
+//! * **HOLD**: four valves shut, air trapped; a wheel ramps to standstill
+//! * **EXHAUST**: inlets shut, outlets open
+//! * **latched**: a fault stays until it is cleared, also when its cause is gone
+//! * **precharge**: filling both chambers before a joint moves
+//! * **supervisor**: decides from sensors, link and outputs whether the mode must change
+//! * **seal**: checksum of state between two ticks, by which a flipped bit is found
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),

@@ -16,6 +16,12 @@
 //! anything.
 //!
 //! No floating point, no heap, and no panic for any input.
+//!
+//! # Glossary
+//!
+//! * **remote board**: a node whose sensors and outputs travel in messages
+//! * **partner**: the simulator at the other end
+//! * **edge**: the instant at which a tick begins: outputs take effect, inputs are latched
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),

@@ -39,6 +39,13 @@
 //! | [`Ticks`] | u32 | control ticks | 0…2^32−1 | 1 |
 //! | [`AdcCode`] | U0F16 | of full scale | 0…1 | 1/65 536 |
 //! | [`WheelCount`] | 24-bit, wraps | encoder counts | ±8 388 608 | 1 |
+//!
+//! # Glossary
+//!
+//! * **Q-format**: fixed point: I16F16 has 16 integer and 16 fractional bits, U0F16 none and 16
+//! * **newtype**: a struct of one field that gives a number its meaning
+//! * **saturating**: a result beyond the range becomes its end
+//! * **wire**: a smaller format in which a quantity travels on the bus
 #![no_std]
 #![cfg_attr(
     not(test),

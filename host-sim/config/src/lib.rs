@@ -1,5 +1,14 @@
 //! Robots and scenarios: TOML files in which every parameter has a value, a
 //! unit and a source, checked against one table of allowed units and ranges.
+//!
+//! # Glossary
+//!
+//! * **robot**: a file with every parameter of the simulated robot and its boards
+//! * **axis**: the same of one cylinder on a test bench
+//! * **scenario**: what happens in a run: robot, start pose, events by time, targets, faults
+//! * **source**: where a value is from: PAPER, DATASHEET, ASSUMED, IDENTIFIED
+//! * **fingerprint**: hash of names, values and units of a robot; equal files of other layout
+//!   have the same
 
 pub mod axis;
 pub mod builtin;

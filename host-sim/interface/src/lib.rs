@@ -5,6 +5,11 @@
 //!
 //! * [`archive`]: the definitions so far;
 //! * [`difference`]: lines in which two of them differ.
+//!
+//! # Glossary
+//!
+//! * **interface**: messages, fields and parameters of the bus, in a text of one line each
+//! * **archive**: the texts of all released interfaces, by hash
 
 pub mod archive;
 pub mod difference;

@@ -13,6 +13,13 @@
 //!
 //! runs an image for a bench board with its second serial port on a pseudo-terminal,
 //! whose name it prints, until it is killed.
+//!
+//! # Glossary
+//!
+//! * **machine**: processor, memory and peripherals of one STM32G431
+//! * **hook**: a function that the emulator calls at an access or an instruction
+//! * **timeline**: edges, received bytes, supply and resets of a board, in order of time
+//! * **outputs**: what the pins show at an instant
 
 #[cfg(unix)]
 mod bench;

@@ -10,6 +10,15 @@
 //! stream per signal, and `exp`, `sin` and their kin from the crate `libm`, because the C library's
 //! differ between systems. The same parameters, seed and inputs give the same bytes. A state saved as JSON comes back bit for bit only with a parser that
 //! rounds correctly (`serde_json` feature `float_roundtrip`).
+//!
+//! # Glossary
+//!
+//! * **chamber**: one side of a cylinder, with pressure, temperature, volume
+//! * **conductance C, critical ratio b**: flow capacity of a valve after ISO 6358
+//! * **bristle**: spring between two surfaces that stick: friction with a memory of position
+//! * **end stop**: cushion and stop at the ends of a stroke
+//! * **edge**: an instant at which a valve changes; a step of the plant ends there
+//! * **mechanics**: what turns forces on joints into motion
 
 pub mod assembly;
 pub mod axis;

@@ -2,6 +2,14 @@
 //! applications on QEMU ([`qemu`]), or on a bench board behind a serial port ([`serial`]).
 //! Every board elsewhere has a native twin beside it, with which it is compared at every tick
 //! and frame.
+//!
+//! # Glossary
+//!
+//! * **SIL**: software in the loop: the application compiled for the host
+//! * **PIL**: processor in the loop: the flashed image on an emulated processor
+//! * **HIL**: hardware in the loop: an image on a bench board
+//! * **twin**: the native application beside a remote board, with the same inputs
+//! * **lock-step**: the board waits for the simulator, the simulator for the board
 
 mod channel;
 pub mod choice;

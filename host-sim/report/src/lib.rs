@@ -1,5 +1,11 @@
 //! What every result page is made of: charts ([`plot`]), the page's frame, tables beside the
 //! pictures, the folder that they go to ([`output`]), and statistics ([`stats`]).
+//!
+//! # Glossary
+//!
+//! * **panel**: one plot with its axes; a figure has several, one above the other
+//! * **verdict**: met, missed or not judged, of one target
+//! * **interval**: range that holds the true value in 95 of 100 experiments
 
 mod error;
 pub mod number;

@@ -5,6 +5,16 @@
 //! enumerates and arms them, and the robot moves to its start pose; all of this
 //! is simulated like the rest. Scenario time 0, where the record begins, is the
 //! instant at which the robot stands at rest in that pose.
+//!
+//! # Glossary
+//!
+//! * **session**: one simulated robot that somebody drives
+//! * **board**: application, hardware model, memory and clock at one address
+//! * **operator**: the user of the paper: gets the robot ready, sends the commands of the
+//!   scenario
+//! * **observer**: samples the robot for the record
+//! * **rogue node**: a node on the bus that should not be there
+//! * **down**: a board without power, or one that hangs
 
 mod audit;
 mod board;

@@ -6,6 +6,15 @@
 //! * [`figures`]: the paper's figures and misprints;
 //! * [`study`]: what all of them do in the same way;
 //! * [`check`], [`export`]: the model against others' numbers, and for others' programs.
+//!
+//! # Glossary
+//!
+//! * **target**: one number of a run with the band it must lie in, and whether it is required
+//! * **row**: one fault of the matrix, with its instant and what must come of it
+//! * **case**: one move of one controller on one cylinder
+//! * **corner**: one set of deviations of a cylinder from its data sheet
+//! * **baseline**: the same run without the fault
+//! * **job**: folder, progress and stop signal of a study
 
 pub mod analysis;
 pub mod bench;

@@ -9,6 +9,15 @@
 //!
 //! A [`Recorder`] takes the samples of a run and hands them to [`Sink`]s: a log file
 //! ([`LogFile`]), tables ([`Tables`]), the last seconds ([`Ring`]), and memory ([`Keep`]).
+//!
+//! # Glossary
+//!
+//! * **channel**: a named stream of samples of one kind, such as `/joint/3`
+//! * **sample**: the values of a channel at one instant
+//! * **event**: something that happened, with cause and time
+//! * **sink**: a place where samples go
+//! * **provenance**: what went into a run: program, robot, scenario, seed
+//! * **hash**: BLAKE3 over channel, time and value of all samples at full rate
 
 mod csv_out;
 mod difference;

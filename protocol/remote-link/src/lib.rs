@@ -30,6 +30,12 @@
 //!
 //! `COBS(index, postcard(message), CRC-32C) 0x00`, see [`frame`]. The stream
 //! can be joined anywhere: what stands before the first zero is dropped.
+//!
+//! # Glossary
+//!
+//! * **edge**: the instant at which a tick begins
+//! * **hook**: a way to make a remote board fail
+//! * **postcard**: the encoding of the messages: variable-length integers, fields in order
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),

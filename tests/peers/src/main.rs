@@ -3,6 +3,11 @@
 //! `wheeleg-peers GROUP` prints `RESULT case peer unit cpu wall check` lines, tab separated, as every
 //! program beside it does. `PEERS_SCALE` multiplies the work, `PEERS_LABEL` is the peer's name.
 //! `cargo xtask bench` runs all of them in turn and compares.
+//!
+//! # Glossary
+//!
+//! * **peer**: another implementation of the same work, here in C
+//! * **check**: a number made of all results, equal where two programs did the same
 
 mod control;
 mod leg;

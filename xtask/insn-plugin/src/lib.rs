@@ -13,6 +13,11 @@
 //! Counts are exact: every executed instruction adds one, in code that the
 //! emulator generates. The declarations below are written from QEMU's
 //! documentation of the interface (docs/devel/tcg-plugins.rst); no header is copied.
+//!
+//! # Glossary
+//!
+//! * **TCG**: the code generator of QEMU, which plugins can watch
+//! * **region**: instructions from one mark to another
 #![allow(
     unsafe_code,
     reason = "the interface of the emulator is one of C functions and pointers"

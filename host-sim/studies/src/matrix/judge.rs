@@ -2,8 +2,8 @@
 
 use super::expected::Expected;
 use super::measure::{Measured, line, lost_messages, messages};
+use super::ran::Ran;
 use super::row::{Expect, Row, Stop};
-use super::run::Ran;
 use wheeleg_config::RobotConfig;
 use wheeleg_config::faults::FaultKind;
 use wheeleg_telemetry::event::{Cause, ServiceOutcome};
@@ -330,7 +330,7 @@ fn degrades(f: &mut Failures, after_all: &AfterAll, m: &Measured) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::matrix::run::Outputs;
+    use crate::matrix::ran::Outputs;
     use crate::matrix::select;
     use wheeleg_config::builtin;
     use wheeleg_sim::LineAudit;

@@ -4,8 +4,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::ran::Ran;
 use super::row::{Expect, Row, Since};
-use super::run::Ran;
 use crate::analysis::{commanded_open, window};
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_telemetry::{Event, EventKind, JointSample, Recording, Row as Sample};
@@ -169,7 +169,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, baseline: Option<&Recording>) -> Mea
 /// Instant from which the row counts.
 fn since(row: &Row, at_s: f64, r: &Recording, baseline: Option<&Recording>) -> f64 {
     let begin_s = if row.estop {
-        at_s + super::run::ESTOP_S
+        at_s + super::ran::ESTOP_S
     } else {
         at_s
     };

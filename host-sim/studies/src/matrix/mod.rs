@@ -11,6 +11,7 @@ mod expected;
 mod judge;
 mod measure;
 mod page;
+mod ran;
 mod row;
 mod rows;
 mod run;

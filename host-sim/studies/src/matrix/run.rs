@@ -10,6 +10,7 @@ use wheeleg_protocol::param::{ParamInfo, params_at};
 
 use super::judge::{Outcome, judge};
 use super::measure::{Measured, measure};
+use super::ran::{ESTOP_S, Outputs, Ran};
 use super::row::{Ask, Expect, Phase, Row, Variant};
 use super::rows::ROWS;
 use crate::StudyError;
@@ -25,35 +26,10 @@ use wheeleg_sim::faults::check;
 use wheeleg_sim::{self as sil, Boards, JointProbe, LineAudit, Observers};
 use wheeleg_telemetry::{Recorder, Recording};
 
-/// E-stop after the instant, s.
-pub(super) const ESTOP_S: f64 = 0.1;
 /// Arming is asked for this long before the end, s.
 const ARM_S: f64 = 0.6;
 /// Steps of the long walk.
 const LONG_STEPS: u16 = 18;
-
-/// A run of a row.
-pub(super) struct Ran {
-    pub(super) at_s: f64,
-    pub(super) faults: Vec<FaultSpec>,
-    pub(super) recording: Recording,
-    pub(super) line: LineAudit,
-    /// Arming was asked for when every fault was over.
-    pub(super) arming_asked: bool,
-    /// From power-up on.
-    pub(super) outputs: Outputs,
-    /// The run ended before its time, and why.
-    pub(super) error: Option<String>,
-}
-
-/// What the joint boards had on their outputs from power-up on, in the time of the start-up, too.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Outputs {
-    /// Ticks that were looked at, of all joints.
-    pub(super) ticks: u64,
-    /// Ticks among them with a valve energised, or under control.
-    pub(super) driven: u64,
-}
 
 /// The robots and their runs without faults.
 struct Robots {

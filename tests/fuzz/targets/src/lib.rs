@@ -15,6 +15,11 @@
 //!
 //! libFuzzer (`cargo xtask fuzz`), bolero and the replay of the corpus
 //! (`cargo test`) all call the same functions.
+//!
+//! # Glossary
+//!
+//! * **target**: a function that takes any bytes
+//! * **corpus**: inputs that once reached something new
 
 mod action;
 mod chip;
