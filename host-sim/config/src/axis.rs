@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_plant::chamber::GasModel;
 use wheeleg_plant::sensors::AdcNoise;
 
@@ -15,6 +15,7 @@ use super::error::ConfigError;
 use super::params::{ParameterInfo, params};
 use super::plant::pneumatics::{self, Pneumatics, Sensing};
 use super::reader::Reader;
+use super::relations::{self, Moved};
 
 params! {
     /// What moves with the rod.
@@ -152,7 +153,7 @@ fn read(r: &mut Reader) -> Option<AxisParams> {
             heat_transfer_w_m2_k: chamber.heat_transfer,
         };
     }
-    Some(AxisParams {
+    let axis = AxisParams {
         gas: pneumatics.gas,
         supply: pneumatics.supply,
         cylinder,
@@ -162,7 +163,35 @@ fn read(r: &mut Reader) -> Option<AxisParams> {
         potentiometer: sensing.potentiometer,
         adc: sensing.adc,
         step_ns: sensing.step_ns,
-    })
+    };
+    check_relations(r, &axis);
+    Some(axis)
+}
+
+/// What the fields must be to each other.
+fn check_relations(r: &mut Reader, axis: &AxisParams) {
+    let cylinder = &axis.cylinder;
+    relations::check_break_away(r, cylinder.friction.coulomb_n, cylinder.friction.static_n);
+    let start_pa = [
+        cylinder.initial_pressure_a_pa,
+        cylinder.initial_pressure_b_pa,
+    ];
+    relations::check_start(r, "start", start_pa, axis.supply.set_pressure_pa);
+    let step_s = axis.step_ns as f64 * 1e-9;
+    relations::check_supply(r, &axis.supply, &axis.gas, step_s);
+    let moved = Moved {
+        cylinder,
+        gas: &axis.gas,
+        supply: &axis.supply,
+        mass_kg: axis.moving_mass_kg,
+        mass_fields: &["moving.mass"],
+        load_n: axis.load_n.abs(),
+        step_s,
+    };
+    moved.check(r);
+    if r.is_clean() {
+        relations::check_plant(r, Axis::new(axis).map(drop));
+    }
 }
 
 #[cfg(test)]

@@ -6,10 +6,22 @@ use std::sync::Arc;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
-/// Line of a byte of a file, from 1.
-pub(crate) fn line_of(text: &str, at: usize) -> usize {
-    let before = &text.as_bytes()[..at.min(text.len())];
-    before.iter().filter(|b| **b == b'\n').count() + 1
+/// Problems of a file that are printed; of more there is the number.
+const SHOWN: usize = 20;
+
+/// Where the lines of a file begin.
+pub(crate) struct Lines(Vec<usize>);
+
+impl Lines {
+    pub(crate) fn of(text: &str) -> Self {
+        let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n');
+        Self(breaks.map(|(at, _)| at + 1).collect())
+    }
+
+    /// Line of a byte, from 1.
+    pub(crate) fn of_byte(&self, at: usize) -> usize {
+        self.0.partition_point(|begin| *begin <= at) + 1
+    }
 }
 
 /// One thing that is wrong at one place of a file.
@@ -27,18 +39,16 @@ pub struct Problem {
 impl Problem {
     /// A problem at a byte range of a file.
     pub(crate) fn at(
-        file: &str,
-        text: &Arc<str>,
+        (file, text, lines): (&str, &Arc<str>, &Lines),
         span: Range<usize>,
         message: String,
         label: impl Into<String>,
         help: Option<String>,
     ) -> Self {
-        let line = line_of(text, span.start);
         Self {
             source: Some(NamedSource::new(file, text.clone()).with_language("TOML")),
             file: file.to_owned(),
-            line: Some(line),
+            line: Some(lines.of_byte(span.start)),
             message,
             label: label.into(),
             span: Some(span),
@@ -134,7 +144,8 @@ impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.problems.len() {
             1 => write!(f, "{}", self.what),
-            n => write!(f, "{} ({n} problems)", self.what),
+            n if n <= SHOWN => write!(f, "{} ({n} problems)", self.what),
+            n => write!(f, "{} ({n} problems; the first {SHOWN} follow)", self.what),
         }
     }
 }
@@ -147,6 +158,7 @@ impl Diagnostic for ConfigError {
     }
 
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        Some(Box::new(self.problems.iter().map(|p| p as &dyn Diagnostic)))
+        let shown = self.problems.iter().take(SHOWN);
+        Some(Box::new(shown.map(|p| p as &dyn Diagnostic)))
     }
 }

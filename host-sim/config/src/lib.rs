@@ -21,6 +21,7 @@ mod params;
 pub mod plant;
 mod quantity;
 mod reader;
+mod relations;
 mod robot;
 mod scenario;
 mod suggest;

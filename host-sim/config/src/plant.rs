@@ -3,17 +3,18 @@
 pub(super) mod pneumatics;
 pub mod sections;
 
-use wheeleg_plant::PlantParams;
 use wheeleg_plant::contact::ContactParams;
 use wheeleg_plant::cylinder::CylinderParams;
 use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
 use wheeleg_plant::ground::Ground;
 use wheeleg_plant::motor::MotorParams;
 use wheeleg_plant::sensors::AdcNoise;
+use wheeleg_plant::{Plant, PlantParams};
 
 use self::pneumatics::{Pneumatics, Sensing};
 use self::sections::{BodySection, ContactSection, LinkSection, MotorSection, StartSection};
 use super::reader::Reader;
+use super::relations::{self, Moved};
 
 /// Names of the plant's sections besides those of one cylinder.
 pub(super) const SECTIONS: [&str; 5] = ["start", "motor", "body", "link", "contact"];
@@ -52,7 +53,7 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
     let (body, motor) = (body?, motor?);
     let [l1, l2, l3, l4, l5, l6] = links;
     let links = [l1?, l2?, l3?, l4?, l5?, l6?];
-    Some(PlantParams {
+    let plant = PlantParams {
         gas: pneumatics.gas,
         supply: pneumatics.supply,
         cylinders: std::array::from_fn(|i| CylinderParams {
@@ -70,7 +71,47 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
         potentiometers: [sensing.potentiometer; 6],
         adc: sensing.adc,
         step_ns: sensing.step_ns,
-    })
+    };
+    check_relations(r, &plant);
+    Some(plant)
+}
+
+/// What the fields must be to each other.
+fn check_relations(r: &mut Reader, plant: &PlantParams) {
+    let friction = &plant.cylinders[0].friction;
+    relations::check_break_away(r, friction.coulomb_n, friction.static_n);
+    relations::check_gravity(r, plant.body.gravity_m_s2);
+    for (name, body) in LINKS.iter().zip(&plant.body.leg_bodies) {
+        let field = format!("link.{name}.inertia");
+        relations::check_inertias(r, &[&field], body.inertia_kg_m2);
+    }
+    for (name, cylinder) in ["yaw", "horizontal", "vertical"]
+        .iter()
+        .zip(&plant.cylinders)
+    {
+        let start_pa = [
+            cylinder.initial_pressure_a_pa,
+            cylinder.initial_pressure_b_pa,
+        ];
+        let section = format!("start.{name}");
+        relations::check_start(r, &section, start_pa, plant.supply.set_pressure_pa);
+    }
+    let step_s = plant.step_ns as f64 * 1e-9;
+    relations::check_supply(r, &plant.supply, &plant.gas, step_s);
+    // The vertical cylinder moves the least: its rod.
+    let moved = Moved {
+        cylinder: &plant.cylinders[2],
+        gas: &plant.gas,
+        supply: &plant.supply,
+        mass_kg: plant.body.leg_bodies[5].mass_kg,
+        mass_fields: &["link.vertical_rod.mass"],
+        load_n: 0.0,
+        step_s,
+    };
+    moved.check(r);
+    if r.is_clean() {
+        relations::check_plant(r, Plant::new(plant).map(drop));
+    }
 }
 
 fn motor_params(s: &MotorSection) -> MotorParams {

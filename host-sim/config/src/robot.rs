@@ -17,6 +17,7 @@ use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
 use super::plant;
 use super::reader::Reader;
+use super::relations;
 
 // Ranges of the gait are those of the master, SI.
 const STEPS: [f64; 2] = bounds(&argument::STEPS);
@@ -186,6 +187,30 @@ fn relations(r: &mut Reader, gait: &GaitParams) {
     }
 }
 
+/// Chassis and wheels must be bodies that there can be.
+fn check_bodies(r: &mut Reader, plant: &PlantParams, spatial: &SpatialParams) {
+    let body = &plant.body;
+    relations::check_inertias(
+        r,
+        &[
+            "spatial.chassis_roll_inertia",
+            "body.chassis_pitch_inertia",
+            "spatial.chassis_yaw_inertia",
+        ],
+        [
+            spatial.chassis_roll_inertia_kg_m2,
+            body.chassis_pitch_inertia_kg_m2,
+            spatial.chassis_yaw_inertia_kg_m2,
+        ],
+    );
+    let transverse_kg_m2 = spatial.wheel_transverse_inertia_kg_m2;
+    relations::check_inertias(
+        r,
+        &["body.wheel_inertia", "spatial.wheel_transverse_inertia"],
+        [body.wheel_inertia_kg_m2, transverse_kg_m2, transverse_kg_m2],
+    );
+}
+
 /// A robot file, checked and converted to SI.
 #[derive(Debug, Clone)]
 pub struct RobotConfig {
@@ -254,6 +279,9 @@ impl RobotConfig {
         let reference = r.section::<ReferenceParams>("reference");
         let plant = plant::read(&mut r);
         let spatial = r.section::<SpatialParams>("spatial");
+        if let (Some(plant), Some(spatial)) = (&plant, &spatial) {
+            check_bodies(&mut r, plant, spatial);
+        }
         let node = node::read(&mut r);
         let commissioned = commissioned::read(&mut r);
         let robot = (|| {

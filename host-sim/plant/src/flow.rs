@@ -202,6 +202,13 @@ impl Restrictor {
         }
     }
 
+    /// Slope of the mass flow in the pressure difference near equal pressures \[kg/(s Pa)\]:
+    /// the steepest there is. `sqrt_t` is the root of the temperature upstream \[√K\].
+    #[must_use]
+    pub fn steepest_kg_s_pa(&self, sqrt_t: f64) -> f64 {
+        self.scale * self.linear_slope / sqrt_t
+    }
+
     /// Flow function ψ(r) \[-\], 1 when choked, 0 at r = 1.
     #[must_use]
     #[inline]

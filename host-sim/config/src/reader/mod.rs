@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use toml_edit::{Document, Item};
 
-use super::error::{ConfigError, Problem, line_of};
+use super::error::{ConfigError, Lines, Problem};
 use super::params::{FieldSpec, ParameterInfo, Params};
 use super::quantity::suffix;
 use super::suggest::closest;
@@ -22,6 +22,7 @@ pub(crate) use quantities::range;
 pub(crate) struct Reader {
     file: String,
     text: Arc<str>,
+    lines: Lines,
     document: Document<String>,
     problems: Vec<Problem>,
     parameters: Vec<ParameterInfo>,
@@ -38,10 +39,12 @@ impl Reader {
         source_required: bool,
     ) -> Result<Self, ConfigError> {
         let shared: Arc<str> = Arc::from(text);
+        let lines = Lines::of(text);
         match Document::parse(text.to_owned()) {
             Ok(document) => Ok(Self {
                 file: file.to_owned(),
                 text: shared,
+                lines,
                 document,
                 problems: Vec::new(),
                 parameters: Vec::new(),
@@ -50,7 +53,7 @@ impl Reader {
             Err(e) => {
                 let span = e.span().unwrap_or(0..0);
                 let message = format!("not valid TOML: {}", e.message());
-                let problem = Problem::at(file, &shared, span, message, "here", None);
+                let problem = Problem::at((file, &shared, &lines), span, message, "here", None);
                 Err(ConfigError::new(what, vec![problem]))
             }
         }
@@ -76,14 +79,61 @@ impl Reader {
         help: Option<String>,
     ) {
         let span = span.unwrap_or(0..0);
-        self.problems.push(Problem::at(
-            &self.file, &self.text, span, message, label, help,
-        ));
+        let place = (&*self.file, &self.text, &self.lines);
+        self.problems
+            .push(Problem::at(place, span, message, label, help));
+    }
+
+    /// Reports fields that do not fit together, each of which is within its range: with what
+    /// the file says of them, and the lines of all.
+    pub(crate) fn contradiction(&mut self, fields: &[&str], why: &str, help: &str) {
+        let mut shown = Vec::new();
+        for path in fields {
+            let listed = self.parameters.iter().find(|p| p.path == *path);
+            let value = listed.map_or(String::new(), |p| {
+                format!(" = {}{}", p.value_text(), suffix(&p.unit))
+            });
+            let line = self.span_of(path).map_or(String::new(), |span| {
+                format!(" (line {})", self.lines.of_byte(span.start))
+            });
+            shown.push(format!("`{path}`{value}{line}"));
+        }
+        let first = fields.first().and_then(|path| self.span_of(path));
+        let (last, others) = match shown.split_last() {
+            Some((last, others)) if !others.is_empty() => (last.clone(), others.join(", ")),
+            _ => (String::new(), shown.concat()),
+        };
+        let message = match last.is_empty() {
+            true => format!("{others} cannot be: {why}"),
+            false => format!("{others} and {last} do not fit together: {why}"),
+        };
+        self.problem(first, message, "not with the others", Some(help.to_owned()));
+    }
+
+    /// Path of the parameter that a name of the plant, a path with a unit behind it, begins with.
+    pub(crate) fn listed(&self, name: &str) -> Option<String> {
+        let mut paths: Vec<&str> = self.parameters.iter().map(|p| p.path.as_str()).collect();
+        paths.retain(|path| name.starts_with(path));
+        paths.sort_by_key(|path| path.len());
+        paths.last().map(|path| (*path).to_owned())
+    }
+
+    /// Whether nothing is wrong so far.
+    pub(crate) fn is_clean(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    /// Position of the field at a dotted path.
+    fn span_of(&self, path: &str) -> Option<Range<usize>> {
+        let (table, key) = path.rsplit_once('.').unwrap_or(("", path));
+        let item = self.item(table)?.as_table_like()?;
+        let key = item.key(key)?;
+        key.span().or_else(|| self.item(path)?.span())
     }
 
     /// Line of a position in the file, from 1.
     pub(crate) fn line_of(&self, span: &Range<usize>) -> usize {
-        line_of(&self.text, span.start)
+        self.lines.of_byte(span.start)
     }
 
     fn item(&self, path: &str) -> Option<&Item> {

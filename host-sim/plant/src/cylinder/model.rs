@@ -112,6 +112,21 @@ impl CylinderModel {
         })
     }
 
+    /// The fastest rate at which a chamber at its end fills or empties \[1/s\]: its pressure
+    /// near that of the supply or the ambience, where the flow is linear and steepest.
+    /// `chamber_b` chooses B.
+    #[must_use]
+    pub fn fastest_rate_1_s(&self, chamber_b: bool) -> f64 {
+        let volume_m3 = match chamber_b {
+            false => self.volume_a0_m3,
+            true => self.volume_b_m3(self.params.stroke_m),
+        };
+        let steepest = self.restrictors[0]
+            .steepest_kg_s_pa(self.sqrt_ambient_t)
+            .max(self.restrictors[1].steepest_kg_s_pa(self.sqrt_ambient_t));
+        self.exponent_r * self.gas.ambient_temperature_k * steepest / volume_m3
+    }
+
     /// Parameters the model was built from.
     #[must_use]
     pub fn params(&self) -> &CylinderParams {
