@@ -18,6 +18,7 @@ mod figures;
 mod foot_sides;
 mod long_runs;
 mod off_data;
+mod plant_check;
 mod precharge;
 mod reference;
 mod restart;

@@ -41,6 +41,7 @@ pub mod plant_check;
 mod refusal;
 mod run;
 pub mod suite;
+mod textbook;
 pub mod valve_resolution;
 
 pub use design::{Kind, axis_data, design};

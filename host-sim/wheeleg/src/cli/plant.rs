@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 
 use super::print;
-use wheeleg_config::AxisConfig;
+use wheeleg_config::{AxisConfig, brief};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::bench::{export, plant_check};
+use wheeleg_studies::bench::export;
+use wheeleg_studies::bench::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
 
 /// Exit code of a check beyond its limit.
 const BEYOND: u8 = 1;
@@ -79,47 +80,73 @@ fn check(args: &CheckArgs) -> Result<ExitCode, StudyError> {
         let value = serde_json::json!({ "axis": config.name, "check": c });
         print(&format!("{value:#}\n"))?;
     } else {
-        let row =
-            |name: &str, value: String, limit: String| format!("{name:<34}{value:>12}  {limit}\n");
-        let mut text = format!("Axis {}\n\n", config.name);
-        let balance = format!("at most {:.0e}", plant_check::BALANCE_LIMIT);
-        text += &row(
-            "mass residual, of the flow",
-            format!("{:.1e}", c.mass_residual),
-            balance.clone(),
-        );
-        text += &row(
-            "energy residual, of the flow",
-            format!("{:.1e}", c.energy_residual),
-            balance,
-        );
-        let [low, high] = plant_check::ORDER_RANGE;
-        for (name, order) in ["order in the stroke", "order in the pressure"]
-            .iter()
-            .zip(c.order)
-        {
-            text += &row(name, format!("{order:.2}"), format!("{low} to {high}"));
-        }
-        text += &row(
-            "stroke error of the step",
-            format!("{:.2} um", c.step_error_m * 1e6),
-            format!("at most {} um", plant_check::STEP_LIMIT_M * 1e6),
-        );
-        text += &row(
-            "jump of the flow at its borders",
-            format!("{:.1e}", c.flow_jump),
-            format!("at most {:.0e}", plant_check::JUMP_LIMIT),
-        );
-        text += if c.passed {
-            "\nAll within limits.\n"
-        } else {
-            "\nBEYOND LIMITS.\n"
-        };
-        print(&text)?;
+        print(&check_text(&config.name, &c))?;
     }
     Ok(if c.passed {
         ExitCode::SUCCESS
     } else {
         ExitCode::from(BEYOND)
     })
+}
+
+/// The table of a check, and what it comes to.
+fn check_text(axis: &str, check: &PlantCheck) -> String {
+    let mut text = format!("Axis {axis}\n\n");
+    for finding in &check.findings {
+        let (name, value, limit) = figures(finding);
+        let verdict = match finding.verdict {
+            Verdict::Holds => String::new(),
+            Verdict::Wrong => "  WRONG".to_owned(),
+            Verdict::StepTooLong { try_s } => format!(
+                "  cannot be judged at this step: try numerics.step = {} us",
+                brief(try_s * 1e6)
+            ),
+            Verdict::NotAsymptotic => "  no order at these steps: not judged".to_owned(),
+        };
+        text += &format!("{name:<34}{value:>12}  {limit}{verdict}\n");
+    }
+    let open = check
+        .findings
+        .iter()
+        .filter(|f| f.verdict != Verdict::Holds)
+        .count();
+    text += &match (check.passed, open) {
+        (true, 0) => "\nAll within limits.\n".to_owned(),
+        (true, n) => format!("\nNothing is wrong; {n} could not be judged.\n"),
+        (false, _) => "\nBEYOND LIMITS.\n".to_owned(),
+    };
+    text
+}
+
+/// Name, value and limits of a finding.
+fn figures(finding: &Finding) -> (&'static str, String, String) {
+    let name = match finding.quantity {
+        Quantity::MassResidual => "mass residual, of the flow",
+        Quantity::EnergyResidual => "energy residual, of the flow",
+        Quantity::Pressure => "pressure against the text book",
+        Quantity::Stroke => "stroke against the text book",
+        Quantity::ThermalPressure => "the same pressure, with heat",
+        Quantity::OrderStroke => "order in the stroke",
+        Quantity::OrderPressure => "order in the pressure",
+        Quantity::StepError => "stroke error of the step",
+        Quantity::FlowJump => "jump of the flow at its borders",
+    };
+    let (value, min, max) = (finding.value, finding.min, finding.max);
+    let (value, limit) = match finding.quantity {
+        Quantity::MassResidual | Quantity::EnergyResidual | Quantity::FlowJump => {
+            (format!("{value:.1e}"), format!("at most {max:.0e}"))
+        }
+        Quantity::Pressure | Quantity::Stroke | Quantity::ThermalPressure => (
+            format!("{:.3} %", value * 1e2),
+            format!("at most {} %", max * 1e2),
+        ),
+        Quantity::OrderStroke | Quantity::OrderPressure => {
+            (format!("{value:.2}"), format!("{min} to {max}"))
+        }
+        Quantity::StepError => (
+            format!("{:.2} um", value * 1e6),
+            format!("at most {} um", max * 1e6),
+        ),
+    };
+    (name, value, limit)
 }
