@@ -378,6 +378,47 @@ fn tuning_gives_a_section_that_a_run_accepts() {
         .success();
 }
 
+/// The axes that come with the program are better for being tuned; a light piston with much
+/// viscous friction, for which the law is not made, keeps its board's defaults.
+#[test]
+fn tuning_is_refused_where_it_makes_a_move_worse() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    for axis in ["small-12x50", "long-16x400", "heavy-40x250"] {
+        let out = folder.path().join(axis);
+        wheeleg(&["tune", axis, "--out"])
+            .arg(&out)
+            .assert()
+            .success();
+        assert!(out.join("node-parameters.toml").exists(), "{axis}");
+    }
+    let mut text = source("axes/small-12x50.toml");
+    for (from, to) in [
+        ("value = 15.0, unit = \"N s/m\"", "50.0"),
+        ("value = 0.4, unit = \"kg\"", "0.1"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let unit = from.rsplit_once(',').expect("a unit").1;
+        text = text.replace(from, &format!("value = {to},{unit}"));
+    }
+    let path = folder.path().join("light.toml");
+    fs::write(&path, text).expect("written");
+    let out = folder.path().join("light");
+    let refused = wheeleg(&["tune", "--json"])
+        .arg(&path)
+        .arg("--out")
+        .arg(&out)
+        .assert()
+        .code(1);
+    let summary: Value = serde_json::from_slice(&refused.get_output().stdout).expect("JSON");
+    assert_valid(&summary, "tune");
+    assert_eq!(summary["accepted"], false);
+    let worse = summary["worse"].as_array().expect("a list");
+    assert!(worse.iter().any(|w| w["figure"] == "stopped"), "{worse:?}");
+    assert!(!out.join("node-parameters.toml").exists());
+    let report = fs::read_to_string(out.join("report.html")).expect("written");
+    assert!(report.contains("Refused: "));
+}
+
 #[test]
 fn an_axis_that_cannot_hold_its_load_is_refused() {
     let folder = tempfile::tempdir().expect("temporary folder");

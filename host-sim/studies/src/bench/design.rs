@@ -9,8 +9,10 @@ use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
 use wheeleg_node::sensor::SensorConfig;
 use wheeleg_plant::axis::AxisParams;
+use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 
+use super::commission::value;
 use super::firmware::{Design, Supervision};
 
 /// A controller of the comparison.
@@ -263,6 +265,17 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     }
 }
 
+/// Beyond its stops a piston is measured to this share of its stroke, and this much more \[m\].
+const BEYOND_STOP: (f64, f64) = (0.02, 0.005);
+
+/// The longest stroke that a board can be told \[m\]: its range of travel is that of
+/// `sensor_max`.
+#[must_use]
+pub fn longest_stroke_m() -> f64 {
+    let row = JointParam::SensorMax.info();
+    (value(row, row.max) * 1e-3 - BEYOND_STOP.1) / (1.0 + BEYOND_STOP.0)
+}
+
 /// Calibration of the axis's position sensor, as commissioning would find it.
 fn sensor(axis: &AxisParams) -> SensorConfig {
     let p = &axis.potentiometer;
@@ -274,8 +287,8 @@ fn sensor(axis: &AxisParams) -> SensorConfig {
         full_scale: mm(p.electrical_stroke_m / p.gain),
         code_min: code(0.01),
         code_max: code(0.99),
-        travel_min: mm(-0.005 - 0.02 * stroke_m),
-        travel_max: mm(1.02 * stroke_m + 0.005),
+        travel_min: mm(-BEYOND_STOP.1 - BEYOND_STOP.0 * stroke_m),
+        travel_max: mm((1.0 + BEYOND_STOP.0) * stroke_m + BEYOND_STOP.1),
         step_max: PositionMm::from_int(10),
     }
 }

@@ -44,7 +44,7 @@ pub mod suite;
 mod textbook;
 pub mod valve_resolution;
 
-pub use design::{Kind, axis_data, design};
+pub use design::{Kind, axis_data, design, longest_stroke_m};
 pub use firmware::{Design, Firmware, Supervision, TICK};
 pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};

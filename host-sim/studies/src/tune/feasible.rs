@@ -3,6 +3,7 @@
 use wheeleg_plant::axis::AxisParams;
 
 use crate::StudyError;
+use crate::bench::longest_stroke_m;
 use crate::bench::suite::force_left_n;
 use crate::compare::MARGIN;
 
@@ -44,6 +45,16 @@ friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take
                 left_n / p.load_n.abs(),
                 gauge_pa * 1e-5
             ),
+        );
+    }
+    let longest_m = longest_stroke_m();
+    if c.stroke_m > longest_m {
+        return refuse(
+            "cylinder.stroke",
+            format!("{:.1} mm", c.stroke_m * 1e3),
+            format!("up to {:.1} mm", longest_m * 1e3),
+            "a joint board measures a piston up to 500 mm, a margin beyond its stops included"
+                .into(),
         );
     }
     // Where the wiper stands with the rod out.
@@ -105,6 +116,11 @@ mod tests {
         let text = message(|p| p.potentiometer.electrical_stroke_m = 0.18);
         assert!(
             text.contains("electrical_stroke") && text.contains("at least 191.9 mm"),
+            "{text}"
+        );
+        let text = message(|p| p.cylinder.stroke_m = 0.5);
+        assert!(
+            text.contains("`cylinder.stroke` = 500.0 mm") && text.contains("up to 485.3 mm"),
             "{text}"
         );
         let text = message(|p| p.potentiometer.offset_m = 0.001);

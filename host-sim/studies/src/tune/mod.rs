@@ -6,7 +6,10 @@
 //! tuned. The tuned parameters are written as a section for a robot file.
 
 mod feasible;
+mod judge;
 mod page;
+
+pub use judge::{Figure, Worse};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -112,6 +115,8 @@ pub struct Tuned {
     pub delays: Option<Delays>,
     /// All tests.
     pub tests: Vec<Test>,
+    /// What became worse; if anything did, the parameters are refused.
+    pub worse: Vec<Worse>,
     /// All parameters that are set.
     pub parameters: Vec<Parameter>,
     /// Section for a robot file.
@@ -143,6 +148,10 @@ pub struct Summary<'a> {
     found_t_on_ms: Option<f64>,
     /// Closing delay found \[ms\]; null if the piston did not answer.
     found_t_off_ms: Option<f64>,
+    /// Whether the parameters are written: no figure of any test became worse.
+    accepted: bool,
+    /// What became worse.
+    worse: &'a [Worse],
     /// The tests that were played before and after.
     tests: &'a [Test],
     /// All parameters that are set.
@@ -154,7 +163,7 @@ impl study::Summary for Summary<'_> {
 }
 
 /// File of the tuned parameters, below the folder of the results. A tuning that was stopped
-/// writes none: not all of its tests were played.
+/// writes none, because not all of its tests were played, nor does one that made a move worse.
 pub const PARAMETERS: &str = "node-parameters.toml";
 
 /// Tunes an axis and writes report, figures, `summary.json` and [`PARAMETERS`] into the folder
@@ -254,6 +263,7 @@ impl Tuned {
             margin: Factors::NONE.static_margin(plant).min(1e3),
             grain: ValveResolution::of(plant),
             delays,
+            worse: judge::worse(&tests),
             tests,
             stopped,
             toml: format!(
@@ -282,6 +292,12 @@ impl Tuned {
         })
     }
 
+    /// Whether the tuned board is at least as good as before in all tests, and all were played.
+    #[must_use]
+    pub fn is_accepted(&self) -> bool {
+        self.worse.is_empty() && self.stopped.is_none()
+    }
+
     /// Moves that the board's supervision stopped, by name, of either column.
     #[must_use]
     pub fn stopped(&self, figures: fn(&Test) -> &Figures) -> Vec<&'static str> {
@@ -308,6 +324,8 @@ impl Tuned {
             sheet_t_off_ms: ms(valve.t_off_s),
             found_t_on_ms: self.delays.map(|d| ms(d.t_on_s)),
             found_t_off_ms: self.delays.map(|d| ms(d.t_off_s)),
+            accepted: self.is_accepted(),
+            worse: &self.worse,
             tests: &self.tests,
             parameters: &self.parameters,
         }
@@ -320,7 +338,7 @@ impl Tuned {
     pub fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
         let stopped = self.stopped.clone();
         let summary = job.summary(&self.summary(), stopped.as_ref())?;
-        if stopped.is_none() {
+        if self.is_accepted() {
             job.save(PARAMETERS, &self.toml)?;
         }
         let drawn = job.draw(page::figures(&self))?;

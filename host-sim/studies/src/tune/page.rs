@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Parameter, Test, Tuned};
+use super::{Parameter, Test, Tuned, Worse};
 use crate::StudyError;
 use crate::bench::Delays;
 use crate::bench::Trace;
@@ -201,6 +201,14 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
         stopped: tuned.stopped.as_ref().map(ToString::to_string),
         version: env!("CARGO_PKG_VERSION"),
         verdict: match (before_s, after_s) {
+            _ if !tuned.worse.is_empty() => {
+                let first: Vec<String> = tuned.worse.iter().take(3).map(Worse::message).collect();
+                format!(
+                    "Refused: {} figures are worse than before tuning. {}.",
+                    tuned.worse.len(),
+                    first.join("; ")
+                )
+            }
             (Some(before), Some(after)) => format!(
                 "Tuned, the large step settles in {after:.3} s, with the board's defaults in {before:.3} s."
             ),

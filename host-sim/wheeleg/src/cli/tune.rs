@@ -54,12 +54,12 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
         png: args.drawing.png,
         stop,
     })?;
-    let text = |tuned: &Tuned| text(tuned, finished.stopped.is_none(), &finished.report);
-    end(&finished, args.json, text, true)
+    let text = |tuned: &Tuned| text(tuned, &finished.report);
+    end(&finished, args.json, text, finished.result.is_accepted())
 }
 
 /// The tests before and after, what supervision stopped, delays, and where the files are.
-fn text(tuned: &Tuned, whole: bool, report: &Path) -> String {
+fn text(tuned: &Tuned, report: &Path) -> String {
     let mut text = format!(
         "{:<15}{:>20}{:>20}{:>20}{:>20}\n{:<15}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
         "",
@@ -116,9 +116,15 @@ fn text(tuned: &Tuned, whole: bool, report: &Path) -> String {
         tuned.grain.ratio,
     );
     let parameters = report.with_file_name(PARAMETERS);
-    let parameters = match whole {
-        true => parameters.display().to_string(),
-        false => "not written: not all tests were played".to_owned(),
+    for worse in &tuned.worse {
+        let _ = writeln!(text, "worse          {}", worse.message());
+    }
+    let parameters = if tuned.stopped.is_some() {
+        "not written: not all tests were played".to_owned()
+    } else if tuned.worse.is_empty() {
+        parameters.display().to_string()
+    } else {
+        "refused, not written: the moves above are worse than with the board's defaults".to_owned()
     };
     let _ = writeln!(
         text,

@@ -1,0 +1,193 @@
+//! Whether tuning made a board better: after is held against before, move by move.
+//!
+//! Of every move each of these must be as good as before, or good enough:
+//!
+//! | figure | good enough |
+//! |---|---|
+//! | supervision stopped the board | no |
+//! | limit cycle at the end of a step or of holding | no |
+//! | error at rest | 0.5 mm |
+//! | error after a lost contact | 2 mm |
+//! | overshoot, but for a load that is let go | 3 mm |
+//! | it settles at all | yes |
+//!
+//! A tuning that made any of them worse is refused: its parameters are not written.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::Test;
+use crate::compare::{Figures, Move};
+
+/// Error at rest that is good enough, mm.
+const ERROR_MM: f64 = 0.5;
+/// Error after a lost contact that is good enough, mm.
+const CONTACT_MM: f64 = 2.0;
+/// Overshoot that is good enough, mm.
+const OVERSHOOT_MM: f64 = 3.0;
+/// What a figure may grow by within its own scatter.
+const SCATTER: f64 = 1.1;
+
+/// What became worse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Figure {
+    /// The supervision stops the board: 1.
+    Stopped,
+    /// The piston does not come to rest: 1.
+    LimitCycle,
+    /// Error at rest \[mm\].
+    SteadyError,
+    /// Error after a lost contact \[mm\].
+    ContactError,
+    /// Overshoot \[mm\].
+    Overshoot,
+    /// It does not settle: 1.
+    NeverSettles,
+}
+
+/// One figure of one move that tuning made worse.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Worse {
+    /// The move.
+    #[serde(rename = "move")]
+    pub motion: Move,
+    /// The figure.
+    pub figure: Figure,
+    /// Its value before.
+    pub before: f64,
+    /// Its value after.
+    pub after: f64,
+}
+
+impl Worse {
+    /// In words.
+    #[must_use]
+    pub fn message(&self) -> String {
+        let (name, before, after) = (self.motion.name(), self.before, self.after);
+        match self.figure {
+            Figure::Stopped => format!("{name}: supervision stops the board"),
+            Figure::LimitCycle => format!("{name}: the piston does not come to rest"),
+            Figure::SteadyError => {
+                format!("{name}: error at rest {after:.2} mm, before {before:.2} mm")
+            }
+            Figure::ContactError => {
+                format!("{name}: error after the contact {after:.2} mm, before {before:.2} mm")
+            }
+            Figure::Overshoot => format!("{name}: overshoot {after:.2} mm, before {before:.2} mm"),
+            Figure::NeverSettles => format!("{name}: never settles"),
+        }
+    }
+}
+
+/// Everything that is worse after than before.
+pub(super) fn worse(tests: &[Test]) -> Vec<Worse> {
+    tests
+        .iter()
+        .flat_map(|test| worse_of(test.motion, &test.before, &test.after))
+        .collect()
+}
+
+fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
+    let flag = |set: Option<bool>| f64::from(u8::from(set == Some(true)));
+    let size = |value: Option<f64>| value.map_or(0.0, f64::abs);
+    let never = |f: &Figures| flag(Some(f.settle_s.is_none()));
+    // A board that was stopped on the way did not even try.
+    let tried = before.stopped != Some(true);
+    let step = matches!(motion, Move::Step20 | Move::Step100);
+    let rests = step || motion == Move::Hold;
+    // Whoever lets go of a load jumps; what counts then is where the piston comes to rest.
+    let judged = |figure: Figure| match figure {
+        Figure::LimitCycle => rests,
+        Figure::Overshoot => !motion.loses_contact() && tried,
+        _ => true,
+    };
+    let rows = [
+        (
+            Figure::Stopped,
+            flag(before.stopped),
+            flag(after.stopped),
+            0.0,
+        ),
+        (
+            Figure::LimitCycle,
+            flag(before.limit_cycle),
+            flag(after.limit_cycle),
+            0.0,
+        ),
+        (
+            Figure::SteadyError,
+            size(before.steady_error_mm),
+            size(after.steady_error_mm),
+            ERROR_MM,
+        ),
+        (
+            Figure::ContactError,
+            size(before.contact_error_mm),
+            size(after.contact_error_mm),
+            CONTACT_MM,
+        ),
+        (
+            Figure::Overshoot,
+            size(before.overshoot_mm),
+            size(after.overshoot_mm),
+            OVERSHOOT_MM,
+        ),
+        (Figure::NeverSettles, never(before), never(after), 0.0),
+    ];
+    rows.into_iter()
+        .filter(|(figure, before, after, enough)| {
+            judged(*figure) && *after > enough.max(SCATTER * before)
+        })
+        .map(|(figure, before, after, _)| Worse {
+            motion,
+            figure,
+            before,
+            after,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_worse_is_named_and_what_is_good_enough_is_not() {
+        let good = Figures {
+            steady_error_mm: Some(-0.4),
+            overshoot_mm: Some(1.0),
+            settle_s: Some(0.3),
+            stopped: Some(false),
+            limit_cycle: Some(false),
+            ..Figures::default()
+        };
+        let names = |before: &Figures, after: &Figures| -> Vec<Figure> {
+            let worse = worse_of(Move::Step100, before, after);
+            worse.into_iter().map(|w| w.figure).collect()
+        };
+        assert_eq!(names(&good, &good), []);
+        let exact = Figures {
+            steady_error_mm: Some(0.05),
+            settle_s: Some(0.9),
+            ..good.clone()
+        };
+        assert_eq!(names(&exact, &good), [], "both are good enough");
+        let away = Figures {
+            steady_error_mm: Some(-39.0),
+            overshoot_mm: Some(11.0),
+            settle_s: None,
+            stopped: Some(true),
+            ..good.clone()
+        };
+        let all = [
+            Figure::Stopped,
+            Figure::SteadyError,
+            Figure::Overshoot,
+            Figure::NeverSettles,
+        ];
+        assert_eq!(names(&good, &away), all);
+        assert_eq!(names(&away, &good), []);
+        assert_eq!(names(&away, &away), []);
+    }
+}
