@@ -177,6 +177,46 @@ fn the_log_of_a_killed_run_is_recovered() {
     );
 }
 
+/// The disk fills up at ten different times of a run: the verdict is told and kept all the same.
+/// Each disk is a file system in memory, of a mount name space of its own.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_disk_that_fills_at_any_time_keeps_the_summary() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    // From hardly more than the summary to room for everything.
+    for kib in [96, 160, 256, 400, 640, 1000, 1600, 2500, 4000, 12_000] {
+        // What is on that disk is gone with the name space: the summary is copied out of it.
+        let script = format!(
+            "mount -t tmpfs -o size={kib}k tmpfs \"$1\" || exit 77\n\
+             \"$0\" run three-step --json --out \"$1/out\"; code=$?\n\
+             cat \"$1/out/summary.json\" >&2; exit $code"
+        );
+        let output = Command::new("unshare")
+            .args(["--mount", "--map-root-user", "bash", "-c", &script])
+            .arg(program::path())
+            .arg(dir.path())
+            .env("NO_COLOR", "1")
+            .output()
+            .expect("unshare of util-linux");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let code = output.status.code();
+        assert_ne!(code, Some(77), "no file system in memory: {stderr}");
+        let told = json(&output);
+        assert_eq!(told["complete"], true, "{kib} KiB");
+        assert_eq!(told["passed"], true, "{kib} KiB");
+        let kept = &stderr[stderr.rfind("\n{").map_or(0, |at| at + 1)..];
+        let kept: Value = serde_json::from_str(kept).unwrap_or_default();
+        assert_eq!(kept, told, "{kib} KiB: the summary on the disk: {stderr}");
+        let filled = stderr.contains("No space left on device");
+        assert_eq!(
+            code,
+            Some(if filled { 2 } else { 0 }),
+            "{kib} KiB: {stderr}"
+        );
+        assert_eq!(filled, kib < 12_000, "{kib} KiB: {stderr}");
+    }
+}
+
 /// A limit on the size of a file stands for the full disk: log and page do not fit, the summary
 /// does.
 #[test]

@@ -178,6 +178,40 @@ fn a_run_that_is_terminated_or_hung_up_leaves_log_summary_and_report() {
 }
 
 /// Both signals reach the program at once, before it could have ended by itself.
+/// Twenty instants of a run, from its first to its last milliseconds: what was begun is whole.
+#[test]
+fn a_run_can_be_terminated_at_any_time() {
+    let mut stopped = 0;
+    for instant in 0..20 {
+        let dir = tempfile::tempdir().expect("temporary folder");
+        let out = dir.path().join("out");
+        let mut child = start(&out, &["run", "three-step"], Stdio::piped);
+        // From the folder on: before it there is nothing to leave behind.
+        wait_until(&mut child, "the log", || out.join("log.mcap").exists());
+        std::thread::sleep(Duration::from_millis(40 * instant));
+        // The program may have ended by itself.
+        signal(&child, "TERM");
+        let output = end(child);
+        let code = output.status.code();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            matches!(code, Some(0 | 143)),
+            "{instant}: {code:?} {stderr}"
+        );
+        let summary = summary(&out);
+        assert!(summary["targets"].is_array() && summary["hash"].is_string());
+        assert_eq!(summary["complete"] == false, code == Some(143), "{instant}");
+        assert!(out.join("report.html").exists(), "{instant}");
+        ends_whole(&out.join("log.mcap"));
+        let names = fs::read_dir(&out).expect("readable").flatten();
+        let names = names.map(|f| f.file_name().to_string_lossy().into_owned());
+        let hidden: Vec<String> = names.filter(|name| name.starts_with('.')).collect();
+        assert_eq!(hidden, [".lock"], "{instant}: nothing is left half done");
+        stopped += u32::from(code == Some(143));
+    }
+    assert!(stopped > 0, "at least one was stopped on its way");
+}
+
 #[test]
 fn a_second_signal_ends_the_program_at_once() {
     use std::os::unix::process::ExitStatusExt as _;

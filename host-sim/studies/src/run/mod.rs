@@ -67,8 +67,9 @@ const LOG_BYTES_PER_S: f64 = 250e3;
 const TABLE_BYTES_PER_S: f64 = 110e3;
 /// From this duration on the program says how much disk a run takes, s.
 const LONG_S: f64 = 60.0;
-/// Room that is held for the summary while log and tables fill the disk, bytes.
-const RESERVE_BYTES: usize = 256 * 1024;
+/// Room that is held for the summary while log and tables fill the disk, bytes: the first of
+/// these that there is.
+const RESERVES_BYTES: [usize; 3] = [256 * 1024, 64 * 1024, 32 * 1024];
 
 /// Runs a scenario: log, tables, figures, summary, report. `stop` ends it at
 /// the next bus cycle and the files are finished all the same. Results of an
@@ -228,9 +229,11 @@ fn announce(duration_s: f64) {
 
 /// Room on the disk for the summary, given back when it is dropped; `None` where there is none.
 fn reserve(folder: &Path) -> Option<File> {
-    let mut file = tempfile::tempfile_in(folder).ok()?;
-    file.write_all(&vec![0; RESERVE_BYTES]).ok()?;
-    Some(file)
+    RESERVES_BYTES.into_iter().find_map(|bytes| {
+        let mut file = tempfile::tempfile_in(folder).ok()?;
+        file.write_all(&vec![0; bytes]).ok()?;
+        Some(file)
+    })
 }
 
 /// What went into the run, as messages at time zero: part of the log and of
