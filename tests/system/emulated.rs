@@ -5,6 +5,7 @@ mod program;
 mod sil;
 
 mod pil;
+mod pil_breaks;
 mod pil_driver;
 mod pil_faults;
 mod pil_flips;

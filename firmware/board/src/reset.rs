@@ -25,6 +25,13 @@ pub enum Note {
     ClockLoss = 0x434C_4F53,
 }
 
+/// Whether these flags of RCC_CSR are those of a reset by software, before which a handler may
+/// have left a note.
+#[must_use]
+pub const fn may_have_note(flags: u32) -> bool {
+    flags & csr::SFTRSTF != 0
+}
+
 /// From the flags of RCC_CSR and the word that a handler may have left, the most
 /// telling flag first. The word counts only after a reset by software: at power-up
 /// RAM is random.

@@ -151,8 +151,13 @@ impl Board {
     }
 
     fn hook(&mut self, hook: &Hook) -> Reply {
-        if matches!(hook, Hook::StopProcessor | Hook::FaultProcessor)
-            && self.machine.is_some()
+        if !matches!(
+            hook,
+            Hook::StopMainLoop
+                | Hook::FlipBit { .. }
+                | Hook::BrownOutInSave { .. }
+                | Hook::StretchTransmission { .. }
+        ) && self.machine.is_some()
             && let Err(what) = self.finish_tick()
         {
             return Reply::Refused(text(&what));
@@ -163,6 +168,9 @@ impl Board {
         match hook {
             Hook::StopMainLoop => machine.state_mut().stop_main_loop = true,
             Hook::StopProcessor => machine.state_mut().stop_processor = true,
+            Hook::LockUp => machine.lock_up(),
+            Hook::RamParityError => machine.ram_parity_error(),
+            Hook::StopCrystal => machine.crystal_stops(),
             Hook::FaultProcessor => {
                 if let Err(what) = machine.derail() {
                     return Reply::Refused(text(&what));

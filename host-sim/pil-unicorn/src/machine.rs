@@ -16,8 +16,9 @@ use self::blocks::Blocks;
 pub(crate) use self::state::Profile;
 use self::state::State;
 use crate::image::{FLASH_BASE, FLASH_SIZE, Image, RAM_BASE, RAM_SIZE};
-use crate::nvic::{HARD_FAULT, SV_CALL};
+use crate::nvic::{HARD_FAULT, NON_MASKABLE, SV_CALL};
 use crate::soc::flash::STORE_SIZE;
+use crate::soc::syscfg::BreakSource;
 use crate::soc::{Soc, Transfer};
 
 /// Blocks kept for messages.
@@ -181,6 +182,7 @@ impl Machine {
             state.soc.rcc.crystal,
             cause,
         );
+        soc.flash.torn = std::mem::take(&mut state.soc.flash.torn);
         soc.time = state.soc.time;
         soc.time.clock(state.cycle, soc.rcc.hclk_hz());
         for (fresh, old) in soc.ports.iter_mut().zip(&state.soc.ports) {
@@ -420,11 +422,33 @@ impl Machine {
             return Err(format!("{what} at {pc:#010x}"));
         }
         if state.nvic.is_active(HARD_FAULT) {
-            // Lock-up: only a reset helps.
-            self.uc.get_data_mut().stop_processor = true;
+            self.lock_up();
             return Ok(());
         }
         self.enter(HARD_FAULT)
+    }
+
+    /// The processor faults in its fault handler: it executes nothing any more, and only a reset
+    /// helps.
+    pub(crate) fn lock_up(&mut self) {
+        let state = self.uc.get_data_mut();
+        state.stop_processor = true;
+        state.soc.raise_break(BreakSource::LockUp);
+    }
+
+    /// RAM has a parity error, of a bit that nobody reads.
+    pub(crate) fn ram_parity_error(&mut self) {
+        let state = self.uc.get_data_mut();
+        state.soc.raise_break(BreakSource::RamParity);
+        state.nvic.pend(NON_MASKABLE);
+    }
+
+    /// The crystal stops.
+    pub(crate) fn crystal_stops(&mut self) {
+        let state = self.uc.get_data_mut();
+        if state.soc.crystal_stops(state.cycle) {
+            state.nvic.pend(NON_MASKABLE);
+        }
     }
 
     /// Program counter, and where the processor came by last.

@@ -4,6 +4,8 @@
 pub(crate) const FIRST_IRQ: usize = 16;
 /// Interrupt lines of an STM32G431.
 pub(crate) const IRQS: usize = 102;
+/// Non-maskable interrupt.
+pub(crate) const NON_MASKABLE: usize = 2;
 /// Hard fault.
 pub(crate) const HARD_FAULT: usize = 3;
 /// Supervisor call.
@@ -28,6 +30,8 @@ pub(crate) struct Nvic {
     active: Vec<usize>,
     vtor: u32,
     scr: u32,
+    /// Control, region number, base and attributes of the memory protection unit.
+    mpu: [u32; 4],
     /// The processor asked for a system reset.
     pub(crate) reset_request: bool,
 }
@@ -43,6 +47,7 @@ impl Default for Nvic {
             active: Vec::new(),
             vtor: 0,
             scr: 0,
+            mpu: [0; 4],
             reset_request: false,
         }
     }
@@ -109,7 +114,7 @@ impl Nvic {
 
     fn priority_of(&self, n: usize) -> i16 {
         match n {
-            2 => -2,
+            NON_MASKABLE => -2,
             HARD_FAULT => -1,
             _ => i16::from(self.priority[n] & 0xF0),
         }
@@ -168,6 +173,9 @@ impl Nvic {
             (0xD0C, 4) => 0xFA05_0000,
             (0xD10, 4) => self.scr,
             (0xD18..=0xD23, 1) => u32::from(self.priority[4 + (offset - 0xD18) as usize]),
+            // Eight regions; what they forbid is not mapped here anyway.
+            (0xD90, 4) => 8 << 8,
+            (0xD94..=0xDA0, 4) => self.mpu[(offset as usize - 0xD94) / 4],
             _ => return None,
         })
     }
@@ -199,6 +207,8 @@ impl Nvic {
             (0xD0C, 4) if value >> 16 == 0x05FA => self.reset_request |= value & 4 != 0,
             (0xD10, 4) if value & !0x10 == 0 => self.scr = value,
             (0xD18..=0xD23, 1) => self.priority[4 + (offset - 0xD18) as usize] = value as u8 & 0xF0,
+            (0xD94, 4) if value & !7 == 0 => self.mpu[0] = value,
+            (0xD9C | 0xDA0, 4) => self.mpu[(offset as usize - 0xD94) / 4] = value,
             _ => return None,
         }
         Some(())

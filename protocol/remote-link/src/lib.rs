@@ -66,7 +66,7 @@ pub use reply::{
 pub use request::{Hook, Inputs, Nonvolatile, Power, Request, Run, Straps, Switches};
 
 /// Version of this interface; both sides must have the same.
-pub const LINK_VERSION: u16 = 4;
+pub const LINK_VERSION: u16 = 5;
 
 /// Most bus bytes in one [`Run`]: 1.28 ms of two drivers at 1 Mbit/s.
 pub const MAX_RECEIVED: usize = 256;

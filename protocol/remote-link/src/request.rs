@@ -178,4 +178,10 @@ pub enum Hook {
         /// At least 1.
         times: u8,
     },
+    /// The processor faults in its fault handler: it executes nothing any more until a reset.
+    LockUp,
+    /// A parity error of RAM.
+    RamParityError,
+    /// The crystal stops, and does not start again.
+    StopCrystal,
 }

@@ -14,7 +14,7 @@ const SIXTEEN: u8 = 3;
 /// Time after an edge by which the conversion must be there, µs; it takes 23.
 const DEADLINE_US: u32 = 100;
 
-/// Calibrates the converter and arms it for the tick edge.
+/// Calibrates the converter and sets it up, without a trigger yet.
 pub(super) fn start() {
     pac::ADC12_COMMON
         .ccr()
@@ -37,23 +37,35 @@ pub(super) fn start() {
     adc.sqr1().write(|r| r.set_sq(0, CHANNEL));
     adc.smpr()
         .write(|r| r.set_smp(usize::from(CHANNEL), SampleTime::CYCLES47_5));
-    adc.cfgr().write(|r| {
-        r.set_exten(Exten::RISING_EDGE);
-        r.set_extsel(TRIGGER);
-        r.set_ovrmod(Ovrmod::OVERWRITE);
-        // The reset value of the register: the injected queue stays off.
-        r.set_jqdis(true);
-    });
     adc.cfgr2().write(|r| {
         r.set_rovse(true);
         r.set_ovsr(SIXTEEN);
         #[cfg(feature = "mutant-adc-scale")]
         r.set_ovss(1);
     });
-    adc.ier().write(|r| r.set_eosie(true));
-    adc.cr().modify(|r| r.set_adstart(true));
+    // The reset value: no trigger yet, and the injected queue stays off.
+    adc.cfgr().write(|r| r.set_jqdis(true));
     // The first edge is at time 0.
     tick::enable_deadline(DEADLINE_US);
+}
+
+/// Converts once without a trigger, then waits for the tick edge. Called within a millisecond
+/// before the first edge: a result later than that after the one before may be wrong (errata
+/// sheet ES0431, read at second hand).
+pub(super) fn arm() {
+    let adc = pac::ADC1;
+    adc.cr().modify(|r| r.set_adstart(true));
+    while !adc.isr().read().eos() {}
+    let _ = adc.dr().read();
+    adc.isr().write(|r| r.set_eos(true));
+    adc.cfgr().write(|r| {
+        r.set_exten(Exten::RISING_EDGE);
+        r.set_extsel(TRIGGER);
+        r.set_ovrmod(Ovrmod::OVERWRITE);
+        r.set_jqdis(true);
+    });
+    adc.ier().write(|r| r.set_eosie(true));
+    adc.cr().modify(|r| r.set_adstart(true));
 }
 
 /// The end of a conversion: latches the tick.

@@ -46,6 +46,7 @@ impl Start {
         }
         super::valves::permit();
         tick::start();
+        adc::arm();
         G431 {
             bus,
             internal: self.source == clock::Source::Internal,

@@ -8,7 +8,7 @@ use crate::same_core::Announce;
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
 use pac::bdma::vals::{Dir, Size};
-use pac::timer::vals::{Ocm, Sms, Ts};
+use pac::timer::vals::{Bkp, Ocm, Ossi, Sms, Ts};
 use wheeleg_node::Transmission;
 use wheeleg_protocol::MAX_ENCODED;
 use wheeleg_units::Micros;
@@ -120,7 +120,15 @@ impl Bus {
         guard.cr1().write(|r| r.set_opm(true));
         guard.ccmr_output(0).write(|r| r.set_ocm(0, Ocm::PWM_MODE2));
         guard.ccer().write(|r| r.set_cce(0, true));
-        guard.bdtr().write(|r| r.set_moe(true));
+        // A crystal that stops slows this timer tenfold: the break, of inner causes alone, ends the
+        // pulse then. Its own pin is no source of it.
+        guard.af1().write(|r| r.set_bkine(false));
+        guard.bdtr().write(|r| {
+            r.set_moe(true);
+            r.set_bke(0, true);
+            r.set_bkp(0, Bkp::ACTIVE_HIGH);
+            r.set_ossi(Ossi::IDLE_LEVEL);
+        });
         Self { read: 0 }
     }
 

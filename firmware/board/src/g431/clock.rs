@@ -43,6 +43,9 @@ fn wait(polls: u32, ready: impl Fn() -> bool) -> bool {
 pub fn start() -> Source {
     let rcc = pac::RCC;
     rcc.apb1enr1().modify(|r| r.set_pwren(true));
+    // The dead-battery resistors of USB-C: 5.1 kΩ from PB6, the bus transmitter, to ground
+    // while PA9 is high, and PB4 with PA10. They are on after a reset (RM0440 §6.4.3).
+    pac::PWR.cr3().modify(|r| r.set_ucpd1_dbdis(true));
     // Voltage range 1, boost mode: needed above 150 MHz (RM0440 §6.1.5).
     pac::PWR.cr1().modify(|r| r.set_vos(Vos::RANGE1));
     // R1MODE is bit 8 and all that is there; 0 is boost (RM0440, PWR_CR5). The register

@@ -1,6 +1,6 @@
 //! The ways down: outputs off, a note for the next start, reset.
 
-use super::{flash, pac, pins};
+use super::{breaks, flash, pac, pins};
 use crate::reset::{self, Note};
 use core::sync::atomic::{AtomicU32, Ordering};
 use wheeleg_protocol::ResetCause;
@@ -21,18 +21,50 @@ pub fn take_cause() -> ResetCause {
     let csr = pac::RCC.csr();
     let flags = csr.read().0;
     csr.modify(|r| r.set_rmvf(true));
-    let note = NOTE.load(Ordering::Relaxed);
+    // The note is read only where a program has written it: with parity, RAM that nobody has
+    // written since power-up gives an error.
+    let note = match reset::may_have_note(flags) {
+        true => NOTE.load(Ordering::Relaxed),
+        false => 0,
+    };
     NOTE.store(0, Ordering::Relaxed);
     reset::decode(flags, note)
 }
 
-/// The non-maskable interrupt: a flash word with a double error is noted for its reader; anything
-/// else is taken for a clock that has stopped. So is a double error whose flag does not stand,
-/// because an earlier error's does (RM0440 §5.7.7).
+/// Flag of the clock security system in RCC_CIFR (RM0440 §7.4.6); the register crate has no name
+/// for it.
+const CSSF: u32 = 1 << 8;
+
+/// The non-maskable interrupt, by its cause: a crystal that has stopped, a parity error of RAM,
+/// a word of flash with a double error. Such a word in the parameter store is noted for its
+/// reader, and the program goes on; anything else ends in a reset.
 pub fn on_nmi() {
-    if !flash::on_nmi() {
+    if pac::RCC.cifr().read().0 & CSSF != 0 {
         reset(Note::ClockLoss);
     }
+    let in_store = flash::on_nmi();
+    if breaks::ram_is_damaged() || !in_store {
+        reset(Note::ProcessorFault);
+    }
+}
+
+/// The processor has faulted, perhaps because its stack is no memory: the handler begins with
+/// the stack as after a reset, since a second fault in here would lock the processor up. The
+/// name is that of the vector table; a handler of `cortex-m-rt` would push registers first.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+extern "C" fn on_fault() -> ! {
+    core::arch::naked_asm!(
+        "movw r0, :lower16:_stack_start",
+        "movt r0, :upper16:_stack_start",
+        "msr msp, r0",
+        "b {after}",
+        after = sym after_fault,
+    )
+}
+
+extern "C" fn after_fault() -> ! {
+    reset(Note::ProcessorFault)
 }
 
 /// The handlers of all that ends in a reset, once in every image: the supply
@@ -54,11 +86,6 @@ macro_rules! exception_handlers {
             #[exception]
             unsafe fn NonMaskableInt() {
                 fatal::on_nmi();
-            }
-
-            #[exception(trampoline = false)]
-            unsafe fn HardFault() -> ! {
-                fatal::reset(Note::ProcessorFault)
             }
 
             #[exception]

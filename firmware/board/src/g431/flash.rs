@@ -49,6 +49,9 @@ impl ParameterPages {
         }
         // Flags of an earlier operation are cleared by writing them.
         flash.sr().write_value(flash.sr().read());
+        // What the data cache holds of the place would outlive the change; it can be emptied
+        // only while it is off (RM0440 §5.3.7).
+        flash.acr().modify(|r| r.set_dcen(false));
         match change {
             Change::Erase { page } => {
                 flash.cr().write(|r| {
@@ -70,6 +73,9 @@ impl ParameterPages {
             }
         }
         let result = outcome();
+        flash.acr().modify(|r| r.set_dcrst(true));
+        flash.acr().modify(|r| r.set_dcrst(false));
+        flash.acr().modify(|r| r.set_dcen(true));
         flash.cr().write(|r| r.set_lock(true));
         result
     }
@@ -98,11 +104,14 @@ fn outcome() -> Result<(), FlashError> {
 impl Flash for ParameterPages {
     fn read(&self, page: usize, word: usize) -> Option<u64> {
         let address = Self::address(page, word)?;
-        // SAFETY: an aligned address inside the flash. A word that a power cut
-        // left half-written has a double error, which the NMI handler turns into
-        // a note that `take_ecc_error` gives, unless the flag of an earlier error
-        // still stands: then the checksum of the set decides.
+        // A flag that stands would hide the errors after it (RM0440 §5.7.7).
+        clear_ecc_flags();
+        // SAFETY: an aligned address inside the flash. A word that a power cut left half-written
+        // has a double error, which the NMI handler turns into a note.
         let value = unsafe { core::ptr::read_volatile(address as *const u64) };
+        // The interrupt of this read has come before its note is looked for.
+        cortex_m::asm::dsb();
+        cortex_m::asm::isb();
         (!take_ecc_error()).then_some(value)
     }
 
@@ -129,13 +138,24 @@ fn take_ecc_error() -> bool {
     error
 }
 
-/// The part of the non-maskable interrupt that is the flash's; true if it was.
+/// First address of the parameter store, counted from the beginning of the flash.
+const STORE: u32 = FIRST * PAGE;
+
+fn clear_ecc_flags() {
+    pac::FLASH.eccr().modify(|r| {
+        r.set_eccc(true);
+        r.set_eccd(true);
+    });
+}
+
+/// The part of the non-maskable interrupt that is the flash's: true if it was a double error in
+/// the parameter store, which its reader survives. One in the program is not survived.
 pub(super) fn on_nmi() -> bool {
-    let eccr = pac::FLASH.eccr();
-    let error = eccr.read().eccd();
-    if error {
-        eccr.modify(|r| r.set_eccd(true));
+    let eccr = pac::FLASH.eccr().read();
+    let in_store = eccr.eccd() && !eccr.sysf_ecc() && eccr.addr_ecc() >= STORE;
+    if in_store {
+        clear_ecc_flags();
         ECC_ERROR.store(true, Ordering::Release);
     }
-    error
+    in_store
 }

@@ -7,7 +7,7 @@
 //! features exclude each other.
 
 use super::slot::Slot;
-use super::{clock, fatal, pac, pins, power, timebase, watchdog};
+use super::{breaks, clock, fatal, pac, pins, power, timebase, watchdog};
 use crate::reset::Note;
 use pac::usart::vals::Over8;
 use wheeleg_remote::{Board, Session, Stopwatch, Stream, serve};
@@ -31,6 +31,7 @@ where
     watchdog::start();
     let source = clock::start();
     power::start();
+    breaks::guard_stack();
     clock::enable_hil();
     pins::configure_hil();
     timebase::configure(Micros::ZERO);

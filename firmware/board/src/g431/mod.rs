@@ -9,6 +9,7 @@
 pub mod adc;
 #[cfg(feature = "outputs")]
 pub mod board;
+mod breaks;
 #[cfg(feature = "outputs")]
 pub mod bridge;
 #[cfg(feature = "outputs")]

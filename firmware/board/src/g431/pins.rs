@@ -71,6 +71,17 @@ core::arch::global_asm!(
     "ldr r2, =0x00001000", // PC6 output
     "orrs r1, r2",
     "str r1, [r0]",
+    // The first write to each RAM after a reset may be lost (errata sheet ES0431, read at second
+    // hand), and with parity nothing may be read before it is written: twice.
+    "ldr r0, =0x20000000", // SRAM1
+    "str r3, [r0]",
+    "str r3, [r0]",
+    "ldr r0, =0x20004000", // SRAM2
+    "str r3, [r0]",
+    "str r3, [r0]",
+    "ldr r0, =0x20005800", // CCM SRAM
+    "str r3, [r0]",
+    "str r3, [r0]",
     "bx lr",
     ".ltorg",
     ".size __pre_init, . - __pre_init",

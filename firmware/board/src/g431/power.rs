@@ -22,6 +22,10 @@ pub fn start() {
     exti.imr(0).modify(|r| r.set_line(LINE, true));
     // SAFETY: the handler shares no state that a critical section protects.
     unsafe { cortex_m::peripheral::NVIC::unmask(Interrupt::PVD_PVM) };
+    // A supply that is low already makes no edge.
+    if pac::PWR.sr2().read().pvdo() {
+        on_sag();
+    }
 }
 
 /// The supply sags: outputs off at once; then either it goes on falling until

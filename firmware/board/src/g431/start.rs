@@ -1,6 +1,6 @@
 //! The first half of a board's start: what all images have in common.
 
-use super::{clock, fatal, identity, pins, power, watchdog};
+use super::{breaks, clock, fatal, identity, pins, power, watchdog};
 use crate::led::Status;
 use crate::straps;
 use wheeleg_node::NodeIdentity;
@@ -24,8 +24,10 @@ pub fn start() -> Start {
     let cause = fatal::take_cause();
     watchdog::start();
     let source = clock::start();
-    power::start();
+    breaks::guard_stack();
     clock::enable_common();
+    power::start();
+    breaks::connect();
     pins::configure_common();
     let identity = straps::address(pins::straps()).map(|address| NodeIdentity {
         address,

@@ -196,7 +196,7 @@ impl Board {
         let soc = &mut self.machine()?.state_mut().soc;
         soc.ports[0].outside &= !(1 << wiring::POWER_OK);
         soc.break_inputs(false);
-        soc.pwr.supply(true);
+        soc.supply_sags();
         soc.flash.power_failed = false;
         let time = soc.time;
         let fallen = time.ns_of(self.machine()?.state().cycle) + FALL_NS;

@@ -7,6 +7,7 @@ use unicorn_engine::{
 use super::state::State;
 use super::{Machine, THUMB, TRACE};
 use crate::image::{RAM_BASE, RAM_SIZE};
+use crate::nvic::NON_MASKABLE;
 use crate::soc::flash::{STORE_BASE, STORE_SIZE};
 
 /// Interrupt numbers of the engine for ARM (`EXCP_…` of QEMU).
@@ -62,7 +63,13 @@ impl Machine {
             u64::from(STORE_BASE),
             STORE_SIZE as u64,
             Some(|uc: &mut Unicorn<'_, State>, offset: u64, size: usize| {
-                u64::from(uc.get_data().soc.flash.load(offset as usize, size))
+                let state = uc.get_data_mut();
+                let value = state.soc.flash.load(offset as usize, size);
+                if state.soc.flash.take_double_error() {
+                    state.nvic.pend(NON_MASKABLE);
+                    state.touched();
+                }
+                u64::from(value)
             }),
             Some(
                 |uc: &mut Unicorn<'_, State>, offset: u64, size: usize, value: u64| {

@@ -10,6 +10,9 @@ const ADVREGEN: u32 = 1 << 28;
 const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 
+/// Trigger edges in CFGR; none: by software.
+const TRIGGERED: u32 = 3 << 10;
+
 const ADRDY: u32 = 1;
 const EOC: u32 = 1 << 2;
 const EOS: u32 = 1 << 3;
@@ -117,6 +120,14 @@ impl Adc {
         }
     }
 
+    /// A start without a trigger converts at once, and once.
+    pub(crate) fn start_by_software(&mut self, code: u16, cycle: u64) {
+        let armed = self.cr & (ADEN | ADSTART) == ADEN | ADSTART && self.isr & ADRDY != 0;
+        if armed && self.cfgr & TRIGGERED == 0 && self.running.is_none() {
+            self.running = Some((cycle + self.duration(), self.result(code)));
+        }
+    }
+
     /// End of the conversion under way.
     pub(crate) fn next(&self) -> Option<u64> {
         self.running.map(|(end, _)| end)
@@ -127,6 +138,9 @@ impl Adc {
         if let Some((_, code)) = self.running.take() {
             self.dr = code;
             self.isr |= EOC | EOS;
+            if self.cfgr & TRIGGERED == 0 {
+                self.cr &= !ADSTART;
+            }
         }
     }
 
@@ -191,6 +205,10 @@ impl Adc {
             0x0C => {
                 // Overrun mode, trigger and alignment; no DMA, no discontinuous mode.
                 only(1 << 31 | 1 << 15 | 1 << 12 | 3 << 10 | 0x1F << 5)?;
+                // Not while it converts, or waits for a trigger (RM0440 §21.7.4).
+                if self.cr & ADSTART != 0 {
+                    return Err(Refusal::Bits(value));
+                }
                 self.cfgr = value;
             }
             0x10 => {
@@ -243,6 +261,21 @@ mod tests {
         assert_eq!(adc.next(), Some(1000 + 3840));
         adc.happen();
         assert_eq!(adc.read(0x40), Ok(0xABCD));
+    }
+
+    #[test]
+    fn a_start_without_a_trigger_converts_once() {
+        let mut adc = converter(1 | 3 << 2);
+        adc.write(0x08, ADVREGEN | ADSTP).expect("modelled");
+        adc.write(0x0C, 1 << 31).expect("no trigger");
+        adc.write(0x08, ADVREGEN | ADSTART).expect("modelled");
+        adc.start_by_software(0x1234, 500);
+        assert_eq!(adc.next(), Some(500 + 3840));
+        assert!(adc.write(0x0C, 1 << 31).is_err(), "it converts");
+        adc.happen();
+        assert_eq!(adc.read(0x40), Ok(0x1234));
+        assert_eq!(adc.read(0x08).expect("modelled") & ADSTART, 0);
+        adc.write(0x0C, 1 << 31 | 1 << 10 | 9 << 5).expect("idle");
     }
 
     #[test]

@@ -1,4 +1,11 @@
 //! Flash interface and the two pages of the parameter store.
+//!
+//! The data cache is modelled for the store: what was read through it stays as it was read until
+//! the cache is reset, whatever happens to the flash meanwhile (RM0440 §5.3.7). So is the error
+//! correction: a double word that a falling supply has torn raises the NMI when it is read,
+//! unless the flag of an earlier error stands (§5.7.7).
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Refusal;
 
@@ -17,7 +24,18 @@ const PROGRAM_NS: u64 = 81_690;
 /// FLASH_ACR: wait states, prefetch and caches, access of the debugger.
 const LATENCY: u32 = 0xF;
 const CACHES: u32 = 7 << 8;
+const DCEN: u32 = 1 << 10;
+const ICRST: u32 = 1 << 11;
+const DCRST: u32 = 1 << 12;
+const ICEN: u32 = 1 << 9;
 const DEBUG: u32 = 1 << 18;
+
+/// FLASH_ECCR: an error was corrected, one was found.
+const ECCC: u32 = 1 << 30;
+const ECCD: u32 = 1 << 31;
+const ECC_ADDRESS: u32 = 0x7_FFFF;
+/// Bytes of a double word.
+const UNIT: usize = 8;
 
 const PG: u32 = 1;
 const PER: u32 = 1 << 1;
@@ -36,6 +54,13 @@ pub(crate) struct Flash {
     cr: u32,
     sr: u32,
     key: u8,
+    eccr: u32,
+    /// Double words of the store in the data cache.
+    cached: BTreeMap<usize, [u8; UNIT]>,
+    /// Double words that a falling supply has left half written; they outlive resets, too.
+    pub(crate) torn: BTreeSet<usize>,
+    /// A double error was found since this was asked last.
+    double_error: bool,
     /// Contents of the store; outlives resets and power.
     pub(crate) store: Vec<u8>,
     /// First half of a double word being written.
@@ -57,6 +82,10 @@ impl Flash {
             cr: LOCK | 1 << 30,
             sr: 0,
             key: 0,
+            eccr: 0,
+            cached: BTreeMap::new(),
+            torn: BTreeSet::new(),
+            double_error: false,
             store,
             half: None,
             busy_until: 0,
@@ -101,14 +130,28 @@ impl Flash {
             0x00 => self.acr,
             0x10 => self.sr | if cycle < self.busy_until { BSY } else { 0 },
             0x14 => self.cr,
+            0x18 => self.eccr,
             _ => return Err(Refusal::Register),
         })
+    }
+
+    /// Whether a double error was found since the last call: the NMI.
+    pub(crate) fn take_double_error(&mut self) -> bool {
+        std::mem::take(&mut self.double_error)
     }
 
     pub(crate) fn write(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
         match offset {
             0x00 => {
-                Refusal::beyond(LATENCY | CACHES | DEBUG, value)?;
+                Refusal::beyond(LATENCY | CACHES | DEBUG | ICRST | DCRST, value)?;
+                // A cache is reset only while it is off.
+                let on = |reset: u32, enable: u32| value & reset != 0 && value & enable != 0;
+                if on(DCRST, DCEN) || on(ICRST, ICEN) {
+                    return Err(Refusal::Bits(value & (DCRST | ICRST)));
+                }
+                if value & DCRST != 0 {
+                    self.cached.clear();
+                }
                 self.acr = value;
             }
             0x08 => {
@@ -135,6 +178,10 @@ impl Flash {
                     self.erase(value >> 3 & 0x7F)?;
                 }
             }
+            0x18 => {
+                Refusal::beyond(ECCC | ECCD | ECC_ADDRESS, value)?;
+                self.eccr &= !(value & (ECCC | ECCD));
+            }
             _ => return Err(Refusal::Register),
         }
         Ok(())
@@ -153,16 +200,40 @@ impl Flash {
             start + PAGE / 2
         };
         self.store[start..end].fill(0xFF);
+        self.torn.retain(|at| !(start..end).contains(at));
         self.stall_ns = ERASE_NS;
         self.sr |= EOP;
         Ok(())
     }
 
-    /// Reads the store.
-    pub(crate) fn load(&self, offset: usize, size: usize) -> u32 {
+    /// Reads the store, through the data cache if it is on.
+    pub(crate) fn load(&mut self, offset: usize, size: usize) -> u32 {
         (0..size).fold(0, |value, i| {
-            value | u32::from(self.store.get(offset + i).copied().unwrap_or(0xFF)) << (8 * i)
+            value | u32::from(self.load_byte(offset + i)) << (8 * i)
         })
+    }
+
+    fn load_byte(&mut self, offset: usize) -> u8 {
+        let unit = offset - offset % UNIT;
+        let caches = self.acr & DCEN != 0;
+        if caches && let Some(bytes) = self.cached.get(&unit) {
+            return bytes[offset % UNIT];
+        }
+        let Some(place) = self.store.get(unit..unit + UNIT) else {
+            return 0xFF;
+        };
+        let mut bytes = [0; UNIT];
+        bytes.copy_from_slice(place);
+        if self.torn.contains(&unit) {
+            if self.eccr & (ECCC | ECCD) == 0 {
+                let address = FIRST_PAGE * PAGE as u32 + unit as u32;
+                self.eccr = self.eccr & !ECC_ADDRESS | ECCD | address;
+                self.double_error = true;
+            }
+        } else if caches {
+            self.cached.insert(unit, bytes);
+        }
+        bytes[offset % UNIT]
     }
 
     /// Writes to the store: two words, low one first, make a unit.
@@ -186,7 +257,9 @@ impl Flash {
                     return Ok(());
                 }
                 place.copy_from_slice(&unit.to_le_bytes());
+                self.torn.remove(&first);
                 if !self.completes() {
+                    self.torn.insert(first);
                     // Torn: some bits have not been written.
                     for byte in &mut self.store[first..first + 8] {
                         *byte |= 0x5A;
@@ -218,6 +291,7 @@ mod tests {
     #[test]
     fn a_double_word_is_written_once_and_stalls() {
         let mut flash = open();
+        flash.write(0, 4).expect("no cache");
         flash.write(0x14, PG).expect("modelled");
         flash.program(16, 4, 0x1122_3344).expect("low");
         assert_eq!(flash.load(16, 4), u32::MAX);
@@ -244,6 +318,40 @@ mod tests {
         flash.write(0x14, PER | 63 << 3 | STRT).expect("page 63");
         assert!(flash.store[..PAGE].iter().all(|b| *b == 0));
         assert!(flash.store[PAGE..].iter().all(|b| *b == 0xFF));
+    }
+
+    #[test]
+    fn the_data_cache_holds_what_was_read_until_it_is_reset() {
+        let mut flash = open();
+        flash.write(0, 4 | DCEN).expect("modelled");
+        assert_eq!(flash.load(16, 4), u32::MAX);
+        flash.write(0x14, PG).expect("modelled");
+        flash.program(16, 4, 0x1122_3344).expect("low");
+        flash.program(20, 4, 0x5566_7788).expect("high");
+        assert_eq!(flash.load(16, 4), u32::MAX, "stale");
+        assert!(flash.write(0, 4 | DCEN | DCRST).is_err(), "it is on");
+        flash.write(0, 4 | DCRST).expect("off");
+        flash.write(0, 4 | DCEN).expect("modelled");
+        assert_eq!(flash.load(16, 4), 0x1122_3344);
+    }
+
+    #[test]
+    fn a_torn_word_is_a_double_error_unless_a_flag_stands() {
+        let mut flash = open();
+        flash.write(0x14, PG).expect("modelled");
+        flash.units_left = Some(0);
+        flash.program(24, 4, 1).expect("low");
+        flash.program(28, 4, 2).expect("high");
+        flash.load(16, 4);
+        assert!(!flash.take_double_error(), "another word");
+        flash.load(24, 4);
+        assert!(flash.take_double_error());
+        assert_eq!(flash.read(0x18, 0), Ok(ECCD | 0x1_F018));
+        flash.load(24, 4);
+        assert!(!flash.take_double_error(), "the flag stands");
+        flash.write(0x18, ECCD | ECCC).expect("modelled");
+        flash.load(28, 4);
+        assert!(flash.take_double_error());
     }
 
     #[test]

@@ -69,6 +69,7 @@ impl Soc {
         let value = match name {
             "IWDG" => self.watchdog.read(offset),
             "PWR" => self.pwr.read(offset),
+            "SYSCFG" => self.syscfg.read(offset),
             "EXTI" => self.pwr.read_exti(offset),
             "USART1" => self.usart.read(offset),
             "USART2" => self.serial.read(offset),
@@ -126,6 +127,7 @@ impl Soc {
                 .watchdog
                 .write(offset, value, self.time.signed_ns(cycle)),
             "PWR" => self.pwr.write(offset, value),
+            "SYSCFG" => self.syscfg.write(offset, value),
             "EXTI" => self.pwr.write_exti(offset, value),
             "USART1" => self.usart.write(offset, value, cycle),
             "USART2" => self.serial.write(offset, value, cycle),
@@ -180,7 +182,11 @@ impl Soc {
                 self.plan(USART);
             }
             "USART2" => self.plan(USART2),
-            "ADC1" => self.plan(ADC),
+            "ADC1" => {
+                let code = self.wiper_code();
+                self.adc.start_by_software(code, cycle);
+                self.plan(ADC);
+            }
             "IWDG" => self.plan_bite(),
             _ => {
                 if let Some(n) = Self::timer_of(name) {

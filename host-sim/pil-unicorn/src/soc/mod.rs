@@ -11,6 +11,7 @@ pub(crate) mod flash;
 pub(crate) mod gpio;
 mod map;
 pub(crate) mod rcc;
+pub(crate) mod syscfg;
 pub(crate) mod tim;
 pub(crate) mod usart;
 
@@ -19,6 +20,7 @@ use dma::Dma;
 use flash::Flash;
 use gpio::Port;
 use rcc::{Pwr, Rcc, Watchdog};
+use syscfg::Syscfg;
 use tim::{Event, Kind, Tim};
 use usart::Usart;
 
@@ -96,6 +98,7 @@ pub(crate) enum Transfer {
 pub(crate) struct Soc {
     pub(crate) rcc: Rcc,
     pub(crate) pwr: Pwr,
+    pub(crate) syscfg: Syscfg,
     pub(crate) watchdog: Watchdog,
     pub(crate) flash: Flash,
     pub(crate) ports: [Port; 4],
@@ -156,6 +159,7 @@ impl Soc {
         Self {
             rcc: Rcc::new(crystal, cause),
             pwr: Pwr::default(),
+            syscfg: Syscfg::default(),
             watchdog: Watchdog::default(),
             flash: Flash::new(store),
             ports: [
@@ -318,15 +322,19 @@ impl Soc {
         self.edge = Some(at);
         if self.tim[TIM1].triggers_on_update() {
             self.tim[TIM2].trigger(0, at);
-            let code = if self.ports[0].is_analogue(wiring::WIPER) {
-                self.wiper
-            } else {
-                // The pin is not switched to the converter.
-                0
-            };
-            self.adc.trigger(ADC_TIM1_TRGO, code, at);
+            self.adc.trigger(ADC_TIM1_TRGO, self.wiper_code(), at);
             self.plan(TIM2);
             self.plan(ADC);
+        }
+    }
+
+    /// What the converter sees of the wiper.
+    fn wiper_code(&self) -> u16 {
+        if self.ports[0].is_analogue(wiring::WIPER) {
+            self.wiper
+        } else {
+            // The pin is not switched to the converter.
+            0
         }
     }
 
@@ -381,7 +389,9 @@ impl Soc {
                 .burst_high
                 .take()
                 .is_some_and(|(on, off)| on <= start && end <= off);
-            if driven && self.ports[1].carries(wiring::BUS_TX, wiring::BUS_FUNCTION) {
+            // The dead-battery resistors would load the transmitter's pin.
+            let free = self.pwr.dead_battery_is_off();
+            if driven && free && self.ports[1].carries(wiring::BUS_TX, wiring::BUS_FUNCTION) {
                 self.gone.push((start, bytes));
             } else {
                 self.driver_timeouts += 1;

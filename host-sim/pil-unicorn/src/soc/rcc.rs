@@ -33,6 +33,8 @@ pub(crate) struct Rcc {
     cfgr: u32,
     pllcfgr: u32,
     cier: u32,
+    /// Flag of the clock security system.
+    cssf: bool,
     csr: u32,
     /// AHB1, AHB2, APB1-1, APB2 enables.
     pub(crate) enr: [u32; 4],
@@ -47,11 +49,25 @@ impl Rcc {
             cfgr: 1 << 2 | 1,
             pllcfgr: 0x1000,
             cier: 0,
+            cssf: false,
             csr: cause,
             // Flash interface on at reset.
             enr: [1 << 8, 0, 0, 0],
             crystal,
         }
+    }
+
+    /// The crystal stops. With the clock security system the processor goes on with the internal
+    /// oscillator, and is told; gives whether it is.
+    pub(crate) fn crystal_stops(&mut self) -> bool {
+        let watched = self.cr & CSSON != 0 && self.ready() & HSERDY != 0;
+        self.crystal = false;
+        if watched {
+            self.cr &= !(HSEON | PLLON);
+            self.cfgr = 1 << 2 | 1;
+            self.cssf = true;
+        }
+        watched
     }
 
     fn pll_hz(&self) -> u64 {
@@ -121,7 +137,7 @@ impl Rcc {
             0x08 => self.cfgr & !(3 << 2) | (self.cfgr & 3) << 2,
             0x0C => self.pllcfgr,
             0x18 => self.cier,
-            0x1C => 0,
+            0x1C => u32::from(self.cssf) << 8,
             0x48 => self.enr[0],
             0x4C => self.enr[1],
             0x58 => self.enr[2],
@@ -154,7 +170,7 @@ impl Rcc {
             0x0C if self.cr & PLLON != 0 => return Err(Refusal::Bits(value)),
             0x0C => self.pllcfgr = value,
             0x18 => self.cier = value,
-            0x20 => {}
+            0x20 => self.cssf &= value & 1 << 8 == 0,
             0x48 => self.enr[0] = value,
             0x4C => self.enr[1] = value,
             0x58 => self.enr[2] = value,
@@ -178,6 +194,7 @@ impl Rcc {
 pub(crate) struct Pwr {
     cr1: u32,
     cr2: u32,
+    cr3: u32,
     cr5: u32,
     imr: u32,
     rtsr: u32,
@@ -192,6 +209,9 @@ const PVD_LINE: u32 = 1 << 16;
 const VOS: u32 = 3 << 9;
 const VOS_RANGE_1: u32 = 1 << 9;
 const VOS_RANGE_2: u32 = 2 << 9;
+/// Internal wake-up line, on after reset; dead-battery resistors of USB-C off.
+const EIWUL: u32 = 1 << 15;
+const UCPD1_DBDIS: u32 = 1 << 14;
 /// No boost in range 1.
 const R1MODE: u32 = 1 << 8;
 
@@ -200,6 +220,7 @@ impl Default for Pwr {
         Self {
             cr1: 0x200,
             cr2: 0,
+            cr3: EIWUL,
             cr5: 0x100,
             imr: 0,
             rtsr: 0,
@@ -222,6 +243,16 @@ impl Pwr {
         self.low = low;
     }
 
+    /// Whether the detector says that the supply is low.
+    pub(crate) fn detects(&self) -> bool {
+        self.low && self.cr2 & 1 != 0
+    }
+
+    /// Whether the dead-battery resistors are off the pins.
+    pub(crate) fn dead_battery_is_off(&self) -> bool {
+        self.cr3 & UCPD1_DBDIS != 0
+    }
+
     /// Voltage of the core: ready at once.
     pub(crate) fn range(&self) -> Range {
         match (self.cr1 & VOS == VOS_RANGE_1, self.cr5 & R1MODE != 0) {
@@ -240,6 +271,7 @@ impl Pwr {
         Ok(match offset {
             0x00 => self.cr1,
             0x04 => self.cr2,
+            0x08 => self.cr3,
             // Regulators are ready at once; the flag of the detector.
             0x14 => u32::from(self.low && self.cr2 & 1 != 0) << 11,
             0x80 => self.cr5,
@@ -252,6 +284,10 @@ impl Pwr {
             0x00 if [VOS_RANGE_1, VOS_RANGE_2].contains(&value) => self.cr1 = value,
             0x00 => return Err(Refusal::Bits(value)),
             0x04 if value & !0xF == 0 => self.cr2 = value,
+            0x08 => {
+                Refusal::beyond(EIWUL | UCPD1_DBDIS, value)?;
+                self.cr3 = value;
+            }
             0x80 => {
                 Refusal::beyond(R1MODE, value)?;
                 self.cr5 = value;

@@ -57,6 +57,7 @@ pub(crate) struct Tim {
     pub(crate) ccr: [u32; 4],
     ccr_now: [u32; 4],
     bdtr: u32,
+    af1: u32,
     /// The counter had `base` at `since`.
     base: u32,
     since: u64,
@@ -88,6 +89,8 @@ impl Tim {
             ccr: [0; 4],
             ccr_now: [0; 4],
             bdtr: 0,
+            // The break pin is a source after reset.
+            af1: 1,
             base: 0,
             since: 0,
             seen: 0,

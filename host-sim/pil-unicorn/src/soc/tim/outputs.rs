@@ -1,5 +1,6 @@
 //! What the pins of a timer show: pulse width, break, the pulse of a one-shot.
 
+use super::registers::SBIF;
 use super::{BKE, BKP, Kind, MOE, Tim};
 
 impl Tim {
@@ -9,6 +10,14 @@ impl Tim {
         if active {
             self.bdtr &= !MOE;
             self.sr |= 1 << 7;
+        }
+    }
+
+    /// A break from within the system takes the outputs away.
+    pub(crate) fn system_break(&mut self) {
+        if self.bdtr & BKE != 0 {
+            self.bdtr &= !MOE;
+            self.sr |= SBIF;
         }
     }
 

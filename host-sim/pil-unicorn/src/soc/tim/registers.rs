@@ -1,6 +1,6 @@
 //! The registers, as a program reads and writes them.
 
-use super::{BKE, Kind, MOE, Tim};
+use super::{BKE, BKP, Kind, MOE, Tim};
 use crate::soc::Refusal;
 
 pub(super) const CR1: usize = 0x00;
@@ -19,6 +19,13 @@ pub(super) const RCR: usize = 0x30;
 pub(super) const CCR1: usize = 0x34;
 pub(super) const CCR4: usize = 0x40;
 pub(super) const BDTR: usize = 0x44;
+pub(super) const AF1: usize = 0x60;
+
+/// AF1: the break pin is a source of the break.
+const BKINE: u32 = 1;
+/// SR: a break has come by a pin, or from within the system.
+const BIF: u32 = 1 << 7;
+pub(super) const SBIF: u32 = 1 << 13;
 
 /// CCER: the second signal is inverted.
 const SECOND_INVERTED: u32 = 1 << 5;
@@ -50,6 +57,7 @@ impl Tim {
                 self.ccr[channel]
             }
             BDTR if matches!(self.kind, Kind::Advanced | Kind::Small) => self.bdtr,
+            AF1 if matches!(self.kind, Kind::Advanced | Kind::Small) => self.af1,
             _ => return Err(Refusal::Register),
         })
     }
@@ -159,8 +167,15 @@ impl Tim {
             }
             BDTR if matches!(self.kind, Kind::Advanced | Kind::Small) => {
                 only(0xFFFF)?;
-                let broken = self.sr & 1 << 7 != 0 && self.bdtr & BKE != 0;
-                self.bdtr = if broken { value & !MOE } else { value };
+                let broken = self.sr & (BIF | SBIF) != 0 && self.bdtr & BKE != 0;
+                // Without a pin the input is low, which is a break if low is active.
+                let pulled = self.af1 & BKINE == 0 && value & (BKE | BKP) == BKE;
+                let off = broken || pulled;
+                self.bdtr = if off { value & !MOE } else { value };
+            }
+            AF1 if matches!(self.kind, Kind::Advanced | Kind::Small) => {
+                only(BKINE)?;
+                self.af1 = value;
             }
             _ => return Err(Refusal::Register),
         }
