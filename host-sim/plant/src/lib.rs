@@ -22,7 +22,6 @@ pub mod endstop;
 pub mod error;
 pub mod flow;
 pub mod friction;
-pub mod ground;
 pub mod hash;
 pub mod motor;
 pub mod noise;
@@ -30,6 +29,7 @@ pub mod reference;
 pub mod robot;
 pub mod sensors;
 pub mod supply;
+pub mod terrain;
 pub mod testing;
 pub mod valve;
 
