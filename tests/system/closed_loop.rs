@@ -376,14 +376,14 @@ fn the_chassis_travels_what_the_leg_reached() {
         let body = &steps.recording.body;
         for [begin, push, end] in steps.steps() {
             let reached = at(steps.b5(), push).position_mm;
-            let travelled = at(body, end).travel_mm - at(body, push).travel_mm;
+            let travelled = at(body, end).x_mm - at(body, push).x_mm;
             assert!(
                 (travelled - reached).abs() < 1.0,
                 "{travelled} mm against {reached} mm"
             );
             assert!((170.0..181.0).contains(&travelled), "{travelled} mm");
             // Before the push the robot stands, but it is not bolted down.
-            let (low, high) = range(window(body, begin, push), |s| s.travel_mm);
+            let (low, high) = range(window(body, begin, push), |s| s.x_mm);
             assert!(high - low < 1.0, "{} mm while stepping", high - low);
             assert!(high - low > 1e-4, "the ground is rigid");
         }
@@ -393,7 +393,7 @@ fn the_chassis_travels_what_the_leg_reached() {
 #[test]
 fn the_held_foot_slides_with_the_chassis_under_kinetic_friction() {
     let robot = robot();
-    let contact = robot.plant.contact;
+    let contact = robot.plant.contacts.foot.law;
     for steps in [left(), right()] {
         let held = 1 - steps.foot;
         let held_b5 = &steps.recording.joints[3 * held + 1];
@@ -441,10 +441,10 @@ fn the_held_foot_slides_with_the_chassis_under_kinetic_friction() {
 fn odometry_is_the_travel_of_the_chassis() {
     let steps = left();
     let origin = [0, 1].map(|w| steps.recording.wheels[w][0].v.sensed_mm);
-    let start = steps.recording.body[0].v.travel_mm;
+    let start = steps.recording.body[0].v.x_mm;
     let mut worst = 0.0_f64;
     for (i, body) in steps.recording.body.iter().enumerate() {
-        let travel = body.v.travel_mm - start;
+        let travel = body.v.x_mm - start;
         for (wheel, origin) in origin.iter().enumerate() {
             let error = steps.recording.wheels[wheel][i].v.sensed_mm - origin - travel;
             worst = worst.max(error.abs());
@@ -458,9 +458,9 @@ fn odometry_is_the_travel_of_the_chassis() {
     // stays on its spot: reference and travel add up to the stroke reached.
     for [_, push, _] in steps.steps() {
         let reached = at(steps.b5(), push).position_mm;
-        let from = at(&steps.recording.body, push).travel_mm;
+        let from = at(&steps.recording.body, push).x_mm;
         for t in [0.4, 0.6, 0.8].map(|u| push + u) {
-            let travelled = at(&steps.recording.body, t).travel_mm - from;
+            let travelled = at(&steps.recording.body, t).x_mm - from;
             assert!(travelled > 30.0, "{travelled} mm");
             let sum = at(steps.b5(), t).reference_mm + travelled;
             // A cycle or two of the bus at 0.18 m/s.
@@ -509,7 +509,7 @@ fn the_other_leg_does_the_same_in_the_mirror() {
     for (a, b) in l.start_delays().into_iter().zip(r.start_delays()) {
         assert!((a - b).abs() < 0.02, "{a} s {b} s");
     }
-    let travel = |s: &Steps| s.recording.body[s.recording.body.len() - 1].v.travel_mm;
+    let travel = |s: &Steps| s.recording.body[s.recording.body.len() - 1].v.x_mm;
     assert!(
         (travel(l) - travel(r)).abs() < 0.5,
         "{} {}",

@@ -3,21 +3,35 @@
 pub(super) mod pneumatics;
 pub mod sections;
 
-use wheeleg_plant::contact::ContactParams;
+use wheeleg_plant::body::{ChassisContact, FootContact, RobotContacts, WheelContact};
+use wheeleg_plant::contact::ContactLaw;
 use wheeleg_plant::cylinder::CylinderParams;
 use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
-use wheeleg_plant::ground::Ground;
 use wheeleg_plant::motor::MotorParams;
+use wheeleg_plant::robot::SpatialParams as PlantSpatial;
 use wheeleg_plant::sensors::AdcNoise;
+use wheeleg_plant::terrain::Terrain;
 use wheeleg_plant::{Plant, PlantParams};
 
 use self::pneumatics::{Pneumatics, Sensing};
-use self::sections::{BodySection, ContactSection, LinkSection, MotorSection, StartSection};
+use self::sections::{
+    BodySection, ChassisContactSection, ContactSection, LinkSection, MotorSection, SpatialParams,
+    StartSection, WheelContactSection,
+};
 use super::reader::Reader;
 use super::relations::{self, Moved};
 
 /// Names of the plant's sections besides those of one cylinder.
-pub(super) const SECTIONS: [&str; 5] = ["start", "motor", "body", "link", "contact"];
+pub(super) const SECTIONS: [&str; 8] = [
+    "start",
+    "motor",
+    "body",
+    "spatial",
+    "link",
+    "contact",
+    "wheel_contact",
+    "chassis_contact",
+];
 
 /// The six bodies of a leg, in the order of the chain.
 const LINKS: [&str; 6] = [
@@ -29,8 +43,8 @@ const LINKS: [&str; 6] = [
     "vertical_rod",
 ];
 
-/// Reads all sections of the plant.
-pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
+/// Reads all sections of the plant; what only its drawing needs comes beside it.
+pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
     let pneumatics = Pneumatics::read(r);
     if let Some(start) = r.table("start") {
         r.reject_unknown(&start, &["yaw", "horizontal", "vertical"]);
@@ -46,13 +60,18 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
         r.reject_unknown(&link, &LINKS);
     }
     let links = LINKS.map(|name| r.section::<LinkSection>(&format!("link.{name}")));
+    let spatial = r.section::<SpatialParams>("spatial");
     let contact = r.section::<ContactSection>("contact");
+    let wheel_contact = r.section::<WheelContactSection>("wheel_contact");
+    let chassis_contact = r.section::<ChassisContactSection>("chassis_contact");
 
     let starts = [yaw?, horizontal?, vertical?];
     let (pneumatics, sensing) = (pneumatics?, sensing?);
     let (body, motor) = (body?, motor?);
     let [l1, l2, l3, l4, l5, l6] = links;
     let links = [l1?, l2?, l3?, l4?, l5?, l6?];
+    let spatial = spatial?;
+    let contacts = contacts(&contact?, &wheel_contact?, &chassis_contact?, &spatial);
     let plant = PlantParams {
         gas: pneumatics.gas,
         supply: pneumatics.supply,
@@ -64,16 +83,22 @@ pub(super) fn read(r: &mut Reader) -> Option<PlantParams> {
         initial_stroke_m: std::array::from_fn(|i| starts[i % 3].stroke),
         stroke_zero_m: std::array::from_fn(|i| body.stroke_zero[i % 3]),
         body: dynamics_params(&body, &links, motor.reduction),
-        contact: contact_params(&contact?),
+        spatial: PlantSpatial {
+            chassis_roll_inertia_kg_m2: spatial.chassis_roll_inertia_kg_m2,
+            chassis_yaw_inertia_kg_m2: spatial.chassis_yaw_inertia_kg_m2,
+            wheel_transverse_inertia_kg_m2: spatial.wheel_transverse_inertia_kg_m2,
+            track_m: spatial.track_m,
+        },
+        contacts,
         // The ground is the scenario's.
-        ground: Ground::default(),
+        terrain: Terrain::default(),
         motors: [motor_params(&motor); 2],
         potentiometers: [sensing.potentiometer; 6],
         adc: sensing.adc,
         step_ns: sensing.step_ns,
     };
     check_relations(r, &plant);
-    Some(plant)
+    Some((plant, spatial))
 }
 
 /// What the fields must be to each other.
@@ -159,17 +184,53 @@ fn dynamics_params(
     }
 }
 
-fn contact_params(s: &ContactSection) -> ContactParams {
-    ContactParams {
-        stiffness_n_m: s.stiffness,
-        damping_s_m: s.damping,
-        mu_static: s.mu_static,
-        mu_kinetic: s.mu_kinetic,
-        stribeck_m_s: s.stribeck,
-        bristle_stiffness_n_m: s.bristle_stiffness,
-        bristle_damping_n_s_m: s.bristle_damping,
-        sole_radius_m: s.sole_radius,
-        switch_threshold_m: s.switch_threshold,
+fn contacts(
+    sole: &ContactSection,
+    wheel: &WheelContactSection,
+    chassis: &ChassisContactSection,
+    spatial: &SpatialParams,
+) -> RobotContacts {
+    let law = ContactLaw {
+        stiffness_n_m: sole.stiffness,
+        damping_s_m: sole.damping,
+        mu_static: sole.mu_static,
+        mu_kinetic: sole.mu_kinetic,
+        stribeck_m_s: sole.stribeck,
+        bristle_stiffness_n_m: sole.bristle_stiffness,
+        bristle_damping_n_s_m: sole.bristle_damping,
+    };
+    RobotContacts {
+        foot: FootContact {
+            law,
+            sole_radius_m: sole.sole_radius,
+            sphere_radius_m: sole.sphere_radius,
+            switch_threshold_m: sole.switch_threshold,
+        },
+        wheel: WheelContact {
+            law: ContactLaw {
+                stiffness_n_m: wheel.stiffness,
+                mu_static: wheel.mu_static,
+                mu_kinetic: wheel.mu_kinetic,
+                bristle_stiffness_n_m: wheel.bristle_stiffness,
+                bristle_damping_n_s_m: wheel.bristle_damping,
+                ..law
+            },
+            width_m: spatial.wheel_width_m,
+            rolling_resistance: wheel.rolling_resistance,
+            rolling_blend_rad_s: wheel.rolling_blend,
+        },
+        chassis: ChassisContact {
+            law: ContactLaw {
+                stiffness_n_m: chassis.stiffness,
+                mu_static: chassis.mu_static,
+                mu_kinetic: chassis.mu_kinetic,
+                bristle_stiffness_n_m: chassis.bristle_stiffness,
+                bristle_damping_n_s_m: chassis.bristle_damping,
+                ..law
+            },
+            from_m: chassis.from,
+            to_m: chassis.to,
+        },
     }
 }
 

@@ -16,6 +16,7 @@ use super::error::ConfigError;
 use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
 use super::plant;
+pub use super::plant::sections::SpatialParams;
 use super::reader::Reader;
 use super::relations;
 
@@ -115,22 +116,6 @@ params! {
         load_arm_m: f64, "load_arm", Length, 0.01, 5.0;
         /// Sampling of the positions from which the paper's velocities and accelerations are computed.
         sample_period_s: f64, "sample_period", Time, 0.01, 0.2;
-    }
-
-    /// What only the robot with a floating chassis and its drawing need.
-    SpatialParams {
-        /// Inertia of the chassis about its centre of mass, roll axis.
-        chassis_roll_inertia_kg_m2: f64, "chassis_roll_inertia", Inertia, 1e-4, 1000.0;
-        /// Inertia of the chassis about its centre of mass, yaw axis.
-        chassis_yaw_inertia_kg_m2: f64, "chassis_yaw_inertia", Inertia, 1e-4, 1000.0;
-        /// Inertia of one wheel about a diameter, at its centre.
-        wheel_transverse_inertia_kg_m2: f64, "wheel_transverse_inertia", Inertia, 1e-6, 100.0;
-        /// Distance between the middle planes of the wheels.
-        track_m: f64, "track", Length, 0.05, 5.0;
-        /// Chassis box: length, width, height. For the drawing.
-        chassis_size_m: [f64; 3], "chassis_size", Length, 0.01, 5.0;
-        /// Width of a wheel. For the drawing.
-        wheel_width_m: f64, "wheel_width", Length, 1e-3, 1.0;
     }
 }
 
@@ -259,7 +244,6 @@ impl RobotConfig {
                 "start_up",
                 "gait",
                 "reference",
-                "spatial",
                 "node",
                 "commissioned",
             ];
@@ -278,13 +262,13 @@ impl RobotConfig {
         }
         let reference = r.section::<ReferenceParams>("reference");
         let plant = plant::read(&mut r);
-        let spatial = r.section::<SpatialParams>("spatial");
-        if let (Some(plant), Some(spatial)) = (&plant, &spatial) {
+        if let Some((plant, spatial)) = &plant {
             check_bodies(&mut r, plant, spatial);
         }
         let node = node::read(&mut r);
         let commissioned = commissioned::read(&mut r);
         let robot = (|| {
+            let (plant, spatial) = plant?;
             Some(Self {
                 name: name?,
                 description: description?,
@@ -293,8 +277,8 @@ impl RobotConfig {
                 start_up: start_up?,
                 gait: gait?,
                 reference: reference?,
-                plant: plant?,
-                spatial: spatial?,
+                plant,
+                spatial,
                 node,
                 commissioned,
                 parameters: Vec::new(),
@@ -308,14 +292,7 @@ impl RobotConfig {
     /// Parameters of the robot with a floating chassis.
     #[must_use]
     pub fn floating_params(&self) -> FloatingParams {
-        let s = &self.spatial;
-        FloatingParams {
-            robot: self.plant.body.clone(),
-            chassis_roll_inertia_kg_m2: s.chassis_roll_inertia_kg_m2,
-            chassis_yaw_inertia_kg_m2: s.chassis_yaw_inertia_kg_m2,
-            wheel_transverse_inertia_kg_m2: s.wheel_transverse_inertia_kg_m2,
-            track_m: s.track_m,
-        }
+        self.plant.floating()
     }
 
     /// Fingerprint of all parameters: BLAKE3 over name, value and unit, in the

@@ -64,7 +64,7 @@ pub struct ScenarioEvent {
     pub action: EventAction,
 }
 
-/// A rectangle of ground whose top is not at height zero. Axes as MODEL.md:
+/// A block on the floor, its walls vertical. Axes as MODEL.md:
 /// x forward, y left, origin on the ground below the middle of the wheel axle
 /// at the start.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +73,7 @@ pub struct GroundPatch {
     pub x_m: [f64; 2],
     /// From and to, m.
     pub y_m: [f64; 2],
-    /// Height of the top, m; above all patches that overlap counts the highest.
+    /// Height of the top over the floor, m; where blocks overlap, each is touched on its own.
     pub height_m: f64,
 }
 
@@ -397,7 +397,13 @@ fn patch(r: &mut Reader, entry: &Entry) -> Option<GroundPatch> {
     };
     let x_m = range("x", "from and to, forward of the axle");
     let y_m = range("y", "from and to, left of the middle");
-    let height = scalar("height", Dimension::Length, -0.2, 0.3, "height of the top");
+    let height = scalar(
+        "height",
+        Dimension::Length,
+        0.0,
+        0.3,
+        "height of the top over the floor",
+    );
     let height_m = required(r, entry, &height);
     Some(GroundPatch {
         x_m: x_m?,

@@ -7,13 +7,13 @@ use std::hint::black_box;
 
 use criterion::Criterion;
 use nalgebra::Vector3;
+use wheeleg_plant::dynamics::RobotDynamicsParams;
 use wheeleg_plant::dynamics::chain::ChainLeg;
 use wheeleg_plant::dynamics::chain::reference::{
     GRAVITY_M_S2, ROBOT14, RPP, RPR, leg_states, robot_state,
 };
 use wheeleg_plant::dynamics::floating::{Contacts, FloatingParams, FloatingRobot, FloatingState};
 use wheeleg_plant::dynamics::noc::Leg;
-use wheeleg_plant::dynamics::{RobotDynamics, RobotDynamicsParams};
 use wheeleg_plant::testing::wheeleg_2003;
 use wheeleg_plant::{Inputs, Plant};
 
@@ -115,17 +115,11 @@ fn own_leg(c: &mut Criterion) {
     });
 }
 
-/// Whole robots: reference tree, model on its wheel axle, model with a floating chassis.
+/// Whole robots: reference tree, and the engine that every run steps.
 fn robots(c: &mut Criterion) {
     let (state, tau, down) = (robot_state(0.1), [1.0; 14], [0.0, 0.0, -9.81]);
     c.bench_function("robot_fd_14dof", |b| {
         b.iter(|| ROBOT14.forward(black_box(&state), black_box(&tau), black_box(&down)));
-    });
-    let axle = RobotDynamics::new(&RobotDynamicsParams::wheeleg_2003()).expect("robot");
-    let [b2, b5, b6] = LENGTHS_M;
-    let q = [0.0, 0.0, b2, b5, b6, b2, b5, b6];
-    c.bench_function("robot_fd_own_8dof", |b| {
-        b.iter(|| axle.accelerations(black_box(&q), &[0.1; 8], &[1.0; 8]));
     });
     let floating = FloatingRobot::new(&FloatingParams::wheeleg_2003()).expect("floating robot");
     let state = FloatingState::at_rest([LENGTHS_M; 2]);

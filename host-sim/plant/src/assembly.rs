@@ -97,14 +97,18 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         std::array::from_fn(|i| self.cylinders[i].forces(&state.cylinders[i], strokes[i], rates[i]))
     }
 
-    /// Evaluates the accelerations of the state as it is. To be called once
-    /// before stepping, because inputs may have changed.
-    fn start(&self, state: &mut AssemblyState<M::State>) -> Result<(), PlantError> {
+    /// Evaluates the accelerations of the state as it is: before the first step, and where forces
+    /// were changed from outside and the next step is not to wait for its end to feel them.
+    ///
+    /// # Errors
+    /// As [`Mechanics::evaluate`].
+    pub fn start(&self, state: &mut AssemblyState<M::State>) -> Result<(), PlantError> {
         let net = self.forces(state).map(|f| f.net_n());
         self.mechanics.evaluate(&mut state.motion, &net, 0.0)
     }
 
-    /// Advances to `to_ns` with the commands latched so far.
+    /// Advances to `to_ns` with the commands latched so far, from a state whose accelerations
+    /// are known ([`Self::start`]).
     ///
     /// # Errors
     /// Any [`PlantError`]; the state is then not usable any more.
@@ -122,7 +126,6 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         }
         // Faults may have been set from outside since the last call.
         state.cylinders.iter_mut().for_each(CylinderState::refresh);
-        self.start(state)?;
         while state.time_ns < to_ns {
             let mut edge_ns = state.supply.dump.next_edge_ns();
             for cylinder in &state.cylinders {

@@ -184,6 +184,8 @@ impl Axis {
         }
         let now = state.core.time_ns;
         self.assembly.cylinders[0].command(&mut state.core.cylinders[0], now, on_time_us, TICK_US);
+        // The load may have been changed.
+        self.assembly.start(&mut state.core)?;
         self.assembly.advance_to(&mut state.core, now + TICK_NS)
     }
 

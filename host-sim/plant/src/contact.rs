@@ -1,4 +1,4 @@
-//! A round foot on the ground: normal force, friction with true stick, four optical switches.
+//! The law of a hard contact: normal force, friction with true stick.
 //!
 //! # Normal force
 //!
@@ -9,144 +9,65 @@
 //! # Friction
 //!
 //! An elastic–plastic bristle (a two-dimensional brush): the bristle stretches with the sliding
-//! of the sole, F = −σ0 z − σ1 v, and total force and stretch are limited to the friction
+//! of the body, F = −σ0 z − σ1 v, and total force and stretch are limited to the friction
 //! circle μ(v) F. Below the limit it is a spring: a foot under a steady load below μ F does not
 //! creep, as it would with the plain LuGre bristle (Dupont et al., 2002). Above the limit the
 //! bristle is dragged along: Coulomb friction, with μ falling from static to kinetic over the
-//! Stribeck velocity.
-//!
-//! The foot touches in its sole's centre: a moment about the sole is not transferred. The
-//! switches look at the four sides of the sole on their own.
+//! Stribeck velocity. The stretch is a vector of the world, laid into the tangent plane anew in
+//! every step, so that it follows a curved surface.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::dynamics::FootKin;
 use crate::error::{PlantError, check};
-use crate::hash::StateHasher;
+use crate::terrain::Material;
 
-/// Height and normal of the ground at a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GroundPoint {
-    /// Height (m).
-    pub height_m: f64,
-    /// Unit normal, upwards.
-    pub normal: [f64; 3],
-}
-
-/// The ground's surface in ground axes (x along the travel, y left, z up).
-pub trait GroundHeight {
-    /// Surface at x, y (m).
-    fn at(&self, x_m: f64, y_m: f64) -> GroundPoint;
-}
-
-/// Flat ground at height 0.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FlatGround;
-
-impl GroundHeight for FlatGround {
-    fn at(&self, _x_m: f64, _y_m: f64) -> GroundPoint {
-        GroundPoint {
-            height_m: 0.0,
-            normal: [0.0, 0.0, 1.0],
-        }
-    }
-}
-
-impl<F: Fn(f64, f64) -> GroundPoint> GroundHeight for F {
-    fn at(&self, x_m: f64, y_m: f64) -> GroundPoint {
-        self(x_m, y_m)
-    }
-}
-
-/// Parameters of foot and ground.
+/// Parameters of one contact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ContactParams {
-    /// Normal stiffness k (N/m).
+pub struct ContactLaw {
+    /// Normal stiffness k \[N/m\].
     pub stiffness_n_m: f64,
-    /// Hunt–Crossley damping λ (s/m).
+    /// Hunt–Crossley damping λ \[s/m\].
     pub damping_s_m: f64,
     /// Static friction coefficient.
     pub mu_static: f64,
     /// Kinetic friction coefficient, at most the static one.
     pub mu_kinetic: f64,
-    /// Stribeck velocity (m/s).
+    /// Stribeck velocity \[m/s\].
     pub stribeck_m_s: f64,
-    /// Bristle stiffness σ0 (N/m).
+    /// Bristle stiffness σ0 \[N/m\].
     pub bristle_stiffness_n_m: f64,
-    /// Bristle damping σ1 (N s/m).
+    /// Bristle damping σ1 \[N s/m\].
     pub bristle_damping_n_s_m: f64,
-    /// Radius of the sole (m).
-    pub sole_radius_m: f64,
-    /// Penetration of a side of the sole that closes its switch (m).
-    pub switch_threshold_m: f64,
 }
 
-/// What a contact carries from step to step.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct ContactState {
-    /// Bristle stretch along the two tangents (m): sole ahead of its bristle's root.
-    pub bristle_m: [f64; 2],
+/// How a body touches one surface at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Penetration \[m\], above 0.
+    pub depth_m: f64,
+    /// Outward unit normal of the surface.
+    pub normal: Vector3<f64>,
+    /// Velocity of the body's point against the surface \[m/s\].
+    pub velocity_m_s: Vector3<f64>,
+    /// What that point has moved since the last instant \[m\].
+    pub moved_m: Vector3<f64>,
+    /// The ground.
+    pub material: Material,
 }
 
-/// Forces of one foot.
+/// Force of a surface on a body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ContactForce {
-    /// Force on the foot (N), ground axes.
-    pub force_n: [f64; 3],
-    /// Normal component (N), not negative.
+    /// Force \[N\], world axes.
+    pub force_n: Vector3<f64>,
+    /// Normal component \[N\], not negative.
     pub normal_n: f64,
-    /// Penetration (m), zero in the air.
-    pub penetration_m: f64,
-    /// The friction circle is reached: the foot slips.
+    /// The friction circle is reached.
     pub slipping: bool,
 }
 
-/// The four switches of a sole.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SoleSwitches {
-    /// Front, along the leg.
-    pub front: bool,
-    /// Back.
-    pub back: bool,
-    /// Left as the robot looks, on both legs.
-    pub left: bool,
-    /// Right.
-    pub right: bool,
-}
-
-impl SoleSwitches {
-    /// `[front, back, left, right]`.
-    #[must_use]
-    pub fn to_array(self) -> [bool; 4] {
-        [self.front, self.back, self.left, self.right]
-    }
-}
-
-impl ContactState {
-    /// Adds the state to a hash.
-    pub fn feed(&self, hasher: &mut StateHasher) {
-        self.bristle_m.iter().for_each(|v| hasher.f64(*v));
-    }
-
-    /// Energy held in the bristle (J).
-    #[must_use]
-    pub fn elastic_energy_j(&self, params: &ContactParams) -> f64 {
-        let [x, y] = self.bristle_m;
-        0.5 * params.bristle_stiffness_n_m * (x * x + y * y)
-    }
-}
-
-/// Where the sole's centre is against the ground.
-struct Touch {
-    penetration_m: f64,
-    /// Speed into the ground (m/s).
-    closing_m_s: f64,
-    normal: [f64; 3],
-    tangents: [[f64; 3]; 2],
-    slide_m_s: [f64; 2],
-}
-
-impl ContactParams {
+impl ContactLaw {
     /// Checks the ranges.
     ///
     /// # Errors
@@ -168,145 +89,87 @@ impl ContactParams {
             self.bristle_damping_n_s_m,
             0.0,
             1e6,
-        )?;
-        check("contact.sole_radius_m", self.sole_radius_m, 0.0, 1.0)?;
-        check(
-            "contact.switch_threshold_m",
-            self.switch_threshold_m,
-            0.0,
-            0.1,
         )
     }
 
-    /// Friction coefficient at a sliding speed (m/s).
+    /// The law of one of `count` equal contacts that make up this one.
     #[must_use]
-    pub fn mu(&self, speed_m_s: f64) -> f64 {
-        let ratio = speed_m_s / self.stribeck_m_s;
-        self.mu_kinetic + (self.mu_static - self.mu_kinetic) * libm::exp(-ratio * ratio)
+    pub fn shared_by(&self, count: usize) -> Self {
+        let share = 1.0 / count as f64;
+        Self {
+            stiffness_n_m: share * self.stiffness_n_m,
+            bristle_stiffness_n_m: share * self.bristle_stiffness_n_m,
+            bristle_damping_n_s_m: share * self.bristle_damping_n_s_m,
+            ..*self
+        }
     }
 
-    /// Normal force (N) at a penetration (m) and a speed into the ground (m/s).
+    /// Static and kinetic friction on a material: of two the smaller.
+    #[inline]
+    fn friction_on(&self, material: &Material) -> [f64; 2] {
+        [
+            self.mu_static.min(material.mu_static),
+            self.mu_kinetic.min(material.mu_kinetic),
+        ]
+    }
+
+    /// Normal force \[N\] at a penetration \[m\] and a speed into the ground \[m/s\].
     #[must_use]
-    pub fn normal_force_n(&self, penetration_m: f64, closing_m_s: f64) -> f64 {
-        if penetration_m <= 0.0 {
+    #[inline]
+    pub fn normal_force_n(&self, depth_m: f64, closing_m_s: f64) -> f64 {
+        if depth_m <= 0.0 {
             return 0.0;
         }
-        let elastic = self.stiffness_n_m * penetration_m;
+        let elastic = self.stiffness_n_m * depth_m;
         (elastic * (1.0 + self.damping_s_m * closing_m_s)).max(0.0)
     }
 
-    /// Force of the ground on a foot.
+    /// Stretches the bristle by what the body has moved, and gives the force on the body.
     #[must_use]
-    pub fn force(
-        &self,
-        state: &ContactState,
-        foot: &FootKin,
-        ground: &impl GroundHeight,
-    ) -> ContactForce {
-        let Some(touch) = Touch::of(foot, ground) else {
-            return ContactForce::default();
+    #[inline]
+    pub fn force(&self, stretch_m: &mut Vector3<f64>, touch: &Touch) -> ContactForce {
+        let n = &touch.normal;
+        let closing = -n.dot(&touch.velocity_m_s);
+        let slide = touch.velocity_m_s + closing * n;
+        let normal_n = self.normal_force_n(touch.depth_m, closing);
+        let moved = *stretch_m + touch.moved_m;
+        let laid = moved - n.dot(&moved) * n;
+        let elastic = -self.bristle_stiffness_n_m * laid;
+        let pull = elastic - self.bristle_damping_n_s_m * slide;
+
+        // Within the kinetic circle nothing slips at any speed.
+        let [mu_static, mu_kinetic] = self.friction_on(&touch.material);
+        let sure = mu_kinetic * normal_n;
+        let (stretched, pulled) = (elastic.norm_squared(), pull.norm_squared());
+        let (friction, slipping) = if stretched.max(pulled) <= sure * sure {
+            *stretch_m = laid;
+            (pull, false)
+        } else {
+            let ratio = slide.norm() / self.stribeck_m_s;
+            // Beyond six Stribeck velocities static friction has no share left.
+            let share = if ratio < 6.0 {
+                libm::exp(-ratio * ratio)
+            } else {
+                0.0
+            };
+            let most = (mu_kinetic + (mu_static - mu_kinetic) * share) * normal_n;
+            *stretch_m = laid * shortening(stretched, most);
+            (pull * shortening(pulled, most), pulled > most * most)
         };
-        let normal_n = self.normal_force_n(touch.penetration_m, touch.closing_m_s);
-        let limit = self.mu(length(touch.slide_m_s)) * normal_n;
-        let pull: [f64; 2] = std::array::from_fn(|i| {
-            -self.bristle_stiffness_n_m * state.bristle_m[i]
-                - self.bristle_damping_n_s_m * touch.slide_m_s[i]
-        });
-        let (friction, slipping) = within(pull, limit);
         ContactForce {
-            force_n: std::array::from_fn(|i| {
-                normal_n * touch.normal[i]
-                    + friction[0] * touch.tangents[0][i]
-                    + friction[1] * touch.tangents[1][i]
-            }),
+            force_n: normal_n * n + friction,
             normal_n,
-            penetration_m: touch.penetration_m,
             slipping,
         }
     }
+}
 
-    /// Bristle after `h_s` seconds at the foot's speed. In the air it relaxes at once.
-    pub fn advance(
-        &self,
-        state: &mut ContactState,
-        foot: &FootKin,
-        ground: &impl GroundHeight,
-        h_s: f64,
-    ) {
-        let Some(touch) = Touch::of(foot, ground) else {
-            *state = ContactState::default();
-            return;
-        };
-        let normal_n = self.normal_force_n(touch.penetration_m, touch.closing_m_s);
-        let limit = self.mu(length(touch.slide_m_s)) * normal_n / self.bristle_stiffness_n_m;
-        let stretched = std::array::from_fn(|i| state.bristle_m[i] + h_s * touch.slide_m_s[i]);
-        (state.bristle_m, _) = within(stretched, limit);
+/// Factor that brings a vector of this squared length down to `most`.
+#[inline]
+fn shortening(squared: f64, most: f64) -> f64 {
+    if squared <= most * most {
+        1.0
+    } else {
+        most / squared.sqrt()
     }
-
-    /// Switches of a sole: each closes when its side of the sole is deeper in the ground than the
-    /// threshold.
-    #[must_use]
-    pub fn switches(&self, foot: &FootKin, ground: &impl GroundHeight) -> SoleSwitches {
-        let closed = |axis: &[f64; 3], sign: f64| {
-            let point: [f64; 3] =
-                std::array::from_fn(|i| foot.position_m[i] + sign * self.sole_radius_m * axis[i]);
-            depth(&point, &ground.at(point[0], point[1])) > self.switch_threshold_m
-        };
-        SoleSwitches {
-            front: closed(&foot.forward, 1.0),
-            back: closed(&foot.forward, -1.0),
-            left: closed(&foot.left, 1.0),
-            right: closed(&foot.left, -1.0),
-        }
-    }
-}
-
-impl Touch {
-    fn of(foot: &FootKin, ground: &impl GroundHeight) -> Option<Self> {
-        let surface = ground.at(foot.position_m[0], foot.position_m[1]);
-        let penetration_m = depth(&foot.position_m, &surface);
-        if penetration_m <= 0.0 {
-            return None;
-        }
-        let n = surface.normal;
-        // First tangent: X laid into the surface. It is never vertical, so never zero.
-        let scale = 1.0 / libm::hypot(n[2], n[0]);
-        let t1 = [n[2] * scale, 0.0, -n[0] * scale];
-        let t2 = [
-            n[1] * t1[2] - n[2] * t1[1],
-            n[2] * t1[0] - n[0] * t1[2],
-            n[0] * t1[1] - n[1] * t1[0],
-        ];
-        let v = foot.velocity_m_s;
-        Some(Self {
-            penetration_m,
-            closing_m_s: -dot(n, v),
-            normal: n,
-            tangents: [t1, t2],
-            slide_m_s: [dot(t1, v), dot(t2, v)],
-        })
-    }
-}
-
-/// Depth of a point below the surface, along the normal (m).
-fn depth(point: &[f64; 3], surface: &GroundPoint) -> f64 {
-    (surface.height_m - point[2]) * surface.normal[2]
-}
-
-/// A vector shortened to a limit; true if it was longer.
-fn within(v: [f64; 2], limit: f64) -> ([f64; 2], bool) {
-    let size = length(v);
-    if size <= limit {
-        return (v, false);
-    }
-    let scale = limit / size;
-    ([v[0] * scale, v[1] * scale], true)
-}
-
-fn length(v: [f64; 2]) -> f64 {
-    libm::hypot(v[0], v[1])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -31,7 +31,6 @@ pub mod endstop;
 pub mod error;
 pub mod flow;
 pub mod friction;
-pub mod ground;
 pub mod hash;
 pub mod motor;
 pub mod noise;
@@ -39,6 +38,7 @@ pub mod reference;
 pub mod robot;
 pub mod sensors;
 pub mod supply;
+pub mod terrain;
 pub mod testing;
 pub mod valve;
 

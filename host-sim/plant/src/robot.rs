@@ -1,20 +1,21 @@
 //! The whole robot: six cylinders, supply, two wheel drives, mechanism, sensors.
 
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::assembly::{Assembly, AssemblyState, CylinderOutputs};
 use crate::axis::{TICK_NS, TICK_US};
-use crate::body::{BodyMechanics, BodyMotion, FootOutputs};
-use crate::contact::ContactParams;
+use crate::body::{BodyMechanics, BodyMotion, FootLoad, RobotContacts, Touching, WheelLoad};
 use crate::cylinder::{CylinderModel, CylinderParams};
-use crate::dynamics::{RobotDynamics, RobotDynamicsParams};
+use crate::dynamics::RobotDynamicsParams;
+use crate::dynamics::floating::{FloatingParams, FloatingRobot, FloatingState};
 use crate::error::{PlantError, check};
 use crate::flow::GasParams;
-use crate::ground::Ground;
 use crate::hash::StateHasher;
 use crate::motor::MotorParams;
 use crate::sensors::{AdcParams, AdcState, PotentiometerParams};
 use crate::supply::{SupplyModel, SupplyParams};
+use crate::terrain::Terrain;
 
 /// Every parameter of the plant. No other constant enters.
 ///
@@ -33,10 +34,12 @@ pub struct PlantParams {
     pub stroke_zero_m: [f64; 6],
     /// Masses and dimensions.
     pub body: RobotDynamicsParams,
-    /// Sole on the ground.
-    pub contact: ContactParams,
-    /// Ground under the feet.
-    pub ground: Ground,
+    /// Inertias and the track that only a chassis that rolls and turns needs.
+    pub spatial: SpatialParams,
+    /// Feet, wheels and chassis on the ground.
+    pub contacts: RobotContacts,
+    /// The ground.
+    pub terrain: Terrain,
     /// Wheel drives, left and right. Their reduction must be the body's.
     pub motors: [MotorParams; 2],
     /// Position sensors.
@@ -45,6 +48,34 @@ pub struct PlantParams {
     pub adc: AdcParams,
     /// Plant step \[ns\], 1 000..1 000 000; 100 000 by design.
     pub step_ns: u64,
+}
+
+/// What the floating chassis needs beyond [`RobotDynamicsParams`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SpatialParams {
+    /// Chassis inertia about its centre of mass, roll axis \[kg m²\].
+    pub chassis_roll_inertia_kg_m2: f64,
+    /// Chassis inertia about its centre of mass, yaw axis \[kg m²\].
+    pub chassis_yaw_inertia_kg_m2: f64,
+    /// Inertia of one wheel about a diameter \[kg m²\].
+    pub wheel_transverse_inertia_kg_m2: f64,
+    /// Distance between the wheels' middle planes \[m\].
+    pub track_m: f64,
+}
+
+impl PlantParams {
+    /// Parameters of the floating robot.
+    #[must_use]
+    pub fn floating(&self) -> FloatingParams {
+        let s = &self.spatial;
+        FloatingParams {
+            robot: self.body.clone(),
+            chassis_roll_inertia_kg_m2: s.chassis_roll_inertia_kg_m2,
+            chassis_yaw_inertia_kg_m2: s.chassis_yaw_inertia_kg_m2,
+            wheel_transverse_inertia_kg_m2: s.wheel_transverse_inertia_kg_m2,
+            track_m: s.track_m,
+        }
+    }
 }
 
 /// Inputs of one tick, latched at its edge.
@@ -85,15 +116,23 @@ pub struct Outputs {
     pub time_ns: u64,
     /// The six cylinders.
     pub cylinders: [CylinderOutputs; 6],
-    /// Chassis travel \[m\] and pitch \[rad\], nose up positive.
-    pub travel_m: f64,
-    /// Chassis speed \[m/s\].
-    pub speed_m_s: f64,
-    /// Pitch about the axle \[rad\], nose up positive.
-    pub pitch_rad: f64,
-    /// Pitch rate \[rad/s\].
-    pub pitch_rate_rad_s: f64,
-    /// Ground force on each foot \[N\], ground axes x forward, y left, z up.
+    /// Middle of the wheel axle in the world \[m\]: x, y horizontal, z up.
+    pub position_m: [f64; 3],
+    /// Attitude of the chassis \[rad\]: roll, right side down positive; pitch, nose up
+    /// positive; yaw, to the left positive. It turns about Z by yaw, then pitches, then rolls.
+    pub attitude_rad: [f64; 3],
+    /// Velocity of the middle of the axle in chassis axes \[m/s\]: forward, left, up.
+    pub velocity_m_s: [f64; 3],
+    /// Angular velocity of the chassis about its axes \[rad/s\]: roll, pitch (nose up), yaw.
+    pub angular_velocity_rad_s: [f64; 3],
+    /// Normal force on each wheel \[N\], not negative.
+    pub wheel_normal_n: [f64; 2],
+    /// Speed of each tread over the ground \[m/s\]: positive if the wheel turns faster than it
+    /// travels.
+    pub wheel_slip_m_s: [f64; 2],
+    /// Normal force on the chassis \[N\]: 0 unless it lies on the ground.
+    pub chassis_normal_n: f64,
+    /// Ground force on each foot \[N\], world axes.
     pub foot_force_n: [[f64; 3]; 2],
     /// Normal force on each foot \[N\], not negative.
     pub foot_normal_n: [f64; 2],
@@ -153,8 +192,8 @@ impl Plant {
         for (stroke, cylinder) in params.initial_stroke_m.iter().zip(&params.cylinders) {
             check("initial_stroke_m", *stroke, 0.0, cylinder.stroke_m)?;
         }
-        params.contact.validate()?;
-        params.ground.validate()?;
+        params.contacts.validate()?;
+        params.terrain.validate()?;
         for motor in &params.motors {
             // Two names for one gear: a rotor inertia reflected by another ratio
             // than the torque's would be a silent error.
@@ -179,12 +218,16 @@ impl Plant {
                 ],
                 supply: SupplyModel::new(&params.supply, &params.gas)?,
                 mechanics: BodyMechanics {
-                    dynamics: RobotDynamics::new(&params.body)?,
-                    contact: params.contact,
-                    ground: params.ground.clone(),
+                    dynamics: FloatingRobot::new(&params.floating())?,
+                    touching: Touching::new(
+                        &params.contacts,
+                        params.body.wheel_radius_m,
+                        &params.terrain,
+                    ),
                     stroke_zero_m: params.stroke_zero_m,
                     motors: params.motors,
                     load_n: [0.0; 6],
+                    gravity_m_s2: params.body.gravity_m_s2.into(),
                 },
                 step_ns: params.step_ns,
             },
@@ -211,14 +254,16 @@ impl Plant {
         let mechanics = &assembly.mechanics;
         let mut stroke = self.params.initial_stroke_m;
         let mut bristle = [0.0; 6];
+        let length = |stroke: &[f64; 6]| {
+            let of = |i: usize| mechanics.stroke_zero_m[i] + stroke[i];
+            [[of(0), of(1), of(2)], [of(3), of(4), of(5)]]
+        };
+        let mut motion = BodyMotion::at_rest(self.start(length(&stroke)));
         // Stops and ground are stiff, so each round shrinks the error some
-        // hundredfold; four reach rounding.
-        let mut motion = BodyMotion::at_rest([0.0; 8]);
-        for _ in 0..4 {
-            for (i, (zero, stroke)) in mechanics.stroke_zero_m.iter().zip(&stroke).enumerate() {
-                motion.position[i + 2] = zero + stroke;
-            }
-            mechanics.settle_pitch(&mut motion)?;
+        // hundredfold; six reach rounding.
+        for _ in 0..6 {
+            motion.state.lengths_m = length(&stroke);
+            mechanics.stand(&mut motion)?;
             let needed = mechanics.holding_forces_n(&motion)?;
             for (i, cylinder) in assembly.cylinders.iter().enumerate() {
                 let c = cylinder.params();
@@ -244,16 +289,43 @@ impl Plant {
                 state
             })
             .collect();
+        let mut core = AssemblyState {
+            time_ns: 0,
+            cylinders,
+            supply: assembly.supply.initial_state(),
+            motion,
+        };
+        assembly.start(&mut core)?;
         Ok(PlantState {
-            core: AssemblyState {
-                time_ns: 0,
-                cylinders,
-                supply: assembly.supply.initial_state(),
-                motion,
-            },
+            core,
             adc: [1, 2, 3, 4, 5, 6]
                 .map(|joint| AdcState::new(seed, &format!("joint.{joint}.potentiometer"))),
         })
+    }
+
+    /// Wheels just on the ground at the world's origin, heading along X, level with the ground
+    /// between them.
+    fn start(&self, lengths_m: [[f64; 3]; 2]) -> FloatingState {
+        let mut state = FloatingState::at_rest(lengths_m);
+        let ground = self.assembly.mechanics.touching.terrain();
+        let high = Vector3::z() * 10.0;
+        // Where a fall straight down from above meets the ground: a few steps of its distance.
+        let mut place = high;
+        for _ in 0..200 {
+            let Some(near) = ground.nearest(&place) else {
+                break;
+            };
+            place.z -= near.distance_m;
+        }
+        let normal = ground
+            .nearest(&place)
+            .map_or(Vector3::z(), |near| near.normal);
+        // Forward stays in the X–Z plane.
+        let left = normal.cross(&Vector3::x()).normalize();
+        let axes = Matrix3::from_columns(&[left.cross(&normal), left, normal]);
+        state.orientation = UnitQuaternion::from_matrix(&axes);
+        state.position_m = place + self.params.body.wheel_radius_m * normal;
+        state
     }
 
     /// Latches one tick's inputs at the state's time.
@@ -353,36 +425,52 @@ impl Plant {
     pub fn outputs(&self, state: &PlantState) -> Outputs {
         let core = &state.core;
         let mechanics = &self.assembly.mechanics;
-        let feet = mechanics
-            .feet(&core.motion)
-            .unwrap_or([FootOutputs::UNKNOWN; 2]);
-        let angle = mechanics.wheel_angle_rad(&core.motion);
-        let rate = mechanics.wheel_rate_rad_s(&core.motion, 0.0);
+        let motion = &core.motion;
+        let state = &motion.state;
+        let scene = mechanics.scene(motion).ok();
+        let nan = f64::NAN;
+        let feet: [FootLoad; 2] = scene
+            .as_ref()
+            .map_or([FootLoad::UNKNOWN; 2], |s| s.loads.feet);
+        let wheels: [WheelLoad; 2] = scene
+            .as_ref()
+            .map_or([WheelLoad::UNKNOWN; 2], |s| s.loads.wheels);
+        let soles = scene.as_ref().map_or([[nan; 3]; 2], |s| {
+            let points = s.kin.points_m();
+            [points[0].into(), points[1].into()]
+        });
+        let clearance = scene.as_ref().map_or([nan; 2], |s| {
+            [0, 1].map(|leg| mechanics.touching.clearance_m(&s.kin, leg))
+        });
+        let rates = mechanics.wheel_rate_rad_s(motion);
+        let angles = mechanics.wheel_angle_rad(motion);
+        let (roll, pitch_down, yaw) = state.orientation.euler_angles();
+        let (turning, moving) = (state.angular_velocity(), state.linear_velocity());
         Outputs {
             time_ns: core.time_ns,
             cylinders: self.assembly.outputs(core),
-            travel_m: core.motion.position[0],
-            speed_m_s: core.motion.velocity[0],
-            pitch_rad: core.motion.position[1],
-            pitch_rate_rad_s: core.motion.velocity[1],
-            foot_force_n: std::array::from_fn(|i| feet[i].force.force_n),
-            foot_normal_n: std::array::from_fn(|i| feet[i].force.normal_n),
-            sole_m: std::array::from_fn(|i| feet[i].sole_m),
-            foot_clearance_m: std::array::from_fn(|i| feet[i].clearance_m),
-            foot_switches: std::array::from_fn(|i| {
-                let sole = feet[i].switches;
-                [sole.front, sole.left, sole.back, sole.right]
-            }),
+            position_m: state.position_m.into(),
+            attitude_rad: [roll, -pitch_down, yaw],
+            velocity_m_s: moving.into(),
+            angular_velocity_rad_s: [turning.x, -turning.y, turning.z],
+            wheel_normal_n: wheels.map(|w| w.normal_n),
+            wheel_slip_m_s: wheels.map(|w| w.slip_m_s),
+            chassis_normal_n: scene.as_ref().map_or(nan, |s| s.loads.chassis_n),
+            foot_force_n: feet.map(|f| f.force_n.into()),
+            foot_normal_n: feet.map(|f| f.normal_n),
+            sole_m: soles,
+            foot_clearance_m: clearance,
+            foot_switches: motion.contacts.switches,
             supply_pressure_pa: self.assembly.supply.pressure_pa(core.supply.mass_kg),
             pressure_switch: core.supply.pressure_switch(),
             dumping: core.supply.dump.is_open(),
-            motor_current_a: std::array::from_fn(|i| core.motion.motors[i].current_a),
+            motor_current_a: std::array::from_fn(|i| motion.motors[i].current_a),
             wheel_torque_n_m: std::array::from_fn(|i| {
-                mechanics.wheel_torque_n_m(&core.motion, i, 0.0)
+                mechanics.wheel_torque_n_m(motion, i, rates[i])
             }),
-            wheel_angle_rad: [angle; 2],
-            wheel_rate_rad_s: [rate; 2],
-            encoder_edges: std::array::from_fn(|i| mechanics.motors[i].encoder_edges(angle)),
+            wheel_angle_rad: angles,
+            wheel_rate_rad_s: rates,
+            encoder_edges: std::array::from_fn(|i| mechanics.motors[i].encoder_edges(angles[i])),
             air_used_kg: core.cylinders.iter().map(|c| c.supply_mass_kg).sum(),
         }
     }

@@ -5,18 +5,20 @@
 //! Tags: PAPER, DATASHEET, ASSUMED (chosen here), DERIVED (computed from others).
 
 use crate::axis::AxisParams;
+use crate::body::{ChassisContact, FootContact, RobotContacts, WheelContact};
 use crate::chamber::GasModel;
-use crate::contact::ContactParams;
+use crate::contact::ContactLaw;
 use crate::cylinder::CylinderParams;
 use crate::dynamics::RobotDynamicsParams;
+use crate::dynamics::floating::FloatingParams;
 use crate::endstop::EndStopParams;
 use crate::flow::{GasParams, Iso6358};
 use crate::friction::FrictionParams;
-use crate::ground::Ground;
 use crate::motor::MotorParams;
-use crate::robot::PlantParams;
+use crate::robot::{PlantParams, SpatialParams};
 use crate::sensors::{AdcNoise, AdcParams, PotentiometerParams};
 use crate::supply::{SupplyParams, SwitchParams};
+use crate::terrain::Terrain;
 use crate::valve::ValveParams;
 
 /// dm³/(s·bar) in m³/(s·Pa).
@@ -189,10 +191,10 @@ pub fn wheeleg_2003_axis() -> AxisParams {
     }
 }
 
-/// Rubber sole on firm ground.
+/// Rubber soles and tyres on firm ground, and a bare chassis.
 #[must_use]
-pub fn ground_contact() -> ContactParams {
-    ContactParams {
+pub fn ground_contacts() -> RobotContacts {
+    let sole = ContactLaw {
         stiffness_n_m: 2.0e4,         // N/m ASSUMED (0.8 mm under 17 N)
         damping_s_m: 5.0,             // s/m ASSUMED
         mu_static: 0.8,               // - ASSUMED rubber on stone
@@ -200,8 +202,37 @@ pub fn ground_contact() -> ContactParams {
         stribeck_m_s: 0.01,           // m/s ASSUMED
         bristle_stiffness_n_m: 2.0e4, // N/m ASSUMED
         bristle_damping_n_s_m: 100.0, // N s/m ASSUMED
-        sole_radius_m: 0.03,          // m ASSUMED
-        switch_threshold_m: 0.0002,   // m ASSUMED (4 N on a flat sole)
+    };
+    RobotContacts {
+        foot: FootContact {
+            law: sole,
+            sole_radius_m: 0.03,        // m ASSUMED
+            sphere_radius_m: 0.01,      // m ASSUMED: rounding of the sole's rim
+            switch_threshold_m: 5.0e-5, // m ASSUMED (1 N on a flat sole)
+        },
+        wheel: WheelContact {
+            law: ContactLaw {
+                stiffness_n_m: 6.0e4,         // N/m ASSUMED (1.8 mm under 107 N)
+                bristle_stiffness_n_m: 6.0e4, // N/m ASSUMED
+                bristle_damping_n_s_m: 150.0, // N s/m ASSUMED
+                ..sole                        // damping and friction ASSUMED as the sole's
+            },
+            width_m: 0.05,            // m ASSUMED
+            rolling_resistance: 0.02, // - ASSUMED
+            rolling_blend_rad_s: 0.1, // rad/s ASSUMED, numerical
+        },
+        chassis: ChassisContact {
+            law: ContactLaw {
+                stiffness_n_m: 1.0e5,         // N/m ASSUMED
+                mu_static: 0.4,               // - ASSUMED sheet metal on stone
+                mu_kinetic: 0.4,              // - ASSUMED
+                bristle_stiffness_n_m: 5.0e4, // N/m ASSUMED
+                ..sole                        // damping ASSUMED as the sole's
+            },
+            // m ASSUMED: the box of the inertias, with its belly 0.12 m above the ground
+            from_m: [-0.433, -0.20, -0.03],
+            to_m: [0.167, 0.20, 0.12],
+        },
     }
 }
 
@@ -246,6 +277,7 @@ pub fn wheeleg_2003() -> PlantParams {
     let leg = [balanced.clone(), balanced, pushing];
     let [yaw, horizontal, vertical] = leg.clone();
     let [yaw_r, horizontal_r, vertical_r] = leg;
+    let floating = FloatingParams::wheeleg_2003();
     PlantParams {
         gas,
         supply,
@@ -254,8 +286,14 @@ pub fn wheeleg_2003() -> PlantParams {
         initial_stroke_m: [0.09, 0.0, 0.18, 0.09, 0.0, 0.18],
         stroke_zero_m: [0.31, 0.01, 0.01, 0.31, 0.01, 0.01], // m ASSUMED; 0.01 PAPER Table 1
         body: RobotDynamicsParams::wheeleg_2003(),
-        contact: ground_contact(),
-        ground: Ground::default(), // flat
+        spatial: SpatialParams {
+            chassis_roll_inertia_kg_m2: floating.chassis_roll_inertia_kg_m2, // ASSUMED
+            chassis_yaw_inertia_kg_m2: floating.chassis_yaw_inertia_kg_m2,   // ASSUMED
+            wheel_transverse_inertia_kg_m2: floating.wheel_transverse_inertia_kg_m2, // ASSUMED
+            track_m: floating.track_m,                                       // m ASSUMED
+        },
+        contacts: ground_contacts(),
+        terrain: Terrain::default(), // level floor
         motors: [wheel_motor(); 2],
         potentiometers: [potentiometer(); 6],
         adc: adc(),

@@ -63,7 +63,7 @@ impl Observer {
                 t_ns,
                 foot,
                 FootSample {
-                    normal_force_n: out.foot_force_n[foot][2],
+                    normal_force_n: out.foot_normal_n[foot],
                     friction_force_n: out.foot_force_n[foot][0],
                     clearance_mm: out.foot_clearance_m[foot] * 1e3,
                     switches: vertical.map_or(0, |board| switch_bits(board.snapshot().switches)),
@@ -74,10 +74,17 @@ impl Observer {
         recorder.body(
             t_ns,
             BodySample {
-                travel_mm: out.travel_m * 1e3,
-                speed_mm_s: out.speed_m_s * 1e3,
-                pitch_deg: out.pitch_rad.to_degrees(),
-                pitch_rate_deg_s: out.pitch_rate_rad_s.to_degrees(),
+                x_mm: out.position_m[0] * 1e3,
+                y_mm: out.position_m[1] * 1e3,
+                z_mm: out.position_m[2] * 1e3,
+                roll_deg: out.attitude_rad[0].to_degrees(),
+                pitch_deg: out.attitude_rad[1].to_degrees(),
+                yaw_deg: out.attitude_rad[2].to_degrees(),
+                speed_mm_s: out.velocity_m_s[0] * 1e3,
+                roll_rate_deg_s: out.angular_velocity_rad_s[0].to_degrees(),
+                pitch_rate_deg_s: out.angular_velocity_rad_s[1].to_degrees(),
+                yaw_rate_deg_s: out.angular_velocity_rad_s[2].to_degrees(),
+                chassis_force_n: out.chassis_normal_n,
             },
         );
         let gas = &world.plant().params().gas;
@@ -158,6 +165,8 @@ impl Observer {
                     drive: f64::from(node.drive_percent) / 100.0,
                     current_a: out.motor_current_a[i],
                     torque_n_m: out.wheel_torque_n_m[i],
+                    slip_mm_s: out.wheel_slip_m_s[i] * 1e3,
+                    load_n: out.wheel_normal_n[i],
                     count: node.count.get(),
                     limits: node.limits.raw(),
                     mode: node.mode.code(),

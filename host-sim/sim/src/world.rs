@@ -322,7 +322,7 @@ impl World {
     pub(super) fn wheel_inputs(&mut self, wheel: usize) -> BoardInputs {
         let core = &self.state.core;
         let mechanics = &self.plant.assembly.mechanics;
-        let angle_rad = mechanics.wheel_angle_rad(&core.motion);
+        let angle_rad = mechanics.wheel_angle_rad(&core.motion)[wheel];
         let edges = mechanics.motors[wheel].encoder_edges(angle_rad);
         BoardInputs {
             edges: self.faults.edges(wheel, edges),

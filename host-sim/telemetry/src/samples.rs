@@ -186,6 +186,10 @@ samples! {
         current_a: f64, "A", 4, Plant;
         /// Torque on the wheel.
         torque_n_m: f64, "N m", 4, Plant;
+        /// Speed of the tread over the ground, positive if the wheel turns faster than it travels.
+        slip_mm_s: f64, "mm/s", 4, Plant;
+        /// Ground force normal to the tread.
+        load_n: f64, "N", 3, Plant;
         /// Encoder position, 24-bit wrapping count.
         count: i32, "count", 0, Node;
         /// Limits that shaped the output in this sample, as for joints.
@@ -198,21 +202,35 @@ samples! {
 
     /// Chassis motion, 1 kHz.
     BodySample = "wheeleg.Body" {
-        /// Forward travel of the chassis.
-        travel_mm: f64, "mm", 4, Plant;
-        /// Forward speed of the chassis.
-        speed_mm_s: f64, "mm/s", 4, Plant;
-        /// Pitch about the wheel axle, nose up positive.
+        /// Middle of the wheel axle in the world: forward at the start.
+        x_mm: f64, "mm", 4, Plant;
+        /// The same, left.
+        y_mm: f64, "mm", 4, Plant;
+        /// The same, up.
+        z_mm: f64, "mm", 4, Plant;
+        /// Roll of the chassis, right side down positive.
+        roll_deg: f64, "deg", 5, Plant;
+        /// Pitch, nose up positive.
         pitch_deg: f64, "deg", 5, Plant;
+        /// Yaw, to the left positive.
+        yaw_deg: f64, "deg", 5, Plant;
+        /// Forward speed of the middle of the axle.
+        speed_mm_s: f64, "mm/s", 4, Plant;
+        /// Roll rate about the chassis's own axis.
+        roll_rate_deg_s: f64, "deg/s", 4, Plant;
         /// Pitch rate.
         pitch_rate_deg_s: f64, "deg/s", 4, Plant;
+        /// Yaw rate.
+        yaw_rate_deg_s: f64, "deg/s", 4, Plant;
+        /// Ground force normal to what the chassis lies on; 0 unless it lies.
+        chassis_force_n: f64, "N", 3, Plant;
     }
 
     /// One foot, 1 kHz.
     FootSample = "wheeleg.Foot" {
-        /// Ground force normal to the sole.
+        /// Ground force normal to the surfaces that the sole touches.
         normal_force_n: f64, "N", 3, Plant;
-        /// Ground force along the direction of travel.
+        /// Ground force along the world's X, the direction of travel at the start.
         friction_force_n: f64, "N", 3, Plant;
         /// Height of the sole above the ground below it.
         clearance_mm: f64, "mm", 4, Plant;

@@ -237,6 +237,22 @@ params! {
         gravity: [f64; 3], "gravity", Acceleration, -30.0, 30.0;
     }
 
+    /// What a chassis that rolls and turns needs beyond its masses, and the drawing.
+    SpatialParams {
+        /// Inertia of the chassis about its centre of mass, roll axis.
+        chassis_roll_inertia_kg_m2: f64, "chassis_roll_inertia", Inertia, 1e-4, 1000.0;
+        /// Inertia of the chassis about its centre of mass, yaw axis.
+        chassis_yaw_inertia_kg_m2: f64, "chassis_yaw_inertia", Inertia, 1e-4, 1000.0;
+        /// Inertia of one wheel about a diameter, at its centre.
+        wheel_transverse_inertia_kg_m2: f64, "wheel_transverse_inertia", Inertia, 1e-6, 100.0;
+        /// Distance between the middle planes of the wheels.
+        track_m: f64, "track", Length, 0.05, 5.0;
+        /// Chassis box: length, width, height. For the drawing.
+        chassis_size_m: [f64; 3], "chassis_size", Length, 0.01, 5.0;
+        /// Width of a wheel.
+        wheel_width_m: f64, "wheel_width", Length, 1e-3, 1.0;
+    }
+
     /// A rigid body of a leg, in its link frame.
     LinkSection {
         /// Mass.
@@ -264,9 +280,47 @@ params! {
         /// Bristle damping.
         bristle_damping: f64, "bristle_damping", Damping, 0.0, 1e6;
         /// Radius of the sole.
-        sole_radius: f64, "sole_radius", Length, 0.0, 1.0;
-        /// Penetration of a side of the sole that closes its switch.
+        sole_radius: f64, "sole_radius", Length, 1e-3, 1.0;
+        /// Radius of each of the five spheres that the sole touches with.
+        sphere_radius: f64, "sphere_radius", Length, 1e-4, 1.0;
+        /// Penetration of a side of the sole that closes its switch; half of it opens it.
         switch_threshold: f64, "switch_threshold", Length, 0.0, 0.1;
+    }
+
+    /// Wheels on the ground; damping, friction and Stribeck velocity are those of the soles.
+    WheelContactSection {
+        /// Normal stiffness of a wheel.
+        stiffness: f64, "stiffness", Stiffness, 1.0, 1e9;
+        /// Bristle stiffness of a wheel.
+        bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1.0, 1e9;
+        /// Bristle damping of a wheel.
+        bristle_damping: f64, "bristle_damping", Damping, 0.0, 1e6;
+        /// Coefficient of static friction.
+        mu_static: f64, "mu_static", Number, 0.0, 10.0;
+        /// Coefficient of kinetic friction; at most the static one.
+        mu_kinetic: f64, "mu_kinetic", Number, 0.0, 10.0;
+        /// Rolling resistance: moment over load and radius.
+        rolling_resistance: f64, "rolling_resistance", Number, 0.0, 1.0;
+        /// Speed of turning at which that moment is nearly whole.
+        rolling_blend: f64, "rolling_blend", AngularVelocity, 1e-3, 10.0;
+    }
+
+    /// The chassis on the ground; damping and Stribeck velocity are those of the soles.
+    ChassisContactSection {
+        /// Normal stiffness of a corner.
+        stiffness: f64, "stiffness", Stiffness, 1.0, 1e9;
+        /// Bristle stiffness of a corner.
+        bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1.0, 1e9;
+        /// Bristle damping of a corner.
+        bristle_damping: f64, "bristle_damping", Damping, 0.0, 1e6;
+        /// Coefficient of static friction.
+        mu_static: f64, "mu_static", Number, 0.0, 10.0;
+        /// Coefficient of kinetic friction; at most the static one.
+        mu_kinetic: f64, "mu_kinetic", Number, 0.0, 10.0;
+        /// Rear right lower corner of its box from the middle of the axle: forward, left, up.
+        from: [f64; 3], "from", Length, -10.0, 10.0;
+        /// Front left upper corner.
+        to: [f64; 3], "to", Length, -10.0, 10.0;
     }
 
     /// Numerics of the plant.

@@ -2,9 +2,8 @@
 //!
 //! * [`noc`]: the readable reference, block by block as in the paper (leg 36 × 3, half robot
 //!   48 × 4), with the corrected equations. [`printed`] holds the paper's printed variants.
-//! * [`robot`]: the engine the simulator steps: the whole robot in eight coordinates, floating in
-//!   pitch on its wheel axle. Same principle, with the zeros left out.
-//! * [`floating`]: the whole robot with a floating chassis, fourteen velocities, both ways.
+//! * [`floating`]: the engine the simulator steps: the whole robot with a floating chassis,
+//!   fourteen velocities, both ways.
 //! * [`chain`]: a recursive engine for any tree of revolute and prismatic joints, and the leg on it.
 //!
 //! Positive cylinder forces extend their cylinder. Gravity is a vector, so a slope is a tilted
@@ -16,8 +15,6 @@ pub mod floating;
 pub mod noc;
 mod params;
 pub mod printed;
-pub mod robot;
 
 pub use error::DynamicsError;
 pub use params::{BodyParams, HalfRobotParams, LegBodies, RobotDynamicsParams};
-pub use robot::{FootKin, RobotDynamics, RobotKin, RobotSide};

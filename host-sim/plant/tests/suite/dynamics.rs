@@ -1,11 +1,12 @@
 //! The fast engine against the half robot, and against energies summed over bodies whose
 //! positions are written down here a second time.
 
+use crate::eight::dynamics::{RobotDynamics, RobotSide};
 use nalgebra::{Matrix3, SVector, Vector3, Vector4};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use wheeleg_plant::dynamics::RobotDynamicsParams;
 use wheeleg_plant::dynamics::noc::HalfRobot;
-use wheeleg_plant::dynamics::{RobotDynamics, RobotDynamicsParams, RobotSide};
 
 type V8 = SVector<f64, 8>;
 

@@ -33,7 +33,7 @@ fn twists_are_the_rates_of_the_poses() {
             let placements = at(t).placements;
             SVector::from_fn(|i, _| placements[i / 3].com_m[i % 3])
         });
-        let points: SVector<f64, 12> = derivative(|t| {
+        let points: SVector<f64, 15> = derivative(|t| {
             let points = at(t).points_m;
             SVector::from_fn(|i, _| points[i / 3][i % 3])
         });
@@ -51,7 +51,7 @@ fn twists_are_the_rates_of_the_poses() {
             worst[1] = worst[1].max((centres.fixed_rows::<3>(3 * i) - linear).amax());
             fastest = fastest.max(linear.amax());
         }
-        for i in 0..4 {
+        for i in 0..5 {
             let velocity = now.contact_jacobians[i] * now.blocks.rates;
             let error = points.fixed_rows::<3>(3 * i) - velocity.fixed_rows::<3>(3);
             worst[2] = worst[2].max(error.amax());
@@ -189,12 +189,12 @@ fn power_of_all_forces_is_the_change_of_energy() {
         // Contacts: force on the moving point, moment on the turning body.
         let system = plain.at(&c.state).unwrap();
         let wrenches = c.contacts.all();
-        let turning = [6, 12, 13, 14].map(|body: usize| {
+        let turning = [6, 12, 13, 14, 0].map(|body: usize| {
             let block = &system.blocks.bodies[body];
             (block.t * nu).fixed_rows::<3>(0).into_owned()
         });
         let mut ground = 0.0;
-        for i in 0..4 {
+        for i in 0..5 {
             let velocity: Vector3<f64> = derivative_over(1e-4, |t| {
                 fast.prepare(&at(t), &c.gravity).unwrap().points_m()[i]
             });

@@ -1,14 +1,13 @@
 //! Any bits as input of the dynamics: a finite answer or a typed refusal, never NaN, never a panic.
 
+use crate::eight::dynamics::{RobotDynamics, RobotSide};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 use wheeleg_plant::dynamics::chain::reference::{ROBOT14, RPP, RPR};
 use wheeleg_plant::dynamics::chain::{ChainLeg, FloatingState};
 use wheeleg_plant::dynamics::noc::{HalfRobot, Leg, System, r2p, rpr};
 use wheeleg_plant::dynamics::printed::tau_l_printed_58_64;
-use wheeleg_plant::dynamics::{
-    BodyParams, DynamicsError, HalfRobotParams, RobotDynamics, RobotDynamicsParams, RobotSide,
-};
+use wheeleg_plant::dynamics::{BodyParams, DynamicsError, HalfRobotParams, RobotDynamicsParams};
 
 /// Raw bits, edges of the format, and ordinary numbers, so that every branch is met.
 fn number() -> impl Strategy<Value = f64> {

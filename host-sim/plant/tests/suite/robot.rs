@@ -1,5 +1,6 @@
 //! Behaviour of the assembled robot.
 
+use nalgebra::Vector3;
 use wheeleg_plant::testing::wheeleg_2003;
 use wheeleg_plant::{Inputs, Plant, PlantError, PlantState};
 
@@ -114,10 +115,13 @@ fn save_and_restore_goes_on_bit_for_bit() {
 fn every_state_variable_is_in_the_hash() {
     let (plant, state) = robot();
     let base = plant.state_hash(&state);
-    let changes: [fn(&mut PlantState); 9] = [
+    let changes: [fn(&mut PlantState); 12] = [
         |s| s.core.time_ns += 1,
-        |s| s.core.motion.position[7] += 1e-15,
-        |s| s.core.motion.velocity[0] = -0.0,
+        |s| s.core.motion.state.lengths_m[1][2] += 1e-15,
+        |s| s.core.motion.state.velocity[0] = -1e-300,
+        |s| s.core.motion.state.wheel_rad[1] += 1e-15,
+        |s| s.core.motion.contacts.feet[1][4][0].stretch_m.z = 1e-300,
+        |s| s.core.motion.contacts.switches[1][3] ^= true,
         |s| s.core.motion.motors[1].current_a = 1e-300,
         |s| s.core.cylinders[5].chamber_b.mass_kg *= 1.0 + f64::EPSILON,
         |s| s.core.cylinders[3].bristle_m = 1e-300,
@@ -192,7 +196,7 @@ fn dumping_empties_the_supply_and_opens_the_switch() {
 #[test]
 fn an_exploding_state_is_named() {
     let (plant, mut state) = robot();
-    state.core.motion.velocity[4] = 1e9;
+    state.core.motion.state.velocity[8] = 1e9;
     let error = plant.tick(&mut state, &Inputs::default()).unwrap_err();
     let text = error.to_string();
     assert!(!matches!(error, PlantError::Input { .. }), "{text}");
@@ -223,13 +227,13 @@ fn starts_in_equilibrium_and_stands() {
             assert!((o.foot_normal_n[leg] - start.foot_normal_n[leg]).abs() < 0.5);
             assert_eq!(o.foot_switches[leg], [true; 4]);
         }
-        assert!(o.speed_m_s.abs() < 1e-3, "{k}: {}", o.speed_m_s);
+        assert!(o.velocity_m_s[0].abs() < 1e-3, "{k}: {:?}", o.velocity_m_s);
     }
     let end = plant.outputs(&state);
     for (a, b) in start.cylinders.iter().zip(&end.cylinders) {
         assert!((a.stroke_m - b.stroke_m).abs() < 2e-5);
     }
-    assert!(end.travel_m.abs() < 1e-4);
+    assert!(end.position_m[0].abs() < 1e-4);
 }
 
 #[test]
@@ -237,12 +241,16 @@ fn feet_carry_what_the_moments_about_the_axle_say() {
     // Both legs at b5 = 0.01: moment of legs and chassis over the feet's lever.
     let (plant, state) = robot();
     let body = plant.assembly.mechanics.dynamics.clone();
-    let motion = &state.core.motion;
-    let kin = body.prepare(&motion.position, &motion.velocity).unwrap();
-    let weight = body.params().total_mass_kg() * 9.81;
+    let down = Vector3::new(0.0, 0.0, -9.81);
+    let kin = body.prepare(&state.core.motion.state, &down).unwrap();
+    let weight = body.params().robot.total_mass_kg() * 9.81;
     let o = plant.outputs(&state);
-    let lever = o.sole_m[0][0];
-    let expected = weight * kin.com_m()[0] / lever;
+    // The wheels' load acts right below the axle, that of a sole where its spheres have it.
+    let scene = plant.assembly.mechanics.scene(&state.core.motion).unwrap();
+    let sole = &scene.loads.contacts.feet[0];
+    let axle = o.position_m[0];
+    let lever = o.sole_m[0][0] - sole.moment_n_m.y / sole.force_n.z - axle;
+    let expected = weight * (kin.com_m()[0] - axle) / lever;
     let carried: f64 = o.foot_normal_n.iter().sum();
     assert!(
         (carried - expected).abs() < 1e-6 * expected,
@@ -292,12 +300,18 @@ fn drives_at_the_speed_the_motor_characteristic_gives() {
     };
     run(&plant, &mut state, &inputs, 4000);
     let o = plant.outputs(&state);
-    let m = &plant.params().motors[0];
-    assert!(o.speed_m_s > 0.1, "{}", o.speed_m_s);
-    // Steady: torque of both wheels over the radius balances the drag.
-    let drag = -(o.foot_force_n[0][0] + o.foot_force_n[1][0]) + 4.0 * o.speed_m_s;
+    let p = plant.params();
+    let m = &p.motors[0];
+    let speed = o.velocity_m_s[0];
+    assert!(speed > 0.1, "{speed}");
+    // Steady: torque of both wheels over the radius balances soles, bearings and rolling.
+    let load: f64 = o.wheel_normal_n.iter().sum();
+    let rolling = p.contacts.wheel.rolling_resistance * load;
+    let drag = -(o.foot_force_n[0][0] + o.foot_force_n[1][0]) + 4.0 * speed + rolling;
     let push = (o.wheel_torque_n_m[0] + o.wheel_torque_n_m[1]) / 0.15;
     assert!((push / drag - 1.0).abs() < 0.02, "{push} {drag}");
+    // It rolls: far from the friction of its tyres nothing slips but the bristles' give.
+    assert!(o.wheel_slip_m_s.iter().all(|s| s.abs() < 1e-3 * speed));
     // Winding equation at that speed.
     let motor_rad_s = o.wheel_rate_rad_s[0] * m.reduction;
     let current = (0.5 * m.supply_v - m.torque_constant_n_m_a * motor_rad_s) / m.resistance_ohm;
@@ -306,15 +320,18 @@ fn drives_at_the_speed_the_motor_characteristic_gives() {
         "{current}"
     );
     // Encoder: four edges a line, 260 turns of the motor a wheel turn.
-    let turns = (o.travel_m / 0.15 + o.pitch_rad) / std::f64::consts::TAU;
+    let turns = (o.position_m[0] / 0.15 + o.attitude_rad[1]) / std::f64::consts::TAU;
     let edges = turns * 4.0 * f64::from(m.encoder_lines) * 260.0;
-    assert!((o.encoder_edges[0] as f64 - edges).abs() <= 1.0, "{edges}");
+    assert!(
+        (o.encoder_edges[0] as f64 / edges - 1.0).abs() < 2e-3,
+        "{edges}"
+    );
     // Coulomb drag of sliding soles.
-    let mu = plant.params().contact.mu_kinetic;
+    let mu = p.contacts.foot.law.mu_kinetic;
     assert!((-o.foot_force_n[0][0] / (mu * o.foot_normal_n[0]) - 1.0).abs() < 0.01);
     // Bridges off: gear and drag stop it.
     run(&plant, &mut state, &Inputs::default(), 1000);
-    assert!(plant.outputs(&state).speed_m_s.abs() < 2e-3);
+    assert!(plant.outputs(&state).velocity_m_s[0].abs() < 2e-3);
 }
 
 #[test]

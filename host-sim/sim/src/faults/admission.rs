@@ -167,7 +167,7 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
             ("source pressure", " bar", supply_pa * 1e-5)
         }
         FaultKind::FootSlips => {
-            let contact = &plant.contact;
+            let contact = &plant.contacts.foot.law;
             (
                 "coefficient of friction",
                 "",

@@ -8,7 +8,6 @@
 
 use rand_pcg::Pcg64Mcg;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
-use wheeleg_plant::ground::GroundPatch;
 use wheeleg_plant::noise::Normal;
 use wheeleg_plant::robot::{Plant, PlantState};
 use wheeleg_plant::sensors::{SensorFault, signal_rng};
@@ -19,9 +18,6 @@ use super::interface::of_other;
 use super::line::{LineErrors, record, rubbish};
 use rand::RngExt;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
-
-/// Half the side of the ground that falls away, m: further than a robot gets.
-const GROUND_M: f64 = 1e4;
 
 /// The faults of one run.
 #[derive(Debug)]
@@ -343,32 +339,12 @@ fn rebuild(plant: &mut Plant, joint: usize, begin: bool, change: impl FnOnce(&mu
 }
 
 fn on_ground(fault: &FaultSpec, begin: bool, plant: &mut Plant) {
+    let touching = &mut plant.assembly.mechanics.touching;
     match fault.kind {
-        FaultKind::FootSlips => {
-            let sound = plant.params().contact;
-            let mechanics = &mut plant.assembly.mechanics;
-            mechanics.contact = sound;
-            if begin {
-                let contact = &mut mechanics.contact;
-                contact.mu_static = contact.mu_static.min(fault.value);
-                contact.mu_kinetic = contact.mu_kinetic.min(fault.value);
-            }
-        }
+        FaultKind::FootSlips => touching.limit_foot_friction(begin.then_some(fault.value)),
+        // The ground goes down under the feet alone; the wheels stay.
         FaultKind::FootLosesContact => {
-            let sound = plant.params().ground.clone();
-            let mechanics = &mut plant.assembly.mechanics;
-            mechanics.ground = sound;
-            if begin {
-                // The wheels run on their own plane, so the ground may go under the feet alone.
-                for patch in &mut mechanics.ground.patches {
-                    patch.height_m -= fault.value;
-                }
-                mechanics.ground.patches.push(GroundPatch {
-                    x_m: [-GROUND_M, GROUND_M],
-                    y_m: [-GROUND_M, GROUND_M],
-                    height_m: -fault.value,
-                });
-            }
+            touching.sink_under_feet(if begin { fault.value } else { 0.0 });
         }
         _ => {}
     }

@@ -307,7 +307,7 @@ fn leg(
         collides: false,
     };
     let strokes = [0, 1, 2].map(|k| plant.cylinders[first + k].stroke_m);
-    let sole = plant.contact.sole_radius_m;
+    let sole = plant.contacts.foot.sole_radius_m;
     let mut body_link = |name: &str, inertial, shapes| {
         tree.links.push(Link {
             name: link(name),

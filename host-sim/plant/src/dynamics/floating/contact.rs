@@ -50,8 +50,8 @@ impl Wrench {
     }
 }
 
-/// Ground on both feet and both wheels; left first. Reference points: the sole's centre (foot pad
-/// below P) and the wheel's centre. The wheel's wrench acts on the turning wheel, so the driving
+/// Ground on both feet, both wheels and the chassis; left first. Reference points: the sole's centre
+/// (foot pad below P), the wheel's centre, the origin of B. The wheel's wrench acts on the turning wheel, so the driving
 /// force of the ground, taken at the tread, brings its moment about the axle with it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Contacts {
@@ -59,6 +59,8 @@ pub struct Contacts {
     pub feet: [Wrench; 2],
     /// On the wheels.
     pub wheels: [Wrench; 2],
+    /// On the chassis.
+    pub chassis: Wrench,
 }
 
 impl Contacts {
@@ -66,13 +68,14 @@ impl Contacts {
     pub const NONE: Self = Self {
         feet: [Wrench::ZERO; 2],
         wheels: [Wrench::ZERO; 2],
+        chassis: Wrench::ZERO,
     };
 
-    /// In the order feet, wheels; left first.
+    /// In the order feet, wheels, chassis; left first.
     #[must_use]
-    pub fn all(&self) -> [Wrench; 4] {
+    pub fn all(&self) -> [Wrench; 5] {
         let ([a, b], [c, d]) = (self.feet, self.wheels);
-        [a, b, c, d]
+        [a, b, c, d, self.chassis]
     }
 
     /// Refuses NaN and infinity.
@@ -81,7 +84,7 @@ impl Contacts {
     /// [`DynamicsError::NonFinite`], `contact`, index 6 × contact + entry of \[moment, force\].
     pub fn check(&self) -> Result<(), DynamicsError> {
         let all = self.all();
-        let values: [f64; 24] = std::array::from_fn(|i| {
+        let values: [f64; 30] = std::array::from_fn(|i| {
             let wrench = &all[i / 6];
             if i % 6 < 3 {
                 wrench.moment_n_m[i % 3]

@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use wheeleg_kinematics::LegPosture;
 
-use super::contact::Contacts;
+use super::contact::{Contacts, Wrench};
 use super::group::Sym3;
 use super::leg::{LegTerms, joined};
 use super::mirror;
@@ -186,16 +186,77 @@ impl FloatingKin {
         -self.viscous.component_mul(&self.velocity)
     }
 
-    /// Contact reference points in the world (m): left and right sole, left and right wheel centre.
+    /// Contact reference points in the world (m): left and right sole, left and right wheel
+    /// centre, origin of B.
     #[must_use]
-    pub fn points_m(&self) -> [Vector3<f64>; 4] {
+    pub fn points_m(&self) -> [Vector3<f64>; 5] {
         self.local_points()
-            .map(|r| self.position + self.rotation * r)
+            .map(|r| self.position + turned(&self.rotation, &r))
     }
 
-    fn local_points(&self) -> [Vector3<f64>; 4] {
+    #[inline]
+    fn local_points(&self) -> [Vector3<f64>; 5] {
         let wheel = Vector3::new(0.0, self.half_track, 0.0);
-        [self.soles[0], self.soles[1], wheel, -wheel]
+        [
+            self.soles[0],
+            self.soles[1],
+            wheel,
+            -wheel,
+            Vector3::zeros(),
+        ]
+    }
+
+    /// Chassis axes in world components.
+    #[must_use]
+    pub fn rotation(&self) -> &Matrix3<f64> {
+        &self.rotation
+    }
+
+    /// Axes of a foot (0 left, 1 right) in the world: forward along the leg, left as the robot
+    /// looks on both legs, up.
+    #[must_use]
+    pub fn foot_axes(&self, leg: usize) -> [Vector3<f64>; 3] {
+        let (s, posture) = (mirror::sign(leg), &self.postures[leg]);
+        let (s4, c4) = (posture.sin4, posture.cos4);
+        let r = &self.rotation;
+        [
+            turned(r, &Vector3::new(s4, -s * c4, 0.0)),
+            turned(r, &Vector3::new(s * c4, s4, 0.0)),
+            r.column(2).into_owned(),
+        ]
+    }
+
+    /// Twist of a body at a velocity ν in world axes, about its point of
+    /// [`FloatingKin::points_m`]: angular velocity (rad/s) and velocity of the point (m/s). A wheel
+    /// turns with its rate.
+    #[must_use]
+    #[inline]
+    pub fn twist(&self, body: usize, velocity: &Velocity) -> [Vector3<f64>; 2] {
+        let omega = Vector3::new(velocity[0], velocity[1], velocity[2]);
+        let mut turning = omega;
+        let mut moving = Vector3::new(velocity[3], velocity[4], velocity[5]);
+        moving += omega.cross(&self.local_points()[body]);
+        match body {
+            0 | 1 => {
+                let (s, posture) = (mirror::sign(body), &self.postures[body]);
+                let (s4, c4) = (posture.sin4, posture.cos4);
+                let k = LEG + 3 * body;
+                let yaw = posture.phi_prime * velocity[k];
+                let arm = posture.lengths.b5_m * yaw;
+                turning.z += s * yaw;
+                moving += Vector3::new(
+                    arm * c4 + s4 * velocity[k + 1],
+                    s * (arm * s4 - c4 * velocity[k + 1]),
+                    -velocity[k + 2],
+                );
+            }
+            2 | 3 => turning.y += velocity[WHEEL + body - 2],
+            _ => {}
+        }
+        [
+            turned(&self.rotation, &turning),
+            turned(&self.rotation, &moving),
+        ]
     }
 
     /// Generalised force of the contacts.
@@ -205,15 +266,18 @@ impl FloatingKin {
             return Velocity::zeros();
         }
         let (mut angular, mut linear) = (Vector3::zeros(), Vector3::zeros());
-        let mut local = [(Vector3::zeros(), Vector3::zeros()); 4];
+        let mut local = [(Vector3::zeros(), Vector3::zeros()); 5];
         for ((wrench, point), own) in contacts
             .all()
             .iter()
             .zip(self.local_points())
             .zip(&mut local)
         {
-            let n = self.rotation.tr_mul(&wrench.moment_n_m);
-            let f = self.rotation.tr_mul(&wrench.force_n);
+            if *wrench == Wrench::ZERO {
+                continue;
+            }
+            let n = turned_back(&self.rotation, &wrench.moment_n_m);
+            let f = turned_back(&self.rotation, &wrench.force_n);
             angular += n + point.cross(&f);
             linear += f;
             *own = (n, f);
@@ -263,4 +327,24 @@ impl FloatingKin {
             angular_kg_m2_s: self.rotation * about_com,
         }
     }
+}
+
+/// R v. The general product of matrices is no faster than its loops.
+#[inline]
+fn turned(r: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(
+        r.m11 * v.x + r.m12 * v.y + r.m13 * v.z,
+        r.m21 * v.x + r.m22 * v.y + r.m23 * v.z,
+        r.m31 * v.x + r.m32 * v.y + r.m33 * v.z,
+    )
+}
+
+/// Rᵀ v.
+#[inline]
+fn turned_back(r: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(
+        r.m11 * v.x + r.m21 * v.y + r.m31 * v.z,
+        r.m12 * v.x + r.m22 * v.y + r.m32 * v.z,
+        r.m13 * v.x + r.m23 * v.y + r.m33 * v.z,
+    )
 }

@@ -48,9 +48,9 @@ pub struct FloatingSystem {
     pub placements: [Placement; BODIES],
     /// Twist of soles and wheels per velocity, at [`FloatingSystem::points_m`]: left foot, right
     /// foot, left wheel, right wheel.
-    pub contact_jacobians: [SMatrix<f64, 6, DOF>; 4],
+    pub contact_jacobians: [SMatrix<f64, 6, DOF>; 5],
     /// Contact reference points in the world (m).
-    pub points_m: [Vector3<f64>; 4],
+    pub points_m: [Vector3<f64>; 5],
 }
 
 /// Pose and velocity of the chassis while the columns are built.
@@ -180,8 +180,8 @@ impl FloatingReference {
         ));
         let first = base.body(nu, &chassis, p.chassis_mass_kg, &local[0], &[]);
         let mut bodies = [first; BODIES];
-        let mut contact_jacobians = [SMatrix::zeros(); 4];
-        let mut points = [Vector3::zeros(); 4];
+        let mut contact_jacobians = [base.columns(&O); 5];
+        let mut points = [Vector3::zeros(); 5];
 
         for leg in 0..2 {
             let of_leg = |e| on_leg(e, leg);

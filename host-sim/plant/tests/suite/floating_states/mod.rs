@@ -96,6 +96,7 @@ impl Draw {
             contacts: Contacts {
                 feet: [self.wrench(), self.wrench()],
                 wheels: [self.wrench(), self.wrench()],
+                chassis: self.wrench(),
             },
         }
     }

@@ -438,12 +438,7 @@ fn body(s: &Source<'_>) -> Figure {
     let of = |value: fn(&wheeleg_telemetry::BodySample) -> f64| -> Points {
         body.iter().map(|r| (s.t(r.t_s()), value(&r.v))).collect()
     };
-    let mut travel = vec![line(
-        "simulated robot",
-        colour::ROBOT,
-        2,
-        of(|b| b.travel_mm),
-    )];
+    let mut travel = vec![line("simulated robot", colour::ROBOT, 2, of(|b| b.x_mm))];
     if s.analysis.reference.is_some() {
         travel.insert(
             0,
@@ -456,19 +451,18 @@ fn body(s: &Source<'_>) -> Figure {
         );
     }
     let speed = vec![line("chassis", colour::ROBOT, 1, of(|b| b.speed_mm_s))];
-    let pitch = vec![line(
-        "nose up positive",
-        colour::THIRD,
-        1,
-        of(|b| b.pitch_deg),
-    )];
+    let attitude = vec![
+        line("roll, right down", colour::SECOND, 1, of(|b| b.roll_deg)),
+        line("pitch, nose up", colour::THIRD, 1, of(|b| b.pitch_deg)),
+        line("yaw, to the left", colour::ROBOT, 1, of(|b| b.yaw_deg)),
+    ];
     let travel_range = fitted((0.0, 10.0), &travel);
     let speed_range = fitted((-10.0, 200.0), &speed);
-    let pitch_range = fitted((-0.1, 0.1), &pitch);
+    let attitude_range = fitted((-0.1, 0.1), &attitude);
     Figure {
         id: "body".into(),
         title: "Chassis".into(),
-        caption: "Travel, speed and pitch of the chassis.".into(),
+        caption: "Travel, speed and attitude of the chassis.".into(),
         panels: vec![
             s.panel(
                 "travel",
@@ -476,7 +470,11 @@ fn body(s: &Source<'_>) -> Figure {
                 Content::lines(("[mm]", travel_range), travel),
             ),
             s.panel("speed", 140, Content::lines(("[mm/s]", speed_range), speed)),
-            s.panel("pitch", 120, Content::lines(("[deg]", pitch_range), pitch)),
+            s.panel(
+                "attitude",
+                120,
+                Content::lines(("[deg]", attitude_range), attitude),
+            ),
         ],
     }
 }

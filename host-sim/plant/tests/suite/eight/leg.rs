@@ -2,8 +2,8 @@
 
 use wheeleg_kinematics::LegPosture;
 
-use super::RobotDynamics;
-use crate::dynamics::params::BodyParams;
+use super::dynamics::RobotDynamics;
+use wheeleg_plant::dynamics::BodyParams;
 
 /// What slides a body along its yaw frame's forward axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

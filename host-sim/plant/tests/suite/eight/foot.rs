@@ -2,21 +2,21 @@
 
 use wheeleg_kinematics::LegPosture;
 
-use super::RobotDynamics;
+use super::dynamics::RobotDynamics;
 
 /// Position, velocity and Jacobian of a sole's centre in ground axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FootKin {
+pub(crate) struct FootKin {
     /// Sole centre (m); z = 0 is the ground under the wheels.
-    pub position_m: [f64; 3],
+    pub(crate) position_m: [f64; 3],
     /// Its velocity (m/s).
-    pub velocity_m_s: [f64; 3],
+    pub(crate) velocity_m_s: [f64; 3],
     /// Its Jacobian, one column for each of s, p and this leg's b2, b5, b6.
-    pub jacobian: [[f64; 3]; 5],
+    pub(crate) jacobian: [[f64; 3]; 5],
     /// Unit vector from the sole's centre to its front (along the leg).
-    pub forward: [f64; 3],
+    pub(crate) forward: [f64; 3],
     /// Unit vector from the sole's centre to its left side, on both legs.
-    pub left: [f64; 3],
+    pub(crate) left: [f64; 3],
 }
 
 impl RobotDynamics {

@@ -1,14 +1,16 @@
 //! The robot at one state: mass matrix, bias, and the solution for accelerations.
 
+use super::dynamics::RobotSide;
+use super::finite;
+use super::foot::FootKin;
 use super::leg::LegTerms;
-use super::{FootKin, RobotSide};
-use crate::dynamics::error::{DynamicsError, finite};
+use wheeleg_plant::dynamics::DynamicsError;
 
 /// Kinematics and mass matrix at one state, ready to solve for accelerations.
 #[derive(Debug, Clone, Copy)]
-pub struct RobotKin {
+pub(crate) struct RobotKin {
     /// Left and right foot.
-    pub feet: [FootKin; 2],
+    pub(crate) feet: [FootKin; 2],
     pub(super) ss: f64,
     pub(super) sp: f64,
     pub(super) pp: f64,
@@ -55,7 +57,7 @@ impl RobotKin {
     ///
     /// # Errors
     /// [`DynamicsError::NonFinite`], [`DynamicsError::Singular`].
-    pub fn solve(&self, generalised_force: &[f64; 8]) -> Result<[f64; 8], DynamicsError> {
+    pub(crate) fn solve(&self, generalised_force: &[f64; 8]) -> Result<[f64; 8], DynamicsError> {
         let f: [f64; 8] = std::array::from_fn(|i| generalised_force[i] + self.damping[i]);
         finite("force", &f)?;
         let (mut ss, mut sp, mut pp) = (self.ss, self.sp, self.pp);
@@ -112,7 +114,12 @@ impl RobotKin {
     }
 
     /// Adds a force on a sole's centre (N, ground axes) to a generalised force.
-    pub fn add_foot_force(&self, side: RobotSide, force_n: &[f64; 3], generalised: &mut [f64; 8]) {
+    pub(crate) fn add_foot_force(
+        &self,
+        side: RobotSide,
+        force_n: &[f64; 3],
+        generalised: &mut [f64; 8],
+    ) {
         let leg = side as usize;
         let work = self.feet[leg].jacobian.map(|column| dot(column, *force_n));
         generalised[0] += work[0];
@@ -124,7 +131,7 @@ impl RobotKin {
 
     /// Mass matrix (kg, kg m, kg m²), symmetric.
     #[must_use]
-    pub fn mass_matrix(&self) -> [[f64; 8]; 8] {
+    pub(crate) fn mass_matrix(&self) -> [[f64; 8]; 8] {
         let mut m = [[0.0; 8]; 8];
         m[0][0] = self.ss;
         m[0][1] = self.sp;
@@ -150,7 +157,7 @@ impl RobotKin {
     /// Bias forces less gravity, C q̇ − τ_g (N, N m): the force that holds q̈ at zero, friction
     /// apart.
     #[must_use]
-    pub fn bias(&self) -> [f64; 8] {
+    pub(crate) fn bias(&self) -> [f64; 8] {
         let [l, r] = &self.legs;
         [
             self.h_s, self.h_p, l.h[2], l.h[3], l.h[4], r.h[2], r.h[3], r.h[4],
@@ -159,7 +166,7 @@ impl RobotKin {
 
     /// Generalised force that gives an acceleration, friction included.
     #[must_use]
-    pub fn inverse(&self, qdd: &[f64; 8]) -> [f64; 8] {
+    pub(crate) fn inverse(&self, qdd: &[f64; 8]) -> [f64; 8] {
         let (m, h) = (self.mass_matrix(), self.bias());
         std::array::from_fn(|i| {
             let inertia: f64 = m[i].iter().zip(qdd).map(|(a, b)| a * b).sum();
@@ -169,7 +176,7 @@ impl RobotKin {
 
     /// Kinetic energy (J) at the rates given.
     #[must_use]
-    pub fn kinetic_energy_j(&self, qd: &[f64; 8]) -> f64 {
+    pub(crate) fn kinetic_energy_j(&self, qd: &[f64; 8]) -> f64 {
         let m = self.mass_matrix();
         let rows = m
             .iter()
@@ -180,7 +187,7 @@ impl RobotKin {
 
     /// Centre of mass of the robot in ground axes (m).
     #[must_use]
-    pub fn com_m(&self) -> [f64; 3] {
+    pub(crate) fn com_m(&self) -> [f64; 3] {
         self.com_m
     }
 }

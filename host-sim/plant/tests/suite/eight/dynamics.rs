@@ -1,4 +1,4 @@
-//! The whole robot in eight coordinates, fast.
+//! The whole robot in eight coordinates.
 //!
 //! # Coordinates
 //!
@@ -31,21 +31,16 @@
 //! The mass matrix is an arrow: a 2 × 2 block (s, p), a 3 × 3 block a leg whose b6 row is
 //! diagonal, and no block between the legs. It is solved by its Schur complement.
 
-mod foot;
-mod kin;
-mod leg;
-
 use wheeleg_kinematics::{LegGeometry, LegLengths, LegPosture};
 
-use super::error::{DynamicsError, finite};
-use super::params::RobotDynamicsParams;
-pub use foot::FootKin;
-pub use kin::RobotKin;
-use leg::{Axes, Slide, YawBody};
+use super::finite;
+use super::kin::RobotKin;
+use super::leg::{Axes, Slide, YawBody};
+use wheeleg_plant::dynamics::{DynamicsError, RobotDynamicsParams};
 
 /// Left or right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RobotSide {
+pub(crate) enum RobotSide {
     /// Left leg and wheel.
     Left = 0,
     /// Right leg and wheel.
@@ -54,15 +49,15 @@ pub enum RobotSide {
 
 /// Model of the robot: built once.
 #[derive(Debug, Clone)]
-pub struct RobotDynamics {
-    params: RobotDynamicsParams,
-    geometry: LegGeometry<f64>,
-    bodies: [YawBody; 6],
+pub(crate) struct RobotDynamics {
+    pub(super) params: RobotDynamicsParams,
+    pub(super) geometry: LegGeometry<f64>,
+    pub(super) bodies: [YawBody; 6],
     /// Constant part of the (s, p) block: total mass and rolling inertia; rotor coupling; rotors
     /// and chassis.
-    constant_ss: f64,
-    constant_sp: f64,
-    constant_pp: f64,
+    pub(super) constant_ss: f64,
+    pub(super) constant_sp: f64,
+    pub(super) constant_pp: f64,
 }
 
 impl RobotDynamics {
@@ -70,7 +65,7 @@ impl RobotDynamics {
     ///
     /// # Errors
     /// [`DynamicsError::Parameter`], or [`DynamicsError::Leg`] for impossible leg dimensions.
-    pub fn new(params: &RobotDynamicsParams) -> Result<Self, DynamicsError> {
+    pub(crate) fn new(params: &RobotDynamicsParams) -> Result<Self, DynamicsError> {
         params.validate()?;
         let geometry = LegGeometry::new(params.leg_parameters())
             .map_err(|source| DynamicsError::Leg { leg: 0, source })?;
@@ -105,20 +100,20 @@ impl RobotDynamics {
 
     /// The parameters.
     #[must_use]
-    pub fn params(&self) -> &RobotDynamicsParams {
+    pub(crate) fn params(&self) -> &RobotDynamicsParams {
         &self.params
     }
 
     /// Adds a wheel torque (N m, positive drives forward) to a generalised force: on s and, as the
     /// stator's reaction, on p.
-    pub fn add_wheel_torque(&self, torque_n_m: f64, force: &mut [f64; 8]) {
+    pub(crate) fn add_wheel_torque(&self, torque_n_m: f64, force: &mut [f64; 8]) {
         force[0] += torque_n_m / self.params.wheel_radius_m;
         force[1] += torque_n_m;
     }
 
     /// Angle of a wheel against the chassis (rad), what its encoder sees.
     #[must_use]
-    pub fn wheel_angle_rad(&self, q: &[f64; 8]) -> f64 {
+    pub(crate) fn wheel_angle_rad(&self, q: &[f64; 8]) -> f64 {
         q[0] / self.params.wheel_radius_m + q[1]
     }
 
@@ -126,7 +121,7 @@ impl RobotDynamics {
     ///
     /// # Errors
     /// [`DynamicsError::NonFinite`], [`DynamicsError::Leg`].
-    pub fn prepare(&self, q: &[f64; 8], qd: &[f64; 8]) -> Result<RobotKin, DynamicsError> {
+    pub(crate) fn prepare(&self, q: &[f64; 8], qd: &[f64; 8]) -> Result<RobotKin, DynamicsError> {
         finite("position", q)?;
         finite("velocity", qd)?;
         let p = &self.params;
@@ -182,7 +177,7 @@ impl RobotDynamics {
     ///
     /// # Errors
     /// [`DynamicsError`].
-    pub fn accelerations(
+    pub(crate) fn accelerations(
         &self,
         q: &[f64; 8],
         qd: &[f64; 8],
@@ -193,7 +188,7 @@ impl RobotDynamics {
 
     /// Potential energy (J), zero with the centre of mass at the origin of the ground.
     #[must_use]
-    pub fn potential_energy_j(&self, kin: &RobotKin) -> f64 {
+    pub(crate) fn potential_energy_j(&self, kin: &RobotKin) -> f64 {
         let g = self.params.gravity_m_s2;
         let lift: f64 = (0..3).map(|i| g[i] * kin.com_m[i]).sum();
         -self.params.total_mass_kg() * lift

@@ -1,0 +1,125 @@
+//! The pose in which the robot stands at rest, with its joints and wheels held.
+//!
+//! First the height, roll and pitch at which the normal forces carry it, then the whole pose, with
+//! the bristles of the contacts stretched by what it shifts: on a slope they hold it. The unknown
+//! is a small twist of the chassis, the equations its six equations of motion at rest. Newton's
+//! method, with the step bounded by a stiffness of its own that fades with the error: |error| over
+//! the longest step. It goes down at that pace while nothing touches, and converges quadratically
+//! in the end.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::contacts::ContactStates;
+use super::{BodyMechanics, BodyMotion};
+use crate::dynamics::floating::Velocity;
+use crate::dynamics::floating::state::LEG;
+use crate::error::PlantError;
+
+/// Longest step \[m, rad\].
+const STEP: f64 = 2e-3;
+/// Steps before it is given up; 0.3 m of fall.
+const STEPS: usize = 400;
+/// What counts as nothing \[N, N m\].
+const NOTHING: f64 = 1e-9;
+/// For the slope of the forces \[m, rad\].
+const DIFFERENCE: f64 = 1e-8;
+
+/// Roll, pitch, up.
+const UPRIGHT: [usize; 3] = [0, 1, 5];
+/// All directions of a twist.
+const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
+
+impl BodyMechanics {
+    /// Puts the robot into the pose in which it stands, starting from where it is.
+    ///
+    /// # Errors
+    /// [`PlantError::Mechanics`] if it does not stand on its feet in this pose.
+    pub fn stand(&self, motion: &mut BodyMotion) -> Result<(), PlantError> {
+        motion.contacts = ContactStates::default();
+        self.balance(motion, &UPRIGHT, false)?;
+        self.balance(motion, &ALL, true)?;
+        let scene = self.scene(motion)?;
+        if scene.loads.feet.iter().all(|foot| foot.normal_n <= 0.0) {
+            return Err(not_standing());
+        }
+        Ok(())
+    }
+
+    /// Piston forces that hold the robot at rest in its pose, with its contacts as they are \[N\].
+    ///
+    /// # Errors
+    /// [`PlantError::Mechanics`] or [`PlantError::NonFinite`] if the pose cannot be.
+    pub fn holding_forces_n(&self, motion: &BodyMotion) -> Result<[f64; 6], PlantError> {
+        let scene = self.scene(motion)?;
+        let needed = scene.kin.bias() - scene.kin.contact_force(&scene.loads.contacts);
+        Ok(std::array::from_fn(|i| needed[LEG + i]))
+    }
+
+    /// Moves the chassis along some directions until nothing pushes it that way.
+    fn balance(
+        &self,
+        motion: &mut BodyMotion,
+        along: &[usize],
+        grips: bool,
+    ) -> Result<(), PlantError> {
+        let n = along.len();
+        for _ in 0..STEPS {
+            let (error, here) = self.unbalanced(motion, &Velocity::zeros(), along, grips)?;
+            let size = error.amax();
+            if size < NOTHING {
+                *motion = here;
+                return Ok(());
+            }
+            let mut slope = DMatrix::zeros(n, n);
+            for (column, direction) in along.iter().enumerate() {
+                let mut shift = Velocity::zeros();
+                shift[*direction] = DIFFERENCE;
+                let moved = self.unbalanced(motion, &shift, along, grips)?.0;
+                slope.set_column(column, &((&error - moved) / DIFFERENCE));
+                slope[(column, column)] += size / STEP;
+            }
+            let step = slope.lu().solve(&error).ok_or_else(not_standing)?;
+            let longest = step.amax();
+            let step = step * (STEP / longest.max(STEP));
+            let mut shift = Velocity::zeros();
+            for (direction, value) in along.iter().zip(step.iter()) {
+                shift[*direction] = *value;
+            }
+            let (_, moved) = self.unbalanced(motion, &shift, along, grips)?;
+            *motion = moved;
+            if longest < 1e-15 {
+                return Ok(());
+            }
+        }
+        Err(not_standing())
+    }
+
+    /// What pushes the chassis after a small shift, and the robot there.
+    fn unbalanced(
+        &self,
+        motion: &BodyMotion,
+        shift: &Velocity,
+        along: &[usize],
+        grips: bool,
+    ) -> Result<(DVector<f64>, BodyMotion), PlantError> {
+        let mut moved = motion.clone();
+        moved.state = motion.state.advanced(shift, 1.0);
+        let rest = Velocity::zeros();
+        moved.state.velocity = rest;
+        let kin = self.dynamics.prepare(&moved.state, &self.gravity_m_s2)?;
+        let mut contacts = motion.contacts;
+        let loads = self.touching.loads(&kin, &rest, shift, 1.0, &mut contacts);
+        let force = kin.contact_force(&loads.contacts) - kin.bias();
+        if grips {
+            moved.contacts = contacts;
+        } else {
+            moved.contacts = ContactStates::default();
+        }
+        let error = DVector::from_iterator(along.len(), along.iter().map(|i| force[*i]));
+        Ok((error, moved))
+    }
+}
+
+fn not_standing() -> PlantError {
+    PlantError::Mechanics("the robot does not stand on its feet in this pose".into())
+}

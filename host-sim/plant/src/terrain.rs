@@ -1,0 +1,129 @@
+//! The ground: bodies that do not move, each with its material.
+//!
+//! What touches it is a point (the centre of a sphere, the corner of a box) or a disc (a slice of
+//! a wheel). A [`Surface`] answers both with its closest place: distance, outward normal, point.
+//! World axes: X and Y horizontal, Z up, gravity vertical whatever the slope.
+
+mod plane;
+mod solid;
+mod surface;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{PlantError, check};
+pub use plane::Plane;
+pub use solid::Solid;
+pub use surface::{Disc, Near, Surface};
+
+/// A kind of surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Shape {
+    /// Everything below a plane.
+    Plane(Plane),
+    /// A convex body with flat faces.
+    Solid(Solid),
+}
+
+impl Surface for Shape {
+    #[inline]
+    fn to_point(&self, point_m: &Vector3<f64>) -> Near {
+        match self {
+            Self::Plane(s) => s.to_point(point_m),
+            Self::Solid(s) => s.to_point(point_m),
+        }
+    }
+
+    #[inline]
+    fn to_disc(&self, disc: &Disc) -> Option<Near> {
+        match self {
+            Self::Plane(s) => s.to_disc(disc),
+            Self::Solid(s) => s.to_disc(disc),
+        }
+    }
+
+    fn top_m(&self) -> f64 {
+        match self {
+            Self::Plane(s) => s.top_m(),
+            Self::Solid(s) => s.top_m(),
+        }
+    }
+}
+
+/// What a surface is made of. Friction is that of the pair: the smaller of body and ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Material {
+    /// Most static friction that it gives.
+    pub mu_static: f64,
+    /// Most kinetic friction that it gives, at most the static one.
+    pub mu_kinetic: f64,
+}
+
+impl Material {
+    /// Rough rock or floor: friction is that of the robot's soles and tyres.
+    pub const ROUGH: Self = Self {
+        mu_static: 10.0,
+        mu_kinetic: 10.0,
+    };
+
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`PlantError::Parameter`] names the field.
+    pub fn validate(&self) -> Result<(), PlantError> {
+        check("terrain.mu_static", self.mu_static, 0.0, 10.0)?;
+        check("terrain.mu_kinetic", self.mu_kinetic, 0.0, self.mu_static)
+    }
+}
+
+/// A surface and its material.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// The surface.
+    pub shape: Shape,
+    /// Its material.
+    pub material: Material,
+}
+
+/// The whole ground.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Terrain {
+    /// Its parts; a body touches each on its own.
+    pub parts: Vec<Part>,
+}
+
+impl Default for Terrain {
+    /// A level floor at height 0.
+    fn default() -> Self {
+        Self {
+            parts: vec![Part {
+                shape: Shape::Plane(Plane::level(0.0)),
+                material: Material::ROUGH,
+            }],
+        }
+    }
+}
+
+impl Terrain {
+    /// Checks every part.
+    ///
+    /// # Errors
+    /// [`PlantError::Parameter`] names the field.
+    pub fn validate(&self) -> Result<(), PlantError> {
+        self.parts.iter().try_for_each(|p| p.material.validate())
+    }
+
+    /// No part of it is higher \[m\].
+    #[must_use]
+    pub fn top_m(&self) -> f64 {
+        let tops = self.parts.iter().map(|p| p.shape.top_m());
+        tops.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Signed distance of a point from the nearest part \[m\], and the normal there.
+    #[must_use]
+    pub fn nearest(&self, point_m: &Vector3<f64>) -> Option<Near> {
+        let all = self.parts.iter().map(|p| p.shape.to_point(point_m));
+        all.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+    }
+}

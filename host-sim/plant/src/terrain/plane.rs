@@ -1,0 +1,75 @@
+//! A plane: level floor or slope.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::surface::{Disc, Near, Surface};
+
+/// Everything below a plane.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Plane {
+    /// Outward unit normal.
+    normal: Vector3<f64>,
+    /// Distance of the plane from the origin along the normal \[m\].
+    offset_m: f64,
+}
+
+impl Plane {
+    /// Level, at a height \[m\].
+    #[must_use]
+    pub fn level(height_m: f64) -> Self {
+        Self {
+            normal: Vector3::z(),
+            offset_m: height_m,
+        }
+    }
+
+    /// Through the origin, rising by `slope_rad` in the direction `azimuth_rad` from X to Y.
+    #[must_use]
+    pub fn sloping(slope_rad: f64, azimuth_rad: f64) -> Self {
+        let ((sin, cos), (up_y, up_x)) = (libm::sincos(slope_rad), libm::sincos(azimuth_rad));
+        Self {
+            normal: Vector3::new(-sin * up_x, -sin * up_y, cos),
+            offset_m: 0.0,
+        }
+    }
+
+    /// Outward unit normal.
+    #[must_use]
+    pub fn normal(&self) -> Vector3<f64> {
+        self.normal
+    }
+}
+
+impl Surface for Plane {
+    #[inline]
+    fn to_point(&self, point_m: &Vector3<f64>) -> Near {
+        Near {
+            distance_m: self.normal.dot(point_m) - self.offset_m,
+            normal: self.normal,
+            point_m: *point_m,
+        }
+    }
+
+    #[inline]
+    fn to_disc(&self, disc: &Disc) -> Option<Near> {
+        let n = &self.normal;
+        // Down the plane within the disc; a disc that lies on its side has no lowest point.
+        let within = n - n.dot(&disc.axis) * disc.axis;
+        let size = within.norm();
+        let reach = if size > 1e-9 {
+            (-disc.radius_m / size) * within
+        } else {
+            Vector3::zeros()
+        };
+        Some(self.to_point(&(disc.centre_m + reach)))
+    }
+
+    fn top_m(&self) -> f64 {
+        if self.normal.z >= 1.0 {
+            self.offset_m
+        } else {
+            f64::INFINITY
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! What every kind of ground can tell of itself.
+
+use nalgebra::Vector3;
+
+/// The closest place of a surface, seen from a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Near {
+    /// From the body to the surface \[m\]; negative: the body is in it by that depth.
+    pub distance_m: f64,
+    /// Outward unit normal of the surface there.
+    pub normal: Vector3<f64>,
+    /// Point of the body that is closest or deepest \[m\].
+    pub point_m: Vector3<f64>,
+}
+
+/// A circular slice of a wheel: its rim touches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disc {
+    /// Centre \[m\].
+    pub centre_m: Vector3<f64>,
+    /// Unit vector along the axle.
+    pub axis: Vector3<f64>,
+    /// Radius \[m\], above 0.
+    pub radius_m: f64,
+}
+
+/// Something that carries robots.
+pub trait Surface {
+    /// Closest place to a point.
+    fn to_point(&self, point_m: &Vector3<f64>) -> Near;
+
+    /// Closest place to a disc; `None` if its plane does not meet the body.
+    fn to_disc(&self, disc: &Disc) -> Option<Near>;
+
+    /// No part of it is higher \[m\].
+    fn top_m(&self) -> f64;
+}

@@ -1,0 +1,24 @@
+//! The robot in eight coordinates: wheels that roll without slip on a level floor, a chassis that
+//! travels and pitches, feet that touch in one point. An oracle for the floating robot: it was
+//! written before it, from other equations.
+
+pub(crate) mod body;
+mod contact;
+pub(crate) mod dynamics;
+mod foot;
+mod kin;
+mod leg;
+
+use wheeleg_plant::dynamics::DynamicsError;
+
+/// Passes a finite array, refuses the first value that is not.
+fn finite<const N: usize>(name: &'static str, values: &[f64; N]) -> Result<(), DynamicsError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(DynamicsError::NonFinite {
+            name,
+            index,
+            value: values[index],
+        }),
+    }
+}
