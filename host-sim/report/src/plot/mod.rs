@@ -3,6 +3,7 @@
 mod axes;
 mod bars;
 pub mod colour;
+mod data;
 mod heat;
 mod lines;
 #[cfg(feature = "png")]
@@ -15,6 +16,7 @@ use std::path::Path;
 use axes::Axes;
 pub use bars::{Bars, Column};
 pub use colour::Colour;
+pub(crate) use data::PanelData;
 pub use heat::Heat;
 pub use lines::{Lines, Series, line};
 pub use raster::{RasterRow, runs};
@@ -75,6 +77,8 @@ pub struct Panel {
     pub content: Content,
     /// Height in pixels.
     pub height: u32,
+    /// Whether the abscissa is the clock of the page: its cursor then shows there, too.
+    pub on_clock: bool,
     /// Label of the abscissa of a raster; lines have their own.
     raster_x: &'static str,
 }
@@ -130,6 +134,19 @@ impl Figure {
         svg.finish()
     }
 
+    /// Every panel as a picture of its own, with its axis.
+    pub(crate) fn panel_svgs(&self) -> impl Iterator<Item = String> + '_ {
+        self.panels.iter().map(|panel| {
+            let axis = match panel.content {
+                Content::Bars(_) => 0,
+                _ => AXIS_HEIGHT,
+            };
+            let mut svg = Svg::new(WIDTH, TITLE_HEIGHT + panel.height + axis);
+            panel.draw(&mut svg, 0, axis);
+            svg.finish()
+        })
+    }
+
     /// Writes the figure as PNG, at twice the size.
     ///
     /// # Errors
@@ -162,6 +179,7 @@ impl Panel {
             marks: Vec::new(),
             content,
             height,
+            on_clock: false,
             raster_x: TIME,
         }
     }

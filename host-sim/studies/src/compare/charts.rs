@@ -340,7 +340,7 @@ fn spread(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     Some(Figure {
         id: format!("combinations-{name}"),
         title: format!("Combinations on {name}"),
-        caption: "Load, mass, supply, friction and valve delay at random at once, one gain set; sorted, so that a curve shows what share stays below a value. Red lines at 0.5 and 6 mm.".to_owned(),
+        caption: "Load, mass, supply, friction and valve delay at random at once, one gain set; sorted, so that a curve shows what share stays below a value. Limit lines at 0.5 and 6 mm.".to_owned(),
         panels: vec![
             curves("Error at rest", errors, 0.5, 5.0),
             curves("Overshoot", sorted(|r| r.figures.overshoot_mm), 6.0, 20.0),

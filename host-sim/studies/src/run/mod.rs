@@ -3,6 +3,7 @@
 mod boards;
 mod figures;
 mod html;
+mod motion;
 mod report;
 mod summary;
 
