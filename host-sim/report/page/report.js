@@ -112,5 +112,15 @@ for (const button of document.querySelectorAll("[data-seek]")) {
     place?.scrollIntoView({ block: "center" });
   });
 }
+// A filter over the bodies of a table.
+for (const input of document.querySelectorAll("input[data-filter]")) {
+  const field = /** @type {HTMLInputElement} */ (input);
+  const table = /** @type {HTMLTableElement} */ (document.getElementById(field.dataset.filter ?? ""));
+  /** @type {HTMLElement} */ (field.closest(".filter")).hidden = false;
+  field.addEventListener("input", () => {
+    const wanted = field.value.toLowerCase();
+    for (const body of table.tBodies) body.hidden = !(body.textContent ?? "").toLowerCase().includes(wanted);
+  });
+}
 // What is folded is not lost on paper.
 addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => (d.open = true)));

@@ -127,7 +127,14 @@ mod tests {
         let page = std::fs::read_to_string(folder.path().join("report.html")).expect("written");
         // The only addresses are anchors in the page and the SVG name space.
         let links = page.replace("http://www.w3.org/2000/svg", "");
-        for forbidden in ["http:", "https:", "src=", "@import", "url(", "await import("] {
+        for forbidden in [
+            "http:",
+            "https:",
+            "src=",
+            "@import",
+            "url(",
+            "await import(",
+        ] {
             assert!(!links.contains(forbidden), "{forbidden}");
         }
         for number in 12..=16 {
