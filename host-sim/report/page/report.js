@@ -64,7 +64,7 @@ function showMotion(place, motion, player) {
     say(read.horizontal, `${fixed(now.legs[0].sensed_mm[1])} mm`);
     say(read.vertical, `${fixed(now.legs[0].sensed_mm[2])} mm`);
     say(read.travel, `${fixed(now.travel_mm / 1000, 3)} m`);
-    say(read.air, `${fixed(linear(motion.t, motion.supply_bar, t))} bar`);
+    say(read.air, `${fixed(linear(motion.t, motion.supply_bar, t) ?? held(motion.t, motion.supply_bar, t))} bar`);
   });
   place.hidden = false;
 }
@@ -101,6 +101,8 @@ if (place && source) {
   const motion = JSON.parse(source.textContent ?? "");
   clock = new Player(motion.start, motion.end);
   showMotion(place, motion, clock);
+  // The first instant at which there are samples.
+  clock.seek(motion.t[0]);
 }
 showFigures(clock);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => groups.forEach((g) => g.redraw()));
