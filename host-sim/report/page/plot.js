@@ -4,7 +4,7 @@ import { html, say, fixed } from "./dom.js";
 import { linear } from "./signal.js";
 import { stepByKey } from "./transport.js";
 
-/** @typedef {{label: string, colour: string, width: number, x: number[], y: number[]}} Series */
+/** @typedef {{label: string, colour: string, width: number, x: number[], y: Array<number | null>}} Series */
 /** @typedef {{title: string, unit: string, x_label: string, x: [number, number], y: [number, number],
  *   series: Series[], limits: number[], marks: number[], height: number}} Panel */
 
@@ -54,7 +54,7 @@ export class Plot {
     this.values = panel.series.map(() => html("b", { class: "num" }, "–"));
     const legend = panel.series.map((s, i) => s.label && html("span", { class: "key" }, html("i", { style: `border-color:var(--c-${s.colour.slice(1)}, ${s.colour});border-top-width:${s.width + 0.5}px` }), s.label, " ", this.values[i]));
     if (panel.limits.length > 0) legend.push(html("span", { class: "key" }, html("i", { class: "limit" }), "limit"));
-    if (panel.marks.length > 0) legend.push(html("span", { class: "key" }, html("i", { class: "event" }), "event"));
+    if (panel.marks.length > 0) legend.push(html("span", { class: "key" }, html("i", { class: "event" }), "mark"));
 
     this.canvas = html("canvas", { "aria-hidden": "true" });
     this.cursor = html("div", { class: "cursor", hidden: true });
@@ -190,7 +190,13 @@ export class Plot {
       g.strokeStyle = shade(s.colour);
       g.lineWidth = s.width + 0.25;
       g.beginPath();
-      s.x.forEach((t, i) => (i === 0 ? g.moveTo(X(t), Y(s.y[i])) : g.lineTo(X(t), Y(s.y[i]))));
+      // A value that does not exist is a gap, never a line across it.
+      s.x.forEach((t, i) => {
+        const value = s.y[i];
+        if (value == null) return;
+        if (i === 0 || s.y[i - 1] == null) g.moveTo(X(t), Y(value));
+        else g.lineTo(X(t), Y(value));
+      });
       g.stroke();
     }
     g.restore();

@@ -12,13 +12,13 @@ export function before(times, t) {
   return low;
 }
 
-/** Value at `t`, on a straight line between two samples; null before the first and after the last.
+/** Value at `t`, on a straight line between two samples; null before the first, after the last and in a gap.
  * @param {ArrayLike<number>} times @param {ArrayLike<number>} values @param {number} t */
 export function linear(times, values, t) {
   const last = times.length - 1;
   if (last < 0 || t < times[0] || t > times[last]) return null;
   const i = before(times, t);
-  if (i === last) return values[last];
+  if (i === last || values[i] == null || values[i + 1] == null) return i === last ? values[last] : null;
   const width = times[i + 1] - times[i];
   const part = width > 0 ? (t - times[i]) / width : 1;
   return values[i] + part * (values[i + 1] - values[i]);

@@ -2,11 +2,14 @@
 
 use serde::Serialize;
 
+use super::simplify::simplified;
 use super::{Content, Panel, Series};
 
 /// Most stretches of a curve, each told by its smallest and its largest value: no peak is lost,
 /// and a report stays small.
 const STRETCHES: usize = 500;
+/// A curve may be off by this share of its axis: a quarter of a pixel of a high panel.
+const INVISIBLE: f64 = 1e-3;
 
 /// A panel of lines for `page/plot.js`.
 #[derive(Debug, Serialize)]
@@ -31,7 +34,8 @@ struct SeriesData<'a> {
     colour: String,
     width: u32,
     x: Vec<f64>,
-    y: Vec<f64>,
+    /// None is a gap.
+    y: Vec<Option<f64>>,
 }
 
 impl<'a> PanelData<'a> {
@@ -40,10 +44,9 @@ impl<'a> PanelData<'a> {
         let Content::Lines(lines) = &panel.content else {
             return None;
         };
-        let series = lines
-            .series
-            .iter()
-            .map(|s| SeriesData::new(s, panel.x_range));
+        let tolerance = INVISIBLE * (lines.y_range.1 - lines.y_range.0);
+        let series = lines.series.iter();
+        let series = series.map(|s| SeriesData::new(s, panel.x_range, tolerance));
         Some(Self {
             title: &panel.title,
             unit: &lines.y_label,
@@ -60,18 +63,30 @@ impl<'a> PanelData<'a> {
 }
 
 impl<'a> SeriesData<'a> {
-    fn new(series: &'a Series, (from, to): (f64, f64)) -> Self {
+    fn new(series: &'a Series, (from, to): (f64, f64), tolerance: f64) -> Self {
         let inside = series.points.iter().copied();
-        let inside: Vec<(f64, f64)> = inside
-            .filter(|(x, y)| (from..=to).contains(x) && y.is_finite())
-            .collect();
-        let kept = straightened(&thinned(&inside));
+        let inside: Vec<(f64, f64)> = inside.filter(|(x, _)| (from..=to).contains(x)).collect();
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        // A value that does not exist is a gap.
+        for piece in inside.split(|(_, y)| !y.is_finite()) {
+            if piece.is_empty() {
+                continue;
+            }
+            if let Some(end) = x.last().copied() {
+                x.push(end);
+                y.push(None);
+            }
+            for point in simplified(&thinned(piece), tolerance) {
+                x.push(rounded(point.0));
+                y.push(Some(rounded(point.1)));
+            }
+        }
         Self {
             label: &series.label,
             colour: series.colour.to_string(),
             width: series.width,
-            x: kept.iter().map(|p| rounded(p.0)).collect(),
-            y: kept.iter().map(|p| rounded(p.1)).collect(),
+            x,
+            y,
         }
     }
 }
@@ -98,18 +113,6 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
-/// Without the inner points of level stretches.
-fn straightened(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let inner = |i: usize| {
-        i > 0
-            && i + 1 < points.len()
-            && points[i - 1].1 == points[i].1
-            && points[i].1 == points[i + 1].1
-    };
-    let kept = points.iter().enumerate().filter(|(i, _)| !inner(*i));
-    kept.map(|(_, p)| *p).collect()
-}
-
 /// Ten thousandths: finer than any figure shows.
 fn rounded(value: f64) -> f64 {
     // Without a minus sign on zero.
@@ -120,25 +123,35 @@ fn rounded(value: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn series(points: Vec<(f64, f64)>) -> Series {
+        crate::plot::line("", crate::plot::colour::ROBOT, 1, points)
+    }
+
     #[test]
     fn a_long_curve_keeps_its_peaks_and_its_order() {
         let mut points: Vec<(f64, f64)> = (0..50_000).map(|i| (f64::from(i), 0.0)).collect();
         points[12_345].1 = 9.0;
         points[33_333].1 = -7.0;
-        let kept = straightened(&thinned(&points));
+        let series = series(points);
+        let data = SeriesData::new(&series, (0.0, 1e6), 0.01);
+        let kept: Vec<_> = data
+            .x
+            .iter()
+            .copied()
+            .zip(data.y.iter().flatten().copied())
+            .collect();
         assert!(kept.contains(&(12_345.0, 9.0)) && kept.contains(&(33_333.0, -7.0)));
         assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
-        assert!(
-            kept.len() < 20,
-            "level stretches are two points each: {}",
-            kept.len()
-        );
+        assert!(kept.len() < 20, "{}", kept.len());
         assert_eq!(kept.last(), Some(&(49_999.0, 0.0)));
     }
 
     #[test]
-    fn a_short_curve_is_kept_as_it_is() {
-        let points = [(0.0, 1.0), (1.0, 2.0), (2.0, 1.5)];
-        assert_eq!(straightened(&thinned(&points)), points);
+    fn a_gap_stays_a_gap() {
+        let points = vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0), (3.0, 3.5)];
+        let series = series(points);
+        let data = SeriesData::new(&series, (0.0, 9.0), 0.0);
+        assert_eq!(data.x, [0.0, 0.0, 2.0, 3.0]);
+        assert_eq!(data.y, [Some(1.0), None, Some(3.0), Some(3.5)]);
     }
 }

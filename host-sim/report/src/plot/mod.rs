@@ -9,6 +9,7 @@ mod lines;
 #[cfg(feature = "png")]
 mod png;
 mod raster;
+mod simplify;
 mod svg;
 
 use std::path::Path;
@@ -244,7 +245,8 @@ mod tests {
 
     fn figure() -> Figure {
         let wave = (0..500).map(|i| f64::from(i) * 0.02);
-        let wave = wave.map(|t| (t, 3.0 * t.sin())).collect();
+        // Too quick for any of its points to be left out.
+        let wave = wave.map(|t| (t, 3.0 * (40.0 * t).sin())).collect();
         let lines = vec![line("a < b", colour::MODEL, 2, wave)];
         let row = RasterRow {
             label: "fill".to_owned(),

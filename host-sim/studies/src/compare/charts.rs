@@ -12,13 +12,13 @@ type Points = Vec<(f64, f64)>;
 /// One colour per controller.
 pub(crate) fn colour_of(kind: Kind) -> Colour {
     match kind {
-        Kind::OnOff => colour::COMMAND,
-        Kind::PwmP => colour::DELAYED,
-        Kind::PwmPid => colour::MODEL,
+        Kind::OnOff => colour::RAW,
+        Kind::PwmP => colour::AXES[4],
+        Kind::PwmPid => colour::AXES[1],
         Kind::FuzzyPd => colour::SECOND,
         Kind::FuzzyId => colour::AXES[7],
         Kind::Sliding => colour::THIRD,
-        Kind::Predictive => colour::ROBOT,
+        Kind::Predictive => colour::AXES[2],
     }
 }
 
