@@ -13,6 +13,7 @@
 //! * **peer**: another implementation of the same work, for the benchmark
 
 mod bench;
+mod browser;
 mod conformance;
 mod deep;
 mod docs;
@@ -153,6 +154,7 @@ fn test(report: &mut Report) {
     fuzz::short_steps(report);
     let run = main_job::steps(report);
     mcap::steps(report, run.as_deref());
+    browser::steps(report, run.as_deref());
     rigid_body::steps(report);
     plant::steps(report);
 }

@@ -11,7 +11,7 @@ use anyhow::Context;
 use crate::process::{ask, cargo, command, root, run, succeeds};
 use crate::report::{Report, StepError, StepResult};
 use crate::tools::{REQUIREMENTS, have, python, python_path, stamp, virtual_environment};
-use crate::{fuzz, no_std, pil, qemu};
+use crate::{browser, fuzz, no_std, pil, qemu};
 
 /// Oldest Python that the scripts are written for.
 const PYTHON_MIN: (u32, u32) = (3, 9);
@@ -33,7 +33,7 @@ enum Way {
     Python,
 }
 
-const NEEDS: [Need; 10] = [
+const NEEDS: [Need; 11] = [
     Need("rustfmt", || cargo_has("fmt"), Way::Component("rustfmt")),
     Need("clippy", || cargo_has("clippy"), Way::Component("clippy")),
     Need(
@@ -51,6 +51,11 @@ const NEEDS: [Need; 10] = [
         "build tools of the emulated boards",
         pil::have_tools,
         Way::Apt(&pil::PACKAGES),
+    ),
+    Need(
+        "a browser",
+        || have(browser::CHROMIUM),
+        Way::Apt(&[browser::CHROMIUM]),
     ),
     Need("a C++ compiler", || have("c++"), Way::Apt(&["g++"])),
     Need(

@@ -12,13 +12,14 @@ pub mod number;
 pub mod output;
 mod page;
 pub mod plot;
+mod script;
 pub mod stats;
 mod table;
 
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
-pub use page::{Picture, page, pictures};
+pub use page::{Picture, json, page, pictures};
 pub use table::table;
 
 /// Creates a folder in the folder of the results.

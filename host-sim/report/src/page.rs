@@ -4,8 +4,8 @@ use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior, Value};
 use serde::Serialize;
 
-use crate::plot::Figure;
-use crate::{ReportError, number};
+use crate::plot::{Figure, PanelData};
+use crate::{ReportError, number, script};
 
 /// A page of the program from its own template, which extends `base.html`: frame,
 /// style sheet and figures are the same on all of them, and numbers are formatted there
@@ -18,7 +18,10 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     let mut env = Environment::new();
     env.set_undefined_behavior(UndefinedBehavior::SemiStrict);
     number::add_filters(&mut env);
-    env.add_template("style.css", include_str!("style.css"))?;
+    env.add_template("tokens.css", include_str!("../page/tokens.css"))?;
+    env.add_template("ui.css", include_str!("../page/ui.css"))?;
+    env.add_template("report.css", include_str!("../page/report.css"))?;
+    env.add_global("script", Value::from_safe_string(script::report()));
     env.add_template("figure.html", include_str!("figure.html"))?;
     env.add_template("base.html", include_str!("base.html"))?;
     env.add_template("page.html", template)?;
@@ -34,17 +37,41 @@ pub struct Picture<'a> {
     /// The title up to its colon, for links.
     short: &'a str,
     caption: &'a str,
-    svg: &'a str,
+    panels: Vec<PanelPicture>,
 }
 
-/// Figures with their SVG text for a template.
+/// A panel: its picture, and the data from which the page's script draws it instead.
+#[derive(Debug, Serialize)]
+struct PanelPicture {
+    svg: String,
+    data: Option<String>,
+}
+
+/// Figures for a template. Their SVG text is what the files have; a page shows every panel with
+/// an axis of its own.
 pub fn pictures(figures: &[(Figure, String)]) -> Vec<Picture<'_>> {
-    let pictures = figures.iter().map(|(figure, svg)| Picture {
+    let pictures = figures.iter().map(|(figure, _)| Picture {
         id: &figure.id,
         title: &figure.title,
         short: figure.title.split(':').next().unwrap_or(&figure.title),
         caption: &figure.caption,
-        svg,
+        panels: figure
+            .panel_svgs()
+            .zip(&figure.panels)
+            .map(|(svg, panel)| PanelPicture {
+                svg,
+                data: PanelData::of(panel).as_ref().map(json),
+            })
+            .collect(),
     });
     pictures.collect()
+}
+
+/// A value as JSON that can stand in a `script` element: nothing in it ends the element.
+///
+/// # Panics
+/// If the value cannot be JSON, as a map whose keys are not texts.
+pub fn json(value: &impl Serialize) -> String {
+    let text = serde_json::to_string(value).expect("plain data is JSON");
+    text.replace('<', "\\u003c")
 }

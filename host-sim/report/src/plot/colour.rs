@@ -20,15 +20,15 @@ pub const GRID: Colour = Colour(0xE4, 0xE7, 0xEB);
 /// Ground of a figure.
 pub const PAPER: Colour = Colour(0xFF, 0xFF, 0xFF);
 /// The reference model.
-pub const MODEL: Colour = Colour(0x1F, 0x6F, 0xC4);
+pub const MODEL: Colour = Colour(0x9A, 0x5C, 0x86);
 /// The reference model, shifted in time.
-pub const DELAYED: Colour = Colour(0x8F, 0xBC, 0xE6);
-/// The simulated robot.
-pub const ROBOT: Colour = Colour(0xD9, 0x4F, 0x0B);
+pub const DELAYED: Colour = Colour(0xC9, 0xA5, 0xBD);
+/// The robot: what was measured is ink, everywhere.
+pub const ROBOT: Colour = Colour(0x16, 0x1B, 0x20);
 /// A signal before its filter.
-pub const RAW: Colour = Colour(0xE6, 0xC3, 0xAE);
-/// What the master commands.
-pub const COMMAND: Colour = Colour(0x9A, 0xA3, 0xAD);
+pub const RAW: Colour = Colour(0x9A, 0xA3, 0xAD);
+/// What the master commands: what was asked is blue, everywhere.
+pub const COMMAND: Colour = Colour(0x00, 0x72, 0xB2);
 /// A second curve of a panel.
 pub const SECOND: Colour = Colour(0x12, 0x8A, 0x6B);
 /// A third curve of a panel.

@@ -1,8 +1,12 @@
 //! Lines over time, or over anything else.
 
 use super::axes::{Axes, Grid};
+use super::simplify::simplified;
 use super::svg::{Stroke, Svg};
 use super::{Colour, LEFT, WIDTH, colour};
+
+/// A line may be off by this, pixels.
+const INVISIBLE_PX: f64 = 0.1;
 
 /// One line.
 pub struct Series {
@@ -58,7 +62,7 @@ impl Lines {
                 let pixels = piece.iter().map(|(x, y)| axes.at((*x, y.clamp(y0, y1))));
                 let pixels: Vec<(f64, f64)> = pixels.collect();
                 if !pixels.is_empty() {
-                    svg.line(&pixels, stroke);
+                    svg.line(&simplified(&pixels, INVISIBLE_PX), stroke);
                 }
             }
         }

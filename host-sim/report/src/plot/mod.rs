@@ -3,11 +3,13 @@
 mod axes;
 mod bars;
 pub mod colour;
+mod data;
 mod heat;
 mod lines;
 #[cfg(feature = "png")]
 mod png;
 mod raster;
+mod simplify;
 mod svg;
 
 use std::path::Path;
@@ -15,6 +17,7 @@ use std::path::Path;
 use axes::Axes;
 pub use bars::{Bars, Column};
 pub use colour::Colour;
+pub(crate) use data::PanelData;
 pub use heat::Heat;
 pub use lines::{Lines, Series, line};
 pub use raster::{RasterRow, runs};
@@ -75,6 +78,8 @@ pub struct Panel {
     pub content: Content,
     /// Height in pixels.
     pub height: u32,
+    /// Whether the abscissa is the clock of the page: its cursor then shows there, too.
+    pub on_clock: bool,
     /// Label of the abscissa of a raster; lines have their own.
     raster_x: &'static str,
 }
@@ -130,6 +135,19 @@ impl Figure {
         svg.finish()
     }
 
+    /// Every panel as a picture of its own, with its axis.
+    pub(crate) fn panel_svgs(&self) -> impl Iterator<Item = String> + '_ {
+        self.panels.iter().map(|panel| {
+            let axis = match panel.content {
+                Content::Bars(_) => 0,
+                _ => AXIS_HEIGHT,
+            };
+            let mut svg = Svg::new(WIDTH, TITLE_HEIGHT + panel.height + axis);
+            panel.draw(&mut svg, 0, axis);
+            svg.finish()
+        })
+    }
+
     /// Writes the figure as PNG, at twice the size.
     ///
     /// # Errors
@@ -162,6 +180,7 @@ impl Panel {
             marks: Vec::new(),
             content,
             height,
+            on_clock: false,
             raster_x: TIME,
         }
     }
@@ -226,7 +245,8 @@ mod tests {
 
     fn figure() -> Figure {
         let wave = (0..500).map(|i| f64::from(i) * 0.02);
-        let wave = wave.map(|t| (t, 3.0 * t.sin())).collect();
+        // Too quick for any of its points to be left out.
+        let wave = wave.map(|t| (t, 3.0 * (40.0 * t).sin())).collect();
         let lines = vec![line("a < b", colour::MODEL, 2, wave)];
         let row = RasterRow {
             label: "fill".to_owned(),

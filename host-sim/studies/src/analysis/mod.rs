@@ -23,7 +23,7 @@ use rest::StandMeter;
 use safe_state::SafeStateMeter;
 pub(crate) use safe_state::commanded_open;
 use sinusoid::SinusoidMeter;
-pub use target::Target;
+pub use target::{Judgement, Target};
 use three_step::ThreeStepMeter;
 
 use wheeleg_config::{EventAction, LegChoice, Motion, RobotConfig, Scenario, TargetSet};

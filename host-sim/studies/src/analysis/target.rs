@@ -3,6 +3,33 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+/// What is to be said of a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Judgement {
+    /// In its band.
+    Met,
+    /// Required, and not in its band.
+    Missed,
+    /// Not in its band, and not required.
+    Outside,
+    /// A value without a band.
+    Value,
+}
+
+impl Judgement {
+    /// As the terminal shows it.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Met => "PASS",
+            Self::Missed => "FAIL",
+            Self::Outside => "info: outside",
+            Self::Value => "info",
+        }
+    }
+}
+
 /// A target: what was measured, what was asked, and whether it holds.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Target {
@@ -82,15 +109,14 @@ impl Target {
         format!("{v:.decimals$}")
     }
 
-    /// `PASS`, `FAIL`, or `info` for a value without a verdict or one that
-    /// only informs and lies outside its band.
+    /// What is to be said of it.
     #[must_use]
-    pub fn verdict(&self) -> &'static str {
+    pub fn judgement(&self) -> Judgement {
         match (self.pass, self.required) {
-            _ if self.min.is_none() && self.max.is_none() => "info",
-            (true, _) => "PASS",
-            (false, true) => "FAIL",
-            (false, false) => "info: outside",
+            _ if self.min.is_none() && self.max.is_none() => Judgement::Value,
+            (true, _) => Judgement::Met,
+            (false, true) => Judgement::Missed,
+            (false, false) => Judgement::Outside,
         }
     }
 }

@@ -12,13 +12,13 @@ type Points = Vec<(f64, f64)>;
 /// One colour per controller.
 pub(crate) fn colour_of(kind: Kind) -> Colour {
     match kind {
-        Kind::OnOff => colour::COMMAND,
-        Kind::PwmP => colour::DELAYED,
-        Kind::PwmPid => colour::MODEL,
+        Kind::OnOff => colour::RAW,
+        Kind::PwmP => colour::AXES[4],
+        Kind::PwmPid => colour::AXES[1],
         Kind::FuzzyPd => colour::SECOND,
         Kind::FuzzyId => colour::AXES[7],
         Kind::Sliding => colour::THIRD,
-        Kind::Predictive => colour::ROBOT,
+        Kind::Predictive => colour::AXES[2],
     }
 }
 
@@ -340,7 +340,7 @@ fn spread(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     Some(Figure {
         id: format!("combinations-{name}"),
         title: format!("Combinations on {name}"),
-        caption: "Load, mass, supply, friction and valve delay at random at once, one gain set; sorted, so that a curve shows what share stays below a value. Red lines at 0.5 and 6 mm.".to_owned(),
+        caption: "Load, mass, supply, friction and valve delay at random at once, one gain set; sorted, so that a curve shows what share stays below a value. Limit lines at 0.5 and 6 mm.".to_owned(),
         panels: vec![
             curves("Error at rest", errors, 0.5, 5.0),
             curves("Overshoot", sorted(|r| r.figures.overshoot_mm), 6.0, 20.0),

@@ -114,7 +114,6 @@ struct Kind<'a> {
 
 #[derive(Serialize)]
 struct Predicted<'a> {
-    /// What another cause would do: right if it does not hold.
     rival: bool,
     prediction: &'a Prediction,
 }
@@ -158,7 +157,7 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
             .collect(),
     });
     let predictions = study.predictions.list.iter().map(|prediction| Predicted {
-        rival: prediction.id.starts_with("rival"),
+        rival: prediction.rival,
         prediction,
     });
     let notices = study.preview.rows.iter().map(Announced::new);

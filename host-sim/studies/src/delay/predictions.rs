@@ -36,6 +36,19 @@ pub struct Prediction {
     pub max: f64,
     /// Whether it does.
     pub holds: bool,
+    /// Whether it is what another cause would do: our explanation is right if it does not hold.
+    #[serde(skip)]
+    pub rival: bool,
+}
+
+impl Prediction {
+    /// The same, of another cause.
+    fn of_a_rival(self) -> Self {
+        Self {
+            rival: true,
+            ..self
+        }
+    }
 }
 
 fn prediction(
@@ -53,6 +66,7 @@ fn prediction(
         min,
         max,
         holds: (min..=max).contains(&value),
+        rival: false,
     }
 }
 
@@ -252,14 +266,16 @@ pub fn measure(
             ),
             home_s / reversal_s,
             (1.0, 1.2),
-        ),
+        )
+        .of_a_rival(),
         prediction(
             "rival: transport",
             "were it a transport delay, it would not depend on C: ratio of the delays at half and double C below 1.2",
             format!("{with_c:.2}"),
             with_c,
             (0.83, 1.2),
-        ),
+        )
+        .of_a_rival(),
     ];
     Ok(Predictions {
         list,

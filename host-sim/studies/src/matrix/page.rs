@@ -121,6 +121,7 @@ struct Shown<'a> {
     limits: String,
     /// Whether it was run.
     run: bool,
+    failed: bool,
     measured: &'a Measured,
     verdict: &'static str,
     class: &'static str,
@@ -138,6 +139,7 @@ impl<'a> Shown<'a> {
             reaction: reaction(&o.row),
             limits: limits(o),
             run: o.verdict != Verdict::NotImplemented,
+            failed: o.verdict == Verdict::Fail,
             measured: &o.measured,
             verdict: o.verdict.label(),
             class: match o.verdict {
@@ -159,6 +161,11 @@ pub(super) fn render(
 ) -> Result<String, StudyError> {
     let [passed, failed, missing] = [Verdict::Pass, Verdict::Fail, Verdict::NotImplemented]
         .map(|verdict| count(outcomes, verdict));
+    // What failed comes first, what was not run last.
+    let rows = [Verdict::Fail, Verdict::Pass, Verdict::NotImplemented].map(|verdict| {
+        let rows = outcomes.iter().filter(move |o| o.verdict == verdict);
+        rows.map(Shown::new)
+    });
     let values = Page {
         stopped: stopped.map(ToString::to_string),
         version: env!("CARGO_PKG_VERSION"),
@@ -170,7 +177,7 @@ pub(super) fn render(
             ),
         },
         seed,
-        rows: outcomes.iter().map(Shown::new).collect(),
+        rows: rows.into_iter().flatten().collect(),
         passed,
         failed,
         missing,

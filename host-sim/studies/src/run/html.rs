@@ -6,11 +6,12 @@ use serde::Serialize;
 use super::Summary;
 use super::boards::Boards;
 use super::figures::Source;
+use super::motion::Motion;
 use crate::StudyError;
-use crate::analysis::StartDelay;
+use crate::analysis::{Judgement, StartDelay, Target};
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_report::plot::Figure;
-use wheeleg_report::{Picture, page, pictures};
+use wheeleg_report::{Picture, json, page, pictures};
 use wheeleg_telemetry::event::BoardChange;
 use wheeleg_telemetry::messages::after_power_up;
 use wheeleg_telemetry::{Cause, Event, EventKind, LinkSample, Row};
@@ -86,7 +87,10 @@ struct Page<'a> {
     /// Events that are in the log alone.
     left_out: u64,
     start_s: f64,
+    missed: Vec<Judged<'a>>,
     targets: Vec<Judged<'a>>,
+    /// What the robot of the page plays, as JSON.
+    motion: Option<String>,
     figures: Vec<Picture<'a>>,
     delays: &'a [StartDelay],
     events: Vec<Value>,
@@ -103,7 +107,23 @@ struct Judged<'a> {
     value: String,
     unit: &'a str,
     band: String,
-    verdict: &'static str,
+    /// None of a run that was cut short.
+    judgement: Option<Judgement>,
+    required: bool,
+}
+
+impl<'a> Judged<'a> {
+    fn new(target: &'a Target, complete: bool) -> Self {
+        Self {
+            id: &target.id,
+            description: &target.description,
+            value: target.value_text(),
+            unit: target.unit,
+            band: target.band_text(),
+            judgement: complete.then(|| target.judgement()),
+            required: target.required,
+        }
+    }
 }
 
 /// A parameter of the robot as the page shows it.
@@ -116,43 +136,43 @@ struct Parameter<'a> {
     doc: &'a str,
 }
 
-/// The page's first sentence.
+/// The page's first sentence: what came of the run, and what that is worth.
 fn verdict(summary: &Summary) -> String {
     let required = summary.targets.iter().filter(|t| t.required);
-    let (count, missed) = (required.clone().count(), required.filter(|t| !t.pass));
-    let missed: Vec<&str> = missed.map(|t| t.id.as_str()).collect();
+    let (count, missed) = (
+        required.clone().count(),
+        required.filter(|t| !t.pass).count(),
+    );
     let differing = summary.pil.as_ref().map_or(0, |pil| pil.differing_bits);
-    if !summary.complete {
-        "Stopped before its end: nothing is judged.".to_owned()
+    let name = &summary.scenario;
+    if summary.failure.is_some() {
+        format!("{name}: the run failed; nothing is judged.")
+    } else if !summary.complete {
+        format!("{name}: stopped before its end; nothing is judged.")
     } else if differing > 0 {
-        format!("Boards differ from the native application in {differing} bits.")
+        format!("{name}: boards differ from the native application in {differing} bits.")
     } else if count == 0 {
-        "Ran to its end; the scenario has no required target.".to_owned()
-    } else if missed.is_empty() {
-        format!("Passed: all {count} required targets are met.")
+        format!("{name}: ran to its end; the scenario requires nothing.")
+    } else if missed == 0 {
+        format!("{name}: all {count} required targets are met.")
     } else {
-        format!(
-            "Failed: {} of {count} required targets missed ({}).",
-            missed.len(),
-            missed.join(", ")
-        )
+        format!("{name}: {missed} of {count} required targets missed.")
     }
 }
 
-/// Renders the page: no scripts, no links to anywhere else.
+/// Renders the page, which links to nothing else. Its script draws figures and robot from the
+/// data in it; without scripts verdicts, tables and pictures are all there.
 pub(super) fn render(
     source: &Source<'_>,
     summary: &Summary,
     figures: &[(Figure, String)],
 ) -> Result<String, StudyError> {
-    let targets = summary.targets.iter().map(|target| Judged {
-        id: &target.id,
-        description: &target.description,
-        value: target.value_text(),
-        unit: target.unit,
-        band: target.band_text(),
-        verdict: target.verdict(),
-    });
+    let judged = |target| Judged::new(target, summary.complete);
+    let missed = summary
+        .targets
+        .iter()
+        .filter(|t| summary.complete && t.judgement() == Judgement::Missed);
+    let motion = Motion::new(source);
     // The start-up is a story of its own, told at time zero.
     let all = &source.recording.events;
     let start_up: Vec<String> = all
@@ -198,7 +218,9 @@ pub(super) fn render(
         period_ms: source.recording.period_ms,
         left_out: source.recording.events_left_out,
         start_s: source.analysis.start_s,
-        targets: targets.collect(),
+        missed: missed.map(judged).collect(),
+        targets: summary.targets.iter().map(judged).collect(),
+        motion: (!motion.is_empty()).then(|| json(&motion)),
         figures: pictures(figures),
         delays: &source.analysis.start_delays,
         events,

@@ -3,6 +3,7 @@
 mod boards;
 mod figures;
 mod html;
+mod motion;
 mod report;
 mod summary;
 
@@ -204,12 +205,21 @@ fn run_on(
     Ok(report::write(job, &source, run, stopped))
 }
 
+/// Longest run whose phases the page shows, s.
+const PHASES_S: f64 = 600.0;
+
 /// What figures and page are made from: the analysis sees every sample as it comes.
 fn keep(scenario: &Scenario) -> Keep {
     let mut events = scenario.events.iter();
     let shown = events.find(|e| !matches!(e.action, EventAction::Command(_)));
     let near_s: Vec<f64> = shown.iter().map(|e| e.at_s).collect();
-    let all = Keep::bounded(scenario.duration_s, &near_s).without(&["/bus", "/master"]);
+    let all = Keep::bounded(scenario.duration_s, &near_s).without(&["/bus"]);
+    // The phases of a gait, for the page: of a long run they are too many to be seen.
+    let all = if scenario.duration_s > PHASES_S {
+        all.without(&["/master"])
+    } else {
+        all
+    };
     match shown {
         Some(_) => all,
         None => all.without(&["/wheel/7", "/wheel/8"]),

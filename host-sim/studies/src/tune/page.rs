@@ -71,7 +71,7 @@ pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
             Figure {
                 id: test.motion.name().to_owned(),
                 title: format!("{}: before and after", test.motion.name()),
-                caption: "After the learning move. Red lines at ±1 mm; larger errors are drawn at the edge.".to_owned(),
+                caption: "After the learning move. Limit lines at ±1 mm; larger errors are drawn at the edge.".to_owned(),
                 panels,
             }
         })

@@ -13,7 +13,7 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_report::output;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::analysis::Target;
+use wheeleg_studies::analysis::{Judgement, Target};
 use wheeleg_studies::run::{self, Options, Run, Summary};
 use wheeleg_studies::study::{Finished, Stop, Stopped};
 use wheeleg_telemetry as telemetry;
@@ -282,7 +282,7 @@ fn target_table(targets: &[Target]) -> String {
         .iter()
         .map(|t| {
             [
-                t.verdict().to_owned(),
+                t.judgement().word().to_owned(),
                 t.id.clone(),
                 t.value_text(),
                 t.unit.to_owned(),
@@ -303,11 +303,11 @@ fn target_table(targets: &[Target]) -> String {
     let left = widths.iter().sum::<usize>() + 9;
     let room = terminal_size_of(std::io::stdout()).map(|(Width(w), _)| usize::from(w));
     let mut out = String::new();
-    let mut row = |c: &[String; 5], description: &str| {
+    let mut row = |c: &[String; 5], judgement: Option<Judgement>, description: &str| {
         let verdict = format!("{:w$}", c[0], w = widths[0]);
-        let verdict = match (colour, c[0].as_str()) {
-            (true, "PASS") => format!("\x1b[32m{verdict}\x1b[0m"),
-            (true, "FAIL") => format!("\x1b[1;31m{verdict}\x1b[0m"),
+        let verdict = match judgement.filter(|_| colour) {
+            Some(Judgement::Met) => format!("\x1b[32m{verdict}\x1b[0m"),
+            Some(Judgement::Missed) => format!("\x1b[1;31m{verdict}\x1b[0m"),
             _ => verdict,
         };
         let _ = writeln!(
@@ -324,9 +324,9 @@ fn target_table(targets: &[Target]) -> String {
             e = widths[4],
         );
     };
-    row(&head, "what");
+    row(&head, None, "what");
     for (c, t) in cells.iter().zip(targets) {
-        row(c, &t.description);
+        row(c, Some(t.judgement()), &t.description);
     }
     out
 }

@@ -175,7 +175,7 @@ pub(super) fn figures(s: &Source<'_>, event: f64) -> Vec<Figure> {
         Figure {
             id: "event".into(),
             title: "All axes around the event".into(),
-            caption: "Red line: the event. Modes: 0 boot, 1 idle, 2 armed, 3 tracking, 4 hold, 5 exhaust, 6 fault (lines set apart slightly); their colours hold for the joints below. \
+            caption: "Dashed line: the event. Modes: 0 boot, 1 idle, 2 armed, 3 tracking, 4 hold, 5 exhaust, 6 fault (lines set apart slightly); their colours hold for the joints below. \
                       While a joint does not drive, its reference is its measured stroke; while a wheel ramps down in hold, its commanded position follows its count. Commanded and counted rim speeds are means over 10 ms."
                 .into(),
             panels,

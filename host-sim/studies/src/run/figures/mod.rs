@@ -35,11 +35,11 @@ const MOTION_TIME: &str = "time since the start of the motion [s]";
 
 impl Source<'_> {
     /// Time axis: seconds since the motion began.
-    fn t(&self, t_s: f64) -> f64 {
+    pub(super) fn t(&self, t_s: f64) -> f64 {
         t_s - self.analysis.start_s
     }
 
-    fn x_range(&self) -> (f64, f64) {
+    pub(super) fn x_range(&self) -> (f64, f64) {
         let rows = &self.recording.joints[0];
         let first = rows.first().map_or(0.0, Row::t_s);
         let last = rows.last().map_or(1.0, |r| r.t_s() + 1e-3);
@@ -95,6 +95,7 @@ impl Source<'_> {
     fn panel(&self, title: impl Into<String>, height: u32, content: Content) -> Panel {
         let mut panel = Panel::new(title, self.x_range(), height, content).over(MOTION_TIME);
         panel.marks = self.marks();
+        panel.on_clock = true;
         panel
     }
 }
@@ -139,7 +140,7 @@ pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
 
 fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
     let delay = s.robot.reference.delay_s;
-    let delayed = format!("model, {delay} s later (the paper's experiment)");
+    let delayed = format!("model, shifted by {delay} s");
     let stroke = |id: &str,
                   number: u8,
                   name: &str,
@@ -238,7 +239,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
         stroke("fig13-b6", 13, "vertical cylinder b6", b6, |p| p.s6_m * 1e3),
         pair(
             "fig14-velocity", 14, "velocities V5 and V6", "[mm/s]",
-            "Velocities, unfiltered. Red lines: the paper's axis, ±400 mm/s.",
+            "Velocities, unfiltered. Limit lines: the paper's axis, ±400 mm/s.",
             vec![
                 ("V5", (-400.0, 400.0), velocity(b5, |p| p.v5_m_s * 1e3)),
                 ("V6", (-400.0, 400.0), velocity(b6, |p| p.v6_m_s * 1e3)),
@@ -246,7 +247,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
         ),
         pair(
             "fig15-acceleration", 15, "accelerations a5 and a6", "[m/s²]",
-            "Accelerations after a 20 Hz low-pass. Red lines: the paper's axes, read in m/s² (its mm/s² cannot be: MODEL.md §11).",
+            "Accelerations after a 20 Hz low-pass. Limit lines: the paper's axes, read in m/s² (its mm/s² cannot be: MODEL.md §11).",
             vec![
                 ("a5", (-5.0, 10.0), acceleration(b5, |p| p.a5_m_s2)),
                 ("a6", (-10.0, 5.0), acceleration(b6, |p| p.a6_m_s2)),
@@ -256,7 +257,7 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
             id: "fig16-f6".into(),
             title: "Fig. 16: force F6 on the vertical cylinder".into(),
             caption: "Net generalised force on b6: pressure forces less seal friction less end-stop reaction. \
-                      Red lines: the paper's axis, ±30 N. The unfiltered trace is cut off at the edges of the figure; its peaks are in the table.".into(),
+                      Limit lines: the paper's axis, ±30 N. The unfiltered trace is cut off at the edges of the figure; its peaks are in the table.".into(),
             panels: vec![s.panel("F6", 300, Content::lines(("[N]", (-60.0, 60.0)), force).limited(&[30.0, -30.0]))],
         },
     ]

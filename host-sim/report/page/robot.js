@@ -1,0 +1,259 @@
+// The robot from its side and from above, to scale, drawn from the dimensions of the robot file
+// (mm; x forward, y left, z up; the origin is on the ground under the axle). Wheels, cranks,
+// cylinders and feet are the file's; the shape of the chassis is ours. A view makes its elements
+// once; `update` then writes transforms and the few attributes that changed.
+import { svg, set, say } from "./dom.js";
+
+/** @typedef {{crank_mm: number, p4_mm: [number, number], o4_mm: [number, number, number], stroke_zero_mm: [number, number, number],
+ *   foot_pad_mm: number, sole_radius_mm: number, wheel_radius_mm: number, track_mm: number}} Geometry */
+/** Strokes of yaw, horizontal and vertical cylinder.
+ * @typedef {[number, number, number]} Strokes */
+/** @typedef {{commanded_mm: Strokes, sensed_mm: Strokes, load_n: number, switches: number}} Leg */
+/** @typedef {{travel_mm: number, pitch_deg: number, legs: [Leg, Leg]}} Pose */
+
+const SIDES = [
+  { name: "left", class: "leg-L", y: 1, yaw_z: 288 },
+  { name: "right", class: "leg-R", y: -1, yaw_z: 312 },
+];
+const BODY = { rear: -290, front: 560, nose: 430, belly: 120, chin: 196, deck: 262, half: 190 };
+const WHEEL_WIDTH = 50;
+/** Outlines nearer to the measured part than this would only blur it. */
+const VISIBLE_MM = 3;
+
+/** Points of a leg in axes of the chassis. @param {Geometry} g @param {number} side 1 left, −1 right @param {Strokes} strokes */
+export function leg(g, side, [yaw, horizontal, vertical]) {
+  const [px, py] = g.p4_mm;
+  const [ox, oy] = g.o4_mm;
+  const reach = Math.hypot(px, py);
+  const b2 = g.stroke_zero_mm[0] + yaw;
+  const b5 = g.stroke_zero_mm[1] + horizontal;
+  const b6 = g.stroke_zero_mm[2] + vertical;
+  // Law of cosines in the triangle of crank, yaw cylinder and chassis.
+  const phi = Math.atan2(py, px) - Math.acos((reach * reach + g.crank_mm * g.crank_mm - b2 * b2) / (2 * g.crank_mm * reach));
+  const [c, s] = [Math.cos(phi), Math.sin(phi)];
+  return {
+    phi: side * phi,
+    o1: [ox - px, side * (oy - py)],
+    o3: [ox - g.crank_mm * c, side * (oy - g.crank_mm * s)],
+    o4: [ox, side * oy],
+    o6: [ox + b5 * c, side * (oy + b5 * s)],
+    // O4 stands above the axle, the axle a wheel's radius above the ground.
+    sole: g.wheel_radius_mm + g.o4_mm[2] - b6 - g.foot_pad_mm,
+  };
+}
+
+const tenth = (v) => Math.round(v * 10) / 10;
+/** Oblique projection: depth goes right and up, x and z stay true. */
+const oblique = (x, y, z) => [tenth(x + 0.26 * y), tenth(-(z + 0.2 * y))];
+const points = (list) => list.map((p) => p.join(",")).join(" ");
+const put = (line, [x1, y1], [x2, y2]) => set(line, { x1: tenth(x1), y1: tenth(y1), x2: tenth(x2), y2: tenth(y2) });
+const bar = (parent, name, width) => svg("line", { class: name, "stroke-width": width }, parent);
+
+/** A wheel seen from its side; returns what turns it. */
+function wheelSide(parent, g, y) {
+  const r = g.wheel_radius_mm;
+  const tyre = svg("line", { class: "r-tyre", "stroke-width": 2 * r, "stroke-linecap": "round" }, parent);
+  put(tyre, oblique(0, y + WHEEL_WIDTH / 2, r), oblique(0, y - WHEEL_WIDTH / 2, r));
+  const face = svg("g", { transform: `translate(${oblique(0, y - WHEEL_WIDTH / 2, r)}) scale(${r / 150})` }, parent);
+  svg("circle", { r: 146, class: "r-tyre-face" }, face);
+  svg("circle", { r: 112, class: "r-rim" }, face);
+  const spokes = svg("g", {}, face);
+  for (let i = 0; i < 5; i += 1) svg("path", { d: "M-9,-26 L-13,-106 A107,107 0 0 1 13,-106 L9,-26Z", class: "r-spoke", transform: `rotate(${i * 72})` }, spokes);
+  svg("rect", { x: -4, y: -143, width: 8, height: 24, rx: 3, class: "r-mark" }, spokes);
+  svg("circle", { r: 27, class: "r-hub" }, face);
+  return (degrees) => set(spokes, { transform: `rotate(${tenth(degrees)})` });
+}
+
+/** Vertical cylinder and foot; its origin is where the carriage is. Commanded ones are outlines. */
+function verticalCylinder(parent, commanded) {
+  const kind = (name) => (commanded ? "r-ask" : name);
+  svg("rect", { x: -24, y: -338, width: 48, height: 62, rx: 5, class: kind("r-carriage") }, parent);
+  const rod = svg("rect", { x: -4, y: -206, width: 8, height: 10, class: kind("r-rod") }, parent);
+  svg("rect", { x: -12, y: -400, width: 24, height: 200, rx: 2, class: kind("r-barrel") }, parent);
+  if (!commanded) for (const y of [-404, -212]) svg("rect", { x: -15, y, width: 30, height: 14, rx: 2.5, class: "r-cap" }, parent);
+  const foot = svg("g", {}, parent);
+  svg("path", { d: "M-8,-34 L8,-34 L17,-13 L-17,-13Z", class: kind("r-ankle") }, foot);
+  svg("rect", { x: -30, y: -14, width: 60, height: 14, rx: 5, class: kind("r-sole") }, foot);
+  return (sole) => {
+    set(rod, { height: tenth(Math.max(2, 176 - sole)) });
+    set(foot, { transform: `translate(0,${tenth(-sole)})` });
+  };
+}
+
+function chassisSide(root) {
+  const { rear, front, nose, belly, chin, deck, half } = BODY;
+  const face = (name, ...corners) => svg("polygon", { class: name, points: points(corners.map((c) => oblique(...c))) }, root);
+  face("r-body-end", [front, -half, chin], [front, half, chin], [front, half, deck], [front, -half, deck]);
+  face("r-body-end", [nose, -half, belly], [nose, half, belly], [front, half, chin], [front, -half, chin]);
+  face("r-body-top", [rear, -half, deck], [front, -half, deck], [front, half, deck], [rear, half, deck]);
+  // Electronics on the deck.
+  face("r-body-end", [230, -120, 262], [230, 120, 262], [230, 120, 296], [230, -120, 296]);
+  face("r-body-top", [-70, -120, 296], [230, -120, 296], [230, 120, 296], [-70, 120, 296]);
+  face("r-body", [-70, -120, 262], [230, -120, 262], [230, -120, 296], [-70, -120, 296]);
+  const tank = svg("line", { class: "r-tank", "stroke-width": 74, "stroke-linecap": "round" }, root);
+  put(tank, oblique(-222, -110, 296), oblique(-222, 110, 296));
+  face("r-body", [rear, -half, 168], [rear + 46, -half, belly], [nose, -half, belly], [front, -half, chin], [front, -half, deck], [rear, -half, deck]);
+}
+
+function groundSide(picture) {
+  const far = 520;
+  const ground = svg("g", {}, picture);
+  svg("polygon", { class: "r-ground", points: points([oblique(-1500, far, 0), oblique(2500, far, 0), oblique(2500, -far, 0), oblique(-1500, -far, 0)]) }, ground);
+  const ticks = svg("g", {}, ground);
+  for (let x = -2000; x <= 6000; x += 100) {
+    const tick = svg("line", { class: x % 500 === 0 ? "r-tick r-tick5" : "r-tick" }, ticks);
+    put(tick, oblique(x, far, 0), oblique(x, -far, 0));
+    if (x % 500 !== 0) continue;
+    const [lx, ly] = oblique(x, -far, 0);
+    say(svg("text", { x: lx + 8, y: ly - 8 }, ticks), `${(x / 1000).toFixed(1)} m`);
+  }
+  const shadows = SIDES.map(() => svg("ellipse", { rx: 34, ry: 8, class: "r-shadow" }, ground));
+  return { ticks, shadows };
+}
+
+/** The robot from its right side. @param {SVGElement} picture @param {Geometry} g */
+export function sideView(picture, g) {
+  set(picture, { viewBox: "-392 -492 1310 606", role: "img", preserveAspectRatio: "xMidYMax meet" });
+  picture.classList.add("robot");
+  const title = svg("title", {}, picture);
+  const { ticks, shadows } = groundSide(picture);
+  const root = svg("g", {}, picture);
+  const farWheel = wheelSide(root, g, g.track_mm / 2);
+  chassisSide(root);
+  const yaws = SIDES.map(() => ({ barrel: bar(root, "r-barrel-l", 22), rod: bar(root, "r-rod-l", 8) }));
+  const legs = SIDES.map((side) => {
+    const group = svg("g", { class: `leg ${side.class}` }, root);
+    const [x, y] = oblique(g.o4_mm[0], side.y * g.o4_mm[1], 0);
+    svg("rect", { x: x - 17, y: y - 346, width: 34, height: 66, rx: 4, class: "r-post" }, group);
+    const crank = bar(group, "r-crank", 15);
+    const barrel = bar(group, "r-barrel-l", 24);
+    const rod = bar(group, "r-rod-l", 8);
+    const commanded = svg("g", { class: "asked" }, group);
+    const setCommanded = verticalCylinder(commanded, true);
+    const sensed = svg("g", {}, group);
+    const setSensed = verticalCylinder(sensed, false);
+    const load = svg("path", { class: "r-force" }, group);
+    const tag = svg("text", { class: "r-tag", "text-anchor": "end" }, group);
+    say(tag, side.name);
+    return { crank, barrel, rod, commanded, setCommanded, sensed, setSensed, load, tag };
+  });
+  const nearWheel = wheelSide(root, g, -g.track_mm / 2);
+
+  return {
+    /** @param {Pose} pose */
+    update(pose) {
+      set(ticks, { transform: `translate(${tenth(-pose.travel_mm)},0)` });
+      const degrees = (pose.travel_mm / g.wheel_radius_mm) * (180 / Math.PI);
+      farWheel(degrees);
+      nearWheel(degrees);
+      set(root, { transform: `rotate(${(-pose.pitch_deg).toFixed(2)} 0 ${-g.wheel_radius_mm})` });
+      SIDES.forEach((side, i) => {
+        const [state, part, yaw] = [pose.legs[i], legs[i], yaws[i]];
+        const at = leg(g, side.y, state.sensed_mm);
+        const towards = (w) => {
+          const length = Math.hypot(at.o3[0] - at.o1[0], at.o3[1] - at.o1[1]);
+          return [at.o1[0] + ((at.o3[0] - at.o1[0]) * w) / length, at.o1[1] + ((at.o3[1] - at.o1[1]) * w) / length];
+        };
+        const along = (w) => [at.o4[0] + w * Math.cos(at.phi), at.o4[1] + w * Math.sin(at.phi)];
+        put(yaw.barrel, oblique(...towards(0), side.yaw_z), oblique(...towards(225), side.yaw_z));
+        put(yaw.rod, oblique(...towards(225), side.yaw_z), oblique(...at.o3, side.yaw_z));
+        put(part.crank, oblique(...at.o3, 300), oblique(...at.o4, 300));
+        put(part.barrel, oblique(...along(-225), 318), oblique(...along(-8), 318));
+        put(part.rod, oblique(...along(-8), 318), oblique(...at.o6, 318));
+        const [x, y] = oblique(...at.o6, 0);
+        set(part.sensed, { transform: `translate(${x},${y})` });
+        part.setSensed(at.sole);
+        const differs = state.commanded_mm.some((c, j) => Math.abs(c - state.sensed_mm[j]) > VISIBLE_MM);
+        part.commanded.style.display = differs ? "" : "none";
+        if (differs) {
+          const asked = leg(g, side.y, state.commanded_mm);
+          set(part.commanded, { transform: `translate(${oblique(...asked.o6, 0)})` });
+          part.setCommanded(asked.sole);
+        }
+        set(shadows[i], { cx: x, cy: y, opacity: tenth(Math.max(0.2, 1 - at.sole / 120)) });
+        const length = state.load_n > 0.5 ? 18 + Math.min(150, state.load_n * 2.2) : 0;
+        set(part.load, { d: length > 0 ? `M${x - 52},${y} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
+        set(part.tag, { x: tenth(x - 24), y: tenth(y - 378) });
+      });
+      say(title, `Robot from its right side, ${Math.round(pose.travel_mm)} mm travelled`);
+    },
+  };
+}
+
+/** The robot from above: forward is right, left is up. @param {SVGElement} picture @param {Geometry} g */
+export function topView(picture, g) {
+  set(picture, { viewBox: "-330 -330 1190 660", role: "img", preserveAspectRatio: "xMidYMid meet" });
+  picture.classList.add("robot");
+  say(svg("title", {}, picture), "Robot from above");
+  const { rear, front, half } = BODY;
+  svg("line", { x1: 0, x2: 0, y1: -g.track_mm / 2, y2: g.track_mm / 2, class: "r-axle", "stroke-width": 22 }, picture);
+  for (const y of [-g.track_mm / 2, g.track_mm / 2]) svg("rect", { x: -g.wheel_radius_mm, y: y - WHEEL_WIDTH / 2, width: 2 * g.wheel_radius_mm, height: WHEEL_WIDTH, rx: 12, class: "r-tyre-face" }, picture);
+  svg("path", { class: "r-body", d: `M${rear},${-half} H330 L470,-150 H${front} V150 H470 L330,${half} H${rear}Z` }, picture);
+  svg("rect", { x: -262, y: -148, width: 80, height: 296, rx: 38, class: "r-tank-t" }, picture);
+  const legs = SIDES.map((side) => {
+    const group = svg("g", { class: `leg ${side.class}` }, picture);
+    const part = {
+      yaw: bar(group, "r-barrel-l", 22),
+      yawRod: bar(group, "r-rod-l", 9),
+      crank: bar(group, "r-crank", 26),
+      barrel: bar(group, "r-barrel-l", 24),
+      rod: bar(group, "r-rod-l", 9),
+      commanded: svg("circle", { r: g.sole_radius_mm + 4, class: "r-ask" }, group),
+      foot: svg("g", {}, group),
+    };
+    svg("circle", { r: g.sole_radius_mm, class: "r-sole-t" }, part.foot);
+    svg("rect", { x: -24, y: -24, width: 48, height: 48, rx: 6, class: "r-carriage" }, part.foot);
+    svg("circle", { cx: g.o4_mm[0], cy: -side.y * g.o4_mm[1], r: 22, class: "r-post" }, group);
+    return part;
+  });
+  const flat = ([x, y]) => [tenth(x), tenth(-y)];
+  return {
+    /** @param {Pose} pose */
+    update(pose) {
+      SIDES.forEach((side, i) => {
+        const [state, part] = [pose.legs[i], legs[i]];
+        const at = leg(g, side.y, state.sensed_mm);
+        const middle = [(at.o1[0] + at.o3[0]) / 2, (at.o1[1] + at.o3[1]) / 2];
+        const along = (w) => [at.o4[0] + w * Math.cos(at.phi), at.o4[1] + w * Math.sin(at.phi)];
+        put(part.yaw, flat(at.o1), flat(middle));
+        put(part.yawRod, flat(middle), flat(at.o3));
+        put(part.crank, flat(at.o3), flat(at.o4));
+        put(part.barrel, flat(along(-225)), flat(along(-8)));
+        put(part.rod, flat(along(-8)), flat(at.o6));
+        set(part.foot, { transform: `translate(${flat(at.o6)})` });
+        const asked = leg(g, side.y, state.commanded_mm).o6;
+        part.commanded.style.display = Math.hypot(asked[0] - at.o6[0], asked[1] - at.o6[1]) > VISIBLE_MM ? "" : "none";
+        set(part.commanded, { cx: tenth(asked[0]), cy: tenth(-asked[1]) });
+      });
+    },
+  };
+}
+
+const SWITCHES = ["front", "rear", "left", "right"];
+const DIRECTIONS = [[1, 0], [-1, 0], [0, -1], [0, 1]];
+
+/** A sole from above with its four switches (closed is filled) and its load.
+ * @param {SVGElement} picture @param {string} name */
+export function footView(picture, name) {
+  set(picture, { viewBox: "-62 -62 124 124", role: "img" });
+  picture.classList.add("robot", "footview");
+  const title = svg("title", {}, picture);
+  svg("circle", { r: 34, class: "r-sole-o" }, picture);
+  const arcs = DIRECTIONS.map(([dx, dy]) => {
+    const middle = Math.atan2(dy, dx);
+    const corner = (r, a) => `${tenth(r * Math.cos(a))},${tenth(r * Math.sin(a))}`;
+    const [a, b] = [middle - 0.66, middle + 0.66];
+    return svg("path", { d: `M${corner(42, a)} A42,42 0 0 1 ${corner(42, b)} L${corner(56, b)} A56,56 0 0 0 ${corner(56, a)}Z`, class: "sw" }, picture);
+  });
+  const load = svg("text", { class: "foot-n", "text-anchor": "middle", y: 5 }, picture);
+  say(svg("text", { class: "foot-u", "text-anchor": "middle", y: 23 }, picture), "N");
+  return {
+    /** @param {Leg} state */
+    update(state) {
+      const closed = SWITCHES.filter((_, i) => (state.switches >> i) & 1);
+      arcs.forEach((arc, i) => set(arc, { class: (state.switches >> i) & 1 ? "sw on" : "sw" }));
+      say(load, state.load_n > 0.5 ? state.load_n.toFixed(0) : "–");
+      say(title, `${name} foot: ${closed.length === 4 ? "flat on the ground" : closed.join(", ") || "in the air"}`);
+    },
+  };
+}

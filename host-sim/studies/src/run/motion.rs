@@ -1,0 +1,193 @@
+//! What the page's robot plays: geometry and state over time, as data for `page/report.js`.
+
+use serde::Serialize;
+
+use super::figures::Source;
+use wheeleg_telemetry::{MasterSample, Row};
+
+/// Instants of the motion, at most; a short run has one every 20 ms.
+const INSTANTS: usize = 1_500;
+const PERIOD_NS: u64 = 20_000_000;
+
+/// The robot over time.
+#[derive(Serialize)]
+pub(super) struct Motion {
+    geometry: Geometry,
+    start: f64,
+    end: f64,
+    /// Times since the start of the motion, s.
+    t: Vec<f64>,
+    commanded_mm: [Vec<f64>; 6],
+    sensed_mm: [Vec<f64>; 6],
+    load_n: [Vec<f64>; 2],
+    switches: [Vec<u8>; 2],
+    travel_mm: Vec<f64>,
+    pitch_deg: Vec<f64>,
+    supply_bar: Vec<f64>,
+    phases: Vec<Phase>,
+    marks: Vec<Mark>,
+}
+
+/// Sizes from the robot file, mm.
+#[derive(Serialize)]
+struct Geometry {
+    crank_mm: f64,
+    p4_mm: [f64; 2],
+    o4_mm: [f64; 3],
+    stroke_zero_mm: [f64; 3],
+    foot_pad_mm: f64,
+    sole_radius_mm: f64,
+    wheel_radius_mm: f64,
+    track_mm: f64,
+}
+
+/// A phase of the gait.
+#[derive(Serialize)]
+struct Phase {
+    from: f64,
+    to: f64,
+    name: String,
+    /// Whether a foot is in the air.
+    air: bool,
+}
+
+/// What happened to the robot.
+#[derive(Serialize)]
+struct Mark {
+    t: f64,
+    text: String,
+}
+
+/// The codes of [`MasterSample::phase`].
+fn phase_name(sample: &MasterSample) -> Option<(String, bool)> {
+    let (name, air) = match sample.phase {
+        1 => ("unload", false),
+        2 => ("lift, reach", true),
+        3 => ("lower", true),
+        4 => ("rest", false),
+        5 => return Some((format!("push, step {}", sample.step), false)),
+        _ => return None,
+    };
+    Some((name.to_owned(), air))
+}
+
+fn mm<const N: usize>(lengths_m: [f64; N]) -> [f64; N] {
+    lengths_m.map(|m| rounded(m * 1e3))
+}
+
+/// A thousandth of a unit is finer than a drawing shows.
+fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3 + 0.0
+}
+
+/// `value` of the last row at each instant.
+fn sampled<S, V>(rows: &[Row<S>], instants: &[u64], value: impl Fn(&S) -> V) -> Vec<V>
+where
+    V: Default,
+{
+    let last = |at: &u64| rows.partition_point(|row| row.t_ns <= *at).max(1) - 1;
+    let values = instants
+        .iter()
+        .map(|at| rows.get(last(at)).map(|row| value(&row.v)));
+    values.map(Option::unwrap_or_default).collect()
+}
+
+impl Motion {
+    pub(super) fn new(source: &Source<'_>) -> Self {
+        let recording = source.recording;
+        let (start, end) = source.x_range();
+        let joints = &recording.joints;
+        let inside = joints[0].iter().map(|row| (row.t_ns, source.t(row.t_s())));
+        let inside = inside.filter(|(_, t)| (start..=end).contains(t));
+        let regular: Vec<(u64, f64)> = inside
+            .filter(|(t_ns, _)| t_ns.is_multiple_of(PERIOD_NS))
+            .collect();
+        let every = regular.len().div_ceil(INSTANTS).max(1);
+        let (instants, t): (Vec<u64>, Vec<f64>) = regular.into_iter().step_by(every).unzip();
+
+        let plant = &source.robot.plant;
+        let zero = plant.stroke_zero_m;
+        let body = &plant.body;
+        Self {
+            geometry: Geometry {
+                crank_mm: rounded(body.crank_m * 1e3),
+                p4_mm: mm(body.p4_m),
+                o4_mm: mm(body.o4_m),
+                stroke_zero_mm: mm([zero[0], zero[1], zero[2]]),
+                foot_pad_mm: rounded(body.foot_pad_m * 1e3),
+                sole_radius_mm: rounded(plant.contact.sole_radius_m * 1e3),
+                wheel_radius_mm: rounded(body.wheel_radius_m * 1e3),
+                track_mm: rounded(source.robot.spatial.track_m * 1e3),
+            },
+            start,
+            end,
+            commanded_mm: std::array::from_fn(|j| {
+                sampled(&joints[j], &instants, |s| rounded(s.commanded_mm))
+            }),
+            sensed_mm: std::array::from_fn(|j| {
+                sampled(&joints[j], &instants, |s| rounded(s.sensed_mm))
+            }),
+            load_n: std::array::from_fn(|f| {
+                sampled(&recording.feet[f], &instants, |s| rounded(s.normal_force_n))
+            }),
+            switches: std::array::from_fn(|f| {
+                sampled(&recording.feet[f], &instants, |s| s.switches)
+            }),
+            travel_mm: sampled(&recording.body, &instants, |s| rounded(s.travel_mm)),
+            pitch_deg: sampled(&recording.body, &instants, |s| rounded(s.pitch_deg)),
+            supply_bar: sampled(&recording.supply, &instants, |s| rounded(s.pressure_bar)),
+            t: t.into_iter().map(rounded).collect(),
+            phases: phases(source, end),
+            marks: marks(source),
+        }
+    }
+
+    /// Whether there is anything to play.
+    pub(super) fn is_empty(&self) -> bool {
+        self.t.len() < 2
+    }
+}
+
+fn phases(source: &Source<'_>, end: f64) -> Vec<Phase> {
+    let mut phases: Vec<Phase> = Vec::new();
+    let mut last = None;
+    for row in &source.recording.master {
+        let t = source.t(row.t_s());
+        let now = phase_name(&row.v);
+        if now == last {
+            continue;
+        }
+        if let (Some(_), Some(open)) = (&last, phases.last_mut()) {
+            open.to = t;
+        }
+        if let Some((name, air)) = now.clone() {
+            let (from, to) = (t.max(source.x_range().0), end);
+            phases.push(Phase {
+                from,
+                to,
+                name,
+                air,
+            });
+        }
+        last = now;
+    }
+    phases.retain(|phase| phase.to > phase.from);
+    phases
+}
+
+/// Faults, the first at each instant: sixteen alike are one mark.
+fn marks(source: &Source<'_>) -> Vec<Mark> {
+    let (start, end) = source.x_range();
+    let faults = source.recording.events.iter();
+    let faults = faults.filter(|row| row.v.cause.kind() == wheeleg_telemetry::EventKind::Fault);
+    let mut marks: Vec<Mark> = Vec::new();
+    for row in faults {
+        let t = source.t(row.t_s());
+        let again = marks.last().is_some_and(|last| t - last.t < 0.05);
+        if !again && (start..=end).contains(&t) {
+            let text = row.v.cause.to_string();
+            marks.push(Mark { t, text });
+        }
+    }
+    marks
+}
