@@ -41,11 +41,9 @@ fn a_step_fills_towards_its_target_and_vents_against_it() {
     for (reference, driving, counter) in [(120.0, 0, 2), (60.0, 2, 0)] {
         let mut joint = JointController::new(config);
         let mut on = [0_u32; 4];
-        // From power-up both chambers fill; here they are half full already.
-        for tick in 0..400 {
+        // From power-up both chambers count as half full.
+        for _ in 0..400 {
             joint.observe(PositionMm::from_int(90));
-            let fill = if tick < 150 { 1000 } else { 0 };
-            joint.sent(&[fill, 0, fill, 0]);
         }
         // Twice the dead time and more: later it would have to move. The first pulses are planned
         // within seven ticks.
@@ -69,10 +67,10 @@ fn a_step_fills_towards_its_target_and_vents_against_it() {
 #[test]
 fn what_is_in_the_chambers_follows_what_was_sent() {
     let mut joint = controller();
-    // Fill A for a second at rest: A ends at the supply, B stays.
-    for _ in 0..1000 {
+    // Fill A and vent B for two seconds at rest: A ends at the supply, B at the atmosphere.
+    for _ in 0..2000 {
         joint.observe(PositionMm::from_int(180));
-        joint.sent(&[1000, 0, 0, 0]);
+        joint.sent(&[1000, 0, 0, 1000]);
     }
     let pressures = joint.predictive().expect("chosen").pressures();
     let kpa = |raw: i32| f64::from(raw) / 256e3;
