@@ -18,6 +18,7 @@
 //! reference at most 3 ℓ ahead of itself (2 ℓ and the way of braking): whoever watches the piston must compare it with the
 //! command.
 
+use crate::axis::square_root;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 /// Ticks of 1 ms in a second.
@@ -72,9 +73,15 @@ impl Reference {
         let sign = if way < 0 { -1 } else { 1 };
         let acceleration = i64::from(config.acceleration);
 
-        // (mm/s)² × 2^16 has a root in mm/s × 2^8.
+        // (mm/s)² × 2^16 has a root in mm/s × 2^8; beyond 32 bits 2^-10 of it has 2^-5 of that.
         let square = acceleration.saturating_mul(2).saturating_mul(distance);
-        let root = i64::try_from(square.unsigned_abs().isqrt()).unwrap_or(i64::MAX) << 8;
+        let root = match u32::try_from(square) {
+            Ok(square) => i64::from(square_root(square)) << 8,
+            Err(_) => {
+                let square = u32::try_from(square >> 10).unwrap_or(u32::MAX);
+                i64::from(square_root(square)) << 13
+            }
+        };
         let top = i64::from(config.speed.raw());
         let lead = raw(config.lead).max(1);
         let ahead = raw(self.position)
@@ -142,7 +149,10 @@ mod tests {
                     break;
                 }
                 let change = now.velocity.raw() - last.velocity.raw();
-                assert!(change.abs() <= (2500 << 16) / 1000, "{now:?} after {last:?}");
+                assert!(
+                    change.abs() <= (2500 << 16) / 1000,
+                    "{now:?} after {last:?}"
+                );
                 assert!(now.velocity.raw().abs() <= 250 << 16, "{now:?}");
                 last = now;
                 ticks += 1;
@@ -156,7 +166,10 @@ mod tests {
             };
             // The last of the parabola is cut off by the sampling.
             let expected = expected * 1000.0;
-            assert!((f64::from(ticks) - expected).abs() < 12.0, "{ticks} {expected}");
+            assert!(
+                (f64::from(ticks) - expected).abs() < 12.0,
+                "{ticks} {expected}"
+            );
         }
     }
 

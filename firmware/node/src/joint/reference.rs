@@ -243,7 +243,11 @@ mod tests {
         for (k, tick) in (0..).zip(follow(moving(None)).take(35)) {
             let on_the_way = k < CYCLE_TICKS;
             let velocity = if on_the_way { 100 } else { 0 };
-            assert_eq!(tick.reference.velocity, VelocityMmS::from_int(velocity), "tick {k}");
+            assert_eq!(
+                tick.reference.velocity,
+                VelocityMmS::from_int(velocity),
+                "tick {k}"
+            );
             // 100 mm/s are 0.1 mm in a tick.
             let tenths = f64::from(k.min(CYCLE_TICKS));
             let off = tick.reference.position.to_f64() - (20.0 + tenths / 10.0);

@@ -172,7 +172,10 @@ fn damage_that_was_seen_is_forgotten_with_all_the_rest() {
             // One has begun a period later: it has leaked for less long.
             let (a, b) = (law.pressures(), fresh.pressures());
             for (one, other) in [(a.a, b.a), (a.b, b.b)] {
-                assert!((one - other).abs() < one >> 10, "{number} {ticks}: {a:?} {b:?}");
+                assert!(
+                    (one - other).abs() < one >> 10,
+                    "{number} {ticks}: {a:?} {b:?}"
+                );
             }
             assert_eq!(law.inertia, fresh.inertia, "{number} {ticks}");
             for _ in 0..12 {
