@@ -87,7 +87,11 @@ impl Reference {
         let ahead = raw(self.position)
             .saturating_sub(raw(measured))
             .saturating_mul(sign);
-        let room = lead.saturating_mul(2).saturating_sub(ahead).clamp(0, lead);
+        let room = lead
+            .saturating_mul(2)
+            .saturating_sub(ahead)
+            .max(0)
+            .min(lead);
         let pace = root.min(top).saturating_mul(room);
         let pace = pace.checked_div(lead).unwrap_or(0);
         let goal = pace
@@ -99,13 +103,16 @@ impl Reference {
             .checked_div(TICKS_PER_SECOND)
             .unwrap_or(0);
         let last = i64::from(self.velocity.raw());
-        let change = goal.saturating_sub(last).clamp(most.saturating_neg(), most);
+        let change = goal
+            .saturating_sub(last)
+            .max(most.saturating_neg())
+            .min(most);
         let velocity = last.saturating_add(change);
         let step = velocity.checked_div(TICKS_PER_SECOND).unwrap_or(0);
         if distance <= THERE || step.saturating_mul(sign) >= distance {
             return (target, false);
         }
-        let narrow = |wide: i64| wide.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+        let narrow = |wide: i64| wide.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32;
         let next = Self {
             position: PositionMm::from_raw(narrow(raw(self.position).saturating_add(step))),
             velocity: VelocityMmS::from_raw(narrow(velocity)),
