@@ -43,6 +43,8 @@ pub struct AxisData {
     pub band: PositionMm,
     /// A piston at rest stays so up to this error, mm, 0…50; 0: by the band alone.
     pub release: PositionMm,
+    /// Both chambers are filled before the law drives; otherwise they count as vented.
+    pub precharged: bool,
     /// Full stroke, mm.
     pub stroke: PositionMm,
 }
@@ -68,6 +70,7 @@ impl Default for AxisData {
             line_delay: Micros(2900),
             band: const { PositionMm::new(I16F16::lit("0.12")) },
             release: PositionMm::ZERO,
+            precharged: false,
             stroke: PositionMm::from_int(180),
         }
     }

@@ -100,6 +100,8 @@ pub struct AxisModel {
     pub band: i32,
     /// Error at which a piston that rests is awake again, if more than the band says, raw mm.
     pub release: i32,
+    /// Both chambers are filled before the law drives.
+    pub precharged: bool,
     /// Square of the period of a swing on the air of both chambers, periods² per kg × 2^8.
     pub swing: i32,
 }
@@ -213,6 +215,7 @@ impl AxisModel {
             stick_step,
             band,
             release,
+            precharged,
             swing,
         } = self;
         match quarter {
@@ -245,6 +248,7 @@ impl AxisModel {
                     stick_step,
                     band,
                     release,
+                    precharged,
                     swing,
                 )
                     .hash(state);
@@ -394,6 +398,7 @@ impl AxisModel {
             ),
             band: number(raw(data.band)),
             release: data.release.raw(),
+            precharged: data.precharged,
             swing: ratio(
                 SWING,
                 swings.saturating_mul(period_us.wrapping_mul(period_us)),

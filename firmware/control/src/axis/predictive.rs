@@ -203,8 +203,8 @@ pub struct Predictive {
 }
 
 impl Predictive {
-    /// At rest, both chambers about the mean pressure and in balance: what they hold nobody knows,
-    /// and the middle of what they can is wrong by the least.
+    /// At rest. Chambers that a precharge fills before the law drives count as half full and in balance
+    /// from power-up on: the middle is wrong by the least. Others count as vented.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
         Self::with(model, Inertia::new(model, model.mass))
@@ -212,7 +212,14 @@ impl Predictive {
 
     #[inline]
     fn with(model: &AxisModel, inertia: Inertia) -> Self {
-        let pressures = targets(model, 0);
+        let pressures = if model.precharged {
+            targets(model, 0)
+        } else {
+            Pressures {
+                a: model.ambient,
+                b: model.ambient,
+            }
+        };
         let mut law = Self {
             a: Chamber::new(pressures.a),
             b: Chamber::new(pressures.b),

@@ -230,6 +230,7 @@ fn gains(parameters: &JointParameters) -> JointGains {
             line_delay: micros(P::LineDelay),
             band: position(P::RestBand),
             release: position(P::RestRelease),
+            precharged: parameters.get(P::Precharge) > 0,
             stroke: position(P::StrokeMax),
         },
     }

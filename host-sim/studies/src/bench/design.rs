@@ -147,6 +147,7 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
         // an eighth of what the smallest pulse does: below it, rest is luck.
         band: mm((2.5 * lsb_m).max(0.13 * free_step_m(axis)).max(2e-5)),
         release: PositionMm::ZERO,
+        precharged: false,
         stroke: mm(c.stroke_m),
     }
 }
