@@ -43,7 +43,8 @@ pub struct AxisData {
     pub band: PositionMm,
     /// A piston at rest stays so up to this error, mm, 0…50; 0: by the band alone.
     pub release: PositionMm,
-    /// Both chambers are filled before the law drives; otherwise they count as vented.
+    /// Both chambers are filled before the law drives, and it seats the piston at end stops. Without,
+    /// chambers count as vented.
     pub precharged: bool,
     /// Full stroke, mm.
     pub stroke: PositionMm,

@@ -1,14 +1,15 @@
 //! The seat at an end stop: where the target is a stop, a force instead of a position.
 //!
 //! ```text
-//! F* = ±4 F_breakaway                    toward the stop
+//! F* = ±3 F_breakaway                    toward the stop
 //! rest: |v| small, within 1.5 mm of the target, and F̂ ≥ ¾ F*
 //! ```
 //!
 //! A cushion, a load or the give of the stop holds a piston some tenths of a millimetre beside a
 //! target at the very end of the stroke: beyond every rest band of a position law, which then
 //! pulses for ever. Pressed against its stop it may rest; and of its chambers one is then known to be
-//! full, or the other to be empty. It is awake again by a new target, or 1.5 mm off its place.
+//! full, or the other to be empty. An axis without precharge has no seat: the air of it would make a
+//! start without notice 20 ms later (`tests/system/delay.rs`). It is awake again by a new target, or 1.5 mm off its place.
 
 use super::{Predictive, STILL};
 use crate::axis::gas::Pressures;
@@ -25,7 +26,7 @@ const GENTLE: i32 = 60 << 16;
 /// A seated piston is no further from its target than this, raw mm (1.5 mm).
 const SEATED: i32 = 3 << 15;
 /// Force of the seat over the break-away friction.
-const FORCE: i32 = 4;
+const FORCE: i32 = 3;
 
 /// A piston at the end stop that is its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +43,9 @@ impl Predictive {
         let reference = input.reference.raw();
         let stroke = self.motion.stroke;
         let speed = self.motion.speed.wrapping_abs();
+        if !model.precharged {
+            return None;
+        }
         if input.reference_velocity.raw().wrapping_abs() > REFERENCE_RESTS || speed > GENTLE {
             return None;
         }
