@@ -186,7 +186,7 @@ mod tests {
             let stuck = PositionMm::from_int(100);
             let last = run(100, target, |_| stuck).take(5000).last().unwrap();
             let ahead = (last.position.raw() - stuck.raw()).abs();
-            assert!(ahead >= 8 << 16 && ahead <= 12 << 16, "{ahead}");
+            assert!((8 << 16..=12 << 16).contains(&ahead), "{ahead}");
         }
     }
 

@@ -33,7 +33,7 @@ impl FromStr for LawChoice {
         if let Some(number) = (0_u8..).zip(NAMES).find(|(_, n)| *n == name) {
             return Ok(Self { number: number.0 });
         }
-        let help = closest(name, NAMES.into_iter());
+        let help = closest(name, NAMES);
         let help = help.map_or(String::new(), |near| format!("did you mean `{near}`? "));
         Err(format!("{help}a law is one of {}", NAMES.join(", ")))
     }
