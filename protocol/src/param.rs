@@ -408,6 +408,12 @@ parameters! {
             "Force beyond what motions took at which a standing piston must move: above any load change; 0: half of the largest force.";
         Precharge = 0x0138, "precharge", "bar", I16F16, "0" ..= "14", default "0", disarmed,
             "Gauge pressure to which both chambers are filled after arming, before the first motion; 0: none; at most 7/8 of the supply, absolute, and only with a PWM period of at most 60 ms.";
+        ReferenceAcceleration = 0x0139, "reference_acceleration", "mm/s2", I16F16, "0" ..= "30000", default "0", disarmed,
+            "Predictive law: acceleration of its reference, in whole mm/s2; 0: the reference has the slew limit alone.";
+        ReferenceLead = 0x013A, "reference_lead", "mm", I16F16, "0.5" ..= "100", default "4", disarmed,
+            "Predictive law: how far its reference leads the piston before it waits; it slows down to a stand at twice this.";
+        RestRelease = 0x013B, "rest_release", "mm", I16F16, "0" ..= "50", default "0", any_time,
+            "Predictive law: a piston at rest stays so up to this error; 0: up to three times the rest band.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

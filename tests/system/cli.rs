@@ -438,7 +438,7 @@ fn a_scenario_finds_its_robot_beside_it_and_the_summary_tells_it_from_the_origin
     let dir = folder();
     let sub = dir.path().join("sub");
     fs::create_dir(&sub).expect("folder");
-    let robot = source("robots/wheeleg-2003.toml");
+    let robot = source("robots/wheeleg.toml");
     let changed = robot.replacen(
         "value = 0.010, unit = \"1/mm\"",
         "value = 0.011, unit = \"1/mm\"",

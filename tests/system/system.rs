@@ -20,6 +20,7 @@ mod long_runs;
 mod off_data;
 mod plant_check;
 mod precharge;
+mod predictive_robot;
 mod reference;
 mod restart;
 mod safe_states;

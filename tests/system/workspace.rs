@@ -165,7 +165,7 @@ const PROGRAM: [&str; 10] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 16] = [
+const TESTED: [&str; 17] = [
     "wheeleg-config",
     "wheeleg-control",
     "wheeleg-identity",
@@ -177,6 +177,7 @@ const TESTED: [&str; 16] = [
     "wheeleg-protocol",
     "wheeleg-remote",
     "wheeleg-remote-host",
+    "wheeleg-report",
     "wheeleg-remote-link",
     "wheeleg-sim",
     "wheeleg-studies",

@@ -8,6 +8,7 @@
 //!   valves, with their switching delays compensated.
 //! * [`axis`]: the cylinder as the predictive law knows it: pressures, motion and
 //!   load without a pressure sensor.
+//! * [`reference`]: second-order reference generator with a governor, ahead of the predictive law.
 //! * [`wheel`]: the HCTL-1100's lead filter and its four modes.
 //!
 //! Cost on a Cortex-M4, as instructions in a linked image (opt-level 2, static
@@ -49,6 +50,7 @@ pub mod axis;
 pub mod fuzzy;
 pub mod joint;
 pub mod pwm;
+pub mod reference;
 pub mod rules;
 pub mod valve;
 pub mod velocity;

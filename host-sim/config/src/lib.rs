@@ -16,6 +16,7 @@ mod command;
 mod commissioned;
 mod error;
 pub mod faults;
+mod law;
 mod node;
 mod params;
 pub mod plant;
@@ -29,6 +30,7 @@ pub mod timing;
 
 pub use axis::AxisConfig;
 pub use error::{ConfigError, Problem};
+pub use law::LawChoice;
 pub use node::NodeParams;
 pub use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};

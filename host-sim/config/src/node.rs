@@ -193,7 +193,8 @@ fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
     }
 }
 
-fn set(list: &mut Vec<(u16, i32)>, id: u16, raw: i32) {
+/// Sets a parameter of a board.
+pub(super) fn set(list: &mut Vec<(u16, i32)>, id: u16, raw: i32) {
     match list.binary_search_by_key(&id, |(id, _)| *id) {
         Ok(at) => list[at].1 = raw,
         Err(at) => list.insert(at, (id, raw)),

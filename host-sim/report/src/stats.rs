@@ -38,9 +38,66 @@ pub fn largest(values: &[f64]) -> Option<f64> {
     values.iter().copied().reduce(f64::max)
 }
 
+/// Upper bound of a failure probability after `failures` in `trials`: one-sided 95 %, exact
+/// (Clopper and Pearson 1934): the p at which so few failures have a probability of 5 %. 1 of no
+/// trials.
+///
+/// # Panics
+/// If there are more failures than trials.
+#[must_use]
+pub fn failure_bound(failures: u32, trials: u32) -> f64 {
+    assert!(failures <= trials, "{failures} of {trials}");
+    if failures == trials {
+        return 1.0;
+    }
+    // The probability falls with p: bisection to the last bit or so.
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let p = 0.5 * (low + high);
+        if at_most(failures, trials, p) > 0.05 {
+            low = p;
+        } else {
+            high = p;
+        }
+    }
+    high
+}
+
+/// Probability of at most `failures` in `trials` of probability `p`, from 0 to 1 exclusive.
+fn at_most(failures: u32, trials: u32, p: f64) -> f64 {
+    let odds = p.ln() - (-p).ln_1p();
+    let mut term = f64::from(trials) * (-p).ln_1p();
+    let mut sum = term.exp();
+    for k in 1..=failures {
+        term += (f64::from(trials - k + 1) / f64::from(k)).ln() + odds;
+        sum += term.exp();
+    }
+    sum
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn failure_bounds_are_those_of_clopper_and_pearson() {
+        // No failure: 1 - 0.05^(1/n). Others: summed with the logarithm of gamma, in Python.
+        for (failures, trials, bound) in [
+            (0, 8, 0.312_344),
+            (0, 60, 0.048_703),
+            (0, 300, 0.009_936),
+            (1, 10, 0.394_163),
+            (10, 5000, 0.003_390),
+            (44, 1000, 0.056_215),
+        ] {
+            let found = failure_bound(failures, trials);
+            assert!(
+                (found - bound).abs() < 2e-5,
+                "{failures} of {trials}: {found}"
+            );
+        }
+        assert_eq!((failure_bound(3, 3), failure_bound(0, 0)), (1.0, 1.0));
+    }
 
     #[test]
     fn quantiles_are_those_of_type_7() {

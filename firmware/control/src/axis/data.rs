@@ -41,6 +41,11 @@ pub struct AxisData {
     /// Rest begins within this error, mm, 0.02…5: three times the noise of the
     /// position, and no less than the converter's step.
     pub band: PositionMm,
+    /// A piston at rest stays so up to this error, mm, 0…50; 0: by the band alone.
+    pub release: PositionMm,
+    /// Both chambers are filled before the law drives, and it seats the piston at end stops. Without,
+    /// chambers count as vented.
+    pub precharged: bool,
     /// Full stroke, mm.
     pub stroke: PositionMm,
 }
@@ -65,6 +70,8 @@ impl Default for AxisData {
             margin: Micros(350),
             line_delay: Micros(2900),
             band: const { PositionMm::new(I16F16::lit("0.12")) },
+            release: PositionMm::ZERO,
+            precharged: false,
             stroke: PositionMm::from_int(180),
         }
     }
@@ -92,7 +99,7 @@ pub enum AxisField {
     Friction,
     /// Switching or line delay, or its margin.
     Delay,
-    /// Rest band.
+    /// Rest band, or release.
     Band,
     /// Stroke.
     Stroke,
@@ -132,6 +139,7 @@ impl AxisData {
         within(self.breakaway.raw(), coulomb, 500 << 16, F::Friction)?;
         within(self.viscous.raw(), 0, 1000 << 16, F::Friction)?;
         within(self.band.raw(), least, 5 << 16, F::Band)?;
+        within(self.release.raw(), 0, 50 << 16, F::Band)?;
         within(self.stroke.raw(), 1 << 16, 1000 << 16, F::Stroke)?;
         // At most nine tenths of the bore.
         let bore_tenths = i64::from(self.bore.raw()).wrapping_mul(9);

@@ -98,6 +98,10 @@ pub struct AxisModel {
     pub stick_step: i32,
     /// Rest band, raw mm.
     pub band: i32,
+    /// Error at which a piston that rests is awake again, if more than the band says, raw mm.
+    pub release: i32,
+    /// Both chambers are filled before the law drives.
+    pub precharged: bool,
     /// Square of the period of a swing on the air of both chambers, periods² per kg × 2^8.
     pub swing: i32,
 }
@@ -210,6 +214,8 @@ impl AxisModel {
             observe_load,
             stick_step,
             band,
+            release,
+            precharged,
             swing,
         } = self;
         match quarter {
@@ -241,6 +247,8 @@ impl AxisModel {
                     observe_load,
                     stick_step,
                     band,
+                    release,
+                    precharged,
                     swing,
                 )
                     .hash(state);
@@ -389,6 +397,8 @@ impl AxisModel {
                 1_000_000,
             ),
             band: number(raw(data.band)),
+            release: data.release.raw(),
+            precharged: data.precharged,
             swing: ratio(
                 SWING,
                 swings.saturating_mul(period_us.wrapping_mul(period_us)),

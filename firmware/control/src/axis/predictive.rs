@@ -22,6 +22,9 @@
 //!   long may do so in a wider band, up to three times and 0.4 mm; and each time it
 //!   enters that band the law waits with the valves shut, to see where it comes to
 //!   rest, before it acts again: no limit cycle lasts.
+//! * **Seat.** Position control against an end stop never rests: cushion and load hold the piston
+//!   beside its target. At a target within [`seat::TARGET`] of a stop a force is controlled
+//!   instead, until the piston is pressed against it.
 //! * **Announced moves.** With a move announced, and the piston at rest at the present target or
 //!   against a stop, the force is brought to the edge
 //!   of slipping in its direction: the counter chamber vents and the drive
@@ -42,6 +45,7 @@ mod plan;
 mod pressures;
 mod rest;
 mod seals;
+mod seat;
 
 use super::air::{Chamber, Clock, Piston};
 use super::gas::Pressures;
@@ -51,6 +55,7 @@ use super::motion::{Inertia, Motion};
 use crate::joint::JointInput;
 use crate::pwm::OnTimes;
 use force::{Ahead, Course, Push, Wish};
+use pressures::targets;
 use rest::Rest;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
@@ -198,7 +203,8 @@ pub struct Predictive {
 }
 
 impl Predictive {
-    /// At rest, both chambers at the atmosphere.
+    /// At rest. Chambers that a precharge fills before the law drives count as half full and in balance
+    /// from power-up on: the middle is wrong by the least. Others count as vented.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
         Self::with(model, Inertia::new(model, model.mass))
@@ -206,9 +212,13 @@ impl Predictive {
 
     #[inline]
     fn with(model: &AxisModel, inertia: Inertia) -> Self {
-        let pressures = Pressures {
-            a: model.ambient,
-            b: model.ambient,
+        let pressures = if model.precharged {
+            targets(model, 0)
+        } else {
+            Pressures {
+                a: model.ambient,
+                b: model.ambient,
+            }
         };
         let mut law = Self {
             a: Chamber::new(pressures.a),

@@ -363,3 +363,36 @@ proptest! {
         }
     }
 }
+
+/// A cushion or a load holds the piston 0.8 mm before the stop: pressed against that, it rests, and
+/// stays at rest until it has another target.
+#[test]
+fn a_piston_is_seated_at_the_end_stop_that_is_its_target() {
+    for (measured, target, drive) in [(179.2, 180.0, 0), (0.8, 0.0, 2)] {
+        let axis = AxisData {
+            precharged: true,
+            ..AxisData::default()
+        };
+        let gains = JointGains {
+            law: Law::Predictive,
+            axis,
+            ..JointGains::default()
+        };
+        let mut joint = JointController::new(JointConfig::new(&gains, TICK).expect("valid"));
+        let mut driven = 0;
+        for _ in 0..1500 {
+            let output = joint.step(&at(measured, target));
+            let sent = output.direct.expect("times its own pulses");
+            driven += u32::from(sent[drive]);
+        }
+        assert!(joint.is_settled() && driven > 5_000, "{target}: {driven}");
+        for tick in 0..500 {
+            let output = joint.step(&at(measured, target));
+            assert_eq!(output.direct, Some([0; 4]), "{target}: tick {tick}");
+        }
+        for _ in 0..40 {
+            joint.step(&at(measured, 90.0));
+        }
+        assert!(!joint.is_settled(), "{target}");
+    }
+}

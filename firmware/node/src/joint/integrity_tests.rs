@@ -92,7 +92,8 @@ fn untouched_state_is_sound() {
 fn every_flipped_bit_of_the_reference_is_seen() {
     for bit in 0..32 {
         assert!(holds_after(|node| {
-            node.state.reference = PositionMm::from_raw(node.state.reference.raw() ^ (1 << bit));
+            node.state.reference.position =
+                PositionMm::from_raw(node.state.reference.position.raw() ^ (1 << bit));
         }));
     }
 }
@@ -187,7 +188,8 @@ fn after_damage_the_correction_is_that_of_the_parameters() {
 #[test]
 fn a_request_does_not_hide_earlier_damage() {
     assert!(holds_after(|node| {
-        node.state.reference = PositionMm::from_raw(node.state.reference.raw() ^ 1);
+        node.state.reference.position =
+            PositionMm::from_raw(node.state.reference.position.raw() ^ 1);
         node.change(|node| node.controller.set_correction(Correction::Id));
     }));
     assert!(!holds_after(|node| {

@@ -18,6 +18,7 @@ use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
 use wheeleg_control::joint::{JointConfig, JointController};
 use wheeleg_control::pwm::ValvePwm;
+use wheeleg_control::reference::Reference;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
 
@@ -31,12 +32,24 @@ const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TickState {
-    pub(super) reference: PositionMm,
+    /// What the law is to follow.
+    pub(super) reference: Reference,
+    /// The command within the slew limit, which supervision compares the piston with: a
+    /// reference that waits for a stuck piston would hide that it is stuck.
+    pub(super) supervised: PositionMm,
     pub(super) measured: PositionMm,
     pub(super) following: Ticks,
     pub(super) motion: MotionWatch,
     pub(super) precharge: Precharge,
     boot_ticks: Ticks,
+}
+
+impl TickState {
+    /// References of an axis that stands at `position`.
+    pub(super) const fn start_from(&mut self, position: PositionMm) {
+        self.reference = Reference::at(position);
+        self.supervised = position;
+    }
 }
 
 /// Application of one joint board: sense, control, valves.
@@ -112,7 +125,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             monitor: SensorMonitor::new(),
             target: Target::default(),
             state: TickState {
-                reference: PositionMm::ZERO,
+                reference: Reference::default(),
+                supervised: PositionMm::ZERO,
                 measured: PositionMm::ZERO,
                 following: Ticks::ZERO,
                 motion: MotionWatch::new(&settings.tick.motion, PositionMm::ZERO),
@@ -300,12 +314,12 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// tests and tools around the node.
     pub fn motion_account(&self) -> MotionAccount {
         let TickState {
-            reference,
+            supervised,
             measured,
             motion,
             ..
         } = &self.state;
-        motion.account(*reference, *measured, &self.settings.motion)
+        motion.account(*supervised, *measured, &self.settings.motion)
     }
 
     /// Present mode.

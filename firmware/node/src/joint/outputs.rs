@@ -18,26 +18,36 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Closed loop on the reference of this tick.
     pub(super) fn drive(&mut self, now: Micros) -> OnTimes {
         let TickReference {
+            supervised,
             reference,
-            velocity,
             announced,
             slew_limited,
-        } = advance(self.state.reference, &mut self.target, &self.settings);
+        } = advance(
+            self.state.supervised,
+            self.state.reference,
+            self.state.measured,
+            &mut self.target,
+            &self.settings,
+        );
+        self.state.supervised = supervised;
         self.state.reference = reference;
         let output = self.controller.step(&JointInput {
             measured: self.state.measured,
-            reference,
-            reference_velocity: velocity,
+            reference: reference.position,
+            reference_velocity: reference.velocity,
             announced,
         });
-        let beyond = output.error.saturating_abs() > self.allowed_error();
+        // The law keeps its reference within the stroke, and its error counts from there.
+        let waits = supervised.saturating_sub(reference.position);
+        let behind = output.error.saturating_add(waits);
+        let beyond = behind.saturating_abs() > self.allowed_error();
         self.state.following = if beyond {
             self.state.following.next()
         } else {
             Ticks::ZERO
         };
         let driven = Driven {
-            reference,
+            reference: supervised,
             position: self.state.measured,
             velocity: output.velocity,
         };
@@ -104,7 +114,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     #[cold]
     #[inline(never)]
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
-        self.state.reference = self.state.measured;
+        self.state.start_from(self.state.measured);
         self.state.precharge = Precharge::default();
         self.target = Target::at(self.state.measured);
         let on_times = if self.core.mode() == Mode::Exhaust {
@@ -129,14 +139,14 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let shortest = self.pwm.timing().shortest_opening();
         let state = &mut self.state;
         let filling = state.precharge.tick(
-            state.reference,
+            state.reference.position,
             state.measured,
             &state.motion,
             &self.settings,
             shortest,
         );
         let filling = filling.unwrap_or_else(|(end, after_ms)| {
-            state.reference = state.measured;
+            state.start_from(state.measured);
             self.core.supervisor.note(end, 0, after_ms, now);
             Filling::NONE
         });
@@ -176,7 +186,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         snapshot.at = now;
         snapshot.mode = self.core.mode();
         snapshot.measured = self.state.measured;
-        snapshot.reference = self.state.reference;
+        snapshot.reference = self.state.reference.position;
         snapshot.commanded = self.target.reference();
         snapshot.velocity = velocity;
         snapshot.duty = duty;

@@ -11,6 +11,9 @@
 //! first reference of the law is the actual position, and from there the slew limit holds: no jump after
 //! an arm, wherever the set-point is.
 //!
+//! The predictive law follows the reference generator of `wheeleg_control::reference` instead, if
+//! its acceleration is set; supervision goes on to compare the piston with the reference above.
+//!
 //! The next reference of a slot is counted down to the tick and handed to the
 //! control law. The predictive law fills and vents ahead of it; the others do not use it.
 
@@ -18,6 +21,7 @@ use super::settings::TickSettings;
 use crate::JOINT_TICK;
 use core::hash::{Hash, Hasher};
 use wheeleg_control::joint::Announced;
+use wheeleg_control::reference::Reference;
 use wheeleg_protocol::JointSetpoint;
 use wheeleg_protocol::link::CYCLE_US;
 use wheeleg_units::{PositionMm, Ticks, VelocityMmS, divide_signed};
@@ -138,15 +142,20 @@ fn travel(velocity: i32, ticks: u32) -> i32 {
 /// Reference of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TickReference {
-    pub(super) reference: PositionMm,
-    pub(super) velocity: VelocityMmS,
+    /// The command within the slew limit.
+    pub(super) supervised: PositionMm,
+    /// What the law follows.
+    pub(super) reference: Reference,
     pub(super) announced: Option<Announced>,
     pub(super) slew_limited: bool,
 }
 
-/// Next reference on the way from `last` to the target.
+/// Next reference on the way to the target, from the `supervised` and the followed one of the last
+/// tick.
 pub(super) fn advance(
-    last: PositionMm,
+    supervised: PositionMm,
+    last: Reference,
+    measured: PositionMm,
     target: &mut Target,
     settings: &TickSettings,
 ) -> TickReference {
@@ -154,17 +163,31 @@ pub(super) fn advance(
     let (wanted, velocity) = target.advance();
     let step = settings.slew_step;
     let down = PositionMm::ZERO.saturating_sub(step);
-    let difference = wanted.saturating_sub(last);
+    let difference = wanted.saturating_sub(supervised);
     let change = difference.limit(down, step);
     let slew_limited = change != difference;
-    let velocity = match (slew_limited, change.raw() > 0) {
-        (false, _) => velocity,
-        (true, true) => settings.slew_rate,
-        (true, false) => VelocityMmS::ZERO.saturating_sub(settings.slew_rate),
+    let supervised = supervised.saturating_add(change);
+    let (reference, slew_limited) = if let Some(generator) = &settings.generator {
+        let target = Reference {
+            position: wanted,
+            velocity,
+        };
+        last.update(generator, target, measured)
+    } else {
+        let velocity = match (slew_limited, change.raw() > 0) {
+            (false, _) => velocity,
+            (true, true) => settings.slew_rate,
+            (true, false) => VelocityMmS::ZERO.saturating_sub(settings.slew_rate),
+        };
+        let reference = Reference {
+            position: supervised,
+            velocity,
+        };
+        (reference, slew_limited)
     };
     TickReference {
-        reference: last.saturating_add(change),
-        velocity,
+        supervised,
+        reference,
         announced,
         slew_limited,
     }
@@ -179,6 +202,7 @@ mod tests {
     use core::num::NonZeroU8;
     use std::hash::DefaultHasher;
     use wheeleg_control::joint::Announced;
+    use wheeleg_control::reference::Reference;
     use wheeleg_protocol::{JointSetpoint, LinkLossAction, NextReference};
     use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
 
@@ -208,8 +232,8 @@ mod tests {
         let settings = settings();
         let mut last = PositionMm::from_int(20);
         core::iter::repeat_with(move || {
-            let tick = advance(last, &mut target, &settings);
-            last = tick.reference;
+            let tick = advance(last, Reference::at(last), last, &mut target, &settings);
+            last = tick.supervised;
             tick
         })
     }
@@ -219,10 +243,14 @@ mod tests {
         for (k, tick) in (0..).zip(follow(moving(None)).take(35)) {
             let on_the_way = k < CYCLE_TICKS;
             let velocity = if on_the_way { 100 } else { 0 };
-            assert_eq!(tick.velocity, VelocityMmS::from_int(velocity), "tick {k}");
+            assert_eq!(
+                tick.reference.velocity,
+                VelocityMmS::from_int(velocity),
+                "tick {k}"
+            );
             // 100 mm/s are 0.1 mm in a tick.
             let tenths = f64::from(k.min(CYCLE_TICKS));
-            let off = tick.reference.to_f64() - (20.0 + tenths / 10.0);
+            let off = tick.reference.position.to_f64() - (20.0 + tenths / 10.0);
             assert!(off.abs() < 1e-4, "tick {k}: {off}");
             assert!(!tick.slew_limited, "tick {k}");
         }

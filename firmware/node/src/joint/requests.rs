@@ -27,7 +27,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
     fn armed(&mut self) {
         self.change(|node| {
             // Here, and not only in ticks at rest: disarming and arming may fall between two.
-            node.state.reference = node.state.measured;
+            node.state.start_from(node.state.measured);
             node.state.following = Ticks::ZERO;
             node.target = Target::at(node.state.measured);
             node.state.precharge = Precharge::begin(&mut node.state.motion, &node.settings);
@@ -50,7 +50,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
             None => {
                 let withdrawn = self.core.supervisor.apply(Event::SetpointWithdrawn, at);
                 if withdrawn.is_ok() && was_tracking {
-                    self.change(|node| node.target = Target::at(node.state.reference));
+                    self.change(|node| node.target = Target::at(node.state.reference.position));
                 }
             }
         }

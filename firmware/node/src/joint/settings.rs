@@ -11,6 +11,7 @@ use crate::supervisor::{SupervisionTimes, watchdog};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains, Law};
 use wheeleg_control::pwm::PwmTiming;
+use wheeleg_control::reference::GeneratorConfig;
 use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS, divide_signed};
@@ -51,6 +52,8 @@ pub struct TickSettings {
     pub slew_step: PositionMm,
     /// Velocity of a reference at the slew limit.
     pub slew_rate: VelocityMmS,
+    /// Generator of the predictive law's reference; `None`: the command within the slew limit.
+    pub generator: Option<GeneratorConfig>,
     /// Following error that is a fault when it lasts …
     pub following_error: PositionMm,
     /// … for this many ticks.
@@ -76,6 +79,7 @@ impl TickSettings {
             correction,
             slew_step,
             slew_rate,
+            generator,
             following_error,
             following_ticks,
             motion: _,
@@ -84,7 +88,7 @@ impl TickSettings {
             full_period,
         } = self;
         let [a, b, c, d] = &staged_exhaust.0;
-        (sensor, correction, slew_step, slew_rate).hash(state);
+        (sensor, correction, slew_step, slew_rate, generator).hash(state);
         (following_error, following_ticks, precharge).hash(state);
         (a, b, c, d, full_period).hash(state);
     }
@@ -147,6 +151,7 @@ impl JointSettings {
                 },
                 slew_step: per_tick(raw(P::SlewRate)),
                 slew_rate: VelocityMmS::from_raw(raw(P::SlewRate)),
+                generator: generator(parameters, gains.law),
                 following_error: position(P::FollowingError),
                 following_ticks: millis(P::FollowingTime).to_ticks_ceil(JOINT_TICK),
                 motion,
@@ -156,6 +161,18 @@ impl JointSettings {
             },
         })
     }
+}
+
+/// The reference generator that these parameters ask for. The other laws follow the command: it
+/// is the step that makes their error.
+fn generator(parameters: &JointParameters, law: Law) -> Option<GeneratorConfig> {
+    use JointParam as P;
+    let acceleration = parameters.get(P::ReferenceAcceleration) >> 16;
+    (law == Law::Predictive && acceleration > 0).then(|| GeneratorConfig {
+        speed: VelocityMmS::from_raw(parameters.get(P::SlewRate)),
+        acceleration,
+        lead: PositionMm::from_raw(parameters.get(P::ReferenceLead)),
+    })
 }
 
 /// The gains of the control crate from raw parameters; formats agree row by row.
@@ -212,6 +229,8 @@ fn gains(parameters: &JointParameters) -> JointGains {
             margin: PULSE_MARGIN,
             line_delay: micros(P::LineDelay),
             band: position(P::RestBand),
+            release: position(P::RestRelease),
+            precharged: parameters.get(P::Precharge) > 0,
             stroke: position(P::StrokeMax),
         },
     }

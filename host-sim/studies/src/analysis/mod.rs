@@ -3,6 +3,7 @@
 
 mod contact;
 mod delay;
+mod moves;
 mod reference;
 mod rest;
 mod safe_state;

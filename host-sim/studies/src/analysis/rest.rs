@@ -22,8 +22,9 @@ const STILL_MM: f64 = 0.01;
 /// One joint, while its samples come in.
 #[derive(Debug, Clone, Default)]
 struct JointRest {
-    /// Reference that was last taken for a new one, mm, and when that was, s.
-    reference: Option<(f64, f64)>,
+    /// Reference and command that were last taken for new ones, mm, and when that was, s. A
+    /// reference generator begins a move by less than stands still; the command tells of it.
+    target: Option<([f64; 2], f64)>,
     /// Time, s, valve edges and distance from the reference, mm, of the last sample.
     last: Option<(f64, u32, f64)>,
     result: RestResult,
@@ -33,14 +34,16 @@ impl JointRest {
     fn joint(&mut self, row: &Row<JointSample>) {
         let t_s = row.t_s();
         let error_mm = (row.v.reference_mm - row.v.position_mm).abs();
-        let (reference, moved_s) = *self.reference.get_or_insert((row.v.reference_mm, t_s));
+        let now = [row.v.reference_mm, row.v.commanded_mm];
+        let (target, moved_s) = *self.target.get_or_insert((now, t_s));
+        let moves = |(now, before): (f64, f64)| (now - before).abs() > STILL_MM;
         if let Some((before_s, edges, before_mm)) = self.last {
             let at_rest = before_s >= moved_s + SETTLING_S;
-            if (row.v.reference_mm - reference).abs() > STILL_MM {
+            if now.into_iter().zip(target).any(moves) {
                 if at_rest {
                     self.result.note_error(before_mm);
                 }
-                self.reference = Some((row.v.reference_mm, t_s));
+                self.target = Some((now, t_s));
             } else if at_rest {
                 self.result.rest_s += t_s - before_s;
                 self.result.edges += row.v.valve_edges - edges;
@@ -50,7 +53,7 @@ impl JointRest {
     }
 
     fn result(mut self) -> RestResult {
-        if let (Some((_, moved_s)), Some((t_s, _, error_mm))) = (self.reference, self.last)
+        if let (Some((_, moved_s)), Some((t_s, _, error_mm))) = (self.target, self.last)
             && t_s >= moved_s + SETTLING_S
         {
             self.result.note_error(error_mm);

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::moves::MoveMeter;
 use super::rest::{RestMeter, rest_targets};
 use super::{Analysis, Extremes, Target, within};
 use wheeleg_config::{GaitParams, RobotConfig};
@@ -170,6 +171,7 @@ pub(super) struct ThreeStepMeter {
     b6: Track,
     strides: Strides,
     rest: RestMeter,
+    moves: MoveMeter,
 }
 
 impl ThreeStepMeter {
@@ -181,6 +183,7 @@ impl ThreeStepMeter {
             b6: Track::new(sample_period_s),
             strides: Strides::default(),
             rest: RestMeter::default(),
+            moves: MoveMeter::default(),
         }
     }
 
@@ -205,17 +208,27 @@ impl ThreeStepMeter {
     pub(super) fn joint(&mut self, joint: usize, row: &Row<JointSample>) {
         if within(row, self.start_s, f64::INFINITY) {
             self.rest.joint(joint, row);
+            self.moves.joint(joint, row);
         }
     }
 
     pub(super) fn targets(self, robot: &RobotConfig, analysis: &Analysis) -> Vec<Target> {
         let mut targets = Vec::new();
         self.strokes(&mut targets);
+        let axes = targets.len();
         self.speeds(&mut targets);
         self.accelerations(&mut targets);
+        // The axes of the paper's plots describe its experiment, and so its law; another one may
+        // be faster.
+        if !robot.has_papers_law() {
+            for target in targets.drain(axes..).collect::<Vec<_>>() {
+                targets.push(target.info());
+            }
+        }
         self.steps(&mut targets, analysis);
         delays(&mut targets, robot, analysis);
         self.forces(&mut targets);
+        targets.extend(self.moves.targets(self.gait.steps));
         targets.extend(rest_targets(&self.rest.result()));
         targets
     }

@@ -102,9 +102,14 @@ fn raw(design: &Design, parameter: JointParam) -> Option<i32> {
         P::FrictionViscous => a.viscous.raw(),
         P::LineDelay => us(a.line_delay),
         P::RestBand => a.band.raw(),
-        P::WatchdogCycles | P::HoldTime | P::ExhaustDuty | P::MotionMargin | P::Precharge => {
-            return None;
-        }
+        P::RestRelease => a.release.raw(),
+        P::WatchdogCycles
+        | P::HoldTime
+        | P::ExhaustDuty
+        | P::MotionMargin
+        | P::Precharge
+        | P::ReferenceAcceleration
+        | P::ReferenceLead => return None,
     })
 }
 

@@ -146,6 +146,8 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
         // Two and a half steps of the converter: below it, rest is noise. And no less than
         // an eighth of what the smallest pulse does: below it, rest is luck.
         band: mm((2.5 * lsb_m).max(0.13 * free_step_m(axis)).max(2e-5)),
+        release: PositionMm::ZERO,
+        precharged: false,
         stroke: mm(c.stroke_m),
     }
 }

@@ -20,7 +20,7 @@ use crate::StudyError;
 use crate::analysis::Analyser;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_config::{EventAction, RobotConfig, Scenario, builtin};
+use wheeleg_config::{EventAction, LawChoice, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
 use wheeleg_sim::{self as sil, Boards, DownTimes, SimError};
@@ -33,6 +33,8 @@ pub struct Options {
     pub scenario: String,
     /// Robot instead of the scenario's.
     pub robot: Option<String>,
+    /// Law of all joints instead of the robot's.
+    pub law: Option<LawChoice>,
     /// Seed instead of the scenario's.
     pub seed: Option<u64>,
     /// Where each node runs.
@@ -114,10 +116,13 @@ fn run_on(
 ) -> Result<Finished<Run>, StudyError> {
     let mut scenario = builtin::scenario(&options.scenario)?;
     scenario.faults.extend_from_slice(&options.faults);
-    let robot = match &options.robot {
+    let mut robot = match &options.robot {
         Some(robot) => builtin::robot(robot)?,
         None => builtin::robot_of(&scenario.robot, &options.scenario)?,
     };
+    if let Some(law) = options.law {
+        robot.set_law(law);
+    }
     faults::check(&scenario, &robot, &options.nodes)?;
     if options.compared {
         faults::ensure_comparable(&scenario, &options.nodes)?;
@@ -285,6 +290,7 @@ mod tests {
         let options = Options {
             scenario: builtin::DEFAULT_SCENARIO.to_owned(),
             robot: None,
+            law: None,
             seed: None,
             nodes,
             faults: Vec::new(),
@@ -309,6 +315,7 @@ mod tests {
         let options = Options {
             scenario: "stand".to_owned(),
             robot: None,
+            law: None,
             seed: None,
             nodes: Nodes::default(),
             faults: vec!["other-interface:joint3@0s".parse().expect("a fault")],

@@ -9,6 +9,7 @@ use clap::Args;
 use terminal_size::{Width, terminal_size_of};
 
 use super::{Drawing, FAILED, end, stop_on_signals, tell};
+use wheeleg_config::LawChoice;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
 use wheeleg_report::output;
@@ -41,6 +42,10 @@ pub(super) struct RunOptions {
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
+    /// Law of all joints, instead of the robot's: `fuzzy` (the paper's), `on-off`, `p`, `pid`,
+    /// `sliding`, `predictive`.
+    #[arg(long, value_name = "NAME")]
+    law: Option<LawChoice>,
     /// Injects a fault, for example `master-silent@3.2s`; may be given several
     /// times. `wheeleg faults list` prints them all.
     #[arg(long = "fault", value_name = "FAULT")]
@@ -83,6 +88,7 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     let options = Options {
         scenario: scenario.to_owned(),
         robot: args.robot.clone(),
+        law: args.law,
         seed: args.seed,
         out: args.out.clone(),
         faults: args.faults.clone(),

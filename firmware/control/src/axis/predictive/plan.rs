@@ -2,6 +2,7 @@
 
 use super::pressures::{made_up, targets};
 use super::rest::{Approach, REFERENCE_RESTS};
+use super::seat::Seat;
 use super::{MakesUp, NOTHING, Predictive, STILL};
 use crate::axis::gas::Pressures;
 use crate::axis::model::AxisModel;
@@ -37,7 +38,16 @@ impl Predictive {
             }
             _ => self.awaits = NOTHING,
         }
-        if awaited.is_none() {
+        let seat = match awaited {
+            Some(_) => None,
+            None => self.seat(model, input),
+        };
+        if seat == Some(Seat::Seated) {
+            self.quiet = true;
+            self.rest.settle();
+        } else if seat.is_some() {
+            self.quiet = false;
+        } else if awaited.is_none() {
             self.quiet = self.rest.quiet(
                 model,
                 &Approach {
@@ -57,8 +67,9 @@ impl Predictive {
                 MakesUp::Retracts
             };
         }
-        let force = match awaited {
-            None if self.quiet => {
+        let force = match (awaited, seat) {
+            (Some(force), _) | (None, Some(Seat::Press(force))) => force,
+            (None, _) if self.quiet => {
                 let ([fill_a, vent_a], [fill_b, vent_b]) = (self.a.shut(model), self.b.shut(model));
                 self.plan = [fill_a, vent_a, fill_b, vent_b];
                 self.turn.limited = false;
@@ -66,8 +77,7 @@ impl Predictive {
                 self.rest_check = self.sum_of_rest();
                 return;
             }
-            None => self.wanted,
-            Some(force) => force,
+            (None, _) => self.wanted,
         };
         let possible = force
             .max(model.force_in.wrapping_neg())

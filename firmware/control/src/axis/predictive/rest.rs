@@ -102,6 +102,15 @@ impl Rest {
         self.near > PATIENCE
     }
 
+    /// At rest, by what is known beside its error.
+    pub(super) const fn settle(&mut self) {
+        self.settled = true;
+        self.aimed = false;
+        self.released = 0;
+        self.near = 0;
+        self.pause = 0;
+    }
+
     /// Whether it rests at the present target.
     #[inline]
     pub(super) const fn holds(&self) -> bool {
@@ -153,7 +162,7 @@ impl Rest {
         // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
         let narrow = model.band;
         let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        if self.settled && self.stays(narrow, now, steps) {
+        if self.settled && self.stays(model, now, steps) {
             return true;
         }
         let error = now
@@ -202,7 +211,8 @@ impl Rest {
 
     /// One period of a piston that rests; whether it stays so.
     #[inline]
-    fn stays(&mut self, narrow: i32, now: &Approach, steps: bool) -> bool {
+    fn stays(&mut self, model: &AxisModel, now: &Approach, steps: bool) -> bool {
+        let narrow = model.band;
         let beyond = self.beyond().wrapping_sub(WIDENS);
         let beyond = beyond.clamp(0, 2 * PATIENCE_STEP);
         let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
@@ -212,6 +222,12 @@ impl Rest {
             .wrapping_shr(4)
             .wrapping_add(band)
             .min(LEFT.max(band.wrapping_add(narrow >> 1)));
+        // The ground pushes a standing joint to and fro. A target that has moved is another matter.
+        let release = if self.aimed {
+            release
+        } else {
+            release.max(model.release)
+        };
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
         if steps && away <= release {
             self.released = 0;

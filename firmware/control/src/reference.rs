@@ -1,0 +1,220 @@
+//! Reference generator: from steps of the command to a motion that a piston can follow.
+//!
+//! Second order, time-optimal within a speed and an acceleration, after the text-book profile of
+//! a double integrator; with a reference governor that lets it lead the piston by little:
+//!
+//! ```text
+//! d = target − r                                  way that is left
+//! e = (r − measured) · sgn d                      how far the reference is ahead
+//! g = min(1, max(0, (2 ℓ − e) / ℓ))               governor: 1 up to the lead ℓ, 0 from twice it
+//! v* = v_target + sgn d · min(v_max, √(2 a |d|)) · g
+//! |v(k) − v(k−1)| ≤ a T                           T: one tick
+//! r(k) = r(k−1) + v(k) T
+//! ```
+//!
+//! A reference that runs away from a piston that has not begun to move asks for a speed that no
+//! valve gives: the piston then overshoots (Gilbert and Kolmanovsky's governor in its simplest
+//! form: only the pace is held back, never the target). A piston that is stuck holds the
+//! reference at most 3 ℓ ahead of itself (2 ℓ and the way of braking): whoever watches the piston must compare it with the
+//! command.
+
+use crate::axis::square_root;
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+/// Ticks of 1 ms in a second.
+const TICKS_PER_SECOND: i64 = 1000;
+/// Raw steps in a unit: I16F16.
+const ONE: i64 = 1 << 16;
+/// As near to the target as this the reference is there, raw mm (30 nm).
+const THERE: i64 = 2;
+
+/// Limits of the reference, one set an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct GeneratorConfig {
+    /// Largest speed, v_max.
+    pub speed: VelocityMmS,
+    /// Acceleration a, mm/s², more than 0.
+    pub acceleration: i32,
+    /// Lead ℓ.
+    pub lead: PositionMm,
+}
+
+/// A reference on its way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Reference {
+    /// r.
+    pub position: PositionMm,
+    /// v.
+    pub velocity: VelocityMmS,
+}
+
+impl Reference {
+    /// At rest.
+    #[must_use]
+    pub const fn at(position: PositionMm) -> Self {
+        Self {
+            position,
+            velocity: VelocityMmS::ZERO,
+        }
+    }
+
+    /// The reference of the next tick towards `target`, which itself moves at its velocity, with
+    /// the piston at `measured`; and whether v_max holds it back.
+    #[must_use]
+    pub fn update(
+        self,
+        config: &GeneratorConfig,
+        target: Self,
+        measured: PositionMm,
+    ) -> (Self, bool) {
+        let raw = |position: PositionMm| i64::from(position.raw());
+        let way = raw(target.position).saturating_sub(raw(self.position));
+        let distance = way.saturating_abs();
+        let sign = if way < 0 { -1 } else { 1 };
+        let acceleration = i64::from(config.acceleration);
+
+        // (mm/s)² × 2^16 has a root in mm/s × 2^8; beyond 32 bits 2^-10 of it has 2^-5 of that.
+        let square = acceleration.saturating_mul(2).saturating_mul(distance);
+        let root = match u32::try_from(square) {
+            Ok(square) => i64::from(square_root(square)) << 8,
+            Err(_) => {
+                let square = u32::try_from(square >> 10).unwrap_or(u32::MAX);
+                i64::from(square_root(square)) << 13
+            }
+        };
+        let top = i64::from(config.speed.raw());
+        let lead = raw(config.lead).max(1);
+        let ahead = raw(self.position)
+            .saturating_sub(raw(measured))
+            .saturating_mul(sign);
+        let room = lead
+            .saturating_mul(2)
+            .saturating_sub(ahead)
+            .max(0)
+            .min(lead);
+        let pace = root.min(top).saturating_mul(room);
+        let pace = pace.checked_div(lead).unwrap_or(0);
+        let goal = pace
+            .saturating_mul(sign)
+            .saturating_add(i64::from(target.velocity.raw()));
+
+        let most = acceleration
+            .saturating_mul(ONE)
+            .checked_div(TICKS_PER_SECOND)
+            .unwrap_or(0);
+        let last = i64::from(self.velocity.raw());
+        let change = goal
+            .saturating_sub(last)
+            .max(most.saturating_neg())
+            .min(most);
+        let velocity = last.saturating_add(change);
+        let step = velocity.checked_div(TICKS_PER_SECOND).unwrap_or(0);
+        if distance <= THERE || step.saturating_mul(sign) >= distance {
+            return (target, false);
+        }
+        let narrow = |wide: i64| wide.max(i64::from(i32::MIN)).min(i64::from(i32::MAX)) as i32;
+        let next = Self {
+            position: PositionMm::from_raw(narrow(raw(self.position).saturating_add(step))),
+            velocity: VelocityMmS::from_raw(narrow(velocity)),
+        };
+        (next, root >= top)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{GeneratorConfig, Reference};
+    use wheeleg_units::{PositionMm, VelocityMmS};
+
+    const CONFIG: GeneratorConfig = GeneratorConfig {
+        speed: VelocityMmS::from_int(250),
+        acceleration: 2500,
+        lead: PositionMm::from_int(4),
+    };
+
+    /// References of every tick towards `target`, with a piston that is where `piston` says.
+    fn run(
+        from: i16,
+        target: i16,
+        piston: impl Fn(PositionMm) -> PositionMm,
+    ) -> impl Iterator<Item = Reference> {
+        let mut reference = Reference::at(PositionMm::from_int(from));
+        let target = Reference::at(PositionMm::from_int(target));
+        core::iter::repeat_with(move || {
+            (reference, _) = reference.update(&CONFIG, target, piston(reference.position));
+            reference
+        })
+    }
+
+    #[test]
+    fn a_step_takes_the_time_of_the_trapezoid_and_stays_within_speed_and_acceleration() {
+        for (from, target) in [(0, 180), (180, 0), (20, 21)] {
+            let mut last = Reference::at(PositionMm::from_int(from));
+            let mut ticks = 0;
+            for now in run(from, target, |reference| reference).take(2000) {
+                if now.position == PositionMm::from_int(target) {
+                    break;
+                }
+                let change = now.velocity.raw() - last.velocity.raw();
+                assert!(
+                    change.abs() <= (2500 << 16) / 1000,
+                    "{now:?} after {last:?}"
+                );
+                assert!(now.velocity.raw().abs() <= 250 << 16, "{now:?}");
+                last = now;
+                ticks += 1;
+            }
+            let way = f64::from((target - from).abs());
+            let ramp = 0.25_f64 / 2.5;
+            let expected = if way > 25.0 {
+                way / 250.0 + ramp
+            } else {
+                2.0 * (way / 2500.0).sqrt()
+            };
+            // The last of the parabola is cut off by the sampling.
+            let expected = expected * 1000.0;
+            assert!(
+                (f64::from(ticks) - expected).abs() < 12.0,
+                "{ticks} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_stuck_piston_holds_the_reference_within_three_leads() {
+        for target in [180, 60] {
+            let stuck = PositionMm::from_int(100);
+            let last = run(100, target, |_| stuck).take(5000).last().unwrap();
+            let ahead = (last.position.raw() - stuck.raw()).abs();
+            assert!((8 << 16..=12 << 16).contains(&ahead), "{ahead}");
+        }
+    }
+
+    #[test]
+    fn a_new_target_behind_it_turns_it_round_without_a_jump() {
+        let mut last = run(0, 180, |reference| reference).nth(300).unwrap();
+        let home = Reference::at(PositionMm::ZERO);
+        for _ in 0..3000 {
+            let (next, _) = last.update(&CONFIG, home, last.position);
+            let change = next.velocity.raw() - last.velocity.raw();
+            let arrives = next == home;
+            assert!(arrives || change.abs() <= (2500 << 16) / 1000);
+            last = next;
+        }
+        assert_eq!(last, home);
+    }
+
+    #[test]
+    fn a_moving_target_is_met_and_kept() {
+        let mut target = Reference {
+            position: PositionMm::from_int(10),
+            velocity: VelocityMmS::from_int(50),
+        };
+        let mut reference = Reference::at(PositionMm::ZERO);
+        for _ in 0..1000 {
+            target.position = PositionMm::from_raw(target.position.raw() + (50 << 16) / 1000);
+            (reference, _) = reference.update(&CONFIG, target, reference.position);
+        }
+        assert_eq!(reference, target);
+    }
+}
