@@ -1,6 +1,7 @@
 //! Configuration of the master.
 
 use crate::layer0::odometry::WheelGeometry;
+use crate::layer0::operator;
 use crate::layer1::homing::HomingConfig;
 use crate::layer1::params::GaitParams;
 use crate::setpoint::NODES;
@@ -55,6 +56,9 @@ pub struct MasterConfig {
     /// Sum of the parameters that each board should have in force (protocol/SPEC.md, Parameter
     /// sets), by address 1..=8; `None` takes any. Wheels are given theirs at every arming.
     pub parameters: [Option<u32>; NODES],
+    /// Time without a newer sight of the robot after which the operator is gone, µs,
+    /// 200 000..=1 000 000.
+    pub operator_timeout_us: u32,
 }
 
 impl Default for MasterConfig {
@@ -69,6 +73,7 @@ impl Default for MasterConfig {
             first_sequence: 1,
             commissioned: [None; NODES],
             parameters: [None; NODES],
+            operator_timeout_us: operator::TIMEOUT_US,
         }
     }
 }

@@ -1,12 +1,18 @@
 //! A simulated robot that somebody drives: step by step, to a time, with commands and faults
 //! given from outside. [`run`](crate::run) is its first caller.
 
+use std::collections::VecDeque;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, RobotConfig, Scenario};
+
+use wheeleg_master::Master;
 use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::{Reject, Request, Ticket};
+use wheeleg_master::event::Event;
+use wheeleg_master::telemetry::Record;
 use wheeleg_remote_host::Nodes;
 use wheeleg_telemetry::Recorder;
-use wheeleg_telemetry::event::{Act, Cause};
+use wheeleg_telemetry::event::{Act, Answer, Cause};
 
 use crate::faults::{ActiveFaults, Schedule};
 use crate::observe::Observer;
@@ -32,7 +38,14 @@ pub struct Session {
     /// Simulated time at which the scenario began, once it has.
     start_ns: Option<u64>,
     over: bool,
+    /// The master's record of the last cycle.
+    record: Option<Record>,
+    /// Ends of the requests of a console, until they are taken.
+    outcomes: Option<VecDeque<(u64, Event)>>,
 }
+
+/// Most ends of requests that wait for their console; then the oldest goes.
+const OUTCOMES: usize = 256;
 
 impl Session {
     /// Powers the robot up in the start pose of the scenario.
@@ -64,7 +77,36 @@ impl Session {
             duration_ns: (scenario.duration_s * 1e9).round() as u64,
             start_ns: None,
             over: false,
+            record: None,
+            outcomes: None,
         })
+    }
+
+    /// Powers a robot up for somebody at a console: nobody arms it, nothing moves by itself, and
+    /// it lasts as long as it is stepped. The record begins with the power; of the scenario are
+    /// ground, pose and the faults that are built in.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn live(
+        boards: Boards,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        seed: u64,
+    ) -> Result<Self, SimError> {
+        let still = Scenario {
+            events: Vec::new(),
+            faults: Vec::new(),
+            ..scenario.clone()
+        };
+        let mut session = Self::new(boards, &still, robot, seed)?;
+        for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
+            session.world.inject(fault, true)?;
+        }
+        session.start_ns = Some(0);
+        session.duration_ns = u64::MAX;
+        session.outcomes = Some(VecDeque::with_capacity(OUTCOMES));
+        Ok(session)
     }
 
     /// Simulated time since power-up, ns.
@@ -107,6 +149,63 @@ impl Session {
         let t_ns = self.scenario_ns().unwrap_or(0);
         self.operator
             .submit(&mut self.world, command, t_ns, recorder);
+    }
+
+    /// A request of a client of the master, now. `None`: the master is dead and says nothing.
+    /// How it ends comes from [`take_outcome`](Self::take_outcome).
+    pub fn request(
+        &mut self,
+        request: Request,
+        recorder: &mut Recorder,
+    ) -> Option<Result<Ticket, Reject>> {
+        let t_ns = self.scenario_ns().unwrap_or(0);
+        let code = request.command.code();
+        let now_us = self.now_ns() / 1_000;
+        let answer = self
+            .world
+            .master_alive()
+            .then(|| self.world.master().submit_request(request, now_us));
+        let told = match answer {
+            Some(Ok(_)) => Answer::Accepted,
+            Some(Err(why)) => Answer::Rejected(why),
+            None => Answer::Nothing,
+        };
+        recorder.event(t_ns, Cause::Command { code, answer: told });
+        answer
+    }
+
+    /// The operator in control has seen the robot as it was at `seen_us`.
+    pub fn beat(&mut self, seen_us: u64) {
+        let now_us = self.now_ns() / 1_000;
+        self.world.master().beat(seen_us, now_us);
+    }
+
+    /// A client of the master connects anew.
+    pub fn open_session(&mut self, client: u8) {
+        self.world.master().open_session(client);
+    }
+
+    /// The oldest end of a request that nobody has taken yet, with its time in µs.
+    pub fn take_outcome(&mut self) -> Option<(u64, Event)> {
+        self.outcomes.as_mut()?.pop_front()
+    }
+
+    /// The master's own record of the last bus cycle, if there was one.
+    #[must_use]
+    pub fn record(&self) -> Option<&Record> {
+        self.record.as_ref()
+    }
+
+    /// Whether the master lives.
+    #[must_use]
+    pub fn master_alive(&self) -> bool {
+        self.world.master_alive()
+    }
+
+    /// The master, to look at.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        self.world.master_ref()
     }
 
     /// A fault begins, or ends, now; its own times are not looked at.
@@ -202,7 +301,19 @@ impl Session {
         for event in self.operator.due(t_ns) {
             self.act(&event.action, t_ns, recorder);
         }
-        self.operator.listen(&mut self.world, t_ns, recorder);
+        let outcomes = &mut self.outcomes;
+        let mut told = |time_us, event: &Event| {
+            if let (Some(outcomes), Event::Done(_) | Event::Refused { .. }) =
+                (outcomes.as_mut(), event)
+            {
+                if outcomes.len() == OUTCOMES {
+                    outcomes.pop_front();
+                }
+                outcomes.push_back((time_us, *event));
+            }
+        };
+        self.operator
+            .listen(&mut self.world, t_ns, recorder, &mut told);
         for note in self.world.take_notes() {
             recorder.event(t_ns, note);
         }
@@ -212,6 +323,7 @@ impl Session {
     fn cycle(&mut self, recorder: &mut Recorder) {
         let now_ns = self.now_ns();
         let record = self.world.master().take_telemetry();
+        self.record = record.or(self.record);
         let Some(start_ns) = self.start_ns else {
             self.observer.pass(&self.world);
             return;

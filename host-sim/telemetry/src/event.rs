@@ -493,9 +493,10 @@ const fn master_board(event: &MasterEvent) -> Option<u8> {
             HoldReason::NodeLost(node)
             | HoldReason::NodeFault { node, .. }
             | HoldReason::NodeDisarmed(node) => Some(node),
-            HoldReason::SupplyLost | HoldReason::LayerOneStalled | HoldReason::EmergencyStop => {
-                None
-            }
+            HoldReason::SupplyLost
+            | HoldReason::LayerOneStalled
+            | HoldReason::OperatorLost
+            | HoldReason::EmergencyStop => None,
         },
         _ => None,
     }
@@ -525,6 +526,7 @@ const fn hold_name(reason: &HoldReason) -> &'static str {
         HoldReason::NodeDisarmed(_) => "board_disarmed",
         HoldReason::SupplyLost => "supply_lost",
         HoldReason::LayerOneStalled => "layer_one_stalled",
+        HoldReason::OperatorLost => "operator_lost",
         HoldReason::EmergencyStop => "emergency_stop",
     }
 }
@@ -544,6 +546,7 @@ const fn reject_name(reason: &Reject) -> &'static str {
 const fn refusal_name(reason: &Refusal) -> &'static str {
     match reason {
         Refusal::Expired => "expired",
+        Refusal::NotInControl => "not_in_control",
         Refusal::NotArmed => "not_armed",
         Refusal::NotDisarmed => "not_disarmed",
         Refusal::Moving => "moving",
