@@ -519,7 +519,9 @@ const fn refusing_board(reason: &Refusal) -> Option<u8> {
     }
 }
 
-const fn hold_name(reason: &HoldReason) -> &'static str {
+/// Name of a reason to hold that stays the same, in snake case.
+#[must_use]
+pub const fn hold_name(reason: &HoldReason) -> &'static str {
     match reason {
         HoldReason::NodeLost(_) => "board_lost",
         HoldReason::NodeFault { .. } => "board_fault",
@@ -531,7 +533,9 @@ const fn hold_name(reason: &HoldReason) -> &'static str {
     }
 }
 
-const fn reject_name(reason: &Reject) -> &'static str {
+/// Name of a refusal at the door that stays the same, in snake case.
+#[must_use]
+pub const fn reject_name(reason: &Reject) -> &'static str {
     match reason {
         Reject::Expired { .. } => "expired",
         Reject::DeadlineTooFar => "deadline_too_far",
