@@ -492,6 +492,50 @@ mod tests {
     }
 
     #[test]
+    fn no_frame_makes_the_parser_panic() {
+        const SOUND: [&str; 3] = [
+            r#"{"n":7,"seen_us":81230000,"valid_ms":500,"cmd":"JointReference","args":{"joint":3,"stroke":120.0}}"#,
+            r#"{"n":1,"op":"subscribe","channels":["/joint/3","/body"],"hz":50}"#,
+            r#"{"n":9,"seen_us":1,"valid_ms":1,"cmd":"Inject","args":{"fault":"pot-open:joint3"}}"#,
+        ];
+        const PIECES: [&str; 12] = [
+            "1e999",
+            "-0",
+            "null",
+            "\\u0000",
+            "[]",
+            "{}",
+            "é",
+            "\"",
+            "18446744073709551616",
+            "@",
+            ":",
+            "=",
+        ];
+        let mut seed = 1_u64;
+        let mut random = |below: usize| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) as usize % below
+        };
+        for _ in 0..200_000 {
+            let mut frame = SOUND[random(SOUND.len())].as_bytes().to_vec();
+            for _ in 0..=random(4) {
+                let at = random(frame.len());
+                match random(4) {
+                    0 => frame[at] ^= 1 << random(8),
+                    1 => drop(frame.drain(at..(at + random(9)).min(frame.len()))),
+                    2 => drop(frame.splice(at..at, PIECES[random(12)].bytes())),
+                    _ => frame.truncate(at + 1),
+                }
+                if frame.is_empty() {
+                    break;
+                }
+            }
+            let _ = parse(&frame);
+        }
+    }
+
+    #[test]
     fn subscriptions_name_channels_and_a_rate() {
         let body = give(r#"{"n":1,"op":"subscribe","channels":["/joint/3","/body"],"hz":50}"#);
         let wanted = Body::Subscribe {

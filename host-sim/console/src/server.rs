@@ -132,6 +132,7 @@ impl Server {
         self.address
     }
 
+    #[doc(hidden)]
     /// A worker of the server does nothing but wait for so long; for tests of what happens to the
     /// robot then.
     pub fn block_for(&self, time: Duration) {

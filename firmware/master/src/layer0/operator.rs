@@ -3,6 +3,7 @@
 
 use super::{Layer0, Power};
 use crate::command::Command;
+use crate::config::{OPERATOR_TIMEOUT_MAX_US, OPERATOR_TIMEOUT_MIN_US};
 use crate::dispatcher::Refusal;
 use crate::event::{Events, HoldReason};
 
@@ -10,13 +11,6 @@ use crate::event::{Events, HoldReason};
 pub const OPERATOR_CLIENT: u8 = 2;
 /// Client number of everybody else at the console: they may stop, and nothing more.
 pub const STOP_CLIENT: u8 = 3;
-/// Time without a newer sight of the robot after which the operator is gone, µs (ASSUMED).
-pub const TIMEOUT_US: u32 = 400_000;
-/// Shortest such time, µs: shorter than this and a browser that collects garbage is gone.
-pub const TIMEOUT_MIN_US: u32 = 200_000;
-/// Longest such time, µs. It cannot be switched off.
-pub const TIMEOUT_MAX_US: u32 = 1_000_000;
-
 /// A lease that lives from one sight of the robot to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Lease {
@@ -26,12 +20,14 @@ pub struct Lease {
 }
 
 impl Lease {
-    /// Free; lost after `timeout_us`, which is kept within [`TIMEOUT_MIN_US`] and
-    /// [`TIMEOUT_MAX_US`].
+    /// Free; lost after `timeout_us`, which is kept within [`OPERATOR_TIMEOUT_MIN_US`] and
+    /// [`OPERATOR_TIMEOUT_MAX_US`].
     #[must_use]
     pub fn new(timeout_us: u32) -> Self {
         Self {
-            timeout_us: timeout_us.clamp(TIMEOUT_MIN_US, TIMEOUT_MAX_US).into(),
+            timeout_us: timeout_us
+                .clamp(OPERATOR_TIMEOUT_MIN_US, OPERATOR_TIMEOUT_MAX_US)
+                .into(),
             seen_us: None,
         }
     }

@@ -3,11 +3,13 @@
 use crate::common::{CYCLE_US, Rig};
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
+use wheeleg_master::config::{
+    OPERATOR_TIMEOUT_MAX_US as TIMEOUT_MAX_US, OPERATOR_TIMEOUT_MIN_US as TIMEOUT_MIN_US,
+    OPERATOR_TIMEOUT_US as TIMEOUT_US,
+};
 use wheeleg_master::dispatcher::{Refusal, Reject, Request, Ticket};
 use wheeleg_master::event::{Event, HoldReason};
-use wheeleg_master::layer0::operator::{
-    Lease, OPERATOR_CLIENT, STOP_CLIENT, TIMEOUT_MAX_US, TIMEOUT_MIN_US, TIMEOUT_US,
-};
+use wheeleg_master::layer0::operator::{Lease, OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_protocol::{Address, NodeMode, SyncFlags};
 
 /// An operator at a console, who numbers what they give.

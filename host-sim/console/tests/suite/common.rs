@@ -67,6 +67,18 @@ impl Rig {
         list.into_iter().filter(|e| e["code"] == code).collect()
     }
 
+    /// Waits for an event with this code.
+    pub(crate) fn event(&self, code: &str) -> Value {
+        let begin = Instant::now();
+        loop {
+            if let Some(event) = self.events(code).first() {
+                return event.clone();
+            }
+            assert!(begin.elapsed() < Duration::from_secs(20), "no {code}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     /// Waits until the state is as wanted.
     pub(crate) fn until(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
         let begin = Instant::now();

@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use wheeleg_console::client::{Incoming, Outcome, http};
+use wheeleg_console::client::{Client, Incoming, Outcome, http};
+use wheeleg_protocol::NodeMode;
+use wheeleg_telemetry::{JointSample, Sample as _};
 
 use crate::common::{Rig, closed, done, look, refusal};
 
@@ -11,8 +13,7 @@ use crate::common::{Rig, closed, done, look, refusal};
 fn held_after(rig: &Rig, seen_us: u64) -> u64 {
     let state = rig.until("held", |state| !state["hold"].is_null());
     assert_eq!(state["hold"], "operator_lost", "{state}");
-    let holds = rig.events("hold");
-    let at_us = holds[0]["t_ns"].as_u64().expect("a time") / 1_000;
+    let at_us = rig.event("hold")["t_ns"].as_u64().expect("a time") / 1_000;
     at_us - seen_us
 }
 
@@ -20,30 +21,60 @@ fn held_after(rig: &Rig, seen_us: u64) -> u64 {
 fn take_arm_move_release() {
     let rig = Rig::new();
     let mut driver = rig.driver("driver");
-    let args = json!({ "joint": 3, "stroke": 120.0 });
-    let outcome = driver
-        .carry_out("JointReference", &args, 500)
-        .expect("sent");
-    assert_eq!(outcome, Outcome::Done);
-    let subscription = json!({ "op": "subscribe", "channels": ["/joint/3"], "hz": 50 });
-    let n = driver.send(subscription).expect("sent");
-    assert_eq!(driver.outcome(n), Outcome::Done);
-    let begin = Instant::now();
-    let commanded = loop {
-        if let Some(Incoming::Samples { channel, body, .. }) = driver.read() {
-            assert_eq!(channel, 2);
-            let commanded = f32::from_le_bytes(body[8..12].try_into().expect("four bytes"));
-            if (commanded - 120.0).abs() < 0.01 {
-                break commanded;
-            }
-        }
-        assert!(begin.elapsed() < Duration::from_secs(5), "never commanded");
-    };
-    assert!((commanded - 120.0).abs() < 0.01);
     done(&mut driver, "ReleaseControl");
     let state = rig.until("free", |state| state["control"].is_null());
     assert_eq!(state["armed"], true);
     assert_eq!(refusal(&mut driver, "Arm", &json!({})), "not_in_control");
+    done(&mut driver, "TakeControl");
+    done(&mut driver, "Disarm");
+}
+
+/// Master time of the first sample of joint 3 that is as wanted, ns.
+fn first(client: &mut Client, wanted: impl Fn(&[u8]) -> bool) -> u64 {
+    let begin = Instant::now();
+    loop {
+        let Some(Incoming::Samples { body, .. }) = client.read() else {
+            assert!(begin.elapsed() < Duration::from_secs(5), "never");
+            continue;
+        };
+        for sample in body.chunks_exact(8 + 4 * JointSample::FIELDS.len()) {
+            if wanted(&sample[8..]) {
+                return u64::from_le_bytes(sample[..8].try_into().expect("a time"));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    let mut viewer = rig.view();
+    let all = json!({ "op": "subscribe", "channels": ["/joint/3"], "hz": "all" });
+    let n = viewer.send(all).expect("sent");
+    assert_eq!(viewer.outcome(n), Outcome::Done);
+    let args = json!({ "joint": 3, "stroke": 120.0 });
+    driver.give("JointReference", &args, 500).expect("sent");
+    // Field 0 is `commanded_mm`, field 21 `mode`.
+    let latched_ns = first(&mut viewer, |fields| {
+        let commanded = f32::from_le_bytes(fields[..4].try_into().expect("four bytes"));
+        (commanded - 120.0).abs() < 0.01
+    });
+    let given = rig.events("command_accepted");
+    let given = given
+        .iter()
+        .find(|e| e["command"] == 0x0101)
+        .expect("an event");
+    let took_ns = latched_ns - given["t_ns"].as_u64().expect("a time");
+    assert!(took_ns <= 13_000_000, "{took_ns} ns");
+    // The stop of somebody who only looks, by another way.
+    let (status, _) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
+    assert_eq!(status, 200);
+    let hold = u32::from(NodeMode::Hold.code());
+    let held_ns = first(&mut viewer, |fields| fields[84..88] == hold.to_le_bytes());
+    let given = rig.event("hold");
+    let took_ns = held_ns - given["t_ns"].as_u64().expect("a time");
+    assert!(took_ns <= 13_000_000, "{took_ns} ns");
 }
 
 #[test]

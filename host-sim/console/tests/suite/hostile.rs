@@ -250,7 +250,7 @@ fn an_address_of_the_network_and_one_in_use_are_refused_with_a_remedy() {
             keys: rig.keys.clone(),
             page: None,
         });
-        let error = refused.err().expect("refused");
+        let error = refused.expect_err("refused");
         let help = miette::Diagnostic::help(&error)
             .expect("a remedy")
             .to_string();

@@ -1,6 +1,7 @@
 //! `wheeleg ctl`: the console for the command line.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -207,7 +208,11 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
             }
             _ => continue,
         };
-        print(&format!("{line}\n"))?;
+        let mut out = std::io::stdout().lock();
+        if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {
+            // The reader has gone away (`| head`).
+            return Ok(ExitCode::SUCCESS);
+        }
     }
 }
 
