@@ -142,7 +142,7 @@ fn a_live_session_does_what_its_clients_ask_and_repeats() {
             let answer = session.request(request, recorder).expect("it lives");
             answer.is_ok()
         };
-        let mut watch = |session: &mut Session, recorder: &mut Recorder, cycles: u64| {
+        let watch = |session: &mut Session, recorder: &mut Recorder, cycles: u64| {
             for _ in 0..cycles {
                 session.beat(session.now_ns() / 1_000);
                 let to_ns = session.now_ns() + 10 * MS;

@@ -47,6 +47,12 @@ pub struct Session {
 /// Most ends of requests that wait for their console; then the oldest goes.
 const OUTCOMES: usize = 256;
 
+/// The faults of a scenario that are there from the power on.
+fn built_in(scenario: &Scenario) -> Vec<FaultSpec> {
+    let faults = scenario.faults.iter();
+    faults.filter(|f| f.kind.is_built_in()).copied().collect()
+}
+
 impl Session {
     /// Powers the robot up in the start pose of the scenario.
     ///
@@ -58,12 +64,23 @@ impl Session {
         robot: &RobotConfig,
         seed: u64,
     ) -> Result<Self, SimError> {
+        Self::build(boards, scenario, robot, seed, false)
+    }
+
+    /// Built in one piece: a session is large, and is not moved about on the stack.
+    fn build(
+        boards: Boards,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        seed: u64,
+        live: bool,
+    ) -> Result<Self, SimError> {
         let plant = setup::plant(scenario, robot);
         let master = setup::master(scenario, robot);
         let nodes = boards.nodes.clone();
         let mut world = World::new(robot, &plant, master, seed, boards)?;
-        for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
-            world.inject(fault, true)?;
+        for fault in built_in(scenario) {
+            world.inject(&fault, true)?;
         }
         Ok(Self {
             world,
@@ -74,11 +91,15 @@ impl Session {
             robot: robot.clone(),
             nodes,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
-            duration_ns: (scenario.duration_s * 1e9).round() as u64,
-            start_ns: None,
+            duration_ns: if live {
+                u64::MAX
+            } else {
+                (scenario.duration_s * 1e9).round() as u64
+            },
+            start_ns: live.then_some(0),
             over: false,
             record: None,
-            outcomes: None,
+            outcomes: live.then(|| VecDeque::with_capacity(OUTCOMES)),
         })
     }
 
@@ -96,17 +117,10 @@ impl Session {
     ) -> Result<Self, SimError> {
         let still = Scenario {
             events: Vec::new(),
-            faults: Vec::new(),
+            faults: built_in(scenario),
             ..scenario.clone()
         };
-        let mut session = Self::new(boards, &still, robot, seed)?;
-        for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
-            session.world.inject(fault, true)?;
-        }
-        session.start_ns = Some(0);
-        session.duration_ns = u64::MAX;
-        session.outcomes = Some(VecDeque::with_capacity(OUTCOMES));
-        Ok(session)
+        Self::build(boards, &still, robot, seed, true)
     }
 
     /// Simulated time since power-up, ns.
