@@ -4,6 +4,9 @@
 use wheeleg_config::builtin;
 use wheeleg_config::faults::{FaultSpec, FaultTarget};
 use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::Request;
+use wheeleg_master::event::Event;
+use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_sim::{Boards, Session};
 use wheeleg_telemetry::{Recorder, Recording};
 
@@ -114,6 +117,83 @@ fn a_fault_that_cannot_be_injected_is_refused() {
     session.step_to(1_800 * MS, &mut recorder).expect("it runs");
     let again = session.inject(&reset, true, &mut recorder);
     assert!(again.is_ok(), "it has started anew long ago");
+}
+
+/// A robot at a console: nobody arms it, and the same inputs give the same recording.
+#[test]
+fn a_live_session_does_what_its_clients_ask_and_repeats() {
+    let drive = || {
+        let scenario = builtin::scenario("three-step").expect("built in");
+        let mut recorder = Recorder::in_memory();
+        let mut session =
+            Session::live(Boards::default(), &scenario, &robot(), 1).expect("it starts");
+        session.step_to(1_000 * MS, &mut recorder).expect("it runs");
+        assert!(session.master().is_ready() && !session.master().is_armed());
+        let mut id = 0;
+        let mut ask = |session: &mut Session, recorder: &mut Recorder, client, command| {
+            id += 1;
+            let deadline_us = session.now_ns() / 1_000 + 500_000;
+            let request = Request {
+                client,
+                id,
+                deadline_us,
+                command,
+            };
+            let answer = session.request(request, recorder).expect("it lives");
+            answer.is_ok()
+        };
+        let watch = |session: &mut Session, recorder: &mut Recorder, cycles: u64| {
+            for _ in 0..cycles {
+                session.beat(session.now_ns() / 1_000);
+                let to_ns = session.now_ns() + 10 * MS;
+                session.step_to(to_ns, recorder).expect("it runs");
+            }
+        };
+        assert!(!ask(
+            &mut session,
+            &mut recorder,
+            OPERATOR_CLIENT,
+            Command::Arm
+        ));
+        assert!(ask(
+            &mut session,
+            &mut recorder,
+            OPERATOR_CLIENT,
+            Command::TakeControl
+        ));
+        watch(&mut session, &mut recorder, 3);
+        assert!(ask(
+            &mut session,
+            &mut recorder,
+            OPERATOR_CLIENT,
+            Command::Arm
+        ));
+        watch(&mut session, &mut recorder, 50);
+        assert!(session.master().is_armed());
+        let done = std::iter::from_fn(|| session.take_outcome());
+        let done = done.filter(|(_, event)| matches!(event, Event::Done(_)));
+        assert_eq!(done.count(), 2);
+        // Nobody looks any more.
+        let seen_ns = session.now_ns();
+        while session.master().layer0().hold().is_none() {
+            let to_ns = session.now_ns() + MS;
+            session.step_to(to_ns, &mut recorder).expect("it runs");
+        }
+        assert!(session.now_ns() - seen_ns <= 460 * MS);
+        assert!(ask(
+            &mut session,
+            &mut recorder,
+            STOP_CLIENT,
+            Command::EmergencyStop
+        ));
+        session
+            .step_to(session.now_ns() + 50 * MS, &mut recorder)
+            .expect("it runs");
+        assert!(session.record().is_some_and(|record| record.emergency_stop));
+        drop(session.finish(true, &mut recorder));
+        recorder.finish().expect("in memory").hash
+    };
+    assert_eq!(drive(), drive());
 }
 
 #[test]

@@ -13,7 +13,7 @@ mod circles;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 26] = [
+const ARROWS: [(&str, &[&str]); 27] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -93,6 +93,16 @@ const ARROWS: [(&str, &[&str]); 26] = [
     ),
     ("wheeleg-sim", &SIM),
     ("wheeleg-report", &[]),
+    (
+        "wheeleg-console",
+        &[
+            "wheeleg-config",
+            "wheeleg-master",
+            "wheeleg-protocol",
+            "wheeleg-sim",
+            "wheeleg-telemetry",
+        ],
+    ),
     ("wheeleg-studies", &STUDIES),
     ("wheeleg", &PROGRAM),
     ("wheeleg-tests", &TESTED),
@@ -152,8 +162,9 @@ const STUDIES: [&str; 13] = [
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 10] = [
+const PROGRAM: [&str; 11] = [
     "wheeleg-config",
+    "wheeleg-console",
     "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",

@@ -158,6 +158,10 @@ pub enum Command {
     ClearFault,
     /// HOLD everywhere and supply dump, in the next SYNC.
     EmergencyStop,
+    /// Take the control, which lasts while the operator is known to see the robot.
+    TakeControl,
+    /// Give the control back.
+    ReleaseControl,
     /// Move to the start pose of the gait parameters.
     Stand,
     /// Freeze every joint where it is.
@@ -270,6 +274,8 @@ commands! {
     ClearFault = 0x0122, [], "Clears latched faults of all nodes and the E-stop of the master.", Self::ClearFault =>
     EmergencyStop = 0x0123, [], "E-stop bit in every SYNC from the next on: HOLD and supply dump. Never queued, never refused for lateness.", Self::EmergencyStop =>
     Commission = 0x0124, [], "Takes the boards as they are for the commissioned ones; refused unless disarmed and every board is identified.", Self::Commission =>
+    TakeControl = 0x0125, [], "Takes the control for the operator, for as long as they are seen to look; refused to a scenario.", Self::TakeControl =>
+    ReleaseControl = 0x0126, [], "Gives the control back; refused while layer 1 moves the robot.", Self::ReleaseControl =>
     ReadParameter = 0x0130, [BOARD, PARAMETER], "Reads a parameter of a board.", Self::ReadParameter { .. } =>
     WriteParameter = 0x0131, [BOARD, PARAMETER, VALUE], "Sets a parameter of a board, which checks it against its limits.", Self::WriteParameter { .. } =>
     SaveParameters = 0x0132, [BOARD], "Stores a board's parameters in its memory; refused unless disarmed.", Self::SaveParameters { .. } =>

@@ -8,6 +8,13 @@ use crate::setpoint::NODES;
 /// Unique id of a board's processor.
 pub type UniqueId = [u8; 12];
 
+/// Time without a newer sight of the robot after which the operator is gone, µs (ASSUMED).
+pub const OPERATOR_TIMEOUT_US: u32 = 400_000;
+/// Shortest such time, µs: shorter than this and a browser that collects garbage is gone.
+pub const OPERATOR_TIMEOUT_MIN_US: u32 = 200_000;
+/// Longest such time, µs. It cannot be switched off.
+pub const OPERATOR_TIMEOUT_MAX_US: u32 = 1_000_000;
+
 /// Frame in which the foot switches of the right leg are reported.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SwitchFrame {
@@ -55,6 +62,9 @@ pub struct MasterConfig {
     /// Sum of the parameters that each board should have in force (protocol/SPEC.md, Parameter
     /// sets), by address 1..=8; `None` takes any. Wheels are given theirs at every arming.
     pub parameters: [Option<u32>; NODES],
+    /// Time without a newer sight of the robot after which the operator is gone, µs, kept within
+    /// [`OPERATOR_TIMEOUT_MIN_US`] and [`OPERATOR_TIMEOUT_MAX_US`].
+    pub operator_timeout_us: u32,
 }
 
 impl Default for MasterConfig {
@@ -69,6 +79,7 @@ impl Default for MasterConfig {
             first_sequence: 1,
             commissioned: [None; NODES],
             parameters: [None; NODES],
+            operator_timeout_us: OPERATOR_TIMEOUT_US,
         }
     }
 }

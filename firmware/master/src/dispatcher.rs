@@ -76,6 +76,8 @@ pub enum Reject {
 pub enum Refusal {
     /// Taken from the queue after its deadline.
     Expired,
+    /// Needs the control, which this client does not hold.
+    NotInControl,
     /// Needs armed axes.
     NotArmed,
     /// Needs disarmed axes.

@@ -34,6 +34,8 @@ pub enum HoldReason {
     SupplyLost,
     /// Layer 1 produced nothing for 100 ms.
     LayerOneStalled,
+    /// The operator in control has seen nothing new for too long.
+    OperatorLost,
     /// An E-stop was commanded.
     EmergencyStop,
 }

@@ -97,20 +97,14 @@ impl Master {
         if matches!(request.command, Command::EmergencyStop) {
             // A stop neither queues nor expires, and what was queued before it
             // must not undo it: a clear would take it back in the next cycle.
-            for _ in 0..self.commands0.capacity() {
-                let Some(earlier) = self.commands0.dequeue() else {
-                    break;
-                };
-                let refused = Event::Refused {
-                    ticket: earlier.ticket,
-                    reason: Refusal::Interrupted,
-                };
-                self.events.push(now_us, refused);
-            }
+            drop_waiting(&mut self.commands0, now_us, &mut self.events);
             self.layer0.emergency_stop(now_us, &mut self.events);
             self.events.push(now_us, Event::Done(accepted.ticket));
             return Ok(accepted.ticket);
         }
+        self.layer0
+            .may_command(request.client, &request.command)
+            .map_err(Reject::Refused)?;
         let (mut to_layer0, _) = self.commands0.split();
         let (mut to_layer1, _) = self.commands1.split();
         Dispatcher::route(accepted, &mut to_layer0, &mut to_layer1)
@@ -121,10 +115,20 @@ impl Master {
         self.dispatcher.open_session(client);
     }
 
+    /// The operator in control has seen the robot as it was at `seen_us`; see
+    /// [`Lease::beat`](crate::layer0::operator::Lease::beat).
+    pub fn beat(&mut self, seen_us: u64, now_us: u64) {
+        self.layer0.beat(seen_us, now_us);
+    }
+
     /// Runs one bus cycle (every 10 ms): ends the last one (supervision,
     /// odometry, telemetry, feedback), carries out commands, runs layer 1, and
     /// returns the SYNC to send now.
     pub fn cycle(&mut self, now_us: u64) -> TxBytes {
+        if self.layer0.watch_operator(now_us, &mut self.events) {
+            drop_waiting(&mut self.commands0, now_us, &mut self.events);
+            drop_waiting(&mut self.commands1, now_us, &mut self.events);
+        }
         let (mut record, feedback) = self.layer0.finish_cycle(now_us, &mut self.events);
         if record.cycle > 0 {
             record.counters.lost_setpoints = self.layer1.lost_setpoints();
@@ -136,11 +140,16 @@ impl Master {
         }
         let lost = push_drop_oldest(&mut self.feedback, feedback);
         self.losses.feedback = self.losses.feedback.wrapping_add(lost);
+        let held = self.layer0.lease().is_held();
         for _ in 0..self.commands0.capacity() {
             match self.commands0.dequeue() {
                 Some(accepted) => self.layer0.execute(&accepted, now_us, &mut self.events),
                 None => break,
             }
+        }
+        if held && !self.layer0.lease().is_held() {
+            // Nobody would watch what begins now.
+            drop_waiting(&mut self.commands1, now_us, &mut self.events);
         }
         if self.layer1_enabled {
             let (_, mut commands) = self.commands1.split();
@@ -207,5 +216,19 @@ impl Master {
     #[must_use]
     pub const fn layer1(&self) -> &Layer1 {
         &self.layer1
+    }
+}
+
+/// Empties a queue of commands; each is answered.
+fn drop_waiting(queue: &mut CommandFifo, now_us: u64, events: &mut Events) {
+    for _ in 0..queue.capacity() {
+        let Some(earlier) = queue.dequeue() else {
+            break;
+        };
+        let refused = Event::Refused {
+            ticket: earlier.ticket,
+            reason: Refusal::Interrupted,
+        };
+        events.push(now_us, refused);
     }
 }

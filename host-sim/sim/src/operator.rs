@@ -234,9 +234,16 @@ impl Operator {
         }
     }
 
-    /// Writes the master's events into the record.
-    pub(super) fn listen(&self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
-        while let Some((_, event)) = world.master().take_event() {
+    /// Writes the master's events into the record, and tells them on.
+    pub(super) fn listen(
+        &self,
+        world: &mut World,
+        t_ns: u64,
+        recorder: &mut Recorder,
+        told: &mut dyn FnMut(u64, &Event),
+    ) {
+        while let Some((time_us, event)) = world.master().take_event() {
+            told(time_us, &event);
             // Counters have channels of their own.
             if let Event::Link { node, record } = event {
                 let node = usize::from(node) - 1;

@@ -1,12 +1,18 @@
 //! A simulated robot that somebody drives: step by step, to a time, with commands and faults
 //! given from outside. [`run`](crate::run) is its first caller.
 
+use std::collections::VecDeque;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, RobotConfig, Scenario};
+
+use wheeleg_master::Master;
 use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::{Reject, Request, Ticket};
+use wheeleg_master::event::Event;
+use wheeleg_master::telemetry::Record;
 use wheeleg_remote_host::Nodes;
 use wheeleg_telemetry::Recorder;
-use wheeleg_telemetry::event::{Act, Cause};
+use wheeleg_telemetry::event::{Act, Answer, Cause};
 
 use crate::faults::{ActiveFaults, Schedule};
 use crate::observe::Observer;
@@ -32,6 +38,19 @@ pub struct Session {
     /// Simulated time at which the scenario began, once it has.
     start_ns: Option<u64>,
     over: bool,
+    /// The master's record of the last cycle.
+    record: Option<Record>,
+    /// Ends of the requests of a console, until they are taken.
+    outcomes: Option<VecDeque<(u64, Event)>>,
+}
+
+/// Most ends of requests that wait for their console; then the oldest goes.
+const OUTCOMES: usize = 256;
+
+/// The faults of a scenario that are there from the power on.
+fn built_in(scenario: &Scenario) -> Vec<FaultSpec> {
+    let faults = scenario.faults.iter();
+    faults.filter(|f| f.kind.is_built_in()).copied().collect()
 }
 
 impl Session {
@@ -45,12 +64,23 @@ impl Session {
         robot: &RobotConfig,
         seed: u64,
     ) -> Result<Self, SimError> {
+        Self::build(boards, scenario, robot, seed, false)
+    }
+
+    /// Built in one piece: a session is large, and is not moved about on the stack.
+    fn build(
+        boards: Boards,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        seed: u64,
+        live: bool,
+    ) -> Result<Self, SimError> {
         let plant = setup::plant(scenario, robot);
         let master = setup::master(scenario, robot);
         let nodes = boards.nodes.clone();
         let mut world = World::new(robot, &plant, master, seed, boards)?;
-        for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
-            world.inject(fault, true)?;
+        for fault in built_in(scenario) {
+            world.inject(&fault, true)?;
         }
         Ok(Self {
             world,
@@ -61,10 +91,36 @@ impl Session {
             robot: robot.clone(),
             nodes,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
-            duration_ns: (scenario.duration_s * 1e9).round() as u64,
-            start_ns: None,
+            duration_ns: if live {
+                u64::MAX
+            } else {
+                (scenario.duration_s * 1e9).round() as u64
+            },
+            start_ns: live.then_some(0),
             over: false,
+            record: None,
+            outcomes: live.then(|| VecDeque::with_capacity(OUTCOMES)),
         })
+    }
+
+    /// Powers a robot up for somebody at a console: nobody arms it, nothing moves by itself, and
+    /// it lasts as long as it is stepped. The record begins with the power; of the scenario are
+    /// ground, pose and the faults that are built in.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn live(
+        boards: Boards,
+        scenario: &Scenario,
+        robot: &RobotConfig,
+        seed: u64,
+    ) -> Result<Self, SimError> {
+        let still = Scenario {
+            events: Vec::new(),
+            faults: built_in(scenario),
+            ..scenario.clone()
+        };
+        Self::build(boards, &still, robot, seed, true)
     }
 
     /// Simulated time since power-up, ns.
@@ -107,6 +163,63 @@ impl Session {
         let t_ns = self.scenario_ns().unwrap_or(0);
         self.operator
             .submit(&mut self.world, command, t_ns, recorder);
+    }
+
+    /// A request of a client of the master, now. `None`: the master is dead and says nothing.
+    /// How it ends comes from [`take_outcome`](Self::take_outcome).
+    pub fn request(
+        &mut self,
+        request: Request,
+        recorder: &mut Recorder,
+    ) -> Option<Result<Ticket, Reject>> {
+        let t_ns = self.scenario_ns().unwrap_or(0);
+        let code = request.command.code();
+        let now_us = self.now_ns() / 1_000;
+        let answer = self
+            .world
+            .master_alive()
+            .then(|| self.world.master().submit_request(request, now_us));
+        let told = match answer {
+            Some(Ok(_)) => Answer::Accepted,
+            Some(Err(why)) => Answer::Rejected(why),
+            None => Answer::Nothing,
+        };
+        recorder.event(t_ns, Cause::Command { code, answer: told });
+        answer
+    }
+
+    /// The operator in control has seen the robot as it was at `seen_us`.
+    pub fn beat(&mut self, seen_us: u64) {
+        let now_us = self.now_ns() / 1_000;
+        self.world.master().beat(seen_us, now_us);
+    }
+
+    /// A client of the master connects anew.
+    pub fn open_session(&mut self, client: u8) {
+        self.world.master().open_session(client);
+    }
+
+    /// The oldest end of a request that nobody has taken yet, with its time in µs.
+    pub fn take_outcome(&mut self) -> Option<(u64, Event)> {
+        self.outcomes.as_mut()?.pop_front()
+    }
+
+    /// The master's own record of the last bus cycle, if there was one.
+    #[must_use]
+    pub fn record(&self) -> Option<&Record> {
+        self.record.as_ref()
+    }
+
+    /// Whether the master lives.
+    #[must_use]
+    pub fn master_alive(&self) -> bool {
+        self.world.master_alive()
+    }
+
+    /// The master, to look at.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        self.world.master_ref()
     }
 
     /// A fault begins, or ends, now; its own times are not looked at.
@@ -202,7 +315,19 @@ impl Session {
         for event in self.operator.due(t_ns) {
             self.act(&event.action, t_ns, recorder);
         }
-        self.operator.listen(&mut self.world, t_ns, recorder);
+        let outcomes = &mut self.outcomes;
+        let mut told = |time_us, event: &Event| {
+            if let (Some(outcomes), Event::Done(_) | Event::Refused { .. }) =
+                (outcomes.as_mut(), event)
+            {
+                if outcomes.len() == OUTCOMES {
+                    outcomes.pop_front();
+                }
+                outcomes.push_back((time_us, *event));
+            }
+        };
+        self.operator
+            .listen(&mut self.world, t_ns, recorder, &mut told);
         for note in self.world.take_notes() {
             recorder.event(t_ns, note);
         }
@@ -212,6 +337,7 @@ impl Session {
     fn cycle(&mut self, recorder: &mut Recorder) {
         let now_ns = self.now_ns();
         let record = self.world.master().take_telemetry();
+        self.record = record.or(self.record);
         let Some(start_ns) = self.start_ns else {
             self.observer.pass(&self.world);
             return;

@@ -418,6 +418,11 @@ impl World {
         &mut self.master
     }
 
+    /// The master, to look at.
+    pub(super) fn master_ref(&self) -> &Master {
+        &self.master
+    }
+
     /// A command of the user's program.
     ///
     /// # Errors

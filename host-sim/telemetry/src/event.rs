@@ -493,9 +493,10 @@ const fn master_board(event: &MasterEvent) -> Option<u8> {
             HoldReason::NodeLost(node)
             | HoldReason::NodeFault { node, .. }
             | HoldReason::NodeDisarmed(node) => Some(node),
-            HoldReason::SupplyLost | HoldReason::LayerOneStalled | HoldReason::EmergencyStop => {
-                None
-            }
+            HoldReason::SupplyLost
+            | HoldReason::LayerOneStalled
+            | HoldReason::OperatorLost
+            | HoldReason::EmergencyStop => None,
         },
         _ => None,
     }
@@ -518,18 +519,23 @@ const fn refusing_board(reason: &Refusal) -> Option<u8> {
     }
 }
 
-const fn hold_name(reason: &HoldReason) -> &'static str {
+/// Name of a reason to hold that stays the same, in snake case.
+#[must_use]
+pub const fn hold_name(reason: &HoldReason) -> &'static str {
     match reason {
         HoldReason::NodeLost(_) => "board_lost",
         HoldReason::NodeFault { .. } => "board_fault",
         HoldReason::NodeDisarmed(_) => "board_disarmed",
         HoldReason::SupplyLost => "supply_lost",
         HoldReason::LayerOneStalled => "layer_one_stalled",
+        HoldReason::OperatorLost => "operator_lost",
         HoldReason::EmergencyStop => "emergency_stop",
     }
 }
 
-const fn reject_name(reason: &Reject) -> &'static str {
+/// Name of a refusal at the door that stays the same, in snake case.
+#[must_use]
+pub const fn reject_name(reason: &Reject) -> &'static str {
     match reason {
         Reject::Expired { .. } => "expired",
         Reject::DeadlineTooFar => "deadline_too_far",
@@ -544,6 +550,7 @@ const fn reject_name(reason: &Reject) -> &'static str {
 const fn refusal_name(reason: &Refusal) -> &'static str {
     match reason {
         Refusal::Expired => "expired",
+        Refusal::NotInControl => "not_in_control",
         Refusal::NotArmed => "not_armed",
         Refusal::NotDisarmed => "not_disarmed",
         Refusal::Moving => "moving",

@@ -47,10 +47,10 @@ pub use log_file::LogFile;
 pub use memory::{Keep, Memory, Recording, Row};
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};
-pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, json_schema};
+pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, json_schema};
 pub use ring::{Message, Ring};
 pub use samples::{
     BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
     ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
 };
-pub use sink::{SampleRef, Sink, Taken};
+pub use sink::{OwnedSample, SampleRef, Sink, Taken};

@@ -92,6 +92,16 @@ impl Keep {
         }
     }
 
+    /// Nothing: for a robot that is driven for hours.
+    #[must_use]
+    pub fn nothing() -> Self {
+        Self {
+            channels: 0,
+            events: 0,
+            ..Self::everything()
+        }
+    }
+
     /// Rows of a bounded number, however long the run: up to a minute every sample, beyond it
     /// one of so many that as many rows are kept, and all of those around the times `near_s`;
     /// the first 20,000 events.

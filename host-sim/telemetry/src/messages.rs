@@ -270,6 +270,10 @@ fn hold_reason(reason: &HoldReason) -> String {
                 .to_owned()
         }
         HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
+        HoldReason::OperatorLost => {
+            "the operator in control is gone. Reconnect, take the control, then clear and arm."
+                .to_owned()
+        }
         HoldReason::EmergencyStop => "E-stop".to_owned(),
     }
 }

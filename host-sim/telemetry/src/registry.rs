@@ -55,6 +55,39 @@ impl FieldType {
     }
 }
 
+/// How a signal is laid out in the console's frames, little-endian
+/// (`host-sim/console/PROTOCOL.md`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wire {
+    /// A real number in 4 bytes.
+    F32,
+    /// An unsigned number in 4 bytes.
+    U32,
+    /// A signed number in 4 bytes.
+    I32,
+    /// An unsigned number in 8 bytes.
+    U64,
+    /// One byte, 0 or 1.
+    Bool,
+    /// Length (u16) and UTF-8.
+    Text,
+}
+
+impl Wire {
+    /// Name in the list of channels.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::U32 => "u32",
+            Self::I32 => "i32",
+            Self::U64 => "u64",
+            Self::Bool => "bool",
+            Self::Text => "text",
+        }
+    }
+}
+
 /// One signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldDef {
@@ -64,6 +97,8 @@ pub struct FieldDef {
     pub unit: &'static str,
     /// JSON type.
     pub ty: FieldType,
+    /// Layout in the console's frames.
+    pub wire: Wire,
     /// Digits after the point in the log: its resolution is `10^-decimals`.
     pub decimals: u8,
     /// Where the value comes from.
@@ -100,6 +135,9 @@ pub trait Sample: Clone {
     /// Appends the values of all fields in order: numbers and integers little-endian in their own
     /// width, a boolean as one byte, a text as its length (u32) and its UTF-8 bytes.
     fn bytes(&self, out: &mut Vec<u8>);
+
+    /// Appends the values of all fields in order, as [`Wire`] lays them out.
+    fn pack(&self, out: &mut Vec<u8>);
 
     /// Calls `cell` with the text of each field in order.
     fn cells(&self, cell: &mut dyn FnMut(&[u8]));

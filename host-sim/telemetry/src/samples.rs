@@ -1,18 +1,25 @@
 //! The declaration of every telemetry signal.
 
 use super::encode::{push_fixed, push_i64, push_json_string, push_u64};
-use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample};
+use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire};
 
 /// A Rust type that can be a signal.
 trait Value {
     const TYPE: FieldType;
+    const WIRE: Wire;
     fn json(&self, out: &mut Vec<u8>, decimals: u8);
     /// Appends the value little-endian, in its own width; a text with its length (u32) before it.
     fn bytes(&self, out: &mut Vec<u8>);
+    /// Appends the value as [`Wire`] lays it out.
+    fn pack(&self, out: &mut Vec<u8>);
 }
 
 impl Value for f64 {
     const TYPE: FieldType = FieldType::Number;
+    const WIRE: Wire = Wire::F32;
+    fn pack(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&(*self as f32).to_le_bytes());
+    }
     fn json(&self, out: &mut Vec<u8>, decimals: u8) {
         push_fixed(out, *self, decimals);
     }
@@ -23,6 +30,10 @@ impl Value for f64 {
 
 impl Value for bool {
     const TYPE: FieldType = FieldType::Boolean;
+    const WIRE: Wire = Wire::Bool;
+    fn pack(&self, out: &mut Vec<u8>) {
+        out.push(u8::from(*self));
+    }
     fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
         out.extend_from_slice(if *self { b"true" } else { b"false" });
     }
@@ -33,6 +44,16 @@ impl Value for bool {
 
 impl Value for String {
     const TYPE: FieldType = FieldType::Text;
+    const WIRE: Wire = Wire::Text;
+    fn pack(&self, out: &mut Vec<u8>) {
+        // Longer texts are cut between two characters.
+        let mut end = self.len().min(usize::from(u16::MAX));
+        while !self.is_char_boundary(end) {
+            end -= 1;
+        }
+        out.extend_from_slice(&(end as u16).to_le_bytes());
+        out.extend_from_slice(&self.as_bytes()[..end]);
+    }
     fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
         push_json_string(out, self);
     }
@@ -43,9 +64,13 @@ impl Value for String {
 }
 
 macro_rules! integer_values {
-    ($($t:ty => $push:ident as $wide:ty),*) => {$(
+    ($($t:ty => $push:ident as $wide:ty, $wire:ident as $packed:ty;)*) => {$(
         impl Value for $t {
             const TYPE: FieldType = FieldType::Integer;
+            const WIRE: Wire = Wire::$wire;
+            fn pack(&self, out: &mut Vec<u8>) {
+                out.extend_from_slice(&<$packed>::from(*self).to_le_bytes());
+            }
             fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
                 $push(out, <$wide>::from(*self));
             }
@@ -56,11 +81,11 @@ macro_rules! integer_values {
     )*};
 }
 integer_values!(
-    u8 => push_u64 as u64,
-    u16 => push_u64 as u64,
-    u32 => push_u64 as u64,
-    u64 => push_u64 as u64,
-    i32 => push_i64 as i64
+    u8 => push_u64 as u64, U32 as u32;
+    u16 => push_u64 as u64, U32 as u32;
+    u32 => push_u64 as u64, U32 as u32;
+    u64 => push_u64 as u64, U64 as u64;
+    i32 => push_i64 as i64, I32 as i32;
 );
 
 /// Declares sample structs: `name: type, "unit", decimals, layer;`. The doc
@@ -85,6 +110,7 @@ macro_rules! samples {
                     name: stringify!($field),
                     unit: $unit,
                     ty: <$ty as Value>::TYPE,
+                    wire: <$ty as Value>::WIRE,
                     decimals: $decimals,
                     layer: Layer::$layer,
                     doc: concat!($($fdoc),*).trim_ascii(),
@@ -105,6 +131,10 @@ macro_rules! samples {
 
             fn bytes(&self, out: &mut Vec<u8>) {
                 $( self.$field.bytes(out); )*
+            }
+
+            fn pack(&self, out: &mut Vec<u8>) {
+                $( self.$field.pack(out); )*
             }
 
             fn cells(&self, cell: &mut dyn FnMut(&[u8])) {

@@ -7,7 +7,7 @@ use super::samples::{
 };
 use crate::LogError;
 
-/// Declares [`SampleRef`] over the types of samples.
+/// Declares [`SampleRef`] and [`OwnedSample`] over the types of samples.
 macro_rules! sample_ref {
     ($($name:ident: $ty:ty),* $(,)?) => {
         /// A sample of any channel.
@@ -27,7 +27,33 @@ macro_rules! sample_ref {
             }
         )*
 
+        /// A sample of any channel, on its way to another thread.
+        #[derive(Debug, Clone)]
+        pub enum OwnedSample {
+            $(
+                #[doc = concat!("A [`", stringify!($ty), "`].")]
+                $name($ty),
+            )*
+        }
+
+        impl OwnedSample {
+            /// Appends the values of all fields, as [`Sample::pack`].
+            pub fn pack(&self, out: &mut Vec<u8>) {
+                match self {
+                    $( Self::$name(sample) => sample.pack(out), )*
+                }
+            }
+        }
+
         impl SampleRef<'_> {
+            /// The sample itself.
+            #[must_use]
+            pub fn to_owned(self) -> OwnedSample {
+                match self {
+                    $( Self::$name(sample) => OwnedSample::$name(sample.clone()), )*
+                }
+            }
+
             /// Appends the payload of the log, as [`Sample::encode_json`].
             pub fn encode_json(self, out: &mut Vec<u8>) {
                 match self {

@@ -136,6 +136,8 @@ impl Command {
             CommandCode::Disarm => Self::Disarm,
             CommandCode::ClearFault => Self::ClearFault,
             CommandCode::EmergencyStop => Self::EmergencyStop,
+            CommandCode::TakeControl => Self::TakeControl,
+            CommandCode::ReleaseControl => Self::ReleaseControl,
             CommandCode::Commission => Self::Commission,
             CommandCode::ReadParameter => Self::ReadParameter {
                 node: read.byte(&argument::BOARD)?,

@@ -38,6 +38,8 @@ impl Layer0 {
         now_us: u64,
         events: &mut Events,
     ) -> Result<bool, Refusal> {
+        // The control may have ended since the door.
+        self.may_command(accepted.ticket.client, &accepted.command)?;
         match accepted.command {
             Command::Arm => self.begin_arming(accepted),
             Command::Disarm => {
@@ -143,6 +145,11 @@ impl Layer0 {
                 };
                 self.ask(accepted, wheel_address(side)?, message.into())
             }
+            Command::TakeControl => {
+                self.take_control(now_us);
+                Ok(true)
+            }
+            Command::ReleaseControl => self.release_control().map(|()| true),
             Command::Commission => {
                 if self.power != Power::Disarmed {
                     return Err(Refusal::NotDisarmed);

@@ -18,6 +18,7 @@ pub mod line;
 pub mod liveness;
 pub mod nodes;
 pub mod odometry;
+pub mod operator;
 pub mod questions;
 pub mod reflex;
 mod requests;
@@ -42,6 +43,7 @@ use line::Line;
 use liveness::Liveness;
 use nodes::Nodes;
 use odometry::Odometry;
+use operator::Lease;
 use questions::Questions;
 use reflex::Reflexes;
 use sums::Sums;
@@ -100,6 +102,7 @@ pub struct Layer0 {
     in_flight: Option<Job>,
     ask_from: usize,
     power: Power,
+    lease: Lease,
     hold: Option<HoldReason>,
     emergency_stop: bool,
     group: Option<Group>,
@@ -152,6 +155,7 @@ impl Layer0 {
             in_flight: None,
             ask_from: 0,
             power: Power::Disarmed,
+            lease: Lease::new(config.operator_timeout_us),
             hold: None,
             emergency_stop: false,
             group: None,

@@ -60,7 +60,7 @@ fn a_request_is_sent_until_its_deadline_and_not_after_it() {
         let mut rig = Rig::new(MasterConfig::default());
         rig.run(60);
         let request = Request {
-            client: 2,
+            client: 1,
             id: 1,
             deadline_us: rig.now_us + deadline_us,
             command: Command::OpenAllValves { joint: 3 },

@@ -9,6 +9,7 @@ mod common;
 mod direct;
 mod foot;
 mod motion;
+mod operator;
 mod parameters;
 mod questions;
 mod senses;

@@ -10,6 +10,9 @@ use super::{board, other_interface};
 pub(super) fn refusal(reason: &Refusal) -> String {
     match *reason {
         Refusal::Expired => "its deadline passed while it waited: give it again".to_owned(),
+        Refusal::NotInControl => {
+            "it needs the control, which an operator takes at the console: take it first".to_owned()
+        }
         Refusal::NotArmed => "it needs armed axes: clear a stop if there was one, then arm".to_owned(),
         Refusal::NotDisarmed => "it needs disarmed axes: disarm first".to_owned(),
         Refusal::Moving => {

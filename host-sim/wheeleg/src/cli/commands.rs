@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use serde_json::{Value, json};
-use wheeleg_master::argument::{Argument, ArgumentKind, Limits};
+use wheeleg_console::command_list;
 use wheeleg_master::command::{TABLE, write_markdown};
 
 use super::print;
@@ -52,52 +52,7 @@ fn text() -> String {
 }
 
 fn as_json() -> Value {
-    let commands: Vec<Value> = TABLE
-        .iter()
-        .map(|row| {
-            let arguments: Vec<Value> = row.arguments.iter().map(argument).collect();
-            json!({
-                "name": row.name,
-                "code": row.code as u16,
-                "layer": row.code.layer() as u8,
-                "effect": row.effect,
-                "arguments": arguments,
-            })
-        })
-        .collect();
-    json!({ "commands": commands })
-}
-
-/// An argument; its limits are in its unit.
-fn argument(argument: &Argument) -> Value {
-    let mut value = json!({
-        "name": argument.name,
-        "kind": argument.kind.name(),
-        "unit": argument.kind.unit(),
-        "description": argument.doc,
-    });
-    // The shortest decimal number that means the limit.
-    let number = |text: String| text.parse::<f64>().map_or(Value::Null, Value::from);
-    match argument.kind {
-        ArgumentKind::Whole(Limits { min, max }) => {
-            value["min"] = json!(min);
-            value["max"] = json!(max);
-        }
-        ArgumentKind::Length(Limits { min, max })
-        | ArgumentKind::Velocity(Limits { min, max })
-        | ArgumentKind::Acceleration(Limits { min, max })
-        | ArgumentKind::Rate(Limits { min, max }) => {
-            value["min"] = number(min.to_string());
-            value["max"] = number(max.to_string());
-        }
-        ArgumentKind::Time(Limits { min, max }) => {
-            value["min"] = json!(f64::from(min) / 1e6);
-            value["max"] = json!(f64::from(max) / 1e6);
-        }
-        ArgumentKind::Choice(words) => value["choices"] = json!(words),
-        ArgumentKind::Flag | ArgumentKind::Parameter | ArgumentKind::Raw => {}
-    }
-    value
+    json!({ "commands": command_list() })
 }
 
 #[cfg(test)]
@@ -116,10 +71,10 @@ mod tests {
             let arguments = shown["arguments"].as_array().expect("a list");
             assert_eq!(arguments.len(), row.arguments.len());
         }
-        let rate = &commands[23]["arguments"][4];
+        let rate = &commands[25]["arguments"][4];
         let limits = (&rate["min"], &rate["max"], &rate["unit"]);
         assert_eq!(limits, (&json!(0.05), &json!(2.0), &json!("rad/s")));
-        let period = &commands[22]["arguments"][1];
+        let period = &commands[24]["arguments"][1];
         assert_eq!(
             (&period["min"], &period["max"]),
             (&json!(0.5), &json!(60.0))

@@ -5,6 +5,7 @@ mod check;
 mod commands;
 mod commission;
 mod compare;
+mod ctl;
 mod delay;
 mod export;
 mod faults;
@@ -15,6 +16,7 @@ mod log;
 mod params;
 mod plant;
 mod run;
+mod serve;
 mod tune;
 mod usage;
 
@@ -66,6 +68,10 @@ where
 enum Command {
     /// Run a scenario; writes log, tables, figures, summary and report.
     Run(run::RunArgs),
+    /// Run a robot live and serve the operator's console on this computer.
+    Serve(serve::ServeArgs),
+    /// See and drive the robot that `wheeleg serve` runs.
+    Ctl(ctl::CtlArgs),
     /// List the built-in scenarios and robots.
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
@@ -106,6 +112,8 @@ pub(crate) fn main() -> ExitCode {
     let result = match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
+        Some(Command::Serve(args)) => serve::command(&args),
+        Some(Command::Ctl(args)) => ctl::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),
         Some(Command::List(args)) => list::command(&args),
         Some(Command::Params(args)) => params::command(&args),

@@ -1,0 +1,132 @@
+//! The operator's lease of control: a person drives the robot only while it is known that they
+//! see it. It is the master that notices when they are gone, not the network before it.
+
+use super::{Layer0, Power};
+use crate::command::Command;
+use crate::config::{OPERATOR_TIMEOUT_MAX_US, OPERATOR_TIMEOUT_MIN_US};
+use crate::dispatcher::Refusal;
+use crate::event::{Events, HoldReason};
+
+/// Client number of the operator who may hold the control.
+pub const OPERATOR_CLIENT: u8 = 2;
+/// Client number of everybody else at the console: they may stop, and nothing more.
+pub const STOP_CLIENT: u8 = 3;
+/// A lease that lives from one sight of the robot to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Lease {
+    timeout_us: u64,
+    /// Newest master time that the holder has seen; `None`: the control is free.
+    seen_us: Option<u64>,
+}
+
+impl Lease {
+    /// Free; lost after `timeout_us`, which is kept within [`OPERATOR_TIMEOUT_MIN_US`] and
+    /// [`OPERATOR_TIMEOUT_MAX_US`].
+    #[must_use]
+    pub fn new(timeout_us: u32) -> Self {
+        Self {
+            timeout_us: timeout_us
+                .clamp(OPERATOR_TIMEOUT_MIN_US, OPERATOR_TIMEOUT_MAX_US)
+                .into(),
+            seen_us: None,
+        }
+    }
+
+    /// Whether the operator holds the control.
+    #[must_use]
+    pub const fn is_held(&self) -> bool {
+        self.seen_us.is_some()
+    }
+
+    /// Newest master time that the holder has seen, µs; `None`: the control is free.
+    #[must_use]
+    pub const fn seen_us(&self) -> Option<u64> {
+        self.seen_us
+    }
+
+    /// The operator has seen the robot as it was at `seen_us`. What is older than the newest
+    /// sight, or in the future, gains nothing.
+    pub fn beat(&mut self, seen_us: u64, now_us: u64) {
+        if let Some(newest) = &mut self.seen_us
+            && seen_us <= now_us
+        {
+            *newest = seen_us.max(*newest);
+        }
+    }
+
+    fn take(&mut self, now_us: u64) {
+        self.seen_us = Some(now_us.max(self.seen_us.unwrap_or(0)));
+    }
+
+    fn release(&mut self) {
+        self.seen_us = None;
+    }
+
+    /// Ends a lease whose holder has seen nothing new for too long; true if it ends now.
+    fn expire(&mut self, now_us: u64) -> bool {
+        let lost = self
+            .seen_us
+            .is_some_and(|seen| now_us.saturating_sub(seen) > self.timeout_us);
+        if lost {
+            self.release();
+        }
+        lost
+    }
+}
+
+impl Layer0 {
+    /// The operator's lease, to look at.
+    #[must_use]
+    pub const fn lease(&self) -> &Lease {
+        &self.lease
+    }
+
+    /// See [`Lease::beat`].
+    pub fn beat(&mut self, seen_us: u64, now_us: u64) {
+        self.lease.beat(seen_us, now_us);
+    }
+
+    /// Whether a client may give this command. An E-stop is not asked for: anybody may stop.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInControl`].
+    pub fn may_command(&self, client: u8, command: &Command) -> Result<(), Refusal> {
+        let takes = matches!(command, Command::TakeControl);
+        let leases = takes || matches!(command, Command::ReleaseControl);
+        let may = match client {
+            OPERATOR_CLIENT => takes || self.lease.is_held(),
+            STOP_CLIENT => false,
+            // A scenario and a service tool beside it need no lease, and can hold none.
+            _ => !leases,
+        };
+        if may {
+            Ok(())
+        } else {
+            Err(Refusal::NotInControl)
+        }
+    }
+
+    pub(super) fn take_control(&mut self, now_us: u64) {
+        self.lease.take(now_us);
+    }
+
+    /// # Errors
+    /// [`Refusal::Moving`]: nobody would watch the motion under way.
+    pub(super) fn release_control(&mut self) -> Result<(), Refusal> {
+        if self.power != Power::Disarmed && self.setpoints.phase.is_moving() {
+            return Err(Refusal::Moving);
+        }
+        self.lease.release();
+        Ok(())
+    }
+
+    /// Stops a robot whose operator is gone. True if they are gone just now: then what they gave
+    /// must not run any more either.
+    pub fn watch_operator(&mut self, now_us: u64, events: &mut Events) -> bool {
+        let lost = self.lease.expire(now_us);
+        if lost && self.power != Power::Disarmed {
+            self.hold_all(HoldReason::OperatorLost, now_us, events);
+        }
+        lost
+    }
+}

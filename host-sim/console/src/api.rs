@@ -1,0 +1,264 @@
+//! Routes of the server: page, socket and HTTP API.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{Extension, Query, Request, State};
+use axum::http::header::{
+    AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, REFERRER_POLICY,
+    X_CONTENT_TYPE_OPTIONS,
+};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::{get, post};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::catalogue::fault_list;
+use crate::guard::Hosts;
+use crate::hex;
+use crate::page::Page;
+use crate::request::FRAME_MAX;
+use crate::session::{self, Context};
+
+/// Subprotocol of the socket.
+pub const SUBPROTOCOL: &str = "wheeleg.console.v1";
+/// Bytes that may wait in a socket's own buffer.
+const WRITE_BUFFER_MAX: usize = 128 * 1024;
+
+const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
+    connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
+/// What the routes need.
+pub(crate) struct Server {
+    /// What a session needs.
+    pub(crate) context: Arc<Context>,
+    /// Names under which the server answers.
+    pub(crate) hosts: Hosts,
+    /// The page.
+    pub(crate) page: Page,
+}
+
+/// The name under which a request asks.
+#[derive(Clone)]
+struct Host(String);
+
+/// Where a connection comes from.
+#[derive(Clone, Copy)]
+pub(crate) struct Peer(pub(crate) SocketAddr);
+
+/// All routes.
+pub(crate) fn router(server: Arc<Server>) -> Router {
+    let api = Router::new()
+        .route("/state", get(state))
+        .route("/channels", get(channels))
+        .route("/commands", get(commands))
+        .route("/events", get(events))
+        .route("/faults", get(faults))
+        .route("/stop", post(stop))
+        .fallback(|| async {
+            problem(
+                StatusCode::NOT_FOUND,
+                "there is no such path",
+                "see PROTOCOL.md",
+            )
+        })
+        .method_not_allowed_fallback(wrong_method)
+        .layer(middleware::from_fn_with_state(Arc::clone(&server), key));
+    Router::new()
+        .route("/ws", get(socket))
+        .nest("/api/v1", api)
+        .fallback(get(page))
+        .method_not_allowed_fallback(wrong_method)
+        .layer(middleware::from_fn_with_state(Arc::clone(&server), door))
+        .with_state(server)
+}
+
+async fn wrong_method() -> Response {
+    let status = StatusCode::METHOD_NOT_ALLOWED;
+    problem(
+        status,
+        "this path is not asked so",
+        "GET; stop is asked with POST",
+    )
+}
+
+/// An error by RFC 9457.
+fn problem(status: StatusCode, detail: &str, remedy: &str) -> Response {
+    let title = status.canonical_reason().unwrap_or("error");
+    let body = json!({
+        "type": "about:blank",
+        "title": title,
+        "status": status.as_u16(),
+        "detail": detail,
+        "remedy": remedy,
+    });
+    let kind = [(CONTENT_TYPE, "application/problem+json")];
+    (status, kind, body.to_string()).into_response()
+}
+
+fn json_text(text: String) -> Response {
+    ([(CONTENT_TYPE, "application/json")], text).into_response()
+}
+
+/// Lets nobody in from a foreign page, and says to the browser what the page may do.
+async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Next) -> Response {
+    let host = server.hosts.check(request.headers()).map(str::to_owned);
+    let mut response = match host {
+        Some(host) => {
+            request.extensions_mut().insert(Host(host));
+            next.run(request).await
+        }
+        None => problem(
+            StatusCode::FORBIDDEN,
+            "the request comes by a foreign name or from a foreign page",
+            "open the address that the server prints",
+        ),
+    };
+    let headers = response.headers_mut();
+    let mut set = |name: HeaderName, value| headers.insert(name, HeaderValue::from_static(value));
+    set(CONTENT_SECURITY_POLICY, CSP);
+    set(X_CONTENT_TYPE_OPTIONS, "nosniff");
+    set(REFERRER_POLICY, "no-referrer");
+    set(CACHE_CONTROL, "no-store");
+    set(
+        HeaderName::from_static("cross-origin-resource-policy"),
+        "same-origin",
+    );
+    response
+}
+
+/// Lets nobody ask without a key.
+async fn key(
+    State(server): State<Arc<Server>>,
+    Extension(Peer(peer)): Extension<Peer>,
+    request: Request,
+    next: Next,
+) -> Response {
+    if has_key(&server.context, request.headers()) {
+        return next.run(request).await;
+    }
+    let remedy = "send `Authorization: Bearer KEY` with the digits of control.key or view.key";
+    if server.context.wrong_keys.count(peer.ip(), Instant::now()) {
+        return problem(StatusCode::TOO_MANY_REQUESTS, "too many wrong keys", remedy);
+    }
+    problem(
+        StatusCode::UNAUTHORIZED,
+        "the key is missing or wrong",
+        remedy,
+    )
+}
+
+fn has_key(context: &Context, headers: &HeaderMap) -> bool {
+    let mut values = headers.get_all(AUTHORIZATION).iter();
+    let (Some(value), None) = (values.next(), values.next()) else {
+        return false;
+    };
+    let token = value.to_str().ok().and_then(|v| v.strip_prefix("Bearer "));
+    let Some(token) = token.and_then(hex::decode::<32>) else {
+        return false;
+    };
+    // Both are compared, whichever fits.
+    context.keys.control.is(&token) | context.keys.view.is(&token)
+}
+
+async fn socket(
+    State(server): State<Arc<Server>>,
+    Extension(Host(host)): Extension<Host>,
+    Extension(Peer(peer)): Extension<Peer>,
+    upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+) -> Response {
+    let Ok(upgrade) = upgrade else {
+        return problem(
+            StatusCode::BAD_REQUEST,
+            "this is a WebSocket",
+            "see PROTOCOL.md",
+        );
+    };
+    if !server.context.hub.has_place() {
+        return problem(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "all places are taken",
+            "close another client",
+        );
+    }
+    let upgrade = upgrade
+        .protocols([SUBPROTOCOL])
+        .max_message_size(FRAME_MAX)
+        .max_frame_size(FRAME_MAX)
+        .write_buffer_size(0)
+        .max_write_buffer_size(WRITE_BUFFER_MAX);
+    if upgrade.selected_protocol().is_none() {
+        let detail = format!("the subprotocol must be {SUBPROTOCOL}");
+        return problem(StatusCode::BAD_REQUEST, &detail, "see PROTOCOL.md");
+    }
+    let context = Arc::clone(&server.context);
+    upgrade.on_upgrade(move |socket| session::serve(socket, context, host, peer.ip()))
+}
+
+async fn page(State(server): State<Arc<Server>>, uri: Uri) -> Response {
+    match server.page.get(uri.path().trim_start_matches('/')) {
+        Some((kind, bytes)) => ([(CONTENT_TYPE, kind)], Body::from(bytes)).into_response(),
+        None => problem(StatusCode::NOT_FOUND, "there is no such file", "open /"),
+    }
+}
+
+async fn state(State(server): State<Arc<Server>>) -> Response {
+    json_text(server.context.hub.state())
+}
+
+async fn channels(State(server): State<Arc<Server>>) -> Response {
+    json_text(server.context.hub.catalogue.channels_json.clone())
+}
+
+async fn commands(State(server): State<Arc<Server>>) -> Response {
+    json_text(server.context.hub.catalogue.commands_json.clone())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Last {
+    last: Option<u16>,
+}
+
+async fn events(
+    State(server): State<Arc<Server>>,
+    query: Result<Query<Last>, axum::extract::rejection::QueryRejection>,
+) -> Response {
+    let last = match query {
+        Ok(Query(Last { last })) => last.unwrap_or(256),
+        Err(_) => 0,
+    };
+    if !(1..=256).contains(&last) {
+        return problem(
+            StatusCode::BAD_REQUEST,
+            "`last`: allowed are 1 to 256",
+            "leave it out",
+        );
+    }
+    json_text(server.context.hub.events(last.into()).to_string())
+}
+
+async fn faults(State(server): State<Arc<Server>>) -> Response {
+    let list: Value = json!({
+        "injectable": fault_list(),
+        "active": server.context.hub.active_faults(),
+    });
+    json_text(list.to_string())
+}
+
+async fn stop(State(server): State<Arc<Server>>) -> Response {
+    match server.context.hub.stop().await {
+        Some(now_us) => json_text(json!({ "stopped": true, "master_us": now_us }).to_string()),
+        None => problem(
+            StatusCode::GATEWAY_TIMEOUT,
+            "NOT CONFIRMED within 200 ms",
+            "cut the air",
+        ),
+    }
+}

@@ -1,0 +1,297 @@
+//! What can be seen and given, as data: channels, commands of the master, commands of the host,
+//! faults, each with what a form or a plot needs to know.
+
+use serde_json::{Value, json};
+use wheeleg_config::faults::KINDS;
+use wheeleg_master::argument::{Argument, ArgumentKind, Limits};
+use wheeleg_master::command::TABLE;
+use wheeleg_telemetry::channels;
+
+/// An argument of a command of the host.
+#[derive(Debug, Clone, Copy)]
+pub struct HostArgument {
+    /// Name.
+    pub name: &'static str,
+    /// Kind: `number`, `whole number` or `text`.
+    pub kind: &'static str,
+    /// Unit; `1` for what has none.
+    pub unit: &'static str,
+    /// Smallest and largest value of a number.
+    pub limits: Option<(f64, f64)>,
+    /// Meaning.
+    pub doc: &'static str,
+}
+
+/// Which command of the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HostCode {
+    /// Stops the clock.
+    Pause = 0x0301,
+    /// Lets it go on.
+    Resume = 0x0302,
+    /// Some bus cycles of a paused robot.
+    Step = 0x0303,
+    /// How fast the clock goes.
+    Speed = 0x0304,
+    /// A fault begins.
+    Inject = 0x0305,
+    /// A fault ends.
+    EndFault = 0x0306,
+}
+
+/// A command that acts on the simulation, not on the robot.
+#[derive(Debug, Clone, Copy)]
+pub struct HostInfo {
+    /// Number.
+    pub code: HostCode,
+    /// Name.
+    pub name: &'static str,
+    /// Arguments.
+    pub arguments: &'static [HostArgument],
+    /// What it does.
+    pub effect: &'static str,
+}
+
+/// Most bus cycles of one `Step`.
+pub(crate) const STEP_MAX: u32 = 1_000;
+/// Slowest and fastest pace.
+pub(crate) const SPEED: (f64, f64) = (0.1, 10.0);
+/// Fastest pace at which somebody may be in control.
+pub(crate) const SPEED_OF_CONTROL: f64 = 2.0;
+
+const FAULT: HostArgument = HostArgument {
+    name: "fault",
+    kind: "text",
+    unit: "1",
+    limits: None,
+    doc: "Fault and target, such as `pot-open:joint3`, as `wheeleg faults list` has them.",
+};
+
+/// Commands of the host.
+pub const HOST_TABLE: &[HostInfo] = &[
+    HostInfo {
+        code: HostCode::Pause,
+        name: "Pause",
+        arguments: &[],
+        effect: "Stops the clock of the simulation.",
+    },
+    HostInfo {
+        code: HostCode::Resume,
+        name: "Resume",
+        arguments: &[],
+        effect: "Lets the clock go on.",
+    },
+    HostInfo {
+        code: HostCode::Step,
+        name: "Step",
+        arguments: &[HostArgument {
+            name: "cycles",
+            kind: "whole number",
+            unit: "1",
+            limits: Some((1.0, STEP_MAX as f64)),
+            doc: "Bus cycles of 10 ms.",
+        }],
+        effect: "Simulates some bus cycles of a paused robot.",
+    },
+    HostInfo {
+        code: HostCode::Speed,
+        name: "Speed",
+        arguments: &[HostArgument {
+            name: "speed",
+            kind: "number",
+            unit: "1",
+            limits: Some(SPEED),
+            doc: "Simulated time over time of the clock on the wall; above 2 only while nobody is in control.",
+        }],
+        effect: "Sets the pace of the simulation.",
+    },
+    HostInfo {
+        code: HostCode::Inject,
+        name: "Inject",
+        arguments: &[FAULT],
+        effect: "Begins a fault, which lasts until it is ended, or is over by itself.",
+    },
+    HostInfo {
+        code: HostCode::EndFault,
+        name: "EndFault",
+        arguments: &[FAULT],
+        effect: "Ends a fault.",
+    },
+];
+
+/// First 16 digits of the BLAKE3 of what a list says.
+fn hash(list: &Value) -> String {
+    let digest = blake3::hash(list.to_string().as_bytes());
+    digest.to_hex().as_str()[..16].to_owned()
+}
+
+/// Channels and commands, made once.
+#[derive(Debug)]
+pub(crate) struct Catalogue {
+    /// Hash of the channels.
+    pub(crate) layout: String,
+    /// Hash of the commands.
+    pub(crate) commands: String,
+    /// Answer of `/api/v1/channels`.
+    pub(crate) channels_json: String,
+    /// Answer of `/api/v1/commands`.
+    pub(crate) commands_json: String,
+}
+
+impl Catalogue {
+    pub(crate) fn new() -> Self {
+        let channels = channel_list();
+        let mut commands = command_list();
+        commands.extend(host_list());
+        let (channels, commands) = (Value::Array(channels), Value::Array(commands));
+        let (layout, hash) = (hash(&channels), hash(&commands));
+        Self {
+            channels_json: json!({ "layout": layout, "channels": channels }).to_string(),
+            commands_json: json!({ "hash": hash, "commands": commands }).to_string(),
+            layout,
+            commands: hash,
+        }
+    }
+}
+
+fn channel_list() -> Vec<Value> {
+    let list = channels().iter().enumerate().map(|(id, channel)| {
+        let fields = channel.fields.iter().map(|f| {
+            json!({
+                "name": f.name,
+                "unit": f.unit,
+                "wire": f.wire.name(),
+                "decimals": f.decimals,
+                "layer": f.layer.name(),
+                "description": f.doc,
+            })
+        });
+        json!({
+            "id": id,
+            "topic": channel.topic,
+            "schema": channel.schema,
+            "rate_hz": channel.rate_hz,
+            "description": channel.doc,
+            "fields": fields.collect::<Vec<_>>(),
+        })
+    });
+    list.collect()
+}
+
+/// The commands of the master, as JSON.
+#[must_use]
+pub fn command_list() -> Vec<Value> {
+    let list = TABLE.iter().map(|row| {
+        let arguments: Vec<Value> = row.arguments.iter().map(argument).collect();
+        json!({
+            "name": row.name,
+            "code": row.code as u16,
+            "layer": row.code.layer() as u8,
+            "effect": row.effect,
+            "arguments": arguments,
+        })
+    });
+    list.collect()
+}
+
+fn host_list() -> Vec<Value> {
+    let list = HOST_TABLE.iter().map(|row| {
+        let arguments = row.arguments.iter().map(|argument| {
+            let mut value = json!({
+                "name": argument.name,
+                "kind": argument.kind,
+                "unit": argument.unit,
+                "description": argument.doc,
+            });
+            if let Some((min, max)) = argument.limits {
+                value["min"] = json!(min);
+                value["max"] = json!(max);
+            }
+            value
+        });
+        json!({
+            "name": row.name,
+            "code": row.code as u16,
+            "layer": 2,
+            "effect": row.effect,
+            "arguments": arguments.collect::<Vec<_>>(),
+        })
+    });
+    list.collect()
+}
+
+/// An argument; its limits are in its unit.
+fn argument(argument: &Argument) -> Value {
+    let mut value = json!({
+        "name": argument.name,
+        "kind": argument.kind.name(),
+        "unit": argument.kind.unit(),
+        "description": argument.doc,
+    });
+    // The shortest decimal number that means the limit.
+    let number = |text: String| text.parse::<f64>().map_or(Value::Null, Value::from);
+    match argument.kind {
+        ArgumentKind::Whole(Limits { min, max }) => {
+            value["min"] = json!(min);
+            value["max"] = json!(max);
+        }
+        ArgumentKind::Length(Limits { min, max })
+        | ArgumentKind::Velocity(Limits { min, max })
+        | ArgumentKind::Acceleration(Limits { min, max })
+        | ArgumentKind::Rate(Limits { min, max }) => {
+            value["min"] = number(min.to_string());
+            value["max"] = number(max.to_string());
+        }
+        ArgumentKind::Time(Limits { min, max }) => {
+            value["min"] = json!(f64::from(min) / 1e6);
+            value["max"] = json!(f64::from(max) / 1e6);
+        }
+        ArgumentKind::Choice(words) => value["choices"] = json!(words),
+        ArgumentKind::Flag | ArgumentKind::Parameter | ArgumentKind::Raw => {}
+    }
+    value
+}
+
+/// The faults that can begin in a robot that runs.
+pub(crate) fn fault_list() -> Vec<Value> {
+    let list = KINDS.iter().filter(|row| !row.kind.is_built_in());
+    let list = list.map(|row| {
+        json!({
+            "fault": row.name,
+            "targets": row.place.expected(),
+            "effect": row.doc,
+            "value": row.value.map(|v| json!({
+                "unit": v.unit, "min": v.min, "max": v.max, "default": v.default, "description": v.doc,
+            })),
+        })
+    });
+    list.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_channel_field_command_and_argument_is_listed() {
+        let catalogue = Catalogue::new();
+        let value: Value = serde_json::from_str(&catalogue.channels_json).expect("JSON");
+        let list = value["channels"].as_array().expect("a list");
+        assert_eq!(list.len(), channels().len());
+        for (channel, shown) in channels().iter().zip(list) {
+            let fields = shown["fields"].as_array().expect("a list");
+            assert_eq!(fields.len(), channel.fields.len(), "{}", channel.topic);
+        }
+        let value: Value = serde_json::from_str(&catalogue.commands_json).expect("JSON");
+        let list = value["commands"].as_array().expect("a list");
+        assert_eq!(list.len(), TABLE.len() + HOST_TABLE.len());
+        for (row, shown) in TABLE.iter().zip(list) {
+            assert_eq!(shown["name"], row.name);
+            let arguments = shown["arguments"].as_array().expect("a list");
+            assert_eq!(arguments.len(), row.arguments.len());
+        }
+        assert_eq!(list[list.len() - 1]["code"], 0x0306);
+        assert_eq!(catalogue.layout.len(), 16);
+        assert_ne!(catalogue.layout, catalogue.commands);
+    }
+}

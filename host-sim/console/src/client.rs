@@ -1,0 +1,356 @@
+//! A client for programs: speaks the contract of PROTOCOL.md over a blocking socket.
+
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tungstenite::client::ClientRequestBuilder;
+use tungstenite::http::Uri;
+use tungstenite::{Message, WebSocket};
+
+use crate::api::SUBPROTOCOL;
+use crate::error::ConsoleError;
+use crate::hex;
+use crate::mac::{Key, Transcript};
+
+/// Time for a connection, and for an answer over HTTP.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// How often the control is kept by a beat.
+const BEAT: Duration = Duration::from_millis(50);
+/// How long a look for a message lasts.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Address of a server, as people write it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Url {
+    /// Name or address and port.
+    host: String,
+}
+
+impl Url {
+    /// Reads `http://HOST:PORT`, `ws://HOST:PORT` or `HOST:PORT`.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let host = text
+            .strip_prefix("http://")
+            .or_else(|| text.strip_prefix("ws://"))
+            .unwrap_or(text)
+            .trim_end_matches('/');
+        let port = host.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
+        if !matches!(port, Some(Ok(_))) || host.contains('/') {
+            return Err("an address of a server is http://HOST:PORT".to_owned());
+        }
+        Ok(Self {
+            host: host.to_owned(),
+        })
+    }
+
+    fn error(&self, what: impl ToString) -> ConsoleError {
+        ConsoleError::Link {
+            url: format!("http://{}", self.host),
+            what: what.to_string(),
+            help: "start a server with `wheeleg serve`; give its address with --url and its key with --key"
+                .to_owned(),
+        }
+    }
+
+    fn stream(&self) -> Result<TcpStream, ConsoleError> {
+        let mut addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
+        let address = addresses.next().ok_or_else(|| self.error("no such host"))?;
+        let stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e))?;
+        let set = stream
+            .set_nodelay(true)
+            .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
+            .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+        set.map_err(|e| self.error(e))?;
+        Ok(stream)
+    }
+}
+
+/// Asks a path of the HTTP API; status and JSON of the answer.
+///
+/// # Errors
+/// [`ConsoleError::Link`] if there is no answer.
+pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Value), ConsoleError> {
+    let mut stream = url.stream()?;
+    let request = format!(
+        "{method} /api/v1/{path} HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n",
+        url.host,
+        key.to_hex()
+    );
+    let mut answer = String::new();
+    stream
+        .write_all(request.as_bytes())
+        .and_then(|()| stream.take(1 << 20).read_to_string(&mut answer))
+        .map_err(|e| url.error(e))?;
+    let odd = || url.error("this is no console of Wheeleg");
+    let (head, body) = answer.split_once("\r\n\r\n").ok_or_else(odd)?;
+    let status = head.split(' ').nth(1).and_then(|code| code.parse().ok());
+    let body = serde_json::from_str(body).map_err(|_| odd())?;
+    Ok((status.ok_or_else(odd)?, body))
+}
+
+/// What came from the server.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Incoming {
+    /// A message in JSON.
+    Json(Value),
+    /// Samples of a channel.
+    Samples {
+        /// `id` of the channel.
+        channel: u16,
+        /// Samples before it that did not come.
+        missed: u32,
+        /// Samples as laid out in PROTOCOL.md.
+        body: Vec<u8>,
+    },
+    /// The connection has ended.
+    Closed {
+        /// Code of the close frame; 1006 without one.
+        code: u16,
+        /// Its reason.
+        reason: String,
+    },
+}
+
+/// How a request ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    /// Done.
+    Done,
+    /// Refused.
+    Refused {
+        /// Name that stays the same.
+        reason: String,
+        /// For a person.
+        text: String,
+    },
+    /// Nobody knows.
+    Unknown,
+    /// The connection ended before.
+    Lost,
+}
+
+/// A connection whose server has proved to have the key.
+pub struct Client {
+    url: Url,
+    socket: WebSocket<TcpStream>,
+    key: Key,
+    n: u64,
+    /// Newest master time that has come, µs.
+    seen_us: u64,
+    beat: Option<Instant>,
+}
+
+impl Client {
+    /// Connects with a role, `control` or `view`, whose key this is.
+    ///
+    /// # Errors
+    /// [`ConsoleError::Link`] if there is no server, it refuses, or it does not have the key.
+    pub fn connect(url: &Url, role: &str, name: &str, key: &Key) -> Result<Self, ConsoleError> {
+        let uri: Uri = format!("ws://{}/ws", url.host)
+            .parse()
+            .map_err(|e| url.error(e))?;
+        let request = ClientRequestBuilder::new(uri).with_sub_protocol(SUBPROTOCOL);
+        let (mut socket, _) =
+            tungstenite::client(request, url.stream()?).map_err(|e| url.error(e))?;
+        let hello = text(url, &mut socket)?;
+        let odd = || url.error("this is no console of Wheeleg");
+        let nonce_s = hello["nonce"].as_str().and_then(hex::decode::<32>);
+        let nonce_s = nonce_s.ok_or_else(odd)?;
+        let mut nonce_c = [0; 32];
+        getrandom::fill(&mut nonce_c).map_err(|e| url.error(e))?;
+        let [layout, commands] = ["layout", "commands"].map(|name| hello[name].as_str());
+        let transcript = Transcript {
+            nonce_s: &nonce_s,
+            nonce_c: &nonce_c,
+            role,
+            name,
+            host: &url.host,
+            layout: layout.ok_or_else(odd)?,
+            commands: commands.ok_or_else(odd)?,
+        };
+        let auth = json!({
+            "op": "auth",
+            "role": role,
+            "name": name,
+            "nonce": hex::encode(&nonce_c),
+            "layout": transcript.layout,
+            "commands": transcript.commands,
+            "mac": hex::encode(&transcript.of_client(key)),
+        });
+        let auth = Message::text(auth.to_string());
+        socket.send(auth).map_err(|e| url.error(e))?;
+        let welcome = text(url, &mut socket)?;
+        if let Some(why) = welcome["text"].as_str() {
+            return Err(url.error(why));
+        }
+        let mac = welcome["mac"].as_str().and_then(hex::decode::<32>);
+        let session = welcome["session"].as_str().ok_or_else(odd)?;
+        if !transcript.is_server(key, session, &mac.ok_or_else(odd)?) {
+            return Err(url.error("this is not your robot: it does not have the key"));
+        }
+        let looks = socket.get_ref().set_read_timeout(Some(LOOK));
+        looks.map_err(|e| url.error(e))?;
+        Ok(Self {
+            url: url.clone(),
+            key: transcript.session_key(key),
+            socket,
+            n: 0,
+            seen_us: welcome["master_us"].as_u64().unwrap_or(0),
+            beat: None,
+        })
+    }
+
+    /// Newest master time that has come, µs.
+    #[must_use]
+    pub fn seen_us(&self) -> u64 {
+        self.seen_us
+    }
+
+    /// Sends a frame and gives its number; `frame` lacks that alone.
+    ///
+    /// # Errors
+    /// [`ConsoleError::Link`] if the connection has ended.
+    pub fn send(&mut self, mut frame: Value) -> Result<u64, ConsoleError> {
+        self.n += 1;
+        frame["n"] = json!(self.n);
+        let json = frame.to_string();
+        let mut bytes = self.key.frame(json.as_bytes()).to_vec();
+        bytes.extend_from_slice(json.as_bytes());
+        self.send_raw(bytes)?;
+        Ok(self.n)
+    }
+
+    /// Sends bytes as they are.
+    ///
+    /// # Errors
+    /// [`ConsoleError::Link`] if the connection has ended.
+    pub fn send_raw(&mut self, bytes: Vec<u8>) -> Result<(), ConsoleError> {
+        let sent = self.socket.send(Message::binary(bytes));
+        sent.map_err(|e| self.url.error(e))
+    }
+
+    /// Leaves a number out, as a client does that loses a frame.
+    pub fn skip(&mut self) {
+        self.n += 1;
+    }
+
+    /// Gives a command, about the robot as it came last, and gives the number of its frame.
+    ///
+    /// # Errors
+    /// As [`Client::send`].
+    pub fn give(&mut self, name: &str, args: &Value, valid_ms: u32) -> Result<u64, ConsoleError> {
+        let seen_us = self.seen_us;
+        self.send(json!({ "seen_us": seen_us, "valid_ms": valid_ms, "cmd": name, "args": args }))
+    }
+
+    /// From now on [`Client::read`] sends beats, until it is told not to.
+    pub fn keep_control(&mut self, keep: bool) {
+        self.beat = keep.then(Instant::now);
+    }
+
+    /// What comes within a short look, if anything does.
+    pub fn read(&mut self) -> Option<Incoming> {
+        if self.beat.is_some_and(|due| Instant::now() >= due) {
+            self.beat = Some(Instant::now() + BEAT);
+            let seen_us = self.seen_us;
+            // Of a connection that has ended, the read below tells.
+            let _ = self.send(json!({ "op": "beat", "seen_us": seen_us }));
+        }
+        let lost = || Incoming::Closed {
+            code: 1006,
+            reason: String::new(),
+        };
+        Some(match self.socket.read() {
+            Ok(Message::Text(text)) => {
+                let Ok(value) = serde_json::from_str::<Value>(&text) else {
+                    return Some(lost());
+                };
+                let time_us = value["master_us"].as_u64();
+                self.seen_us = self.seen_us.max(time_us.unwrap_or(0));
+                Incoming::Json(value)
+            }
+            Ok(Message::Binary(bytes)) => {
+                let (Some(channel), Some(missed), Some(body)) =
+                    (bytes.get(1..3), bytes.get(3..7), bytes.get(7..))
+                else {
+                    return Some(lost());
+                };
+                Incoming::Samples {
+                    channel: u16::from_le_bytes([channel[0], channel[1]]),
+                    missed: u32::from_le_bytes([missed[0], missed[1], missed[2], missed[3]]),
+                    body: body.to_vec(),
+                }
+            }
+            Ok(Message::Close(frame)) => {
+                let frame = frame.map(|f| (f.code.into(), f.reason.as_str().to_owned()));
+                let (code, reason) = frame.unwrap_or((1005, String::new()));
+                Incoming::Closed { code, reason }
+            }
+            Ok(_) => return None,
+            Err(tungstenite::Error::Io(e))
+                if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+            {
+                return None;
+            }
+            Err(_) => lost(),
+        })
+    }
+
+    /// Gives a command and waits for its end.
+    ///
+    /// # Errors
+    /// As [`Client::send`].
+    pub fn carry_out(
+        &mut self,
+        name: &str,
+        args: &Value,
+        valid_ms: u32,
+    ) -> Result<Outcome, ConsoleError> {
+        let n = self.give(name, args, valid_ms)?;
+        Ok(self.outcome(n))
+    }
+
+    /// Waits for the end of the request with this number.
+    pub fn outcome(&mut self, n: u64) -> Outcome {
+        loop {
+            let answer = match self.read() {
+                Some(Incoming::Json(answer)) if answer["op"] == "answer" && answer["n"] == n => {
+                    answer
+                }
+                Some(Incoming::Closed { .. }) => return Outcome::Lost,
+                _ => continue,
+            };
+            let word = |name: &str| answer[name].as_str().unwrap_or_default().to_owned();
+            match answer["status"].as_str() {
+                Some("done") => return Outcome::Done,
+                Some("refused") => {
+                    return Outcome::Refused {
+                        reason: word("reason"),
+                        text: word("text"),
+                    };
+                }
+                Some("unknown") => return Outcome::Unknown,
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The next JSON of a handshake.
+fn text(url: &Url, socket: &mut WebSocket<TcpStream>) -> Result<Value, ConsoleError> {
+    loop {
+        match socket.read().map_err(|e| url.error(e))? {
+            Message::Text(text) => {
+                let odd = |_| url.error("this is no console of Wheeleg");
+                return serde_json::from_str(&text).map_err(odd);
+            }
+            Message::Close(_) => return Err(url.error("the server closes")),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! The two keys of a console: who has the control key may drive, who has the view key may look and
+//! stop. Each is a file that only its owner can read.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::error::ConsoleError;
+use crate::hex;
+use crate::mac::Key;
+
+/// File of the control key.
+pub const CONTROL_FILE: &str = "control.key";
+/// File of the view key.
+pub const VIEW_FILE: &str = "view.key";
+
+/// Digits of a key in its file.
+const DIGITS: usize = 64;
+
+/// Both keys.
+#[derive(Debug, Clone)]
+pub struct Keys {
+    /// May drive.
+    pub control: Key,
+    /// May look and stop.
+    pub view: Key,
+}
+
+impl Keys {
+    /// Reads both keys from `folder`, and makes the files that are not there.
+    ///
+    /// # Errors
+    /// [`ConsoleError::Key`] if a file cannot be read or made, others can read it, or it holds no
+    /// key.
+    pub fn open(folder: &Path) -> Result<Self, ConsoleError> {
+        make_folder(folder)?;
+        let [control, view] = [CONTROL_FILE, VIEW_FILE].map(|name| {
+            let path = folder.join(name);
+            match make(&path) {
+                Ok(()) => {}
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(wrong(&path, format!("cannot be made: {e}"))),
+            }
+            read(&path)
+        });
+        Ok(Self {
+            control: control?,
+            view: view?,
+        })
+    }
+
+    /// Makes both keys anew: the old ones open nothing any more.
+    ///
+    /// # Errors
+    /// As [`Keys::open`].
+    pub fn renew(folder: &Path) -> Result<Self, ConsoleError> {
+        for name in [CONTROL_FILE, VIEW_FILE] {
+            let path = folder.join(name);
+            match fs::remove_file(&path) {
+                Err(e) if e.kind() != ErrorKind::NotFound => {
+                    return Err(wrong(&path, format!("cannot be removed: {e}")));
+                }
+                _ => {}
+            }
+        }
+        Self::open(folder)
+    }
+}
+
+/// Where keys are: `$XDG_STATE_HOME/wheeleg`, else `~/.local/state/wheeleg`.
+///
+/// # Errors
+/// [`ConsoleError::Other`] if neither is known.
+pub fn folder() -> Result<PathBuf, ConsoleError> {
+    let set = |name| std::env::var_os(name).map(PathBuf::from);
+    let state = set("XDG_STATE_HOME").filter(|path| path.is_absolute());
+    let state = state.or_else(|| Some(set("HOME")?.join(".local/state")));
+    let state = state.ok_or_else(|| {
+        ConsoleError::other(
+            "there is no place for the keys: neither XDG_STATE_HOME nor HOME is set",
+            "set one of them",
+        )
+    })?;
+    Ok(state.join("wheeleg"))
+}
+
+/// Reads a key.
+///
+/// # Errors
+/// [`ConsoleError::Key`] if the file cannot be read, others can read it, or it holds no key.
+pub fn read(path: &Path) -> Result<Key, ConsoleError> {
+    let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
+    let file = File::open(path).map_err(cannot)?;
+    if let Some(mode) = open_to_others(&file).map_err(cannot)? {
+        return Err(ConsoleError::Key {
+            path: path.to_owned(),
+            what: format!("others can read this key (mode {mode:o})"),
+            help: format!(
+                "chmod 600 {}; if somebody may have read it, make new keys: wheeleg serve --new-key",
+                path.display()
+            ),
+        });
+    }
+    let mut text = String::new();
+    file.take(DIGITS as u64 + 3)
+        .read_to_string(&mut text)
+        .map_err(cannot)?;
+    let key = hex::decode(text.trim_end());
+    match key {
+        None => Err(wrong(
+            path,
+            format!("is no key: a key is {DIGITS} hexadecimal digits"),
+        )),
+        Some(bytes) if bytes == [0; 32] => Err(wrong(path, "is no key: it is all zero".to_owned())),
+        Some(bytes) => Ok(Key::new(bytes)),
+    }
+}
+
+fn wrong(path: &Path, what: String) -> ConsoleError {
+    ConsoleError::Key {
+        path: path.to_owned(),
+        what,
+        help: "make new keys: wheeleg serve --new-key; clients need them then".to_owned(),
+    }
+}
+
+fn make_folder(folder: &Path) -> Result<(), ConsoleError> {
+    let mut builder = fs::DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder
+        .create(folder)
+        .map_err(|e| wrong(folder, format!("cannot be made: {e}")))
+}
+
+fn make(path: &Path) -> std::io::Result<()> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.open(path)?;
+    let mut key = [0; 32];
+    getrandom::fill(&mut key).map_err(std::io::Error::other)?;
+    writeln!(file, "{}", hex::encode(&key))
+}
+
+/// Permissions of a file that others than its owner may open.
+#[cfg(unix)]
+fn open_to_others(file: &File) -> std::io::Result<Option<u32>> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let mode = file.metadata()?.permissions().mode() & 0o777;
+    Ok((mode & 0o077 != 0).then_some(mode))
+}
+
+/// Where files have no such permissions, the folder of the user is what protects them.
+#[cfg(not(unix))]
+fn open_to_others(_file: &File) -> std::io::Result<Option<u32>> {
+    Ok(None)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    #[test]
+    fn keys_are_made_once_for_their_owner_and_stay() {
+        let home = tempfile::tempdir().expect("a folder");
+        let folder = home.path().join("state/wheeleg");
+        let first = Keys::open(&folder).expect("made");
+        let again = Keys::open(&folder).expect("read");
+        assert_eq!(first.control.to_hex(), again.control.to_hex());
+        assert_ne!(first.control.to_hex(), first.view.to_hex());
+        let mode = fs::metadata(folder.join(VIEW_FILE)).expect("there");
+        assert_eq!(mode.permissions().mode() & 0o777, 0o600);
+        let renewed = Keys::renew(&folder).expect("made");
+        assert_ne!(first.control.to_hex(), renewed.control.to_hex());
+    }
+
+    #[test]
+    fn short_zero_half_and_open_keys_are_refused() {
+        let home = tempfile::tempdir().expect("a folder");
+        let path = home.path().join(CONTROL_FILE);
+        for (text, word) in [
+            ("", "no key"),
+            ("12", "no key"),
+            (&"0".repeat(64), "zero"),
+            (&"a".repeat(63), "no key"),
+            (&"a".repeat(66), "no key"),
+        ] {
+            fs::write(&path, text).expect("written");
+            fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("set");
+            let error = read(&path).expect_err("refused");
+            assert!(error.to_string().contains(word), "{error}");
+            assert!(!error.to_string().contains("aaaa"), "{error}");
+        }
+        fs::write(&path, "a".repeat(64)).expect("written");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).expect("set");
+        let error = Keys::open(home.path()).expect_err("refused");
+        assert!(error.to_string().contains("others can read"), "{error}");
+    }
+}

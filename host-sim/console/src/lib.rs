@@ -1,0 +1,35 @@
+//! The operator's console: a robot that runs live, and the server through which people see and
+//! drive it. The contract with clients is `PROTOCOL.md` beside this crate.
+//!
+//! # Glossary
+//!
+//! * **robot thread**: owns the simulated robot and its clock, and waits for nobody
+//! * **hub**: takes what the robot thread tells, encodes it once, and hands it to all clients
+//! * **session**: one client's connection, from handshake to close
+//! * **control**: the right to give commands; a lease of the master, held by one client
+//! * **beat**: what keeps the control: the holder has seen the robot as it was at a master time
+//! * **outbox**: what waits for one client
+
+mod api;
+mod catalogue;
+pub mod client;
+mod error;
+mod guard;
+mod hex;
+mod hub;
+pub mod keys;
+mod live;
+mod mac;
+mod outbox;
+mod page;
+mod rate;
+pub mod request;
+mod server;
+mod session;
+
+pub use api::SUBPROTOCOL;
+pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};
+pub use error::ConsoleError;
+pub use live::Live;
+pub use mac::Key;
+pub use server::{ADDRESS, Options, Server};

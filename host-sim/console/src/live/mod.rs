@@ -1,0 +1,209 @@
+//! The robot's own thread: it owns the session, keeps time, and waits for nobody. It takes no lock
+//! and writes no file; what comes and goes passes through rings, what matters most through atomics
+//! beside them.
+
+mod pace;
+mod robot;
+mod sink;
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_master::command::Command;
+use wheeleg_master::dispatcher::{Refusal, Reject};
+use wheeleg_master::event::HoldReason;
+use wheeleg_master::setpoint::Phase;
+use wheeleg_protocol::{FaultBits, NodeMode};
+use wheeleg_sim::SimError;
+use wheeleg_telemetry::OwnedSample;
+
+use crate::request::HostCommand;
+
+pub(crate) use robot::{Robot, start};
+
+/// Commands that may wait for the robot.
+pub(crate) const INPUTS: usize = 64;
+/// Samples that may wait for the hub: about one second.
+pub(crate) const SAMPLES: usize = 16_384;
+/// Reports that may wait for the hub.
+pub(crate) const REPORTS: usize = 1_024;
+
+/// What to simulate.
+#[derive(Debug, Clone)]
+pub struct Live {
+    /// Ground, pose and seed.
+    pub scenario: Scenario,
+    /// The robot.
+    pub robot: RobotConfig,
+    /// Simulated over wall time; `None`: as fast as it goes.
+    pub speed: Option<f64>,
+    /// Whether the clock stands at first.
+    pub paused: bool,
+}
+
+/// What the hub asks of the robot.
+#[derive(Debug)]
+pub(crate) enum Input {
+    /// A command to the master, for the holder of the control.
+    Request {
+        /// Number of the request at the hub and at the master.
+        id: u32,
+        /// Newest master time that the sender has been shown, µs.
+        seen_us: u64,
+        /// How long after it the command may begin, µs.
+        valid_us: u64,
+        /// The command.
+        command: Command,
+    },
+    /// A command to the simulation.
+    Host {
+        /// Number of the request at the hub.
+        id: u32,
+        /// The command.
+        command: HostCommand,
+    },
+}
+
+/// What the robot tells the hub.
+#[derive(Debug)]
+pub(crate) enum Report {
+    /// How it is, once per bus cycle.
+    Status(Status),
+    /// What comes of a request.
+    Answer {
+        /// Number of the request.
+        id: u32,
+        /// Master time, µs.
+        time_us: u64,
+        /// What.
+        answer: Answer,
+    },
+    /// The simulation cannot go on.
+    Failed(Box<SimError>),
+}
+
+/// What comes of a request.
+#[derive(Debug)]
+pub(crate) enum Answer {
+    /// It is queued; its end comes later.
+    Accepted,
+    /// It is done.
+    Done,
+    /// Refused at the master's door.
+    Rejected(Reject),
+    /// Refused later.
+    Refused(Refusal),
+    /// The clock stands.
+    Paused,
+    /// The sender has seen the future.
+    SeenInFuture,
+    /// The master is dead.
+    NoMaster,
+    /// The clock goes too fast for somebody in control.
+    TooFast,
+    /// The simulation refuses.
+    Simulation(Box<SimError>),
+}
+
+/// How the robot is, at the end of a bus cycle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Status {
+    /// Master time, µs.
+    pub(crate) now_us: u64,
+    /// The master lives.
+    pub(crate) alive: bool,
+    /// Every board is there and fits.
+    pub(crate) ready: bool,
+    /// All axes are armed.
+    pub(crate) armed: bool,
+    /// Why all axes hold.
+    pub(crate) hold: Option<HoldReason>,
+    /// The stop bit is in SYNC.
+    pub(crate) emergency_stop: bool,
+    /// Phase of the motion.
+    pub(crate) phase: Phase,
+    /// Step of the gait, from 0.
+    pub(crate) step: u16,
+    /// Newest master time that the holder of the control has seen, µs.
+    pub(crate) lease_seen_us: Option<u64>,
+    /// Boards 1 to 8.
+    pub(crate) boards: [BoardStatus; 8],
+    /// How the clock goes.
+    pub(crate) pace: PaceStatus,
+    /// Stops that were asked for and are taken.
+    pub(crate) stops: u64,
+}
+
+/// One board.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BoardStatus {
+    /// It answered in the last cycle, in this mode.
+    pub(crate) mode: Option<NodeMode>,
+    /// Its faults.
+    pub(crate) faults: FaultBits,
+}
+
+/// How the clock goes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PaceStatus {
+    /// Simulated over wall time that is asked for; `None`: as fast as it goes.
+    pub(crate) speed: Option<f64>,
+    /// The clock stands.
+    pub(crate) paused: bool,
+    /// Simulated over wall time of the last second.
+    pub(crate) factor: f64,
+    /// How late the last cycle began, ms.
+    pub(crate) late_ms: f64,
+    /// How late one of the last second began at most, ms.
+    pub(crate) late_max_ms: f64,
+    /// How often the base of the clock was shifted.
+    pub(crate) shifts: u32,
+}
+
+/// A sample on its way to the hub.
+#[derive(Debug)]
+pub(crate) struct Moving {
+    /// Index of the channel.
+    pub(crate) channel: u16,
+    /// Number of the sample in its channel: a gap is what the ring had no room for.
+    pub(crate) number: u64,
+    /// Simulated time, ns.
+    pub(crate) t_ns: u64,
+    /// The sample.
+    pub(crate) sample: OwnedSample,
+}
+
+/// What passes beside the rings, so that no full ring can hold it up.
+#[derive(Debug, Default)]
+pub(crate) struct Signals {
+    /// Stops asked for.
+    stops: AtomicU64,
+    /// Newest master time that the holder of the control has seen, µs.
+    seen_us: AtomicU64,
+    /// The robot's thread is to end.
+    end: AtomicBool,
+    /// Samples that found the ring full.
+    dropped: AtomicU64,
+}
+
+impl Signals {
+    /// Asks for a stop, and gives the number that [`Status::stops`] reaches when it is taken.
+    pub(crate) fn stop(&self) -> u64 {
+        self.stops.fetch_add(1, Ordering::SeqCst) + 1
+    }
+
+    /// The holder of the control has seen the robot.
+    pub(crate) fn beat(&self, seen_us: u64) {
+        self.seen_us.store(seen_us, Ordering::Release);
+    }
+
+    /// Ends the robot's thread.
+    pub(crate) fn end(&self) {
+        self.end.store(true, Ordering::SeqCst);
+    }
+
+    /// Samples that found the ring full.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+}

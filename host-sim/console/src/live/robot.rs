@@ -1,0 +1,350 @@
+//! The loop of the robot's thread.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use wheeleg_master::command::{Command, CommandCode};
+use wheeleg_master::dispatcher::Request;
+use wheeleg_master::event::Event;
+use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
+use wheeleg_protocol::FaultBits;
+use wheeleg_sim::{Boards, Session, SimError};
+use wheeleg_telemetry::{Keep, Recorder};
+
+use super::pace::Pace;
+use super::sink::RingSink;
+use super::{
+    Answer, BoardStatus, INPUTS, Input, Live, Moving, REPORTS, Report, SAMPLES, Signals, Status,
+};
+use crate::catalogue::SPEED_OF_CONTROL;
+use crate::request::HostCommand;
+
+/// Both rings are read so often, ns of simulated time.
+const TICK_NS: u64 = 1_000_000;
+/// Stack of the thread: a world is built on it in one piece.
+const STACK: usize = 16 << 20;
+/// Longest sleep, so that a stop is heard however slow the clock goes.
+const NAP: Duration = Duration::from_millis(5);
+
+/// A robot that lives in a thread of its own: what the hub has of it.
+pub(crate) struct Robot {
+    /// Commands to it.
+    pub(crate) inputs: rtrb::Producer<Input>,
+    /// What it tells.
+    pub(crate) reports: rtrb::Consumer<Report>,
+    /// What it is seen to do.
+    pub(crate) samples: rtrb::Consumer<Moving>,
+    /// What passes beside the rings.
+    pub(crate) signals: Arc<Signals>,
+    /// The thread.
+    pub(crate) thread: JoinHandle<()>,
+}
+
+/// Powers a robot up in a thread of its own.
+///
+/// # Errors
+/// [`SimError`] if it cannot be built.
+pub(crate) fn start(live: Live) -> Result<Robot, SimError> {
+    let (inputs, from_hub) = rtrb::RingBuffer::new(INPUTS);
+    let (to_hub, reports) = rtrb::RingBuffer::new(REPORTS);
+    let (to_samples, samples) = rtrb::RingBuffer::new(SAMPLES);
+    let signals = Arc::new(Signals::default());
+    let (built, is_built) = std::sync::mpsc::sync_channel(1);
+    let beside = Arc::clone(&signals);
+    let run = move || {
+        let Live {
+            scenario, robot, ..
+        } = &live;
+        let session = match Session::live(Boards::default(), scenario, robot, scenario.seed) {
+            Ok(session) => session,
+            Err(why) => {
+                let _ = built.send(Err(why));
+                return;
+            }
+        };
+        let _ = built.send(Ok(()));
+        let cycle = Duration::from_secs_f64(robot.bus.cycle_s);
+        let pace = Pace::new(cycle, live.speed, live.paused, Instant::now());
+        let recorder =
+            Recorder::new(Keep::nothing()).with(RingSink::new(to_samples, Arc::clone(&beside)));
+        Loop {
+            session,
+            recorder,
+            pace,
+            inputs: from_hub,
+            reports: to_hub,
+            signals: beside,
+            cycle_ns: cycle.as_nanos() as u64,
+            target_ns: 0,
+            steps: 0,
+            stops_heard: 0,
+            stops: 0,
+            seen_us: 0,
+            failed: false,
+        }
+        .run();
+    };
+    let thread = thread::Builder::new()
+        .name("robot".to_owned())
+        .stack_size(STACK)
+        .spawn(run)
+        .map_err(|e| {
+            SimError::simulation(
+                format!("the robot's thread cannot be started: {e}"),
+                "end other programs, then try again",
+            )
+        })?;
+    is_built.recv().unwrap_or_else(|_| {
+        Err(SimError::simulation(
+            "the robot's thread ended before it began",
+            "please report this",
+        ))
+    })?;
+    Ok(Robot {
+        inputs,
+        reports,
+        samples,
+        signals,
+        thread,
+    })
+}
+
+struct Loop {
+    session: Session,
+    recorder: Recorder<'static>,
+    pace: Pace,
+    inputs: rtrb::Consumer<Input>,
+    reports: rtrb::Producer<Report>,
+    signals: Arc<Signals>,
+    cycle_ns: u64,
+    /// Time up to which has been simulated.
+    target_ns: u64,
+    /// Cycles still to be simulated although the clock stands.
+    steps: u32,
+    /// Stops that were asked for and heard.
+    stops_heard: u64,
+    /// Stops that the master has taken.
+    stops: u64,
+    /// Newest beat that was given to the master.
+    seen_us: u64,
+    /// The simulation cannot go on.
+    failed: bool,
+}
+
+impl Loop {
+    fn run(mut self) {
+        while !self.signals.end.load(Ordering::SeqCst) {
+            self.listen();
+            let now = Instant::now();
+            let stands = self.failed || (self.pace.status().paused && self.steps == 0);
+            if stands {
+                self.pace.rebase(now);
+                self.report_status();
+                thread::sleep(NAP);
+                continue;
+            }
+            let wait = self.pace.wait(now);
+            if !wait.is_zero() {
+                thread::sleep(wait.min(NAP));
+                continue;
+            }
+            self.pace.begin(now);
+            self.steps = self.steps.saturating_sub(1);
+            self.cycle();
+        }
+    }
+
+    /// Simulates a bus cycle, listening at every tick.
+    fn cycle(&mut self) {
+        let end_ns = self.target_ns + self.cycle_ns;
+        while self.target_ns < end_ns {
+            self.listen();
+            self.target_ns += TICK_NS;
+            if let Err(why) = self.session.step_to(self.target_ns, &mut self.recorder) {
+                self.failed = true;
+                let _ = self.reports.push(Report::Failed(Box::new(why)));
+                break;
+            }
+            self.tell_outcomes();
+        }
+        self.report_status();
+    }
+
+    fn listen(&mut self) {
+        self.hear_stop();
+        let seen_us = self.signals.seen_us.load(Ordering::Acquire);
+        if seen_us != self.seen_us {
+            self.seen_us = seen_us;
+            self.session.beat(seen_us);
+        }
+        for _ in 0..INPUTS {
+            let Ok(input) = self.inputs.pop() else {
+                break;
+            };
+            let (id, answer) = match input {
+                Input::Request {
+                    id,
+                    seen_us,
+                    valid_us,
+                    command,
+                } => (id, self.request(id, seen_us, valid_us, command)),
+                Input::Host { id, command } => (id, self.host(command)),
+            };
+            self.answer(id, answer);
+        }
+    }
+
+    /// Gives a stop that was asked for; it waits neither for a ring nor for the clock.
+    fn hear_stop(&mut self) {
+        let asked = self.signals.stops.load(Ordering::SeqCst);
+        if asked == self.stops_heard || self.failed {
+            return;
+        }
+        self.stops_heard = asked;
+        let stop = Request {
+            client: STOP_CLIENT,
+            id: asked as u32,
+            deadline_us: u64::MAX,
+            command: Command::EmergencyStop,
+        };
+        // A dead master takes none.
+        if let Some(Ok(_)) = self.session.request(stop, &mut self.recorder) {
+            self.stops = asked;
+        }
+    }
+
+    fn now_us(&self) -> u64 {
+        self.session.now_ns() / 1_000
+    }
+
+    fn request(&mut self, id: u32, seen_us: u64, valid_us: u64, command: Command) -> Answer {
+        let now_us = self.now_us();
+        let pace = self.pace.status();
+        let deadline_us = seen_us.saturating_add(valid_us);
+        if self.failed {
+            return Answer::NoMaster;
+        }
+        if pace.paused {
+            return Answer::Paused;
+        }
+        if seen_us > now_us {
+            return Answer::SeenInFuture;
+        }
+        let too_fast = pace.speed.is_none_or(|speed| speed > SPEED_OF_CONTROL);
+        if too_fast && command.code() == CommandCode::TakeControl {
+            return Answer::TooFast;
+        }
+        let request = Request {
+            client: OPERATOR_CLIENT,
+            id,
+            deadline_us,
+            command,
+        };
+        match self.session.request(request, &mut self.recorder) {
+            Some(Ok(_)) => Answer::Accepted,
+            Some(Err(why)) => Answer::Rejected(why),
+            None => Answer::NoMaster,
+        }
+    }
+
+    fn host(&mut self, command: HostCommand) -> Answer {
+        let now = Instant::now();
+        match command {
+            HostCommand::Pause => {
+                self.steps = 0;
+                self.pace.pause(true, now);
+            }
+            HostCommand::Resume => self.pace.pause(false, now),
+            HostCommand::Step(cycles) => {
+                self.pace.pause(true, now);
+                self.steps = cycles;
+            }
+            HostCommand::Speed(speed) => {
+                let held = self.session.master().layer0().lease().is_held();
+                if held && speed > SPEED_OF_CONTROL {
+                    return Answer::TooFast;
+                }
+                self.pace.set_speed(Some(speed), now);
+            }
+            HostCommand::Inject(_) | HostCommand::EndFault(_) if self.failed => {
+                return Answer::NoMaster;
+            }
+            HostCommand::Inject(fault) => return self.inject(&fault, true),
+            HostCommand::EndFault(fault) => return self.inject(&fault, false),
+        }
+        Answer::Done
+    }
+
+    fn inject(&mut self, fault: &wheeleg_config::faults::FaultSpec, begin: bool) -> Answer {
+        match self.session.inject(fault, begin, &mut self.recorder) {
+            Ok(()) => Answer::Done,
+            Err(why) => Answer::Simulation(Box::new(why)),
+        }
+    }
+
+    fn answer(&mut self, id: u32, answer: Answer) {
+        let time_us = self.now_us();
+        // A hub that does not listen is told nothing; the robot goes on.
+        let _ = self.reports.push(Report::Answer {
+            id,
+            time_us,
+            answer,
+        });
+    }
+
+    fn tell_outcomes(&mut self) {
+        while let Some((time_us, event)) = self.session.take_outcome() {
+            let (ticket, answer) = match event {
+                Event::Done(ticket) => (ticket, Answer::Done),
+                Event::Refused { ticket, reason } => (ticket, Answer::Refused(reason)),
+                _ => continue,
+            };
+            if ticket.client == OPERATOR_CLIENT {
+                let _ = self.reports.push(Report::Answer {
+                    id: ticket.id,
+                    time_us,
+                    answer,
+                });
+            }
+        }
+    }
+
+    fn report_status(&mut self) {
+        // Answers go first where the hub does not keep up.
+        if self.reports.slots() < REPORTS / 2 {
+            return;
+        }
+        let _ = self.reports.push(Report::Status(self.status()));
+    }
+
+    fn status(&self) -> Status {
+        let master = self.session.master();
+        let record = self.session.record();
+        let mut boards = [BoardStatus {
+            mode: None,
+            faults: FaultBits::NONE,
+        }; 8];
+        for (board, reply) in boards.iter_mut().zip(record.iter().flat_map(|r| r.replies)) {
+            if let Some(reply) = reply {
+                board.mode = Some(reply.mode);
+                board.faults = reply.active_faults;
+            }
+        }
+        Status {
+            now_us: self.now_us(),
+            alive: !self.failed && self.session.master_alive(),
+            ready: master.is_ready(),
+            armed: master.is_armed(),
+            hold: master.layer0().hold(),
+            emergency_stop: record.is_some_and(|r| r.emergency_stop),
+            phase: master.layer0().phase(),
+            step: record.map_or(0, |r| r.step),
+            lease_seen_us: master.layer0().lease().seen_us(),
+            boards,
+            pace: self.pace.status(),
+            stops: self.stops,
+        }
+    }
+}

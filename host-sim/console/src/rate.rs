@@ -1,0 +1,52 @@
+//! How often a client may ask: a bucket of tokens.
+
+use std::time::Instant;
+
+/// Frames per second.
+const PER_S: f64 = 100.0;
+/// Frames at once.
+const BURST: f64 = 200.0;
+
+/// A bucket of tokens.
+#[derive(Debug)]
+pub(crate) struct Bucket {
+    tokens: f64,
+    filled: Instant,
+}
+
+impl Bucket {
+    pub(crate) fn new(now: Instant) -> Self {
+        Self {
+            tokens: BURST,
+            filled: now,
+        }
+    }
+
+    /// Takes a token, if there is one.
+    pub(crate) fn take(&mut self, now: Instant) -> bool {
+        let passed = now.saturating_duration_since(self.filled).as_secs_f64();
+        self.filled = now;
+        self.tokens = (self.tokens + PER_S * passed).min(BURST);
+        let has = self.tokens >= 1.0;
+        if has {
+            self.tokens -= 1.0;
+        }
+        has
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn a_burst_then_the_rate() {
+        let start = Instant::now();
+        let mut bucket = Bucket::new(start);
+        let taken = |bucket: &mut Bucket, now| (0..1_000).filter(|_| bucket.take(now)).count();
+        assert_eq!(taken(&mut bucket, start), 200);
+        assert_eq!(taken(&mut bucket, start + Duration::from_millis(500)), 50);
+        assert_eq!(taken(&mut bucket, start + Duration::from_secs(100)), 200);
+    }
+}

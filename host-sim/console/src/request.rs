@@ -1,0 +1,556 @@
+//! Frames of a client as typed requests. What is read here came over the network: every answer is
+//! a value, nothing panics, and nothing grows beyond the frame.
+
+use fixed::types::I16F16;
+use serde::Deserialize;
+use serde_json::{Map, Value as Json};
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_master::argument::{Argument, ArgumentKind, Value};
+use wheeleg_master::command::{Command, CommandCode, Given};
+use wheeleg_telemetry::channels;
+
+use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
+
+/// Largest frame of a client, MAC included.
+pub const FRAME_MAX: usize = 4096;
+/// Fastest subscription, Hz.
+pub(crate) const HZ_MAX: u64 = 50;
+/// Longest life of a command, ms.
+const VALID_MAX_MS: u64 = 1_000;
+/// Longest life of a command about parameters, ms.
+const PARAMETER_VALID_MAX_MS: u64 = 5_000;
+/// Most arguments of a command.
+const ARGUMENTS_MAX: usize = 32;
+
+/// A frame of a client.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Its number.
+    pub n: u64,
+    /// What it asks.
+    pub body: Body,
+}
+
+/// What a frame asks.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Body {
+    /// The operator has seen the robot.
+    Beat {
+        /// As it was at this master time, µs.
+        seen_us: u64,
+    },
+    /// Stop.
+    Stop,
+    /// Samples from now on.
+    Subscribe {
+        /// Indices of channels.
+        channels: Vec<u16>,
+        /// Samples per second; `None`: all.
+        hz: Option<u32>,
+    },
+    /// No samples from now on.
+    Unsubscribe {
+        /// Indices of channels.
+        channels: Vec<u16>,
+    },
+    /// A command.
+    Give {
+        /// Which.
+        order: Order,
+        /// Newest master time that was shown, µs.
+        seen_us: u64,
+        /// How long after it the command may begin, µs.
+        valid_us: u64,
+    },
+    /// Sound in form, and cannot be done.
+    Refused(BadRequest),
+}
+
+/// To whom a command goes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Order {
+    /// To the master.
+    Robot(Command),
+    /// To the simulation.
+    Host(HostCommand),
+}
+
+/// A command of the host.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HostCommand {
+    /// Stops the clock.
+    Pause,
+    /// Lets it go on.
+    Resume,
+    /// Some bus cycles.
+    Step(u32),
+    /// Simulated over wall time.
+    Speed(f64),
+    /// A fault begins.
+    Inject(FaultSpec),
+    /// A fault ends.
+    EndFault(FaultSpec),
+}
+
+/// Why a frame that is sound in form cannot be done.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BadRequest {
+    /// Name that stays the same.
+    pub reason: &'static str,
+    /// For a person.
+    pub text: String,
+}
+
+/// The frame is not of the contract.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Malformed;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    n: u64,
+    op: Option<String>,
+    seen_us: Option<u64>,
+    valid_ms: Option<u64>,
+    cmd: Option<String>,
+    args: Option<Map<String, Json>>,
+    channels: Option<Vec<String>>,
+    hz: Option<Rate>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Rate {
+    Hz(u64),
+    Word(String),
+}
+
+/// Reads the JSON of a frame.
+///
+/// # Errors
+/// [`Malformed`] if it is not of the contract's form.
+pub fn parse(json: &[u8]) -> Result<Frame, Malformed> {
+    let raw: Raw = serde_json::from_slice(json).map_err(|_| Malformed)?;
+    let n = raw.n;
+    let body = body(raw)?;
+    Ok(Frame { n, body })
+}
+
+fn body(raw: Raw) -> Result<Body, Malformed> {
+    Ok(match raw {
+        Raw {
+            op: Some(op),
+            seen_us: Some(seen_us),
+            valid_ms: None,
+            cmd: None,
+            args: None,
+            channels: None,
+            hz: None,
+            ..
+        } if op == "beat" => Body::Beat { seen_us },
+        Raw {
+            op: Some(op),
+            seen_us: None,
+            valid_ms: None,
+            cmd: None,
+            args: None,
+            channels: None,
+            hz: None,
+            ..
+        } if op == "stop" => Body::Stop,
+        Raw {
+            op: Some(op),
+            seen_us: None,
+            valid_ms: None,
+            cmd: None,
+            args: None,
+            channels: Some(topics),
+            hz,
+            ..
+        } => {
+            let channels = match indices(&topics) {
+                Ok(channels) => channels,
+                Err(bad) => return Ok(Body::Refused(bad)),
+            };
+            match (op.as_str(), hz) {
+                ("subscribe", Some(Rate::Hz(hz @ 1..=HZ_MAX))) => Body::Subscribe {
+                    channels,
+                    hz: Some(hz as u32),
+                },
+                ("subscribe", Some(Rate::Word(word))) if word == "all" => {
+                    Body::Subscribe { channels, hz: None }
+                }
+                ("subscribe", Some(_)) => Body::Refused(BadRequest {
+                    reason: "bad_argument",
+                    text: format!("`hz`: allowed are 1 to {HZ_MAX}, and \"all\""),
+                }),
+                ("unsubscribe", None) => Body::Unsubscribe { channels },
+                _ => return Err(Malformed),
+            }
+        }
+        Raw {
+            op: None,
+            seen_us: Some(seen_us),
+            valid_ms: Some(valid_ms),
+            cmd: Some(name),
+            args: Some(args),
+            channels: None,
+            hz: None,
+            ..
+        } => match order(&name, &args).and_then(|order| Ok((valid_us(&order, valid_ms)?, order))) {
+            Ok((valid_us, order)) => Body::Give {
+                order,
+                seen_us,
+                valid_us,
+            },
+            Err(bad) => Body::Refused(bad),
+        },
+        _ => return Err(Malformed),
+    })
+}
+
+fn indices(topics: &[String]) -> Result<Vec<u16>, BadRequest> {
+    let find = |topic: &String| {
+        let found = channels().iter().position(|channel| channel.topic == topic);
+        found.map(|index| index as u16).ok_or_else(|| BadRequest {
+            reason: "unknown_channel",
+            text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
+        })
+    };
+    topics.iter().map(find).collect()
+}
+
+fn valid_us(order: &Order, valid_ms: u64) -> Result<u64, BadRequest> {
+    let most = match order {
+        Order::Robot(
+            Command::ReadParameter { .. }
+            | Command::WriteParameter { .. }
+            | Command::SaveParameters { .. },
+        ) => PARAMETER_VALID_MAX_MS,
+        _ => VALID_MAX_MS,
+    };
+    if (1..=most).contains(&valid_ms) {
+        Ok(valid_ms * 1_000)
+    } else {
+        Err(BadRequest {
+            reason: "bad_argument",
+            text: format!("`valid_ms`: allowed are 1 to {most}, not {valid_ms}"),
+        })
+    }
+}
+
+fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
+    if let Some(code) = CommandCode::of_name(name) {
+        return robot(code, args).map(Order::Robot);
+    }
+    if let Some(info) = HOST_TABLE.iter().find(|row| row.name == name) {
+        return host(info, args).map(Order::Host);
+    }
+    Err(BadRequest {
+        reason: "bad_command",
+        text: format!("there is no command {name:?}; /api/v1/commands lists them"),
+    })
+}
+
+fn bad_argument(text: impl ToString) -> BadRequest {
+    BadRequest {
+        reason: "bad_argument",
+        text: text.to_string(),
+    }
+}
+
+fn robot(code: CommandCode, args: &Map<String, Json>) -> Result<Command, BadRequest> {
+    if args.len() > ARGUMENTS_MAX {
+        return Err(bad_argument("too many arguments"));
+    }
+    let info = code.info();
+    let given = args.iter().map(|(name, json)| Given {
+        name,
+        // Of an argument that does not exist, the value is not looked at.
+        value: info
+            .argument(name)
+            .map_or(Value::Flag(false), |argument| value(argument, json)),
+    });
+    let given: Vec<Given> = given.collect();
+    Command::build(code, &given).map_err(bad_argument)
+}
+
+/// The value of an argument; one of another kind where the JSON is of another kind.
+fn value(argument: &Argument, json: &Json) -> Value {
+    let wrong = match argument.kind {
+        ArgumentKind::Flag => Value::Whole(0),
+        _ => Value::Flag(false),
+    };
+    match argument.kind {
+        ArgumentKind::Whole(_) | ArgumentKind::Parameter | ArgumentKind::Raw => {
+            let whole = json.as_i64().or_else(|| json.as_u64().map(|_| i64::MAX));
+            whole.map_or(wrong, |v| {
+                Value::Whole(v.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
+            })
+        }
+        ArgumentKind::Length(_)
+        | ArgumentKind::Velocity(_)
+        | ArgumentKind::Acceleration(_)
+        | ArgumentKind::Rate(_) => json
+            .as_f64()
+            .map_or(wrong, |v| Value::Fixed(I16F16::saturating_from_num(v))),
+        // The cast saturates.
+        ArgumentKind::Time(_) => json
+            .as_f64()
+            .map_or(wrong, |s| Value::Micros((s * 1e6).round() as u32)),
+        ArgumentKind::Choice(words) => {
+            let place = json
+                .as_str()
+                .and_then(|word| words.iter().position(|w| *w == word));
+            match (json.as_str(), place) {
+                (Some(_), Some(place)) => Value::Choice(place as u8),
+                (Some(_), None) => Value::Choice(u8::MAX),
+                _ => wrong,
+            }
+        }
+        ArgumentKind::Flag => json.as_bool().map_or(wrong, Value::Flag),
+    }
+}
+
+fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadRequest> {
+    if let Some(name) = args
+        .keys()
+        .find(|name| info.arguments.iter().all(|a| a.name != *name))
+    {
+        return Err(bad_argument(format!("{} takes no {name:?}", info.name)));
+    }
+    let given = |name: &str| {
+        let missing = || bad_argument(format!("{} needs `{name}`", info.name));
+        args.get(name).ok_or_else(missing)
+    };
+    let fault = || {
+        let text = given("fault")?.as_str();
+        let text = text.ok_or_else(|| bad_argument("`fault` must be a text"))?;
+        if text.contains('@') {
+            return Err(bad_argument(
+                "`fault` takes no time: it begins now, and ends with EndFault",
+            ));
+        }
+        format!("{text}@0s")
+            .parse::<FaultSpec>()
+            .map_err(bad_argument)
+    };
+    Ok(match info.code {
+        HostCode::Pause => HostCommand::Pause,
+        HostCode::Resume => HostCommand::Resume,
+        HostCode::Step => {
+            let cycles = given("cycles")?.as_u64();
+            let cycles = cycles.filter(|n| (1..=u64::from(STEP_MAX)).contains(n));
+            HostCommand::Step(cycles.ok_or_else(|| {
+                bad_argument(format!(
+                    "`cycles`: allowed are whole numbers from 1 to {STEP_MAX}"
+                ))
+            })? as u32)
+        }
+        HostCode::Speed => {
+            let (min, max) = SPEED;
+            let speed = given("speed")?.as_f64();
+            let speed = speed.filter(|v| (min..=max).contains(v));
+            HostCommand::Speed(
+                speed
+                    .ok_or_else(|| bad_argument(format!("`speed`: allowed are {min} to {max}")))?,
+            )
+        }
+        HostCode::Inject => HostCommand::Inject(fault()?),
+        HostCode::EndFault => HostCommand::EndFault(fault()?),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn give(json: &str) -> Body {
+        parse(json.as_bytes()).expect("of the contract").body
+    }
+
+    #[test]
+    fn commands_are_those_of_the_table() {
+        let body = give(
+            r#"{"n":7,"seen_us":81230000,"valid_ms":500,"cmd":"JointReference","args":{"joint":3,"stroke":120.0}}"#,
+        );
+        let Body::Give {
+            order: Order::Robot(Command::JointReference { joint, stroke_mm }),
+            seen_us,
+            valid_us,
+        } = body
+        else {
+            panic!("{body:?}");
+        };
+        assert_eq!((joint, stroke_mm.to_f64()), (3, 120.0));
+        assert_eq!((seen_us, valid_us), (81_230_000, 500_000));
+        let body = give(
+            r#"{"n":7,"seen_us":0,"valid_ms":5000,"cmd":"ReadParameter","args":{"board":3,"parameter":257}}"#,
+        );
+        assert!(matches!(body, Body::Give { .. }), "{body:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_done_is_refused_by_name() {
+        let refused = |cmd: &str, args: &str, valid: u64| {
+            let json =
+                format!(r#"{{"n":1,"seen_us":0,"valid_ms":{valid},"cmd":"{cmd}","args":{args}}}"#);
+            match give(&json) {
+                Body::Refused(bad) => (bad.reason, bad.text),
+                other => panic!("{other:?}"),
+            }
+        };
+        for (cmd, args, reason, word) in [
+            ("Fly", "{}", "bad_command", "Fly"),
+            ("JointReference", "{}", "bad_argument", "joint"),
+            (
+                "JointReference",
+                r#"{"joint":7,"stroke":1}"#,
+                "bad_argument",
+                "joint",
+            ),
+            (
+                "JointReference",
+                r#"{"joint":-1e99,"stroke":1}"#,
+                "bad_argument",
+                "joint",
+            ),
+            (
+                "JointReference",
+                r#"{"joint":18446744073709551615,"stroke":1}"#,
+                "bad_argument",
+                "joint",
+            ),
+            (
+                "JointReference",
+                r#"{"joint":1,"stroke":1e300}"#,
+                "bad_argument",
+                "stroke",
+            ),
+            (
+                "JointReference",
+                r#"{"joint":1,"stroke":"1"}"#,
+                "bad_argument",
+                "stroke",
+            ),
+            ("Arm", r#"{"now":true}"#, "bad_argument", "now"),
+            (
+                "SelectCorrection",
+                r#"{"joint":1,"correction":"xx"}"#,
+                "bad_argument",
+                "correction",
+            ),
+            ("Step", r#"{"cycles":0}"#, "bad_argument", "cycles"),
+            ("Speed", r#"{"speed":11}"#, "bad_argument", "speed"),
+            ("Pause", r#"{"speed":1}"#, "bad_argument", "speed"),
+            (
+                "Inject",
+                r#"{"fault":"pot-open:joint9"}"#,
+                "bad_argument",
+                "joint9",
+            ),
+            (
+                "Inject",
+                r#"{"fault":"pot-open:joint3@1s"}"#,
+                "bad_argument",
+                "time",
+            ),
+        ] {
+            let (got, text) = refused(cmd, args, 500);
+            assert!(
+                got == reason && text.contains(word),
+                "{cmd} {args}: {got} {text}"
+            );
+        }
+        for valid in [0, 1001] {
+            let (_, text) = refused("Arm", "{}", valid);
+            assert!(text.contains("valid_ms"), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_of_the_contract_is_malformed() {
+        for json in [
+            "",
+            "{}",
+            "[]",
+            r#"{"n":1}"#,
+            r#"{"n":-1,"op":"stop"}"#,
+            r#"{"n":1,"op":"stop","x":1}"#,
+            r#"{"n":1,"op":"stop","n":2}"#,
+            r#"{"n":1,"op":"beat"}"#,
+            r#"{"n":1,"op":"beat","seen_us":-1}"#,
+            r#"{"n":1,"op":"subscribe","channels":["/body"]}"#,
+            r#"{"n":1,"op":"stop","cmd":"Arm"}"#,
+            r#"{"n":1,"seen_us":0,"cmd":"Arm","args":{}}"#,
+        ] {
+            assert_eq!(parse(json.as_bytes()), Err(Malformed), "{json}");
+        }
+        assert_eq!(parse(&[0xFF; 100]), Err(Malformed));
+        let deep = "[".repeat(4000);
+        assert_eq!(parse(deep.as_bytes()), Err(Malformed));
+    }
+
+    #[test]
+    fn no_frame_makes_the_parser_panic() {
+        const SOUND: [&str; 3] = [
+            r#"{"n":7,"seen_us":81230000,"valid_ms":500,"cmd":"JointReference","args":{"joint":3,"stroke":120.0}}"#,
+            r#"{"n":1,"op":"subscribe","channels":["/joint/3","/body"],"hz":50}"#,
+            r#"{"n":9,"seen_us":1,"valid_ms":1,"cmd":"Inject","args":{"fault":"pot-open:joint3"}}"#,
+        ];
+        const PIECES: [&str; 12] = [
+            "1e999",
+            "-0",
+            "null",
+            "\\u0000",
+            "[]",
+            "{}",
+            "é",
+            "\"",
+            "18446744073709551616",
+            "@",
+            ":",
+            "=",
+        ];
+        let mut seed = 1_u64;
+        let mut random = |below: usize| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) as usize % below
+        };
+        for _ in 0..200_000 {
+            let mut frame = SOUND[random(SOUND.len())].as_bytes().to_vec();
+            for _ in 0..=random(4) {
+                let at = random(frame.len());
+                match random(4) {
+                    0 => frame[at] ^= 1 << random(8),
+                    1 => drop(frame.drain(at..(at + random(9)).min(frame.len()))),
+                    2 => drop(frame.splice(at..at, PIECES[random(12)].bytes())),
+                    _ => frame.truncate(at + 1),
+                }
+                if frame.is_empty() {
+                    break;
+                }
+            }
+            let _ = parse(&frame);
+        }
+    }
+
+    #[test]
+    fn subscriptions_name_channels_and_a_rate() {
+        let body = give(r#"{"n":1,"op":"subscribe","channels":["/joint/3","/body"],"hz":50}"#);
+        let wanted = Body::Subscribe {
+            channels: vec![2, 8],
+            hz: Some(50),
+        };
+        assert_eq!(body, wanted);
+        let body = give(r#"{"n":1,"op":"subscribe","channels":["/body"],"hz":"all"}"#);
+        assert!(matches!(body, Body::Subscribe { hz: None, .. }));
+        for json in [
+            r#"{"n":1,"op":"subscribe","channels":["/body"],"hz":51}"#,
+            r#"{"n":1,"op":"subscribe","channels":["/body"],"hz":"some"}"#,
+            r#"{"n":1,"op":"subscribe","channels":["/nobody"],"hz":1}"#,
+        ] {
+            assert!(matches!(give(json), Body::Refused(_)), "{json}");
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! One client's connection: handshake, then frames in and whatever its outbox holds out.
+
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use futures_util::{SinkExt as _, StreamExt as _};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::time::timeout;
+
+use crate::guard::WrongKeys;
+use crate::hex;
+use crate::hub::{Hub, Role};
+use crate::keys::Keys;
+use crate::mac::{Key, Transcript};
+use crate::outbox::{Close, Outbox};
+use crate::rate::Bucket;
+use crate::request::{Body, parse};
+
+/// Time for the whole handshake.
+const HANDSHAKE: Duration = Duration::from_secs(2);
+/// Time in which a client must take one message.
+const PROGRESS: Duration = Duration::from_secs(5);
+/// How often a client that is sent nothing is asked whether it is there.
+const PING: Duration = Duration::from_secs(5);
+/// Time after which a client that sends nothing, no answer to a ping either, is gone.
+const SILENCE: Duration = Duration::from_secs(20);
+/// How late a wrong key is answered after too many of them.
+const LATE: Duration = Duration::from_millis(1_500);
+/// Version of the contract.
+const VERSION: u32 = 1;
+
+/// What a session needs of the server.
+pub(crate) struct Context {
+    /// The hub.
+    pub(crate) hub: Arc<Hub>,
+    /// The keys.
+    pub(crate) keys: Keys,
+    /// Wrong keys of the last minute.
+    pub(crate) wrong_keys: WrongKeys,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Auth {
+    op: String,
+    role: String,
+    name: String,
+    nonce: String,
+    layout: String,
+    commands: String,
+    mac: String,
+}
+
+/// A client who has proved to have the key.
+struct Admitted {
+    role: Role,
+    name: String,
+    session: String,
+    server_mac: [u8; 32],
+    key: Key,
+}
+
+/// A nonce of the system's random numbers.
+fn nonce() -> Option<[u8; 32]> {
+    let mut out = [0; 32];
+    getrandom::fill(&mut out).ok()?;
+    Some(out)
+}
+
+/// Serves one client until it is gone.
+pub(crate) async fn serve(
+    mut socket: WebSocket,
+    context: Arc<Context>,
+    host: String,
+    from: IpAddr,
+) {
+    let admitted = match timeout(HANDSHAKE, handshake(&mut socket, &context, &host)).await {
+        Ok(Ok(admitted)) => admitted,
+        Ok(Err(None)) => return,
+        Ok(Err(Some(mut why))) => {
+            if why == Close::WrongKey && context.wrong_keys.count(from, Instant::now()) {
+                tokio::time::sleep(LATE).await;
+                why = Close::Wait;
+            }
+            return refuse(&mut socket, why).await;
+        }
+        Err(_) => return refuse(&mut socket, Close::Timeout).await,
+    };
+    let outbox = Arc::new(Outbox::default());
+    let Admitted {
+        role,
+        name,
+        session,
+        server_mac,
+        key,
+    } = admitted;
+    let Some((id, master_us)) = context.hub.enter(role, &name, &session, &outbox) else {
+        return refuse(&mut socket, Close::TooSlow).await;
+    };
+    let welcome = json!({
+        "op": "welcome",
+        "mac": hex::encode(&server_mac),
+        "session": session,
+        "role": role.name(),
+        "name": name,
+        "master_us": master_us,
+    });
+    let welcome = Message::Text(welcome.to_string().into());
+    if let Ok(Ok(())) = timeout(PROGRESS, socket.send(welcome)).await {
+        let (mut out, mut input) = socket.split();
+        let write = async {
+            loop {
+                let message = timeout(PING, outbox.wait()).await;
+                let message = message.unwrap_or_else(|_| Message::Ping(axum::body::Bytes::new()));
+                let last = matches!(message, Message::Close(_));
+                let sent = timeout(PROGRESS, out.send(message)).await;
+                if last || !matches!(sent, Ok(Ok(()))) {
+                    break;
+                }
+            }
+        };
+        let read = async {
+            let mut reader = Reader {
+                key,
+                next: 1,
+                bucket: Bucket::new(Instant::now()),
+            };
+            while let Ok(Some(Ok(message))) = timeout(SILENCE, input.next()).await {
+                let frame = match message {
+                    Message::Binary(frame) => frame,
+                    Message::Ping(_) | Message::Pong(_) => continue,
+                    Message::Close(_) => return,
+                    Message::Text(_) => {
+                        outbox.close(Close::BadFrame);
+                        std::future::pending::<()>().await;
+                        return;
+                    }
+                };
+                let Some((n, body, limited)) = reader.open(&frame) else {
+                    outbox.close(Close::BadFrame);
+                    // The writer sends the close, and ends the session.
+                    std::future::pending::<()>().await;
+                    return;
+                };
+                context.hub.ask(id, n, body, limited);
+            }
+        };
+        tokio::select! {
+            () = write => {}
+            () = read => {}
+        }
+    }
+    context.hub.leave(id);
+}
+
+struct Reader {
+    key: Key,
+    /// Number that the next frame must have.
+    next: u64,
+    bucket: Bucket,
+}
+
+impl Reader {
+    /// What a frame asks, if it is authentic and the next one; true with it: too often.
+    fn open(&mut self, frame: &[u8]) -> Option<(u64, Body, bool)> {
+        let json = self.key.open(frame)?;
+        let frame = parse(json).ok()?;
+        if frame.n != self.next {
+            return None;
+        }
+        self.next += 1;
+        let exempt = matches!(frame.body, Body::Stop | Body::Beat { .. });
+        let limited = !exempt && !self.bucket.take(Instant::now());
+        Some((frame.n, frame.body, limited))
+    }
+}
+
+async fn refuse(socket: &mut WebSocket, why: Close) {
+    let (text, remedy) = match why {
+        Close::WrongKey => (
+            "the key is wrong",
+            "open the address that the server prints",
+        ),
+        Close::Wait => (
+            "too many wrong keys",
+            "wait a minute, then open the address that the server prints",
+        ),
+        Close::OtherHash => (
+            "the server has other channels or commands than this client",
+            "reload the page, or use the program of the same version",
+        ),
+        Close::Timeout => ("no answer within 2 s", "connect anew"),
+        Close::TooSlow => ("all places are taken", "close another client"),
+        Close::BadFrame | Close::Ended => ("the connection ends", "connect anew"),
+    };
+    let error = json!({ "op": "error", "reason": why.reason(), "text": text, "remedy": remedy });
+    let send = async {
+        let text = Utf8Bytes::from(error.to_string());
+        if socket.send(Message::Text(text)).await.is_ok() {
+            let _ = socket.send(why.message()).await;
+        }
+    };
+    let _ = timeout(HANDSHAKE, send).await;
+}
+
+/// Proves the keys to each other; `Err(None)`: the client is gone.
+async fn handshake(
+    socket: &mut WebSocket,
+    context: &Context,
+    host: &str,
+) -> Result<Admitted, Option<Close>> {
+    let catalogue = &context.hub.catalogue;
+    let nonce_s = nonce().ok_or(None)?;
+    let session = nonce().ok_or(None)?;
+    let session = hex::encode(&session[..8]);
+    let hello = json!({
+        "op": "hello",
+        "version": VERSION,
+        "layout": catalogue.layout,
+        "commands": catalogue.commands,
+        "nonce": hex::encode(&nonce_s),
+    });
+    let hello = Message::Text(hello.to_string().into());
+    socket.send(hello).await.map_err(|_| None)?;
+    let text = loop {
+        match socket.recv().await {
+            Some(Ok(Message::Text(text))) => break text,
+            Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+            Some(Ok(Message::Binary(_))) => return Err(Some(Close::WrongKey)),
+            _ => return Err(None),
+        }
+    };
+    let wrong = Some(Close::WrongKey);
+    let auth: Auth = serde_json::from_str(&text).map_err(|_| wrong)?;
+    let nonce_c: [u8; 32] = hex::decode(&auth.nonce).ok_or(wrong)?;
+    let mac: [u8; 32] = hex::decode(&auth.mac).ok_or(wrong)?;
+    let (role, key) = match auth.role.as_str() {
+        "control" => (Role::Control, &context.keys.control),
+        "view" => (Role::View, &context.keys.view),
+        _ => return Err(wrong),
+    };
+    let transcript = Transcript {
+        nonce_s: &nonce_s,
+        nonce_c: &nonce_c,
+        role: &auth.role,
+        name: &auth.name,
+        host,
+        layout: &auth.layout,
+        commands: &auth.commands,
+    };
+    let sound = auth.op == "auth" && is_name(&auth.name);
+    if !transcript.is_client(key, &mac) || !sound {
+        return Err(wrong);
+    }
+    if auth.layout != catalogue.layout || auth.commands != catalogue.commands {
+        return Err(Some(Close::OtherHash));
+    }
+    Ok(Admitted {
+        role,
+        server_mac: transcript.of_server(key, &session),
+        key: transcript.session_key(key),
+        name: auth.name,
+        session,
+    })
+}
+
+/// Whether a name can be shown to others as it is.
+fn is_name(name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
+    (1..=32).contains(&name.len()) && name.chars().all(plain)
+}

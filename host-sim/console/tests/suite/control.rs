@@ -1,0 +1,295 @@
+//! Who drives, and what comes of a driver who is gone.
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use wheeleg_console::client::{Client, Incoming, Outcome, http};
+use wheeleg_protocol::NodeMode;
+use wheeleg_telemetry::{JointSample, Sample as _};
+
+use crate::common::{Rig, closed, done, look, refusal};
+
+/// Master time between the newest thing that the holder can have seen and the HOLD, µs.
+fn held_after(rig: &Rig, seen_us: u64) -> u64 {
+    let state = rig.until("held", |state| !state["hold"].is_null());
+    assert_eq!(state["hold"], "operator_lost", "{state}");
+    let at_us = rig.event("hold")["t_ns"].as_u64().expect("a time") / 1_000;
+    at_us - seen_us
+}
+
+#[test]
+fn take_arm_move_release() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    done(&mut driver, "ReleaseControl");
+    let state = rig.until("free", |state| state["control"].is_null());
+    assert_eq!(state["armed"], true);
+    assert_eq!(refusal(&mut driver, "Arm", &json!({})), "not_in_control");
+    done(&mut driver, "TakeControl");
+    done(&mut driver, "Disarm");
+}
+
+/// Master time of the first sample of joint 3 that is as wanted, ns.
+fn first(client: &mut Client, wanted: impl Fn(&[u8]) -> bool) -> u64 {
+    let begin = Instant::now();
+    loop {
+        let Some(Incoming::Samples { body, .. }) = client.read() else {
+            assert!(begin.elapsed() < Duration::from_secs(5), "never");
+            continue;
+        };
+        for sample in body.chunks_exact(8 + 4 * JointSample::FIELDS.len()) {
+            if wanted(&sample[8..]) {
+                return u64::from_le_bytes(sample[..8].try_into().expect("a time"));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    let mut viewer = rig.view();
+    let all = json!({ "op": "subscribe", "channels": ["/joint/3"], "hz": "all" });
+    let n = viewer.send(all).expect("sent");
+    assert_eq!(viewer.outcome(n), Outcome::Done);
+    let args = json!({ "joint": 3, "stroke": 120.0 });
+    driver.give("JointReference", &args, 500).expect("sent");
+    // Field 0 is `commanded_mm`, field 21 `mode`.
+    let latched_ns = first(&mut viewer, |fields| {
+        let commanded = f32::from_le_bytes(fields[..4].try_into().expect("four bytes"));
+        (commanded - 120.0).abs() < 0.01
+    });
+    let given = rig.events("command_accepted");
+    let given = given
+        .iter()
+        .find(|e| e["command"] == 0x0101)
+        .expect("an event");
+    let took_ns = latched_ns - given["t_ns"].as_u64().expect("a time");
+    assert!(took_ns <= 13_000_000, "{took_ns} ns");
+    // The stop of somebody who only looks, by another way.
+    let (status, _) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
+    assert_eq!(status, 200);
+    let hold = u32::from(NodeMode::Hold.code());
+    let held_ns = first(&mut viewer, |fields| fields[84..88] == hold.to_le_bytes());
+    let given = rig.event("hold");
+    let took_ns = held_ns - given["t_ns"].as_u64().expect("a time");
+    assert!(took_ns <= 13_000_000, "{took_ns} ns");
+}
+
+#[test]
+fn a_killed_client_is_noticed_by_the_master() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    done(&mut driver, "Stand");
+    let walk = driver.give("StartGait", &json!({}), 500).expect("sent");
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_millis(500) {
+        if let Some(Incoming::Json(answer)) = driver.read() {
+            assert!(
+                answer["n"] != walk || answer["status"] == "accepted",
+                "{answer}"
+            );
+        }
+    }
+    let seen_us = driver.seen_us();
+    drop(driver);
+    let after_us = held_after(&rig, seen_us);
+    assert!(after_us <= 460_000, "{after_us} us");
+    let state = rig.until("free", |state| state["control"].is_null());
+    assert_eq!(state["armed"], false);
+    // Whoever comes back has no control, and the stop is latched.
+    let mut back = rig.control("driver");
+    look(&mut back, "state");
+    assert_eq!(refusal(&mut back, "Stand", &json!({})), "not_in_control");
+    done(&mut back, "TakeControl");
+    back.keep_control(true);
+    assert_eq!(refusal(&mut back, "Arm", &json!({})), "latched");
+    done(&mut back, "ClearFault");
+    done(&mut back, "Arm");
+}
+
+#[test]
+fn beats_that_show_nothing_new_keep_nothing() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("frozen");
+    driver.keep_control(false);
+    let seen_us = driver.seen_us();
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(1) {
+        let beat = json!({ "op": "beat", "seen_us": seen_us });
+        driver.send(beat).expect("the connection stays");
+        let _ = driver.read();
+    }
+    let after_us = held_after(&rig, seen_us);
+    assert!((400_000..=460_000).contains(&after_us), "{after_us} us");
+}
+
+#[test]
+fn a_server_that_hangs_is_noticed_by_the_master() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    look(&mut driver, "state");
+    let seen_us = driver.seen_us();
+    rig.server.block_for(Duration::from_millis(1_500));
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_millis(1_600) {
+        let _ = driver.read();
+    }
+    let after_us = held_after(&rig, seen_us);
+    // Frames that were on their way when it began to hang may have been seen.
+    assert!(after_us <= 470_000 + 60_000, "{after_us} us");
+}
+
+#[test]
+fn a_second_client_is_refused_by_name_and_may_stop() {
+    let rig = Rig::new();
+    let mut first = rig.driver("first");
+    let mut second = rig.control("second");
+    look(&mut second, "state");
+    let n = second.give("TakeControl", &json!({}), 500).expect("sent");
+    let answer = look(&mut second, "answer");
+    assert_eq!(
+        (&answer["n"], &answer["reason"]),
+        (&json!(n), &json!("control_held"))
+    );
+    assert_eq!(answer["holder"], "first");
+    assert_eq!(look(&mut first, "asked")["by"], "second");
+    assert_eq!(refusal(&mut second, "Disarm", &json!({})), "not_in_control");
+    assert_eq!(refusal(&mut second, "Pause", &json!({})), "control_held");
+    // Its beats keep the first one's control no longer than its own.
+    second.keep_control(true);
+    first.keep_control(false);
+    let n = second.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(second.outcome(n), Outcome::Done);
+    let state = rig.state();
+    assert_eq!(state["emergency_stop"], true, "{state}");
+    assert_eq!(state["hold"], "emergency_stop");
+    rig.until("free", |state| state["control"].is_null());
+}
+
+#[test]
+fn a_viewer_may_look_and_stop_and_nothing_else() {
+    let rig = Rig::new();
+    let mut viewer = rig.view();
+    look(&mut viewer, "state");
+    for command in ["TakeControl", "Arm", "Pause"] {
+        assert_eq!(refusal(&mut viewer, command, &json!({})), "role");
+    }
+    let (status, stopped) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
+    assert_eq!(
+        (status, &stopped["stopped"]),
+        (200, &json!(true)),
+        "{stopped}"
+    );
+    assert_eq!(rig.state()["emergency_stop"], true);
+}
+
+#[test]
+fn commands_about_the_past_or_the_future_are_refused() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    for _ in 0..60 {
+        let _ = driver.read();
+    }
+    let ask =
+        |seen_us: u64| json!({ "seen_us": seen_us, "valid_ms": 200, "cmd": "Disarm", "args": {} });
+    let now_us = driver.seen_us();
+    for (seen_us, reason) in [
+        (now_us - 300_000, "expired"),
+        (now_us + 10_000_000, "seen_in_future"),
+    ] {
+        let n = driver.send(ask(seen_us)).expect("sent");
+        let Outcome::Refused { reason: got, .. } = driver.outcome(n) else {
+            panic!("not refused");
+        };
+        assert_eq!(got, reason);
+    }
+    assert_eq!(rig.state()["armed"], true);
+}
+
+#[test]
+fn a_thousand_late_commands_are_each_refused() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    for _ in 0..60 {
+        let _ = driver.read();
+    }
+    let old_us = driver.seen_us() - 400_000;
+    let mut last = 0;
+    for _ in 0..1_000 {
+        let late = json!({ "seen_us": old_us, "valid_ms": 100, "cmd": "Disarm", "args": {} });
+        last = driver.send(late).expect("sent");
+        // Answers are taken as they come: who lets them pile up is closed.
+        let _ = driver.read();
+    }
+    let mut reasons = std::collections::BTreeMap::<String, u32>::new();
+    let mut answered = 0;
+    while answered < last {
+        if let Some(Incoming::Json(answer)) = driver.read()
+            && answer["op"] == "answer"
+        {
+            assert_eq!(answer["status"], "refused", "{answer}");
+            answered = answered.max(answer["n"].as_u64().expect("a number"));
+            let reason = answer["reason"].as_str().unwrap_or_default().to_owned();
+            *reasons.entry(reason).or_default() += 1;
+        }
+    }
+    assert!(
+        reasons.keys().all(|r| r == "expired" || r == "busy"),
+        "{reasons:?}"
+    );
+    assert_eq!(rig.state()["armed"], true);
+}
+
+#[test]
+fn a_paused_robot_takes_a_stop_and_nothing_else() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    done(&mut driver, "Pause");
+    let paused = rig.until("paused", |state| state["pace"]["paused"] == true);
+    assert_eq!(refusal(&mut driver, "Stand", &json!({})), "paused");
+    let n = driver.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(driver.outcome(n), Outcome::Done);
+    let args = json!({ "cycles": 3 });
+    let outcome = driver.carry_out("Step", &args, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    let stepped = rig.until("stopped", |state| state["emergency_stop"] == true);
+    let us = |state: &Value| state["master_us"].as_u64().expect("a time");
+    assert!(us(&stepped) - us(&paused) <= 31_000, "{stepped}");
+}
+
+#[test]
+fn pace_and_faults_are_host_commands() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    let speed = json!({ "speed": 4.0 });
+    assert_eq!(refusal(&mut driver, "Speed", &speed), "too_fast");
+    let fault = json!({ "fault": "pot-open:joint3" });
+    let outcome = driver.carry_out("Inject", &fault, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    let state = rig.until("held", |state| state["hold"] == "board_fault");
+    assert_eq!(state["faults"], json!(["pot-open:joint3"]));
+    let faults = &state["boards"][2]["faults"];
+    assert!(
+        faults[0]["remedy"]
+            .as_str()
+            .is_some_and(|text| text.len() > 10),
+        "{faults}"
+    );
+    let outcome = driver.carry_out("EndFault", &fault, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    rig.until("ended", |state| state["faults"] == json!([]));
+    done(&mut driver, "ClearFault");
+    done(&mut driver, "Arm");
+}
+
+#[test]
+fn a_server_that_ends_says_so() {
+    let rig = Rig::new();
+    let mut viewer = rig.view();
+    look(&mut viewer, "state");
+    let Rig { server, .. } = rig;
+    drop(server);
+    assert_eq!(closed(&mut viewer), 4006);
+}

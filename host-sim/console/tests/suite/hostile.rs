@@ -1,0 +1,259 @@
+//! Who has no key, a wrong one, or sends what is not of the contract.
+
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use wheeleg_console::Key;
+use wheeleg_console::client::{Client, Outcome, http};
+
+use crate::common::{Rig, closed, done, look};
+
+fn raw(rig: &Rig, request: &str) -> String {
+    let mut stream = TcpStream::connect(rig.server.address()).expect("connected");
+    stream
+        .set_read_timeout(Some(Duration::from_secs(6)))
+        .expect("set");
+    stream.write_all(request.as_bytes()).expect("sent");
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+fn get(rig: &Rig, path: &str, headers: &str) -> String {
+    let host = rig.server.address();
+    raw(
+        rig,
+        &format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{headers}\r\n"),
+    )
+}
+
+#[test]
+fn wrong_keys_open_nothing_and_a_right_one_is_never_locked_out() {
+    let rig = Rig::new();
+    let wrong = [Key::new([0; 32]), Key::new([9; 32]), rig.keys.view.clone()];
+    for key in &wrong {
+        let error = Client::connect(&rig.url, "control", "thief", key)
+            .err()
+            .expect("refused");
+        assert!(error.to_string().contains("key is wrong"), "{error}");
+    }
+    assert!(Client::connect(&rig.url, "king", "thief", &rig.keys.control).is_err());
+    assert!(Client::connect(&rig.url, "control", "<b>thief", &rig.keys.control).is_err());
+    let statuses: Vec<u16> = (0..12)
+        .map(|_| {
+            http(&rig.url, "GET", "state", &Key::new([9; 32]))
+                .expect("an answer")
+                .0
+        })
+        .collect();
+    assert!(statuses[..3].iter().all(|s| *s == 401), "{statuses:?}");
+    assert_eq!(statuses[11], 429, "{statuses:?}");
+    rig.state();
+    let mut client = rig.control("owner");
+    look(&mut client, "state");
+    for header in [
+        "",
+        "Authorization: Bearer \r\n",
+        "Authorization: Basic eA==\r\n",
+    ] {
+        let answer = get(&rig, "/api/v1/state", header);
+        assert!(answer.starts_with("HTTP/1.1 4"), "{answer}");
+        assert!(answer.contains("application/problem+json"), "{answer}");
+    }
+}
+
+#[test]
+fn foreign_hosts_and_origins_are_refused_everywhere() {
+    let rig = Rig::new();
+    let address = rig.server.address();
+    for path in ["/", "/ws", "/api/v1/state"] {
+        for (host, origin) in [
+            ("evil.example".to_owned(), String::new()),
+            (
+                address.to_string(),
+                "Origin: http://evil.example\r\n".to_owned(),
+            ),
+            (address.to_string(), "Origin: null\r\n".to_owned()),
+        ] {
+            let request =
+                format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{origin}Connection: close\r\n\r\n");
+            let answer = raw(&rig, &request);
+            assert!(
+                answer.starts_with("HTTP/1.1 403"),
+                "{path} {host} {origin}: {answer}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_page_comes_with_its_policy_and_no_name_leads_out_of_it() {
+    let rig = Rig::new();
+    let page = get(&rig, "/", "");
+    assert!(page.starts_with("HTTP/1.1 200"), "{page}");
+    for header in [
+        "content-type: text/html; charset=utf-8",
+        "default-src 'none'",
+        "frame-ancestors 'none'",
+        "x-content-type-options: nosniff",
+        "cache-control: no-store",
+    ] {
+        assert!(
+            page.to_ascii_lowercase().contains(header),
+            "{header}: {page}"
+        );
+    }
+    for path in [
+        "/../Cargo.toml",
+        "/%2e%2e/Cargo.toml",
+        "//etc/passwd",
+        "/control.key",
+        "/x",
+    ] {
+        let answer = get(&rig, path, "");
+        assert!(answer.starts_with("HTTP/1.1 4"), "{path}: {answer}");
+    }
+}
+
+#[test]
+fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
+    let rig = Rig::new();
+    let stop = br#"{"n":1,"op":"stop"}"#;
+    let mut frames: Vec<Vec<u8>> = vec![
+        Vec::new(),
+        vec![0; 15],
+        [&[0; 16][..], stop].concat(),
+        vec![0x7B; 4000],
+    ];
+    frames.push(vec![0; 10_000]);
+    for frame in frames {
+        let mut client = rig.control("forger");
+        client.send_raw(frame.clone()).expect("sent");
+        let code = closed(&mut client);
+        // What is too large ends the connection before it is a frame.
+        assert!(
+            code == 4003 || (frame.len() > 4096 && code != 1000),
+            "{code}"
+        );
+    }
+    // The session's own frame, out of order: `n` of the client below is one ahead.
+    let mut client = rig.control("forger");
+    look(&mut client, "state");
+    let n = client
+        .send(json!({ "op": "unsubscribe", "channels": [] }))
+        .expect("sent");
+    assert_eq!(client.outcome(n), Outcome::Done);
+    client.skip();
+    client.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(closed(&mut client), 4003);
+    assert_eq!(rig.state()["emergency_stop"], false);
+    // The next session works.
+    let mut client = rig.control("owner");
+    look(&mut client, "state");
+    done(&mut client, "TakeControl");
+}
+
+#[test]
+fn a_flood_is_answered_busy_and_beats_and_stops_are_not() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("flooder");
+    let mut busy = 0;
+    for _ in 0..400 {
+        let frame = json!({ "op": "unsubscribe", "channels": [] });
+        let n = driver.send(frame).expect("sent");
+        if let Outcome::Refused { reason, .. } = driver.outcome(n) {
+            assert_eq!(reason, "busy");
+            busy += 1;
+        }
+    }
+    assert!(busy > 50, "{busy}");
+    let state = rig.state();
+    assert_eq!(
+        (&state["armed"], &state["control"]["holder"]),
+        (&json!(true), &json!("flooder"))
+    );
+    let n = driver.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(driver.outcome(n), Outcome::Done);
+}
+
+#[test]
+fn half_requests_and_half_handshakes_lose_their_place() {
+    let rig = Rig::new();
+    let address = rig.server.address();
+    let upgrade = format!(
+        "GET /ws HTTP/1.1\r\nHost: {address}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: wheeleg.console.v1\r\n\r\n"
+    );
+    let mut open = Vec::new();
+    for i in 0..300 {
+        let Ok(mut stream) = TcpStream::connect(address) else {
+            continue;
+        };
+        let text = if i % 2 == 0 { "GET / HT" } else { &upgrade };
+        let _ = stream.write_all(text.as_bytes());
+        open.push(stream);
+    }
+    let begin = Instant::now();
+    let back = loop {
+        if let Ok(client) = Client::connect(&rig.url, "control", "owner", &rig.keys.control) {
+            break client;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(10), "locked out");
+        std::thread::sleep(Duration::from_millis(100));
+    };
+    drop(back);
+    let state = rig.state();
+    assert_eq!(state["alive"], true, "{state}");
+}
+
+#[test]
+fn rubbish_of_any_kind_ends_the_connection_and_nothing_else() {
+    let rig = Rig::new();
+    let mut seed = 1_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (seed >> 33) as u8
+    };
+    for _ in 0..30 {
+        let mut client = rig.control("rubbish");
+        let length = usize::from(random()) * 8;
+        client
+            .send_raw((0..length).map(|_| random()).collect())
+            .expect("sent");
+        assert_eq!(closed(&mut client), 4003);
+    }
+    for _ in 0..30 {
+        let bytes: Vec<u8> = (0..500).map(|_| random()).collect();
+        raw(&rig, &String::from_utf8_lossy(&bytes));
+    }
+    let state = rig.until("alive", |state| state["clients"] == 0);
+    assert_eq!(state["alive"], true);
+}
+
+#[test]
+fn an_address_of_the_network_and_one_in_use_are_refused_with_a_remedy() {
+    let rig = Rig::new();
+    for (listen, word) in [
+        ("0.0.0.0:0", "ssh -L"),
+        (&rig.server.address().to_string(), "--listen"),
+    ] {
+        let live = wheeleg_console::Live {
+            scenario: wheeleg_config::builtin::scenario("stand").expect("built in"),
+            robot: wheeleg_config::builtin::robot("wheeleg-2003").expect("built in"),
+            speed: Some(1.0),
+            paused: false,
+        };
+        let refused = wheeleg_console::Server::start(wheeleg_console::Options {
+            live,
+            listen: listen.parse().expect("an address"),
+            keys: rig.keys.clone(),
+            page: None,
+        });
+        let error = refused.expect_err("refused");
+        let help = miette::Diagnostic::help(&error)
+            .expect("a remedy")
+            .to_string();
+        assert!(help.contains(word), "{help}");
+    }
+}

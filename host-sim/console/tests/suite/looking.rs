@@ -1,0 +1,159 @@
+//! What those see who only look, however slowly.
+
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use wheeleg_console::client::{Client, Incoming, http};
+use wheeleg_telemetry::{Wire, channels};
+
+use crate::common::{Rig, done, look};
+
+/// Bytes of the sample at the begin of `body`, by the list of channels alone.
+fn length(channel: u16, body: &[u8]) -> usize {
+    let fields = channels()[usize::from(channel)].fields;
+    fields.iter().fold(8, |at, field| {
+        at + match field.wire {
+            Wire::F32 | Wire::U32 | Wire::I32 => 4,
+            Wire::U64 => 8,
+            Wire::Bool => 1,
+            Wire::Text => 2 + usize::from(u16::from_le_bytes([body[at], body[at + 1]])),
+        }
+    })
+}
+
+#[test]
+fn every_sample_of_every_channel_comes_once_and_in_order() {
+    let rig = Rig::new();
+    let mut viewer = rig.view();
+    let topics: Vec<&str> = channels().iter().map(|c| c.topic).collect();
+    let all = json!({ "op": "subscribe", "channels": topics, "hz": "all" });
+    viewer.send(all).expect("sent");
+    let mut last = vec![None; channels().len()];
+    let mut counts = vec![0; channels().len()];
+    let begin = Instant::now();
+    // Every board tells once in a while what it has heard.
+    while counts[0] < 1_500 || counts[17..].contains(&0) {
+        assert!(begin.elapsed() < Duration::from_secs(15), "{counts:?}");
+        let Some(Incoming::Samples {
+            channel,
+            missed,
+            body,
+        }) = viewer.read()
+        else {
+            continue;
+        };
+        assert_eq!(missed, 0);
+        let mut rest = &body[..];
+        while !rest.is_empty() {
+            let t_ns = u64::from_le_bytes(rest[..8].try_into().expect("a time"));
+            let before = last[usize::from(channel)].replace(t_ns);
+            if channels()[usize::from(channel)].rate_hz == 500 {
+                assert!(
+                    before.is_none_or(|t| t + 1_000_000 == t_ns),
+                    "{channel}: {before:?} {t_ns}"
+                );
+            }
+            counts[usize::from(channel)] += 1;
+            rest = &rest[length(channel, rest)..];
+        }
+    }
+}
+
+#[test]
+fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
+    let rig = Rig::new();
+    let subscribe = |client: &mut Client| {
+        let topics = ["/joint/1", "/joint/2", "/body", "/master"];
+        let frame = json!({ "op": "subscribe", "channels": topics, "hz": 50 });
+        client.send(frame).expect("sent");
+    };
+    let (mut slow, mut quick) = (rig.view(), rig.view());
+    subscribe(&mut slow);
+    subscribe(&mut quick);
+    let (mut seen, mut missed_by_quick) = (0, 0);
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(3) {
+        if let Some(Incoming::Samples { missed, .. }) = quick.read() {
+            seen += 1;
+            missed_by_quick += missed;
+        }
+    }
+    // 4 channels, 50 Hz, 3 s; the wall of a busy computer is not judged.
+    assert!(seen > 300, "{seen}");
+    assert_eq!(missed_by_quick, 0);
+    assert!(slow.read().is_some(), "who reads again is still there");
+}
+
+#[test]
+fn clients_that_never_read_cost_the_holder_nothing() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    let topics: Vec<&str> = channels().iter().map(|c| c.topic).collect();
+    let mut idle = Vec::new();
+    for _ in 0..40 {
+        match Client::connect(&rig.url, "view", "idle", &rig.keys.view) {
+            Ok(mut client) => {
+                let all = json!({ "op": "subscribe", "channels": topics, "hz": "all" });
+                client.send(all).expect("sent");
+                idle.push(client);
+            }
+            Err(e) => {
+                let text = e.to_string();
+                assert!(text.contains("503") || text.contains("places"), "{text}");
+            }
+        }
+    }
+    assert_eq!(
+        idle.len(),
+        30,
+        "32 places: the driver, and one kept for control"
+    );
+    let mut second = rig.control("second");
+    look(&mut second, "state");
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(3) {
+        let _ = driver.read();
+    }
+    done(&mut driver, "Stand");
+    let state = rig.state();
+    assert_eq!(
+        (&state["armed"], &state["hold"]),
+        (&json!(true), &json!(null))
+    );
+    // A stop needs no place.
+    let (status, _) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
+    assert_eq!(status, 200);
+}
+
+#[test]
+fn the_lists_are_those_of_the_hashes() {
+    let rig = Rig::new();
+    let get = |path| {
+        let (status, body) = http(&rig.url, "GET", path, &rig.keys.view).expect("an answer");
+        assert_eq!(status, 200, "{path}");
+        body
+    };
+    let list = get("channels");
+    assert_eq!(
+        list["channels"].as_array().map(Vec::len),
+        Some(channels().len())
+    );
+    assert_eq!(list["channels"][2]["fields"][0]["wire"], "f32");
+    let commands = get("commands");
+    let names = commands["commands"].as_array().expect("a list").iter();
+    assert!(
+        names
+            .into_iter()
+            .any(|c| c["name"] == "TakeControl" && c["code"] == 0x0125)
+    );
+    assert!(
+        get("faults")["injectable"]
+            .as_array()
+            .is_some_and(|l| l.len() > 20)
+    );
+    let (status, problem) =
+        http(&rig.url, "GET", "events?last=0", &rig.keys.view).expect("an answer");
+    assert_eq!((status, &problem["status"]), (400, &json!(400)));
+    let (status, _) = http(&rig.url, "GET", "nothing", &rig.keys.view).expect("an answer");
+    assert_eq!(status, 404);
+}

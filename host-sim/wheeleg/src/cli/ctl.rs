@@ -1,0 +1,389 @@
+//! `wheeleg ctl`: the console for the command line.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use serde_json::{Map, Value, json};
+use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
+use wheeleg_console::keys::{self, CONTROL_FILE, VIEW_FILE};
+use wheeleg_console::{ADDRESS, Key};
+use wheeleg_studies::StudyError;
+use wheeleg_telemetry::{FieldDef, Wire, channels};
+
+use super::serve::refused;
+use super::{print, tell, whole};
+
+/// Exit code of what is refused.
+const REFUSED: u8 = 1;
+/// Exit code of a connection that ended, or of a stop that nobody confirms.
+const LOST: u8 = 3;
+/// How long a command of this program may be under way, ms.
+const VALID_MS: u32 = 1_000;
+
+/// Arguments of `wheeleg ctl`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Exit codes: 0 done; 1 refused; 2 error; 3 the connection ended, or nobody confirms."
+)]
+pub(super) struct CtlArgs {
+    /// Address of the server.
+    #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
+    url: Url,
+    /// File of the key [default: the one that `wheeleg serve` has made].
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(subcommand)]
+    command: CtlCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum CtlCommand {
+    /// Print how the robot is.
+    Status,
+    /// Print samples and events as they come.
+    Watch {
+        /// Channels, as `wheeleg channels` has them; events always come.
+        #[arg(value_name = "CHANNEL")]
+        channels: Vec<String>,
+        /// Samples per second of a channel.
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
+        hz: u32,
+    },
+    /// Take the control, give one command, wait for its end, and release the control.
+    Take {
+        /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
+        #[arg(last = true, required = true, value_name = "COMMAND [ARG=VALUE]")]
+        command: Vec<String>,
+    },
+    /// Stop the robot.
+    Stop,
+    /// Begin a fault, such as pot-open:joint3.
+    Inject {
+        /// Fault and target, as `wheeleg faults list` has them.
+        fault: String,
+    },
+    /// End a fault.
+    EndFault {
+        /// As it was begun.
+        fault: String,
+    },
+    /// Stop the clock.
+    Pause,
+    /// Let the clock go on.
+    Resume,
+    /// Simulate some bus cycles of a paused robot.
+    Step {
+        /// How many, 10 ms each.
+        #[arg(default_value_t = 1, value_parser = whole(1_u32, 1_000))]
+        cycles: u32,
+    },
+    /// Set the pace.
+    Speed {
+        /// Simulated time over time of the clock on the wall, 0.1 to 10.
+        speed: f64,
+    },
+}
+
+/// Does what is asked of the server.
+pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
+    let key = |file| read_key(args, file);
+    match &args.command {
+        CtlCommand::Status => status(args, &key(VIEW_FILE)?),
+        CtlCommand::Watch { channels, hz } => watch(args, &key(VIEW_FILE)?, channels, *hz),
+        CtlCommand::Stop => stop(args, &key(VIEW_FILE)?),
+        CtlCommand::Take { command } => take(args, &key(CONTROL_FILE)?, command),
+        CtlCommand::Inject { fault } => host(args, "Inject", &json!({ "fault": fault })),
+        CtlCommand::EndFault { fault } => host(args, "EndFault", &json!({ "fault": fault })),
+        CtlCommand::Pause => host(args, "Pause", &json!({})),
+        CtlCommand::Resume => host(args, "Resume", &json!({})),
+        CtlCommand::Step { cycles } => host(args, "Step", &json!({ "cycles": cycles })),
+        CtlCommand::Speed { speed } => host(args, "Speed", &json!({ "speed": speed })),
+    }
+}
+
+fn read_key(args: &CtlArgs, file: &str) -> Result<Key, StudyError> {
+    let path = match &args.key {
+        Some(path) => path.clone(),
+        None => keys::folder().map_err(refused)?.join(file),
+    };
+    keys::read(&path).map_err(refused)
+}
+
+fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
+    let (code, state) = http(&args.url, "GET", "state", key).map_err(refused)?;
+    if code != 200 {
+        return Ok(not_answered(&state));
+    }
+    if args.json {
+        return print(&format!("{state:#}\n"));
+    }
+    let word = |value: &Value| match value {
+        Value::String(text) => text.clone(),
+        Value::Null => "none".to_owned(),
+        other => other.to_string(),
+    };
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "{}, {:.2} s after power-up, ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
+        word(&state["robot"]),
+        state["master_us"].as_f64().unwrap_or(0.0) * 1e-6,
+        state["ready"],
+        state["armed"],
+        word(&state["phase"]),
+        state["step"],
+        word(&state["hold"]),
+        word(&state["control"]["holder"]),
+        state["pace"]["speed"],
+        state["pace"]["paused"],
+    );
+    for board in state["boards"].as_array().into_iter().flatten() {
+        let _ = writeln!(text, "board {}  {}", board["address"], word(&board["mode"]));
+        for fault in board["faults"].as_array().into_iter().flatten() {
+            let (cause, remedy) = (word(&fault["cause"]), word(&fault["remedy"]));
+            let _ = writeln!(text, "         {cause} {remedy}");
+        }
+    }
+    print(&text)
+}
+
+fn not_answered(problem: &Value) -> ExitCode {
+    let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
+    tell(&format!("{}: {}", text("detail"), text("remedy")));
+    ExitCode::from(REFUSED)
+}
+
+fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
+    let (code, answer) = http(&args.url, "POST", "stop", key).map_err(refused)?;
+    match code {
+        200 if args.json => print(&format!("{answer}\n")),
+        200 => print("stopped: the stop is in SYNC, and latched\n"),
+        504 => {
+            tell("NOT CONFIRMED: CUT THE AIR");
+            Ok(ExitCode::from(LOST))
+        }
+        _ => Ok(not_answered(&answer)),
+    }
+}
+
+fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(&args.url, "view", "ctl", key).map_err(refused)?;
+    if !topics.is_empty() {
+        let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
+        let n = client.send(frame).map_err(refused)?;
+        if let end @ (Outcome::Refused { .. } | Outcome::Lost) = client.outcome(n) {
+            return Ok(told(args, &end));
+        }
+    }
+    loop {
+        let line = match client.read() {
+            Some(Incoming::Json(event)) if event["op"] == "event" => {
+                if args.json {
+                    event.to_string()
+                } else {
+                    let t_s = event["t_ns"].as_f64().unwrap_or(0.0) * 1e-9;
+                    format!(
+                        "{t_s:10.3} s  {}",
+                        event["text"].as_str().unwrap_or_default()
+                    )
+                }
+            }
+            Some(Incoming::Samples {
+                channel,
+                missed,
+                body,
+            }) => match sample(channel, &body) {
+                Some((t_ns, values)) => line(args, channel, missed, t_ns, &values),
+                None => continue,
+            },
+            Some(Incoming::Closed { .. }) => {
+                tell("the connection has ended");
+                return Ok(ExitCode::from(LOST));
+            }
+            _ => continue,
+        };
+        let mut out = std::io::stdout().lock();
+        if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {
+            // The reader has gone away (`| head`).
+            return Ok(ExitCode::SUCCESS);
+        }
+    }
+}
+
+fn line(
+    args: &CtlArgs,
+    channel: u16,
+    missed: u32,
+    t_ns: u64,
+    values: &Map<String, Value>,
+) -> String {
+    let topic = channels()[usize::from(channel)].topic;
+    if args.json {
+        return json!({ "topic": topic, "t_ns": t_ns, "missed": missed, "values": values })
+            .to_string();
+    }
+    let mut out = format!("{:10.3} s  {topic}", t_ns as f64 * 1e-9);
+    for (name, value) in values {
+        let _ = write!(out, "  {name} {value}");
+    }
+    out
+}
+
+/// Time and values of a sample, in the layout of PROTOCOL.md.
+fn sample(channel: u16, body: &[u8]) -> Option<(u64, Map<String, Value>)> {
+    let (time, mut rest) = body.split_at_checked(8)?;
+    let t_ns = u64::from_le_bytes(time.try_into().ok()?);
+    let mut values = Map::new();
+    for field in channels().get(usize::from(channel))?.fields {
+        values.insert(field.name.to_owned(), value(field, &mut rest)?);
+    }
+    Some((t_ns, values))
+}
+
+fn value(field: &FieldDef, rest: &mut &[u8]) -> Option<Value> {
+    let mut take = |n: usize| {
+        let (head, tail) = rest.split_at_checked(n)?;
+        *rest = tail;
+        Some(head)
+    };
+    Some(match field.wire {
+        Wire::F32 => {
+            let value = f32::from_le_bytes(take(4)?.try_into().ok()?);
+            let scale = 10_f64.powi(field.decimals.into());
+            json!((f64::from(value) * scale).round() / scale)
+        }
+        Wire::U32 => json!(u32::from_le_bytes(take(4)?.try_into().ok()?)),
+        Wire::I32 => json!(i32::from_le_bytes(take(4)?.try_into().ok()?)),
+        Wire::U64 => json!(u64::from_le_bytes(take(8)?.try_into().ok()?)),
+        Wire::Bool => json!(take(1)?[0] != 0),
+        Wire::Text => {
+            let length = u16::from_le_bytes(take(2)?.try_into().ok()?);
+            json!(String::from_utf8_lossy(take(length.into())?))
+        }
+    })
+}
+
+/// `NAME=VALUE` as an argument: a number or flag where it reads as one, else a word.
+fn argument(text: &str) -> Result<(String, Value), StudyError> {
+    let (name, value) = text.split_once('=').ok_or_else(|| {
+        StudyError::refused(
+            format!("`{text}` is no argument"),
+            "write arguments as NAME=VALUE; `wheeleg commands` lists them",
+        )
+    })?;
+    let parsed = serde_json::from_str::<Value>(value).ok();
+    let parsed = parsed.filter(|v| v.is_number() || v.is_boolean());
+    Ok((name.to_owned(), parsed.unwrap_or_else(|| json!(value))))
+}
+
+fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyError> {
+    let Some((name, arguments)) = words.split_first() else {
+        return Ok(ExitCode::SUCCESS);
+    };
+    let arguments: Map<String, Value> = arguments
+        .iter()
+        .map(|text| argument(text))
+        .collect::<Result<_, _>>()?;
+    let arguments = Value::Object(arguments);
+    let mut client = Client::connect(&args.url, "control", "ctl", key).map_err(refused)?;
+    let mut give = |name: &str, arguments: &Value| {
+        let end = client.carry_out(name, arguments, VALID_MS).map_err(refused);
+        client.keep_control(true);
+        end
+    };
+    let taken = give("TakeControl", &json!({}))?;
+    if taken != Outcome::Done {
+        return Ok(told(args, &taken));
+    }
+    let end = give(name, &arguments)?;
+    if end != Outcome::Lost {
+        let released = give("ReleaseControl", &json!({}))?;
+        if released != Outcome::Done {
+            tell("the control is not released: the robot will hold");
+        }
+    }
+    Ok(told(args, &end))
+}
+
+fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, StudyError> {
+    let key = read_key(args, CONTROL_FILE)?;
+    let mut client = Client::connect(&args.url, "control", "ctl", &key).map_err(refused)?;
+    let end = client
+        .carry_out(name, arguments, VALID_MS)
+        .map_err(refused)?;
+    Ok(told(args, &end))
+}
+
+/// Prints how a request ended; its exit code.
+fn told(args: &CtlArgs, end: &Outcome) -> ExitCode {
+    let (status, code, reason, text) = match end {
+        Outcome::Done => ("done", 0, "", ""),
+        Outcome::Refused { reason, text } => ("refused", REFUSED, reason.as_str(), text.as_str()),
+        Outcome::Unknown => ("unknown", LOST, "", "nobody answered within 2 s"),
+        Outcome::Lost => ("lost", LOST, "", "the connection ended"),
+    };
+    if args.json {
+        let end = json!({ "status": status, "reason": reason, "text": text });
+        let _ = print(&format!("{end}\n"));
+    } else if text.is_empty() {
+        let _ = print(&format!("{status}\n"));
+    } else {
+        tell(&format!("{status}: {text}"));
+    }
+    ExitCode::from(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_telemetry::{BodySample, EventSample, Sample as _};
+
+    #[test]
+    fn a_sample_is_read_as_it_was_packed() {
+        let body = BodySample {
+            travel_mm: 12.5,
+            pitch_deg: -0.25,
+            ..BodySample::default()
+        };
+        let mut bytes = 7_u64.to_le_bytes().to_vec();
+        body.pack(&mut bytes);
+        let (t_ns, values) = sample(8, &bytes).expect("whole");
+        assert_eq!(
+            (t_ns, &values["travel_mm"], &values["pitch_deg"]),
+            (7, &json!(12.5), &json!(-0.25))
+        );
+        assert!(sample(8, &bytes[..bytes.len() - 1]).is_none());
+        let event = EventSample {
+            text: "so é".to_owned(),
+            start_up_us: u64::MAX,
+            ..EventSample::default()
+        };
+        let mut bytes = vec![0; 8];
+        event.pack(&mut bytes);
+        let (_, values) = sample(15, &bytes).expect("whole");
+        assert_eq!(
+            (&values["text"], &values["start_up_us"]),
+            (&json!("so é"), &json!(u64::MAX))
+        );
+    }
+
+    #[test]
+    fn arguments_are_numbers_flags_or_words() {
+        for (text, value) in [
+            ("joint=3", json!(3)),
+            ("stroke=120.5", json!(120.5)),
+            ("touchdown_reflex=true", json!(true)),
+            ("leg=left", json!("left")),
+            ("x=[1]", json!("[1]")),
+        ] {
+            assert_eq!(argument(text).expect("an argument").1, value, "{text}");
+        }
+        assert!(argument("joint").is_err());
+    }
+}

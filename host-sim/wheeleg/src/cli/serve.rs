@@ -1,0 +1,126 @@
+//! `wheeleg serve`: one simulated robot, live, for the operator's console.
+
+use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use wheeleg_config::builtin;
+use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
+use wheeleg_console::{ADDRESS, ConsoleError, Live, Options, Server};
+use wheeleg_studies::StudyError;
+
+use super::{print, stop_on_signals, tell};
+
+/// Arguments of `wheeleg serve`.
+#[derive(Debug, Args)]
+pub(super) struct ServeArgs {
+    /// Built-in scenario or path of a TOML file: its ground, pose and seed. Its events and its
+    /// motion are the operator's to give.
+    #[arg(default_value = builtin::DEFAULT_SCENARIO)]
+    scenario: String,
+    /// Robot (built in, or path of a TOML file), instead of the scenario's.
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    /// Where to listen: an address of this computer and a port.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = ADDRESS)]
+    listen: SocketAddr,
+    /// Simulated time over time of the clock on the wall, 0.1 to 10, or `max`.
+    #[arg(long, value_name = "SPEED", default_value = "1", value_parser = parse_speed)]
+    speed: Speed,
+    /// Begin with the clock standing.
+    #[arg(long)]
+    paused: bool,
+    /// Make new keys: the old ones open nothing any more.
+    #[arg(long)]
+    new_key: bool,
+    /// Folder of the page, instead of the one in this program: for who works on it.
+    #[arg(long, value_name = "DIR")]
+    page_dir: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Speed {
+    Times(f64),
+    Max,
+}
+
+fn parse_speed(text: &str) -> Result<Speed, String> {
+    if text == "max" {
+        return Ok(Speed::Max);
+    }
+    let speed = text.parse().ok().filter(|x| (0.1..=10.0).contains(x));
+    let speed = speed.map(Speed::Times);
+    speed.ok_or_else(|| "allowed are numbers from 0.1 to 10, and max".to_owned())
+}
+
+/// Serves until it is told to stop.
+pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
+    let stop = stop_on_signals()?;
+    let scenario = builtin::scenario(&args.scenario)?;
+    let robot = match &args.robot {
+        Some(robot) => builtin::robot(robot)?,
+        None => builtin::robot_of(&scenario.robot, &args.scenario)?,
+    };
+    let folder = keys::folder().map_err(refused)?;
+    let open = if args.new_key {
+        Keys::renew
+    } else {
+        Keys::open
+    };
+    let keys = open(&folder).map_err(refused)?;
+    let control = keys.control.to_hex();
+    let live = Live {
+        scenario,
+        robot,
+        speed: match args.speed {
+            Speed::Times(speed) => Some(speed),
+            Speed::Max => None,
+        },
+        paused: args.paused,
+    };
+    let server = Server::start(Options {
+        live,
+        listen: args.listen,
+        keys,
+        page: args.page_dir.clone(),
+    })
+    .map_err(refused)?;
+    let address = server.address();
+    let mut text = String::new();
+    if std::io::stdout().is_terminal() {
+        // The key is for who sits here; no pipe and no log gets it.
+        let _ = writeln!(text, "open     http://{address}/#k={control}");
+    } else {
+        let _ = writeln!(text, "open     http://{address}/");
+    }
+    let _ = writeln!(
+        text,
+        "to drive {}\nto look  {}\nCtrl-C ends it.",
+        folder.join(CONTROL_FILE).display(),
+        folder.join(VIEW_FILE).display()
+    );
+    print(&text)?;
+    loop {
+        if let Some(signal) = stop.signal() {
+            drop(server);
+            tell("the robot is switched off");
+            return Ok(ExitCode::from(signal.exit_code()));
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// An error of the console as the program tells it.
+pub(super) fn refused(error: ConsoleError) -> StudyError {
+    match error {
+        ConsoleError::Sim(error) => StudyError::Sim(error),
+        other => {
+            let help = miette::Diagnostic::help(&other).map(|help| help.to_string());
+            StudyError::refused(other.to_string(), help.unwrap_or_default())
+        }
+    }
+}
