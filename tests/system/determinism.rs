@@ -147,7 +147,10 @@ fn a_saved_state_goes_on_identically() {
     let before = go_on(&plant, &mut state, 0..300);
     let distinct: std::collections::BTreeSet<_> = before.iter().collect();
     assert_eq!(distinct.len(), before.len(), "every tick changes the state");
-    assert!(plant.outputs(&state).velocity_m_s[0].abs() > 1e-4, "in motion");
+    assert!(
+        plant.outputs(&state).velocity_m_s[0].abs() > 1e-4,
+        "in motion"
+    );
 
     let saved = state.clone();
     let unbroken = go_on(&plant, &mut state, 300..600);

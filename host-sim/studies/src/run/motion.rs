@@ -115,7 +115,7 @@ impl Motion {
                 o4_mm: mm(body.o4_m),
                 stroke_zero_mm: mm([zero[0], zero[1], zero[2]]),
                 foot_pad_mm: rounded(body.foot_pad_m * 1e3),
-                sole_radius_mm: rounded(plant.contact.sole_radius_m * 1e3),
+                sole_radius_mm: rounded(plant.contacts.foot.sole_radius_m * 1e3),
                 wheel_radius_mm: rounded(body.wheel_radius_m * 1e3),
                 track_mm: rounded(source.robot.spatial.track_m * 1e3),
             },
@@ -133,7 +133,7 @@ impl Motion {
             switches: std::array::from_fn(|f| {
                 sampled(&recording.feet[f], &instants, |s| s.switches)
             }),
-            travel_mm: sampled(&recording.body, &instants, |s| rounded(s.travel_mm)),
+            travel_mm: sampled(&recording.body, &instants, |s| rounded(s.x_mm)),
             pitch_deg: sampled(&recording.body, &instants, |s| rounded(s.pitch_deg)),
             supply_bar: sampled(&recording.supply, &instants, |s| rounded(s.pressure_bar)),
             t: t.into_iter().map(rounded).collect(),

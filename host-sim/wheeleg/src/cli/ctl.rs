@@ -347,7 +347,7 @@ mod tests {
     #[test]
     fn a_sample_is_read_as_it_was_packed() {
         let body = BodySample {
-            travel_mm: 12.5,
+            x_mm: 12.5,
             pitch_deg: -0.25,
             ..BodySample::default()
         };
@@ -355,7 +355,7 @@ mod tests {
         body.pack(&mut bytes);
         let (t_ns, values) = sample(8, &bytes).expect("whole");
         assert_eq!(
-            (t_ns, &values["travel_mm"], &values["pitch_deg"]),
+            (t_ns, &values["x_mm"], &values["pitch_deg"]),
             (7, &json!(12.5), &json!(-0.25))
         );
         assert!(sample(8, &bytes[..bytes.len() - 1]).is_none());
