@@ -61,7 +61,7 @@ class Robot:
             )
             for side in SIDES
         ]
-        self.contacts = [self.frame(name) for name in ("left_foot", "right_foot", "left_wheel", "right_wheel")]
+        self.contacts = [self.frame(name) for name in ("left_foot", "right_foot", "left_wheel", "right_wheel", "base_link")]
         # Pinocchio's free flyer has the linear part first; ours the angular one.
         drives = [self.velocity_index(name) for side in SIDES for name in DRIVES[side]]
         self.independent = [3, 4, 5, 0, 1, 2, *drives, *(self.velocity_index(name) for name in WHEELS)]

@@ -15,6 +15,7 @@ const LASTS_MS: u64 = 320;
 
 /// What fails.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "a handful of them")]
 enum Failure {
     Hook(Hook),
     Supply,

@@ -105,6 +105,7 @@ fn one(model: &FloatingRobot, draw: &mut Draw) -> Result<Value, Box<dyn Error>> 
     let contacts = Contacts {
         feet: [draw.wrench(), draw.wrench()],
         wheels: [draw.wrench(), draw.wrench()],
+        chassis: draw.wrench(),
     };
     let kin = model.prepare(&state, &gravity)?;
     let acceleration = model.forward(&state, &force, &gravity, &contacts)?;
