@@ -1,5 +1,5 @@
-//! The page is built in: a file that is added to it is seen, too.
+//! The page is built in: a change of it builds this crate anew.
 
 fn main() {
-    println!("cargo::rerun-if-changed=../report/page");
+    println!("cargo:rerun-if-changed=../report/page");
 }

@@ -14,6 +14,7 @@ pub mod axis;
 pub mod builtin;
 mod command;
 mod commissioned;
+mod drawing;
 mod error;
 pub mod faults;
 mod law;
@@ -29,6 +30,7 @@ mod suggest;
 pub mod timing;
 
 pub use axis::AxisConfig;
+pub use drawing::Drawing;
 pub use error::{ConfigError, Problem};
 pub use law::LawChoice;
 pub use node::NodeParams;

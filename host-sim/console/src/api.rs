@@ -56,6 +56,7 @@ pub(crate) struct Peer(pub(crate) SocketAddr);
 pub(crate) fn router(server: Arc<Server>) -> Router {
     let api = Router::new()
         .route("/state", get(state))
+        .route("/robot", get(robot))
         .route("/channels", get(channels))
         .route("/commands", get(commands))
         .route("/events", get(events))
@@ -210,6 +211,10 @@ async fn page(State(server): State<Arc<Server>>, uri: Uri) -> Response {
 
 async fn state(State(server): State<Arc<Server>>) -> Response {
     json_text(server.context.hub.state())
+}
+
+async fn robot(State(server): State<Arc<Server>>) -> Response {
+    json_text(server.context.robot_json.clone())
 }
 
 async fn channels(State(server): State<Arc<Server>>) -> Response {

@@ -10,9 +10,12 @@ use axum::extract::Extension;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use serde_json::json;
 use tokio::net::{TcpListener, TcpSocket};
 use tokio::runtime::Runtime;
 use tokio::sync::Semaphore;
+
+use wheeleg_config::Drawing;
 
 use crate::api::{self, Peer};
 use crate::error::ConsoleError;
@@ -106,10 +109,13 @@ impl Server {
             bind(listen)?
         };
         let name = live.robot.name.clone();
+        let drawing = Drawing::of(&live.robot);
+        let robot_json = json!({ "name": name, "drawing": drawing }).to_string();
         let (hub, robot) = Hub::new(live::start(live)?, name);
         let server = Arc::new(api::Server {
             context: Arc::new(Context {
                 hub: Arc::clone(&hub),
+                robot_json,
                 keys,
                 wrong_keys: WrongKeys::default(),
             }),

@@ -36,6 +36,8 @@ const VERSION: u32 = 1;
 pub(crate) struct Context {
     /// The hub.
     pub(crate) hub: Arc<Hub>,
+    /// Name and sizes of the robot, as JSON.
+    pub(crate) robot_json: String,
     /// The keys.
     pub(crate) keys: Keys,
     /// Wrong keys of the last minute.

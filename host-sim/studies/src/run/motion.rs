@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::figures::Source;
+use wheeleg_config::Drawing;
 use wheeleg_telemetry::{MasterSample, Row};
 
 /// Instants of the motion, at most; a short run has one every 20 ms.
@@ -12,7 +13,7 @@ const PERIOD_NS: u64 = 20_000_000;
 /// The robot over time.
 #[derive(Serialize)]
 pub(super) struct Motion {
-    geometry: Geometry,
+    geometry: Drawing,
     start: f64,
     end: f64,
     /// Times since the start of the motion, s.
@@ -26,19 +27,6 @@ pub(super) struct Motion {
     supply_bar: Vec<f64>,
     phases: Vec<Phase>,
     marks: Vec<Mark>,
-}
-
-/// Sizes from the robot file, mm.
-#[derive(Serialize)]
-struct Geometry {
-    crank_mm: f64,
-    p4_mm: [f64; 2],
-    o4_mm: [f64; 3],
-    stroke_zero_mm: [f64; 3],
-    foot_pad_mm: f64,
-    sole_radius_mm: f64,
-    wheel_radius_mm: f64,
-    track_mm: f64,
 }
 
 /// A phase of the gait.
@@ -71,10 +59,6 @@ fn phase_name(sample: &MasterSample) -> Option<(String, bool)> {
     Some((name.to_owned(), air))
 }
 
-fn mm<const N: usize>(lengths_m: [f64; N]) -> [f64; N] {
-    lengths_m.map(|m| rounded(m * 1e3))
-}
-
 /// A thousandth of a unit is finer than a drawing shows.
 fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3 + 0.0
@@ -104,21 +88,8 @@ impl Motion {
             .collect();
         let every = regular.len().div_ceil(INSTANTS).max(1);
         let (instants, t): (Vec<u64>, Vec<f64>) = regular.into_iter().step_by(every).unzip();
-
-        let plant = &source.robot.plant;
-        let zero = plant.stroke_zero_m;
-        let body = &plant.body;
         Self {
-            geometry: Geometry {
-                crank_mm: rounded(body.crank_m * 1e3),
-                p4_mm: mm(body.p4_m),
-                o4_mm: mm(body.o4_m),
-                stroke_zero_mm: mm([zero[0], zero[1], zero[2]]),
-                foot_pad_mm: rounded(body.foot_pad_m * 1e3),
-                sole_radius_mm: rounded(plant.contacts.foot.sole_radius_m * 1e3),
-                wheel_radius_mm: rounded(body.wheel_radius_m * 1e3),
-                track_mm: rounded(source.robot.spatial.track_m * 1e3),
-            },
+            geometry: Drawing::of(source.robot),
             start,
             end,
             commanded_mm: std::array::from_fn(|j| {

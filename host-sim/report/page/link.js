@@ -1,0 +1,179 @@
+// The socket to `wheeleg serve`, by its contract (host-sim/console/PROTOCOL.md): handshake, signed
+// frames in their order, answers, samples. It knows nothing of the page.
+
+const SUBPROTOCOL = "wheeleg.console.v1";
+/** A command is about what its sender saw at most this long before, ms. */
+const VALID_MS = 800;
+
+const text = new TextEncoder();
+const bytes = (hexadecimal) => Uint8Array.from(hexadecimal.match(/../g) ?? [], (pair) => Number.parseInt(pair, 16));
+const hexadecimal = (list) => Array.from(list, (byte) => byte.toString(16).padStart(2, "0")).join("");
+
+/** Each part with its length before it. @param {...(string | Uint8Array)} parts */
+function prefixed(...parts) {
+  const lists = parts.map((part) => (typeof part === "string" ? text.encode(part) : part));
+  const all = new Uint8Array(lists.reduce((sum, list) => sum + 4 + list.length, 0));
+  const view = new DataView(all.buffer);
+  let at = 0;
+  for (const list of lists) {
+    view.setUint32(at, list.length, true);
+    all.set(list, at + 4);
+    at += 4 + list.length;
+  }
+  return all;
+}
+
+async function mac(key, data) {
+  const imported = await crypto.subtle.importKey("raw", key, { name: "HMAC", hash: "SHA-256" }, false, ["sign"]);
+  return new Uint8Array(await crypto.subtle.sign("HMAC", imported, data));
+}
+
+const READERS = {
+  f32: (view, at) => [view.getFloat32(at, true), 4],
+  u32: (view, at) => [view.getUint32(at, true), 4],
+  i32: (view, at) => [view.getInt32(at, true), 4],
+  u64: (view, at) => [Number(view.getBigUint64(at, true)), 8],
+  bool: (view, at) => [view.getUint8(at) !== 0, 1],
+  text: (view, at) => {
+    const length = view.getUint16(at, true);
+    return [new TextDecoder().decode(new Uint8Array(view.buffer, view.byteOffset + at + 2, length)), 2 + length];
+  },
+};
+
+/** @typedef {{status: string, reason?: string, text?: string, holder?: string, age_ms?: number}} Answer */
+/** @typedef {{sample: (topic: string, t_us: number, values: Object<string, any>) => void, state: (state: any) => void,
+ *   event: (event: any) => void, asked: (by: string) => void, closed: (why: string) => void}} Listener */
+
+/** One session. */
+export class Link {
+  /** @param {{key: string, role: "control" | "view", name: string}} identity @param {Listener} listener */
+  constructor(identity, listener) {
+    this.identity = identity;
+    this.listener = listener;
+    this.n = 0;
+    this.sending = Promise.resolve();
+    /** Newest master time that the page has painted, µs. */
+    this.seen_us = 0;
+    /** @type {Map<number, (answer: Answer) => void>} */
+    this.waiting = new Map();
+  }
+
+  /** A document of the HTTP API. @param {string} path */
+  async ask(path) {
+    const response = await fetch(`/api/v1/${path}`, { headers: { Authorization: `Bearer ${this.identity.key}` } });
+    const answer = await response.json();
+    if (!response.ok) throw new Error(`${answer.detail}: ${answer.remedy}`);
+    return answer;
+  }
+
+  /** Loads what the robot is, opens the socket, and proves both sides to each other. */
+  async open() {
+    const [robot, channels, commands, faults] = await Promise.all(["robot", "channels", "commands", "faults"].map((path) => this.ask(path)));
+    this.channels = new Map(channels.channels.map((channel) => [channel.id, channel]));
+    this.hashes = { layout: channels.layout, commands: commands.hash };
+    const socket = new WebSocket(`ws://${location.host}/ws`, SUBPROTOCOL);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    await new Promise((resolve, reject) => {
+      let proof = Promise.resolve();
+      socket.onclose = (close) => reject(new Error(close.reason || "the robot's server does not answer"));
+      socket.onmessage = (message) => {
+        proof = proof.then(() => this.greet(JSON.parse(message.data))).then((done) => done && resolve(undefined)).catch(reject);
+      };
+    });
+    socket.onclose = (close) => this.end(close.reason || "the connection has ended");
+    socket.onmessage = (message) => (typeof message.data === "string" ? this.told(JSON.parse(message.data)) : this.samples(message.data));
+    return { robot, commands: commands.commands, faults: faults.injectable };
+  }
+
+  /** One message of the handshake; true when it is over. */
+  async greet(message) {
+    const key = bytes(this.identity.key);
+    const { role, name } = this.identity;
+    if (message.op === "hello") {
+      if (message.layout !== this.hashes.layout || message.commands !== this.hashes.commands) throw new Error("the program has changed: reload this page");
+      this.server = bytes(message.nonce);
+      this.client = crypto.getRandomValues(new Uint8Array(32));
+      this.common = prefixed(this.server, this.client, role, name, location.host, message.layout, message.commands);
+      const proof = await mac(key, Uint8Array.from([...prefixed("c1"), ...this.common]));
+      this.socket.send(JSON.stringify({ op: "auth", role, name, nonce: hexadecimal(this.client), ...this.hashes, mac: hexadecimal(proof) }));
+      return false;
+    }
+    if (message.op !== "welcome") throw new Error(`${message.text ?? "refused"}. ${message.remedy ?? ""}`);
+    const expected = await mac(key, Uint8Array.from([...prefixed("s1"), ...this.common, ...prefixed(message.session)]));
+    if (hexadecimal(expected) !== message.mac) throw new Error("this is not your robot: its server does not have the key");
+    this.session = message.session;
+    this.key = await crypto.subtle.importKey("raw", await mac(key, prefixed("k1", this.server, this.client)), { name: "HMAC", hash: "SHA-256" }, false, ["sign"]);
+    return true;
+  }
+
+  end(why) {
+    for (const answer of this.waiting.values()) answer({ status: "unknown", text: why });
+    this.waiting.clear();
+    this.listener.closed(why);
+  }
+
+  /** Sends a frame after those before it, and gives its number. @param {Object<string, any>} frame */
+  send(frame) {
+    this.n += 1;
+    const n = this.n;
+    const json = text.encode(JSON.stringify({ n, ...frame }));
+    this.sending = this.sending.then(async () => {
+      const signature = new Uint8Array(await crypto.subtle.sign("HMAC", this.key, prefixed("f1", json))).slice(0, 16);
+      if (this.socket.readyState === WebSocket.OPEN) this.socket.send(Uint8Array.from([...signature, ...json]));
+    });
+    return n;
+  }
+
+  /** Sends a frame that is answered. @param {Object<string, any>} frame @returns {Promise<Answer>} */
+  answered(frame) {
+    return new Promise((resolve) => this.waiting.set(this.send(frame), resolve));
+  }
+
+  /** @param {string} cmd @param {Object<string, any>} args */
+  command(cmd, args = {}) {
+    return this.answered({ seen_us: this.seen_us, valid_ms: VALID_MS, cmd, args });
+  }
+
+  stop() {
+    return this.answered({ op: "stop" });
+  }
+
+  beat() {
+    this.send({ op: "beat", seen_us: this.seen_us });
+  }
+
+  /** @param {string[]} channels @param {number} hz */
+  subscribe(channels, hz) {
+    return this.answered({ op: "subscribe", channels, hz });
+  }
+
+  told(message) {
+    if (message.op === "answer") {
+      if (message.status === "accepted") return;
+      this.waiting.get(message.n)?.(message);
+      this.waiting.delete(message.n);
+    } else if (message.op === "state") this.listener.state(message);
+    else if (message.op === "event") this.listener.event(message);
+    else if (message.op === "asked") this.listener.asked(message.by);
+    else if (message.op === "error") this.refusal = message.text;
+  }
+
+  samples(buffer) {
+    const view = new DataView(buffer);
+    const channel = this.channels.get(view.getUint16(1, true));
+    if (view.getUint8(0) !== 1 || !channel) return;
+    let at = 7;
+    while (at < view.byteLength) {
+      const t_us = Number(view.getBigUint64(at, true)) / 1000;
+      at += 8;
+      const values = {};
+      for (const field of channel.fields) {
+        const [value, length] = READERS[field.wire](view, at);
+        values[field.name] = value;
+        at += length;
+      }
+      this.listener.sample(channel.topic, t_us, values);
+    }
+  }
+}

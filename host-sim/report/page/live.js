@@ -1,0 +1,383 @@
+// The console: the robot as it is now, and what its operator may do.
+import { html, svg, set, say, fixed, sign } from "./dom.js";
+import { sideView, topView, footView } from "./robot.js";
+import { Link } from "./link.js";
+
+/** What is older is not shown as if it were now, ms. */
+const STALE_MS = 300;
+const BEAT_MS = 50;
+const EVENTS = 200;
+const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
+const VALVES = ["fill A", "vent A", "fill B", "vent B"];
+const STROKE_MM = 180;
+/** Faults that say of a reading that it is none: SensorRange, SensorRate. */
+const NO_READING = new Set([32, 33]);
+const TRAIL_S = 20;
+
+/** The key from the address, which must not stay there, or of this tab. */
+function identity() {
+  const given = /^#([kv])=([0-9a-f]{64})$/.exec(location.hash);
+  if (given) {
+    sessionStorage.setItem("key", given[2]);
+    sessionStorage.setItem("role", given[1] === "k" ? "control" : "view");
+    history.replaceState(null, "", location.pathname);
+  }
+  const key = sessionStorage.getItem("key");
+  const role = sessionStorage.getItem("role") === "control" ? "control" : "view";
+  return key ? { key, role, name: "browser" } : null;
+}
+
+/** Newest values by channel, and when the newest sample came. */
+const now = { /** @type {Map<string, any>} */ of: new Map(), t_us: 0, heard_ms: -Infinity, /** @type {any} */ state: null };
+/** @type {Link | null} */
+let link = null;
+/** Why the page shows nothing new. */
+let lost = "";
+
+const page = /** @type {HTMLElement} */ (document.getElementById("page"));
+const cell = (name) => {
+  const value = html("b", {}, "–");
+  return { root: html("div", { class: "cell" }, html("small", {}, name), value), value };
+};
+const button = (name, code, act) => html("button", { class: "btn", type: "button", onclick: act }, html("span", {}, name), code && html("small", {}, code));
+
+// ---- answers ----
+const answer = html("p", { class: "answer", role: "status" }, "Nothing was asked yet.");
+function tell(what, { status, text, reason, holder }) {
+  const held = holder ? ` (${holder} is in control)` : "";
+  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `refused: ${text || reason}${held}`;
+  answer.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
+  answer.classList.toggle("bad", status !== "done");
+}
+async function command(name, args) {
+  if (!link) return false;
+  say(answer, `${name} …`);
+  const given = await link.command(name, args);
+  tell(name, given);
+  return given.status === "done";
+}
+/** One after the other; ends at the first refusal. @param {string[]} names */
+async function inTurn(...names) {
+  for (const name of names) if (!(await command(name))) return;
+}
+
+// ---- stop ----
+const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", {}, "Esc"));
+async function stop() {
+  if (!link) return unconfirmed();
+  const timer = setTimeout(unconfirmed, 250);
+  const given = await link.stop();
+  clearTimeout(timer);
+  if (given.status !== "done") return unconfirmed();
+  alarm.hidden = true;
+  tell("STOP", given);
+}
+const alarm = html("p", { class: "banner alarm", role: "alert", hidden: true }, sign("alarm"), " STOP NOT CONFIRMED: CUT THE AIR");
+function unconfirmed() {
+  alarm.hidden = false;
+}
+
+// ---- head ----
+const head = { robot: cell("Robot"), mode: cell("State"), gait: cell("Gait"), link: cell("Newest shown"), speed: cell("Clock"), control: cell("Control") };
+const banner = html("p", { class: "banner", role: "alert", hidden: true });
+
+// ---- views ----
+const pictures = { side: svg("svg"), top: svg("svg"), left: svg("svg"), right: svg("svg") };
+/** @type {any} */
+let views = null;
+function pose() {
+  const joint = (i) => now.of.get(`/joint/${i + 1}`);
+  const legs = [0, 1].map((side) => {
+    const foot = now.of.get(side === 0 ? "/foot/left" : "/foot/right") ?? {};
+    const three = [0, 1, 2].map((i) => joint(3 * side + i));
+    return {
+      commanded_mm: three.map((s) => s?.commanded_mm ?? 90),
+      sensed_mm: three.map((s) => s?.sensed_mm ?? 90),
+      load_n: foot.normal_force_n ?? 0,
+      switches: foot.switches ?? 0,
+    };
+  });
+  const body = now.of.get("/body") ?? {};
+  return { travel_mm: body.x_mm ?? 0, pitch_deg: body.pitch_deg ?? 0, legs };
+}
+
+// ---- joints ----
+const joints = JOINTS.map((name, i) => {
+  const picture = svg("svg", { viewBox: "0 0 260 40", class: "cyl", role: "img" });
+  const title = svg("title", {}, picture);
+  svg("rect", { x: 14, y: 9, width: 200, height: 22, class: "bed" }, picture);
+  const chamber = { a: svg("rect", { x: 14, y: 9, height: 22, class: "air" }, picture), b: svg("rect", { y: 9, height: 22, class: "air" }, picture) };
+  svg("rect", { x: 14, y: 9, width: 200, height: 22, class: "wall" }, picture);
+  const rod = svg("rect", { y: 18, height: 4, class: "rod" }, picture);
+  const piston = svg("rect", { y: 9, width: 7, height: 22, class: "piston" }, picture);
+  const asked = svg("rect", { y: 5, width: 7, height: 30, class: "want" }, picture);
+  const valves = VALVES.map((_, k) => svg("path", { d: k % 2 === 0 ? "M-5,4 L5,4 L0,-4Z" : "M-5,-4 L5,-4 L0,4Z", transform: `translate(${[24, 40, 204, 188][k]},36)`, class: "v" }, picture));
+  const value = html("b", { class: "val" }, "–");
+  const side = html("span", { class: "ask" });
+  const root = html("article", { class: "panel joint", "data-live": true }, html("h2", {}, `${name} `, html("small", {}, `board ${i + 1}`)), html("p", {}, value, side), picture);
+  return {
+    root,
+    update(s, board) {
+      const found = board?.faults ?? [];
+      const blind = found.some((f) => NO_READING.has(f.number));
+      root.classList.toggle("bad", found.length > 0);
+      root.classList.toggle("blind", blind);
+      if (!s) return;
+      const x = (mm) => 14 + (Math.min(Math.max(mm, 0), STROKE_MM) / STROKE_MM) * 193;
+      const at = x(s.sensed_mm);
+      set(piston, { x: at });
+      set(rod, { x: at + 7, width: Math.max(0, 250 - at - 7) });
+      set(asked, { x: x(s.commanded_mm) });
+      const shade = (bar) => Math.min(1, Math.max(0, (bar - 1) / 6)).toFixed(2);
+      set(chamber.a, { width: at - 14, "fill-opacity": shade(s.pressure_a_bar) });
+      set(chamber.b, { x: at + 7, width: 214 - at - 7, "fill-opacity": shade(s.pressure_b_bar) });
+      valves.forEach((v, k) => set(v, { class: (s.valves_open >> k) & 1 ? "v on" : "v" }));
+      say(value, blind ? "No reading" : `${fixed(s.sensed_mm)} mm`);
+      say(side, ` asked ${fixed(s.commanded_mm)}, error ${fixed(s.commanded_mm - s.sensed_mm)} mm; A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)`);
+      say(title, `${name}: ${fixed(s.sensed_mm)} mm of ${STROKE_MM} mm, open: ${VALVES.filter((_, k) => (s.valves_open >> k) & 1).join(", ") || "no valve"}`);
+    },
+  };
+});
+
+// ---- one joint over the last seconds ----
+const trail = { chosen: 3, /** @type {{t: number, asked: number, sensed: number}[]} */ rows: [] };
+const chooser = html("select", { "aria-label": "Joint of the plot", onchange: (e) => ((trail.chosen = Number(e.target.value)), (trail.rows = [])) }, JOINTS.map((name, i) => html("option", { value: i + 1, selected: i + 1 === trail.chosen }, name)));
+const plot = svg("svg", { viewBox: "0 0 600 150", class: "trail", preserveAspectRatio: "none", role: "img" });
+svg("title", {}, plot).textContent = "Stroke of the chosen joint over the last 20 s";
+for (const mm of [0, 60, 120, 180]) svg("line", { x1: 0, x2: 600, y1: 145 - (mm / 180) * 140, y2: 145 - (mm / 180) * 140, class: "grid" }, plot);
+const curves = { asked: svg("polyline", { class: "asked-line" }, plot), sensed: svg("polyline", { class: "sensed-line" }, plot) };
+function drawTrail() {
+  const end = now.t_us * 1e-6;
+  trail.rows = trail.rows.filter((row) => row.t > end - TRAIL_S);
+  const points = (of) => trail.rows.map((row) => `${(600 * (1 - (end - row.t) / TRAIL_S)).toFixed(1)},${(145 - (of(row) / 180) * 140).toFixed(1)}`).join(" ");
+  set(curves.asked, { points: points((row) => row.asked) });
+  set(curves.sensed, { points: points((row) => row.sensed) });
+}
+
+// ---- faults, boards, events ----
+const faults = html("ul", { class: "faults" });
+const boards = html("ol", { class: "boards" });
+const events = html("ol", { class: "events" });
+function showBoards(state) {
+  boards.replaceChildren(
+    ...state.boards.map((b) => {
+      const bad = !b.present || b.faults.length > 0;
+      return html("li", { class: bad ? "bad" : "" }, html("b", {}, String(b.address), sign(bad ? "alarm" : "met")), html("span", {}, b.present ? b.mode : "missing"));
+    }),
+  );
+  // One line for what many boards have.
+  const rows = new Map();
+  for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
+  faults.replaceChildren(
+    ...[...rows.values()].map(({ fault: f, boards: of }) => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`), html("p", {}, f.remedy), html("small", {}, `${f.name}, number ${f.number}`))),
+    ...(rows.size === 0 ? [html("li", { class: "none" }, sign("met"), " No board has a fault.")] : []),
+  );
+}
+let shownBoards = "";
+
+// ---- forms ----
+/** @type {any[]} */
+let commands = [];
+const form = html("form", { class: "form" });
+const fields = html("div", { class: "fields" });
+const which = html("select", { "aria-label": "Command", onchange: showFields });
+const effect = html("p", { class: "effect" });
+form.append(html("div", { class: "row" }, which, html("button", { class: "btn" }, "Send")), effect, fields);
+const fault = html("select", { "aria-label": "Fault" });
+const target = html("input", { "aria-label": "Target and value", placeholder: ":joint3 or =3", size: 14, spellcheck: "false" });
+const injected = html("ul", { class: "injected" });
+
+function showFields() {
+  const chosen = commands.find((c) => c.name === which.value);
+  if (!chosen) return;
+  say(effect, chosen.effect);
+  fields.replaceChildren(
+    ...chosen.arguments.map((a) => {
+      const label = `${a.name}${a.unit ? ` [${a.unit}]` : ""}`;
+      const range = a.min != null ? `${a.min} to ${a.max}` : "";
+      let input;
+      if (a.choices) input = html("select", { name: a.name, "data-kind": "text" }, a.choices.map((c) => html("option", {}, c)));
+      else if (a.kind === "flag") input = html("select", { name: a.name, "data-kind": "flag" }, html("option", {}, "false"), html("option", {}, "true"));
+      else if (a.kind === "text") input = html("input", { name: a.name, "data-kind": "text" });
+      else input = html("input", { name: a.name, "data-kind": "number", type: "number", step: "any", min: a.min, max: a.max, required: true, value: a.min != null && a.min > 0 ? a.min : 0 });
+      return html("label", { title: a.description }, html("span", {}, label), input, html("small", {}, range));
+    }),
+  );
+}
+form.addEventListener("submit", (submit) => {
+  submit.preventDefault();
+  const args = {};
+  for (const input of fields.querySelectorAll("[name]")) {
+    const field = /** @type {HTMLInputElement} */ (input);
+    args[field.name] = field.dataset.kind === "number" ? Number(field.value) : field.dataset.kind === "flag" ? field.value === "true" : field.value;
+  }
+  command(which.value, args);
+});
+
+// ---- what the operator does ----
+const take = button("Take control", "0x0125", () => command(mine() ? "ReleaseControl" : "TakeControl"));
+const ready = button("Ready", "take, arm, stand", () => inTurn(...(mine() ? [] : ["TakeControl"]), "Arm", "Stand"));
+const walk = button("Walk", "StartGait", () => command(walking() ? "StopGait" : "StartGait"));
+const hold = button("Hold", "Space", () => command("Hold"));
+const disarm = button("Disarm", "", () => command("Disarm"));
+const clear = button("Clear fault", "", () => command("ClearFault"));
+const mine = () => Boolean(link && now.state?.control?.session === link.session);
+const WALKING = new Set(["unload", "lift", "reach", "lower", "push", "rest", "trajectory"]);
+const walking = () => WALKING.has(now.state?.phase);
+
+addEventListener("keydown", (key) => {
+  const inField = key.target instanceof Element && key.target.matches("input, select, textarea");
+  if (key.key === "Escape") {
+    key.preventDefault();
+    stop();
+  } else if (key.key === " " && !inField && !(key.target instanceof HTMLButtonElement)) {
+    key.preventDefault();
+    command("Hold");
+  }
+});
+/** Who does not look does not drive. */
+const leaves = () => mine() && command("Hold");
+document.addEventListener("visibilitychange", () => document.hidden && leaves());
+addEventListener("pagehide", leaves);
+
+// ---- the page ----
+function build({ robot, commands: list, faults: injectable }) {
+  views = { side: sideView(pictures.side, robot.drawing), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
+  say(head.robot.value, robot.name);
+  commands = list;
+  which.replaceChildren(...[0, 1, 2].map((layer) => html("optgroup", { label: ["Layer 0: joints, wheels, boards", "Layer 1: gait", "Simulation"][layer] }, list.filter((c) => c.layer === layer).map((c) => html("option", { value: c.name }, `${c.name} 0x${c.code.toString(16).padStart(4, "0")}`)))));
+  which.value = "JointReference";
+  showFields();
+  fault.replaceChildren(...injectable.map((f) => html("option", { value: f.fault, title: f.effect }, f.fault)));
+  const inject = button("Inject", "", () => command("Inject", { fault: `${fault.value}${target.value.trim()}` }));
+  page.replaceChildren(
+    html(
+      "header",
+      { class: "bar" },
+      html("h1", {}, "Wheeleg ", html("small", {}, "simulated")),
+      html("div", { class: "cells" }, head.mode.root, head.gait.root, head.control.root, head.link.root, head.speed.root, head.robot.root),
+      html("div", { class: "stopbox" }, stopButton),
+    ),
+    alarm,
+    banner,
+    html(
+      "main",
+      {},
+      html(
+        "div",
+        { class: "col" },
+        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), html("div", { class: "plan" }, pictures.top), html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
+        html("section", { class: "joints", "aria-label": "Joints" }, joints.map((j) => j.root)),
+        html("section", { class: "panel strip", "data-live": true }, html("header", {}, html("h2", {}, "Stroke, last 20 s, 0 to 180 mm"), chooser, html("span", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), plot),
+      ),
+      html(
+        "div",
+        { class: "col" },
+        html("section", { class: "panel", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), answer),
+        html("section", { class: "panel" }, html("h2", {}, "Faults"), faults),
+        html("section", { class: "panel", "data-live": true }, html("h2", {}, "Boards"), boards),
+        html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
+        html("section", { class: "panel" }, html("h2", {}, "Faults to try"), html("div", { class: "row" }, fault, target, inject), injected),
+        html("section", { class: "panel eventlist" }, html("h2", {}, "Events"), events),
+      ),
+    ),
+  );
+  new ResizeObserver(([entry]) => pictures.side.style.setProperty("--u", (1310 / Math.max(entry.contentRect.width, entry.contentRect.height * 2.16, 1)).toFixed(2))).observe(pictures.side);
+}
+
+const ROLE = { armed: "ARMED", disarmed: "disarmed" };
+function showState(state) {
+  const stopped = state.emergency_stop ? "STOPPED" : state.hold ? `HOLD: ${state.hold.replaceAll("_", " ")}` : null;
+  say(head.mode.value, !state.alive ? "master is dead" : stopped ?? (state.armed ? ROLE.armed : ROLE.disarmed));
+  head.mode.root.classList.toggle("alarm", Boolean(stopped) || !state.alive);
+  say(head.gait.value, state.step > 0 && walking() ? `${state.phase}, step ${state.step}` : state.phase);
+  say(head.control.value, mine() ? "you" : (state.control?.holder ?? "free"));
+  const speed = state.pace.paused ? "paused" : `× ${fixed(state.pace.factor)}`;
+  say(head.speed.value, speed);
+  say(take.firstElementChild, mine() ? "Release control" : "Take control");
+  say(take.lastElementChild, mine() ? "0x0126" : "0x0125");
+  say(walk.firstElementChild, walking() ? "Stop gait" : "Walk");
+  say(walk.lastElementChild, walking() ? "StopGait" : "StartGait");
+  const looks = link?.identity.role !== "control";
+  for (const b of [take, ready, walk, hold, disarm, clear]) b.toggleAttribute("disabled", looks);
+  const key = JSON.stringify(state.boards);
+  if (key !== shownBoards) {
+    shownBoards = key;
+    showBoards(state);
+  }
+  const active = state.faults.join();
+  if (injected.dataset.active !== active) {
+    injected.dataset.active = active;
+    injected.replaceChildren(...state.faults.map((f) => html("li", {}, f, button("End", "", () => command("EndFault", { fault: f })))));
+  }
+}
+
+/** Draws the newest state, and only then counts it as seen. */
+function paint() {
+  requestAnimationFrame(paint);
+  if (!views) return;
+  const age = performance.now() - now.heard_ms;
+  const stale = lost !== "" || age > STALE_MS;
+  document.body.dataset.state = stale ? "stale" : "live";
+  banner.hidden = !stale;
+  if (stale) {
+    say(banner, lost || `Nothing new for ${fixed(age / 1000)} s: what is shown is old.`);
+    say(head.link.value, `${fixed(age / 1000)} s old`);
+    return;
+  }
+  const robot = pose();
+  views.side.update(robot);
+  views.top.update(robot);
+  robot.legs.forEach((state, i) => views.feet[i].update(state));
+  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
+  drawTrail();
+  if (now.state) showState(now.state);
+  say(head.link.value, `${fixed(now.t_us * 1e-6, 2)} s`);
+  if (link) link.seen_us = Math.floor(now.t_us);
+}
+
+const listener = {
+  sample(topic, t_us, values) {
+    now.of.set(topic, values);
+    now.heard_ms = performance.now();
+    now.t_us = Math.max(now.t_us, t_us);
+    if (topic === `/joint/${trail.chosen}`) trail.rows.push({ t: t_us * 1e-6, asked: values.commanded_mm, sensed: values.sensed_mm });
+  },
+  state(state) {
+    now.state = state;
+    now.heard_ms = performance.now();
+    now.t_us = Math.max(now.t_us, state.master_us);
+  },
+  event(event) {
+    const bad = event.kind === "fault" || event.code === "fault";
+    events.prepend(html("li", { class: bad ? "bad" : "" }, html("time", {}, fixed(event.t_ns * 1e-9, 2)), html("span", {}, event.text)));
+    while (events.childElementCount > EVENTS) events.lastElementChild?.remove();
+  },
+  asked(by) {
+    tell(`${by} asks for the control`, { status: "done" });
+  },
+  closed(why) {
+    lost = `${why}. Nothing is sent any more; reload the page to look again.`;
+    link = null;
+  },
+};
+
+async function begin() {
+  const who = identity();
+  if (!who) {
+    page.replaceChildren(html("p", { class: "alone" }, "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key."));
+    return;
+  }
+  try {
+    const opened = new Link(who, listener);
+    const about = await opened.open();
+    link = opened;
+    build(about);
+    await link.subscribe([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body"], 30);
+    setInterval(() => mine() && link?.beat(), BEAT_MS);
+  } catch (error) {
+    page.replaceChildren(html("p", { class: "alone", role: "alert" }, error instanceof Error ? error.message : String(error)));
+  }
+}
+begin();
+paint();
