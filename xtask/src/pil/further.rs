@@ -15,6 +15,10 @@ use crate::report::StepResult;
 use crate::runs::{ensure_equal, most, put_most, run_nodes};
 use crate::sizes;
 
+/// Robots with the paper's law, and with the predictive one.
+const PAPER: &str = "wheeleg-2003";
+const PREDICTIVE: &str = "wheeleg";
+
 /// Runs in which boards latch faults, with what strikes them: the master falls silent, a
 /// wheel runs against its drive, a valve does not open, the emergency stop; in which a
 /// board's supply or program fails in mid-move, and a request to brake ends with a tick
@@ -66,21 +70,15 @@ fn ensure_measured(worst: u64, image: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Plays the runs with faults, with the files of `scenarios`; their figures. No bit may differ from
-/// the host.
-fn struck(
-    emulator: &Path,
-    images: &Path,
-    folder: &str,
-    scenarios: impl Fn(&str) -> anyhow::Result<PathBuf>,
-) -> StepResult<Value> {
+/// Plays the runs with faults, with this robot; their figures. No bit may differ from the host.
+fn with_faults(emulator: &Path, images: &Path, folder: &str, robot: &str) -> StepResult<Value> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let mut runs = Vec::new();
     for (number, (scenario, faults, codes)) in EVENTFUL.into_iter().enumerate() {
         let folder = format!("{folder}-{number}");
-        let further = [&["--compare-sil"], faults].concat();
+        let further = [&["--compare-sil", "--robot", robot], faults].concat();
         let mut run = run_nodes(
-            &scenarios(scenario)?,
+            Path::new(scenario),
             &["--nodes", "pil"],
             &folder,
             &environment,
@@ -105,9 +103,7 @@ fn struck(
 
 /// Runs with faults: the worst ticks have the budgets of the others.
 pub(super) fn eventful(emulator: &Path, images: &Path) -> StepResult<Value> {
-    let mut figures = struck(emulator, images, "pil-run/eventful", |name| {
-        Ok(PathBuf::from(name))
-    })?;
+    let mut figures = with_faults(emulator, images, "pil-run/eventful", PAPER)?;
     let within_budget = sizes::check_run(images, &mut figures);
     println!("    {figures}");
     within_budget?;
@@ -125,42 +121,16 @@ fn changed(folder: &Path, from: &str, to: &str, old: &str, new: &str) -> anyhow:
     Ok(path)
 }
 
-/// A copy of a scenario in which the joints have the predictive law.
-fn with_predictive_law(scenario: &str) -> anyhow::Result<PathBuf> {
-    let folder = target_dir().join("pil-run").join("predictive");
-    let law = r#"law = { value = 5, unit = "1", source = "ASSUMED: this run's" }"#;
-    let robot = changed(
-        &folder,
-        "robots/wheeleg-2003.toml",
-        "robot.toml",
-        "[node.joint]\n",
-        &format!("[node.joint]\n{law}\n"),
-    )?;
-    let text = fs::read_to_string(&robot).with_context(|| robot.display().to_string())?;
-    let laws = text.lines().filter(|line| line.starts_with("law "));
-    ensure!(
-        laws.count() == 1,
-        "the law of all joints is this run's alone"
-    );
-    changed(
-        &folder,
-        &format!("scenarios/{scenario}.toml"),
-        &format!("{scenario}.toml"),
-        r#"robot = "wheeleg-2003""#,
-        r#"robot = "robot.toml""#,
-    )
-}
-
 /// The paper's test, and the runs with faults, with the predictive law: no bit may differ from the
 /// host, and tick and stack have their budgets.
 pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult<Value> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let summary = run_nodes(
-        &with_predictive_law("three-step")?,
+        Path::new("three-step"),
         &["--nodes", "pil"],
-        "pil-run/predictive/out",
+        "pil-run/predictive",
         &environment,
-        &["--compare-sil"],
+        &["--compare-sil", "--robot", PREDICTIVE],
     )?;
     let pil = &summary["pil"];
     ensure_equal(pil)?;
@@ -169,12 +139,7 @@ pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult<Value> {
     put_most(&mut steps, &[pil]);
     println!("    three steps with the predictive law {steps}");
     sizes::check_run(images, &mut steps)?;
-    let mut figures = struck(
-        emulator,
-        images,
-        "pil-run/predictive/out",
-        with_predictive_law,
-    )?;
+    let mut figures = with_faults(emulator, images, "pil-run/predictive", PREDICTIVE)?;
     println!("    with faults {figures}");
     sizes::check_run(images, &mut figures)?;
     figures["joint"]["tick_instructions_worst_three_steps"] = json!(worst);
