@@ -13,13 +13,14 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::argument::{
     ACCELERATION, Argument, BOARD, CORRECTION, FORWARD, GAIN, HEIGHT, HELD_LEG_S5, HELD_LEG_S6,
-    JOINT, LEFT, LEG, LIFT, LOWER, PARAMETER, PATTERN, PERIOD, POLE, PUSH, PUSH_ACCELERATION,
+    JOINT, LEFT, LEG, LIFT, LOWER, NOSE, PARAMETER, PATTERN, PERIOD, POLE, PUSH, PUSH_ACCELERATION,
     PUSH_SPEED, RATE, REACH, SIDE, SPEED, STEP_STROKE, STEPPING_LEG, STEPS, STROKE,
-    TOUCHDOWN_REFLEX, TRAVEL, VALUE, YAW_S2, ZERO,
+    TOUCHDOWN_REFLEX, TRAVEL, TURN, VALUE, WALK_LIFT, WALK_PATTERN, WALK_SPEED, YAW_S2, ZERO,
 };
 use crate::contact::Side;
 use crate::layer1::foot::FootShape;
 use crate::layer1::params::GaitParams;
+use crate::layer1::walk::WalkOrder;
 
 pub use build::{ArgumentError, Given};
 pub use reference::write_markdown;
@@ -170,6 +171,11 @@ pub enum Command {
     StartGait,
     /// End the gait with the present step.
     StopGait,
+    /// Walk, or change the order of the walk under way.
+    Walk(
+        /// What is asked for.
+        WalkOrder,
+    ),
     /// Replace the gait parameters.
     SetGait(
         /// New parameters.
@@ -282,9 +288,10 @@ commands! {
     Stand = 0x0201, [], "Slews all joints to the start pose of the gait.", Self::Stand =>
     Hold = 0x0202, [], "Freezes every joint at its measured stroke and stops the wheels.", Self::Hold =>
     StartGait = 0x0203, [], "Starts the gait from the start pose.", Self::StartGait =>
-    StopGait = 0x0204, [], "Ends the gait with the step under way.", Self::StopGait =>
+    StopGait = 0x0204, [], "Ends the gait with the step under way, or a walk with both feet down.", Self::StopGait =>
     SetGait = 0x0205, [STEPS, PERIOD, LIFT, REACH, LOWER, PUSH, STEP_STROKE, HELD_LEG_S5, HELD_LEG_S6, YAW_S2, PUSH_SPEED, PUSH_ACCELERATION, PATTERN, STEPPING_LEG, TOUCHDOWN_REFLEX], "Replaces the gait parameters; refused while a gait runs.", Self::SetGait(_) =>
     FootTrajectory = 0x0206, [LEG, FORWARD, LEFT, HEIGHT, RATE], "Moves one foot along a sinusoid through inverse kinematics.", Self::FootTrajectory { .. } =>
+    Walk = 0x0207, [WALK_SPEED, TURN, WALK_PATTERN, WALK_LIFT, NOSE], "Walks, or changes the walk under way; wheels and legs go on together until StopGait or Hold.", Self::Walk(_) =>
 }
 
 impl CommandCode {

@@ -3,6 +3,7 @@
 use crate::layer0::odometry::WheelGeometry;
 use crate::layer1::homing::HomingConfig;
 use crate::layer1::params::GaitParams;
+use crate::layer1::walk::WalkGeometry;
 use crate::setpoint::NODES;
 
 /// Unique id of a board's processor.
@@ -46,6 +47,8 @@ pub struct MasterConfig {
     pub homing: HomingConfig,
     /// Wheels and encoders.
     pub wheels: WheelGeometry,
+    /// Dimensions that a walk needs.
+    pub walk: WalkGeometry,
     /// Sample time of the wheel controllers, µs, 128..=2048 (520 is the chip's
     /// reset value at 2 MHz).
     pub wheel_sample_us: u32,
@@ -73,6 +76,7 @@ impl Default for MasterConfig {
             gait: GaitParams::default(),
             homing: HomingConfig::default(),
             wheels: WheelGeometry::default(),
+            walk: WalkGeometry::default(),
             wheel_sample_us: 520,
             wheel_drive: WheelDrive::default(),
             switch_frame: SwitchFrame::default(),

@@ -169,6 +169,9 @@ pub enum Refusal {
         /// Which, and its limits.
         ParamError,
     ),
+    /// A walk needs wheels that follow the master's references; those of this robot make profiles
+    /// of their own.
+    WheelsNotStreamed,
     /// Another command of this kind is still being carried out.
     Busy,
     /// An E-stop or HOLD came between.

@@ -5,6 +5,7 @@ use wheeleg_protocol::MAX_ENCODED;
 
 use crate::command::Command;
 use crate::config::MasterConfig;
+use crate::config::WheelDrive;
 use crate::dispatcher::{Dispatcher, Refusal, Reject, Request, Ticket};
 use crate::event::{Event, Events};
 use crate::fifo::{
@@ -58,7 +59,11 @@ impl Master {
         Ok(Self {
             dispatcher: Dispatcher::new(),
             layer0: Layer0::new(config),
-            layer1: Layer1::new(config.gait, config.homing)?,
+            layer1: Layer1::new(
+                config.gait,
+                config.homing,
+                (config.wheel_drive == WheelDrive::Stream).then_some(config.walk),
+            )?,
             layer1_enabled: true,
             commands0: CommandFifo::new(),
             commands1: CommandFifo::new(),

@@ -86,6 +86,8 @@ pub enum Phase {
     Trajectory = 10,
     /// All references frozen at the measured position.
     Hold = 11,
+    /// Walking, both legs at their own times.
+    Walk = 12,
 }
 
 impl Phase {
@@ -143,18 +145,36 @@ pub struct JointSetpoint {
     pub reflex: Reflex,
 }
 
-/// Reference of both wheels' common travel.
+/// Reference of one wheel's travel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TravelSetpoint {
+pub struct WheelTravel {
     /// Distance in mm from where the motion began, now.
     pub travel_mm: PositionMm,
-    /// Distance in mm at the end of the motion.
+    /// Distance in mm at the end of the motion; where no end is planned, as `travel_mm`.
     pub target_mm: PositionMm,
     /// Speed of the reference, mm/s.
     pub velocity_mm_s: VelocityMmS,
+}
+
+/// References of the wheels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TravelSetpoint {
+    /// Left and right.
+    pub wheels: [WheelTravel; WHEELS],
     /// Changes whenever a new motion begins: layer 0 then takes the wheels'
-    /// present reference as the new origin.
+    /// present references as the new origins.
     pub segment: u16,
+}
+
+impl TravelSetpoint {
+    /// Both wheels alike.
+    #[must_use]
+    pub const fn common(wheel: WheelTravel, segment: u16) -> Self {
+        Self {
+            wheels: [wheel; WHEELS],
+            segment,
+        }
+    }
 }
 
 /// One cycle's references, layer 1 to layer 0.
@@ -213,6 +233,8 @@ pub struct Feedback {
     pub feet: [Option<FootSwitches>; WHEELS],
     /// Mean wheel travel since start-up, µm (positive forward).
     pub travel_um: i64,
+    /// Travel of the left and the right wheel since start-up, µm (positive forward).
+    pub wheels_um: [i64; WHEELS],
     /// All nodes armed, alive and free of faults: motion may go on.
     pub motion_allowed: bool,
 }

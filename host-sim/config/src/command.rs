@@ -17,8 +17,13 @@ const OF_THE_EVENT: [&str; 3] = ["at", "action", "command"];
 pub(super) fn read(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Command> {
     let names: Vec<(&str, CommandCode)> = TABLE.iter().map(|row| (row.name, row.code)).collect();
     let code = r.choice(entry, "command", &names)?;
+    reject_others(r, entry, &code.info(), top);
+    arguments(r, entry, code)
+}
+
+/// Reads the arguments of a command that stand in `entry`.
+pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Option<Command> {
     let row = code.info();
-    reject_others(r, entry, &row, top);
     let missing = row
         .arguments
         .iter()
@@ -32,9 +37,9 @@ pub(super) fn read(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Comman
                 "`{}`: the command {} of the scenario needs `{}`",
                 entry.path, row.name, argument.name
             ),
-            "in this event",
+            "in this section",
             Some(format!(
-                "add `{}` to the event: {}",
+                "add `{}` to it: {}",
                 argument.name,
                 example(argument)
             )),
@@ -59,7 +64,7 @@ pub(super) fn read(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Comman
         Ok(command) => Some(command),
         Err(error) => {
             let message = format!("`{}`: {error}", entry.path);
-            r.problem(Some(entry.span.clone()), message, "in this event", None);
+            r.problem(Some(entry.span.clone()), message, "in this section", None);
             None
         }
     }

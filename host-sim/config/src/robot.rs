@@ -86,6 +86,8 @@ params! {
         push_acceleration_m_s2: f64, "push_acceleration", Acceleration, PUSH_ACCELERATION[0], PUSH_ACCELERATION[1];
         /// Stop the lowering of a foot where its switches close.
         touchdown_reflex: bool, "touchdown_reflex", Flag, 0.0, 1.0;
+        /// The master leads the wheels in every cycle, as a walk needs; otherwise their boards make profiles of their own.
+        stream_wheels: bool, "stream_wheels", Flag, 0.0, 1.0;
     }
 
     /// Reference model of the paper's curves: a critically damped cylinder (MODEL.md 6.2).

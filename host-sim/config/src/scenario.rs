@@ -1,7 +1,8 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
 use wheeleg_master::argument;
-use wheeleg_master::command::Command;
+use wheeleg_master::command::{Command, CommandCode};
+use wheeleg_master::layer1::walk::WalkOrder;
 
 use super::command;
 use super::error::ConfigError;
@@ -29,6 +30,8 @@ pub enum Motion {
         /// The stepping leg.
         leg: LegChoice,
     },
+    /// Walk, until a command of an event changes or ends it.
+    Walk(WalkOrder),
     /// Sinusoidal foot trajectory of the paper's section 6.
     Sinusoid {
         /// The moving leg.
@@ -275,6 +278,7 @@ fn required(r: &mut Reader, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
 #[derive(Clone, Copy)]
 enum MotionKind {
     Stand,
+    Walk,
     SquareWave,
     Sinusoid,
 }
@@ -294,6 +298,7 @@ fn motion(r: &mut Reader) -> Option<Motion> {
     };
     let kinds = [
         ("stand", MotionKind::Stand),
+        ("walk", MotionKind::Walk),
         ("square-wave", MotionKind::SquareWave),
         ("sinusoid", MotionKind::Sinusoid),
     ];
@@ -301,6 +306,14 @@ fn motion(r: &mut Reader) -> Option<Motion> {
         MotionKind::Stand => {
             r.reject_misplaced(&entry, &["kind"], &TOP);
             Some(Motion::Stand)
+        }
+        MotionKind::Walk => {
+            let known = ["kind", "speed", "turn", "pattern", "lift", "nose"];
+            r.reject_misplaced(&entry, &known, &TOP);
+            match command::arguments(r, &entry, CommandCode::Walk)? {
+                Command::Walk(order) => Some(Motion::Walk(order)),
+                _ => None,
+            }
         }
         MotionKind::SquareWave => {
             r.reject_misplaced(&entry, &["kind", "leg"], &TOP);

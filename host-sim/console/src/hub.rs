@@ -783,6 +783,7 @@ const fn phase_name(phase: Phase) -> &'static str {
         Phase::Done => "done",
         Phase::Trajectory => "trajectory",
         Phase::Hold => "hold",
+        Phase::Walk => "walk",
     }
 }
 

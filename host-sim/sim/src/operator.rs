@@ -164,6 +164,7 @@ impl Operator {
         let command = match self.motion {
             Motion::Stand => return Ok(()),
             Motion::SquareWave { .. } => Command::StartGait,
+            Motion::Walk(order) => Command::Walk(order),
             Motion::Sinusoid {
                 leg,
                 length_m,

@@ -8,6 +8,7 @@ use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::homing::HomingConfig;
 use wheeleg_master::layer1::params::Pattern;
+use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
 use wheeleg_plant::terrain::{Material, Part, Shape, Solid, Terrain};
@@ -20,7 +21,7 @@ use wheeleg_config::{LegChoice, Motion, RobotConfig, Scenario};
 fn stepping_leg(scenario: &Scenario) -> LegChoice {
     match scenario.motion {
         Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => leg,
-        Motion::Stand => LegChoice::Left,
+        Motion::Stand | Motion::Walk(_) => LegChoice::Left,
     }
 }
 
@@ -78,6 +79,7 @@ fn terrain(scenario: &Scenario) -> Terrain {
 pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
     let cycles = |s: f64| (s / robot.bus.cycle_s).round() as u16;
     let motor = &robot.plant.motors[0];
+    let body = &robot.plant.body;
     let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
     let circumference_um = robot.plant.body.wheel_radius_m * TAU * 1e6;
     MasterConfig {
@@ -94,8 +96,16 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
             counts_per_revolution: counts.round() as u32,
             circumference_um: circumference_um.round() as u32,
         },
-        // The paper's wheel boards make the trapezoid themselves.
-        wheel_drive: WheelDrive::Profile,
+        wheel_drive: if robot.gait.stream_wheels {
+            WheelDrive::Stream
+        } else {
+            WheelDrive::Profile
+        },
+        walk: WalkGeometry {
+            hip_x_m: body.o4_m[0] as f32,
+            hip_y_m: body.o4_m[1] as f32,
+            track_m: robot.plant.spatial.track_m as f32,
+        },
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
         commissioned: robot.commissioned,

@@ -572,6 +572,7 @@ const fn refusal_name(reason: &Refusal) -> &'static str {
         Refusal::NotConfirmed => "not_confirmed",
         Refusal::NoSuchJoint { .. } => "no_such_joint",
         Refusal::Parameter(_) => "parameter",
+        Refusal::WheelsNotStreamed => "wheels-not-streamed",
         Refusal::Busy => "busy",
         Refusal::Interrupted => "interrupted",
         Refusal::NotSettled { .. } => "not_settled",

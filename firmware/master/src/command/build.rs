@@ -10,6 +10,7 @@ use crate::argument::{self, Argument, OutOfRange, Value};
 use crate::contact::Side;
 use crate::layer1::foot::FootShape;
 use crate::layer1::params::{GaitParams, ParamError, Pattern};
+use crate::layer1::walk::{WalkOrder, WalkPattern};
 
 /// A value for the argument of this name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,6 +156,16 @@ impl Command {
             CommandCode::Hold => Self::Hold,
             CommandCode::StartGait => Self::StartGait,
             CommandCode::StopGait => Self::StopGait,
+            CommandCode::Walk => Self::Walk(WalkOrder {
+                speed_mm_s: read.speed(&argument::WALK_SPEED)?,
+                turn_rad_s: read.fixed(&argument::TURN)?,
+                pattern: match read.choice(&argument::WALK_PATTERN)? {
+                    0 => WalkPattern::Alternate,
+                    _ => WalkPattern::Tandem,
+                },
+                lift_mm: read.length(&argument::WALK_LIFT)?,
+                nose_mm: read.length(&argument::NOSE)?,
+            }),
             CommandCode::SetGait => Self::SetGait(read.gait()?),
             CommandCode::FootTrajectory => Self::FootTrajectory {
                 side: read.side(&argument::LEG)?,

@@ -4,7 +4,7 @@ use wheeleg_protocol as proto;
 use wheeleg_protocol::{Address, Correction, Message, OpenMode, WheelControlMode};
 
 use super::acyclic::{ARMING_JOBS, Job, PROFILE_JOBS, Purpose};
-use super::wheels::Wheels;
+use super::wheels::DirectMove;
 use super::{Group, GroupKind, Layer0, Power};
 use crate::argument::{self, Argument, Value};
 use crate::command::{Command, CorrectionKind};
@@ -85,7 +85,12 @@ impl Layer0 {
                     return Err(Refusal::Moving);
                 }
                 self.direct_segment = self.direct_segment.wrapping_add(1) | 0x8000;
-                self.direct_travel = Some(Wheels::direct(travel_mm, self.direct_segment));
+                self.direct_travel = Some(DirectMove::new(
+                    travel_mm,
+                    &self.push,
+                    self.cycle_start_us,
+                    self.direct_segment,
+                ));
                 Ok(true)
             }
             Command::OpenAllValves { joint } => {

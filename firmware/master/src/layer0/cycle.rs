@@ -34,6 +34,7 @@ impl Layer0 {
             strokes_mm: [None; JOINTS],
             feet: self.feet,
             travel_um: self.odometry.travel_um(),
+            wheels_um: [Side::Left, Side::Right].map(|side| self.odometry.wheel_um(side)),
             motion_allowed: self.motion_allowed(),
         };
         for (stroke, reply) in feedback.strokes_mm.iter_mut().zip(replies) {
@@ -72,7 +73,7 @@ impl Layer0 {
         }
         self.cycle = self.cycle.wrapping_add(1);
         self.cycle_start_us = now_us;
-        self.slots = self.build_slots();
+        self.slots = self.build_slots(now_us);
         self.nodes.begin_cycle();
         let flags = if self.emergency_stop {
             SyncFlags::ESTOP
@@ -103,7 +104,7 @@ impl Layer0 {
         }
     }
 
-    fn build_slots(&mut self) -> SyncSlots {
+    fn build_slots(&mut self, now_us: u64) -> SyncSlots {
         let mut slots = SyncSlots::NONE;
         if self.power != Power::Armed {
             return slots;
@@ -128,7 +129,8 @@ impl Layer0 {
             };
             let _is_joint = slots.set_joint(address, slot);
         }
-        if let Some(travel) = self.direct_travel.or(setpoints.travel) {
+        let direct = self.direct_travel.map(|travel| travel.setpoint(now_us));
+        if let Some(travel) = direct.or(setpoints.travel) {
             for (side, number) in [(Side::Left, 7), (Side::Right, 8)] {
                 let slot = self.wheels.setpoint(
                     side,

@@ -34,7 +34,7 @@ use crate::config::MasterConfig;
 use crate::contact::FootSwitches;
 use crate::dispatcher::{Refusal, Ticket};
 use crate::event::HoldReason;
-use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, TravelSetpoint, WHEELS};
+use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
 use feet::FootWatch;
@@ -47,7 +47,7 @@ use operator::Lease;
 use questions::Questions;
 use reflex::Reflexes;
 use sums::Sums;
-use wheels::{WheelUnits, Wheels};
+use wheels::{DirectMove, WheelUnits, Wheels};
 
 /// Cycles without set-points from layer 1 after which all axes hold: 100 ms.
 pub const STALL_CYCLES: u16 = 10;
@@ -116,7 +116,7 @@ pub struct Layer0 {
     frozen: Option<[Option<PositionMm>; JOINTS]>,
     /// References of the user, one joint at a time.
     direct: [Option<PositionMm>; JOINTS],
-    direct_travel: Option<TravelSetpoint>,
+    direct_travel: Option<DirectMove>,
     direct_segment: u16,
     feet: [Option<FootSwitches>; WHEELS],
     foot_watches: [FootWatch; WHEELS],

@@ -6,8 +6,9 @@ use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
 use super::odometry::{Odometry, WheelGeometry};
 use crate::config::WheelDrive;
 use crate::contact::Side;
-use crate::layer1::units::{mm_to_um, um_to_mm};
-use crate::setpoint::{TravelSetpoint, WHEELS};
+use crate::layer1::profile::Trapezoid;
+use crate::layer1::units::{mm_to_um, um_to_mm, us_to_seconds};
+use crate::setpoint::{PushProfile, TravelSetpoint, WHEELS, WheelTravel};
 
 /// Conversions between distance and the wheel controller's counts and samples.
 #[derive(Clone, Copy, Debug)]
@@ -104,9 +105,10 @@ impl Wheels {
                 begin
             }
         };
+        let wheel = travel.wheels.get(side.index())?;
         let (distance, velocity_raw) = match drive {
-            WheelDrive::Profile => (travel.target_mm, 0),
-            WheelDrive::Stream => (travel.travel_mm, units.velocity_raw(travel.velocity_mm_s)),
+            WheelDrive::Profile => (wheel.target_mm, 0),
+            WheelDrive::Stream => (wheel.travel_mm, units.velocity_raw(wheel.velocity_mm_s)),
         };
         let counts = units.geometry.um_to_counts(mm_to_um(distance));
         let reference = begin.wrapping_add(i32::try_from(counts).unwrap_or(0));
@@ -137,15 +139,56 @@ impl Wheels {
             open.saturating_add(counts).unsigned_abs() <= u64::from(REACH_COUNTS.unsigned_abs())
         })
     }
+}
 
-    /// Distance of a motion of `travel_mm` in its own segment.
-    #[must_use]
-    pub const fn direct(travel_mm: PositionMm, segment: u16) -> TravelSetpoint {
-        TravelSetpoint {
-            travel_mm,
+/// A move of both wheels that the user commands by its length.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DirectMove {
+    /// From where the wheels are to the end, over its magnitude.
+    profile: Trapezoid,
+    backward: bool,
+    target_mm: PositionMm,
+    start_us: u64,
+    segment: u16,
+}
+
+impl DirectMove {
+    /// A move of `travel_mm` from `start_us` on, with speed and acceleration as given.
+    pub(super) fn new(
+        travel_mm: PositionMm,
+        shape: &PushProfile,
+        start_us: u64,
+        segment: u16,
+    ) -> Self {
+        let length_mm = travel_mm.get().to_num::<f32>();
+        Self {
+            profile: Trapezoid::new(
+                libm::fabsf(length_mm),
+                shape.speed_mm_s.get().to_num::<f32>(),
+                shape.acceleration_mm_s2.to_num::<f32>(),
+            ),
+            backward: length_mm < 0.0,
             target_mm: travel_mm,
-            velocity_mm_s: VelocityMmS::ZERO,
+            start_us,
             segment,
         }
+    }
+
+    /// References at `now_us`.
+    pub(super) fn setpoint(&self, now_us: u64) -> TravelSetpoint {
+        let t_s = us_to_seconds(now_us.saturating_sub(self.start_us));
+        let (travel, speed) = self.profile.at(t_s);
+        let sign = if self.backward { -1.0 } else { 1.0 };
+        let over = t_s >= self.profile.duration_s();
+        let wheel = WheelTravel {
+            travel_mm: if over {
+                self.target_mm
+            } else {
+                PositionMm::from_f64(f64::from(sign * travel))
+            },
+            target_mm: self.target_mm,
+            velocity_mm_s: VelocityMmS::from_f64(f64::from(sign * speed)),
+        };
+        TravelSetpoint::common(wheel, self.segment)
     }
 }

@@ -3,6 +3,7 @@
 use super::foot::FootTrajectory;
 use super::homing::Homing;
 use super::square::SquareGait;
+use super::walk::Walk;
 use super::{Layer1, Mode};
 use crate::command::Command;
 use crate::dispatcher::{Accepted, Refusal};
@@ -11,7 +12,10 @@ impl Layer1 {
     /// Starts a command. `Ok(true)` if it is done at once, `Ok(false)` if its
     /// end is reported later.
     pub(super) fn execute(&mut self, accepted: &Accepted, now_us: u64) -> Result<bool, Refusal> {
-        let moving = matches!(self.mode, Mode::Homing(_) | Mode::Gait(_) | Mode::Foot(_));
+        let moving = matches!(
+            self.mode,
+            Mode::Homing(_) | Mode::Gait(_) | Mode::Walk(_) | Mode::Foot(_)
+        );
         let allowed = self.feedback.motion_allowed;
         match accepted.command {
             Command::SetGait(params) => {
@@ -33,11 +37,28 @@ impl Layer1 {
                 return Ok(true);
             }
             Command::StopGait => {
-                let Mode::Gait(gait) = &mut self.mode else {
-                    return Err(Refusal::NotMoving);
-                };
-                gait.stop_after_step(now_us);
+                match &mut self.mode {
+                    Mode::Gait(gait) => gait.stop_after_step(now_us),
+                    Mode::Walk(walk) => walk.stop(),
+                    _ => return Err(Refusal::NotMoving),
+                }
                 return Ok(true);
+            }
+            Command::Walk(order) => {
+                if let Mode::Walk(walk) = &mut self.mode {
+                    walk.change(order).map_err(Refusal::Parameter)?;
+                    return Ok(true);
+                }
+                if moving {
+                    return Err(Refusal::Moving);
+                }
+                let geometry = self.walks.ok_or(Refusal::WheelsNotStreamed)?;
+                let segment = self.segment.wrapping_add(1);
+                let walk = Walk::new(geometry, order, &self.feedback, segment)
+                    .map_err(Refusal::Parameter)?;
+                self.mode = Mode::Walk(walk.ok_or(Refusal::NodeMissing {
+                    node: self.unheard(),
+                })?);
             }
             _ if moving => return Err(Refusal::Moving),
             Command::Stand => {

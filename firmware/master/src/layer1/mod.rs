@@ -12,6 +12,7 @@ pub mod params;
 pub mod profile;
 pub mod square;
 pub(crate) mod units;
+pub mod walk;
 
 use heapless::spsc::{Consumer, Producer};
 use wheeleg_units::PositionMm;
@@ -27,6 +28,7 @@ use foot::FootTrajectory;
 use homing::{Homing, HomingConfig, HomingStep};
 use params::GaitParams;
 use square::SquareGait;
+use walk::{Walk, WalkGeometry};
 
 /// Bus cycle, µs.
 pub(crate) const CYCLE_US: u64 = wheeleg_protocol::link::CYCLE_US as u64;
@@ -42,6 +44,8 @@ enum Mode {
     Ready(Setpoints),
     /// Stepping.
     Gait(SquareGait),
+    /// Walking.
+    Walk(Walk),
     /// One foot on a sinusoid.
     Foot(FootTrajectory),
     /// Last references held.
@@ -53,6 +57,8 @@ enum Mode {
 pub struct Layer1 {
     params: GaitParams,
     homing: HomingConfig,
+    /// What a walk needs to know of the robot; `None`: its wheels cannot be led in a walk.
+    walks: Option<WalkGeometry>,
     mode: Mode,
     feedback: Feedback,
     /// Command whose end is still to be reported.
@@ -66,11 +72,16 @@ impl Layer1 {
     ///
     /// # Errors
     /// The first limit that the gait parameters violate.
-    pub fn new(params: GaitParams, homing: HomingConfig) -> Result<Self, params::ParamError> {
+    pub fn new(
+        params: GaitParams,
+        homing: HomingConfig,
+        walks: Option<WalkGeometry>,
+    ) -> Result<Self, params::ParamError> {
         params.validate()?;
         Ok(Self {
             params,
             homing,
+            walks,
             mode: Mode::Idle,
             feedback: Feedback::default(),
             active: None,
@@ -233,6 +244,16 @@ impl Layer1 {
                 let out = gait.setpoints(now_us, &self.feedback);
                 self.segment = gait.segment();
                 let steps = gait.steps();
+                if out.phase == Phase::Done {
+                    self.mode = Mode::Done(out);
+                    self.finish(now_us, Event::GaitDone { steps }, events);
+                }
+                out
+            }
+            Mode::Walk(walk) => {
+                let out = walk.setpoints(now_us, &self.feedback);
+                self.segment = walk.segment();
+                let steps = walk.steps();
                 if out.phase == Phase::Done {
                     self.mode = Mode::Done(out);
                     self.finish(now_us, Event::GaitDone { steps }, events);

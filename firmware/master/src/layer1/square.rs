@@ -20,7 +20,8 @@ use super::profile::Trapezoid;
 use super::units::{seconds_to_us, um_to_mm, us_to_seconds};
 use crate::contact::Side;
 use crate::setpoint::{
-    Cylinder, Feedback, JointSetpoint, OnLinkLoss, Phase, Reflex, Setpoints, TravelSetpoint, WHEELS,
+    Cylinder, Feedback, JointSetpoint, OnLinkLoss, Phase, Reflex, Setpoints, TravelSetpoint,
+    WHEELS, WheelTravel,
 };
 
 /// Progress of a running square-wave gait.
@@ -206,20 +207,30 @@ impl SquareGait {
         }
     }
 
-    fn travel(&self, at: Instant) -> TravelSetpoint {
-        let (travel_mm, velocity) = match self.pushed {
+    /// Speed of the wheels' references at an instant.
+    fn push_speed(&self, at: Instant) -> VelocityMmS {
+        VelocityMmS::from_f64(f64::from(self.push_at(at).1))
+    }
+
+    /// Distance, mm, and speed, mm/s, of the push at an instant.
+    fn push_at(&self, at: Instant) -> (f32, f32) {
+        match self.pushed {
             Some(step) if step == at.step => self.push.at(us_to_seconds(u64::from(
                 at.u_us.saturating_sub(self.params.push_us),
             ))),
             Some(_) => self.push.at(f32::INFINITY),
             None => (0.0, 0.0),
-        };
-        TravelSetpoint {
+        }
+    }
+
+    fn travel(&self, at: Instant) -> TravelSetpoint {
+        let (travel_mm, velocity) = self.push_at(at);
+        let wheel = WheelTravel {
             travel_mm: PositionMm::from_f64(f64::from(travel_mm)),
             target_mm: PositionMm::from_f64(f64::from(self.push.distance_mm())),
             velocity_mm_s: VelocityMmS::from_f64(f64::from(velocity)),
-            segment: self.segment,
-        }
+        };
+        TravelSetpoint::common(wheel, self.segment)
     }
 
     fn joint(&self, side: Side, cylinder: Cylinder, at: Instant, phase: Phase) -> JointSetpoint {
@@ -266,7 +277,7 @@ impl SquareGait {
         let last_stepping = self.pushed.map(|k| self.params.stepping_leg(k));
         if last_stepping.is_some_and(|leg| self.follows(side, leg)) {
             out.reflex = Reflex::FollowTravel;
-            out.velocity_mm_s = VelocityMmS::ZERO.saturating_sub(self.travel(at).velocity_mm_s);
+            out.velocity_mm_s = VelocityMmS::ZERO.saturating_sub(self.push_speed(at));
         }
     }
 

@@ -116,7 +116,7 @@ impl<'a> Analyser<'a> {
     #[must_use]
     pub fn new(scenario: &'a Scenario, robot: &'a RobotConfig) -> Self {
         let moving = match scenario.motion {
-            Motion::Stand => None,
+            Motion::Stand | Motion::Walk(_) => None,
             Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => Some(leg),
         };
         let steps = matches!(scenario.motion, Motion::SquareWave { .. });

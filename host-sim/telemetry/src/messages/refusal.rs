@@ -71,6 +71,11 @@ pub(super) fn refusal(reason: &Refusal) -> String {
         }
         Refusal::NoSuchJoint { joint } => format!("there is no joint {joint}: they are 1 to 6"),
         Refusal::Parameter(ref error) => error.to_string(),
+        Refusal::WheelsNotStreamed => {
+            "the wheels of this robot make profiles of their own, but a walk leads them in every \
+             cycle: set `stream_wheels` in the [gait] of the robot file"
+                .to_owned()
+        }
         Refusal::Busy => "other requests are still under way: wait for their answers".to_owned(),
         Refusal::Interrupted => {
             "a stop or another command came between: see what came before it, then give it again"

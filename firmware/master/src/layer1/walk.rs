@@ -1,0 +1,334 @@
+//! Walking: the wheels drive, the legs step along.
+//!
+//! The robot moves on without a stop: the wheels turn at the speed asked for, a standing foot
+//! goes with the ground (every standing foot moves in the robot's axes with −v − ω × p), and one
+//! foot at a time swings to a new foothold. Time and place of a swing follow from speed and reach:
+//!
+//! * a stance lasts as long as the foot stays within its leg's reach, T_st = S/v;
+//! * a cycle is a stance and a swing; the legs swing half a cycle apart (alternate) or one right
+//!   after the other (tandem);
+//! * a foot rises only when the other has been loaded for 100 ms;
+//! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the
+//!   standing foot has room for it.
+
+mod geometry;
+mod leg;
+mod order;
+
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use super::params::{ParamError, STROKE_MM};
+use crate::contact::Side;
+use crate::setpoint::{Cylinder, Feedback, Phase, Setpoints, TravelSetpoint, WHEELS, WheelTravel};
+pub use geometry::WalkGeometry;
+use geometry::{Twist, stance, time_left_s};
+use leg::{Leg, Sensed};
+pub use order::{WalkOrder, WalkPattern};
+
+/// Bus cycle, s.
+const CYCLE_S: f32 = 0.01;
+/// Acceleration of the robot, m/s².
+const ACCELERATION_M_S2: f32 = 0.3;
+/// Acceleration of turning, rad/s².
+const TURN_RAD_S2: f32 = 0.5;
+/// A foot rises only when the other has been loaded for so many cycles (100 ms).
+const LOADED: u16 = 10;
+/// Duration of a swing before one has been measured, s: lift, reach and lower overlapped.
+const SWING_S: f32 = 1.1;
+/// Shortest and longest swing that the plan takes from the last ones, s.
+const SWING_MIN_S: f32 = 0.6;
+const SWING_MAX_S: f32 = 3.0;
+/// From the touch of one foot to the rise of the other, s: [`LOADED`] and a cycle each way.
+const EXCHANGE_S: f32 = 0.12;
+/// The wheels' references begin anew after this distance, mm, far below what they can tell.
+const SEGMENT_MM: f32 = 4000.0;
+
+/// A walk under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
+    geometry: WalkGeometry,
+    order: WalkOrder,
+    legs: [Leg; WHEELS],
+    /// Present motion of the references.
+    twist: Twist,
+    /// Travel of the references since the segment began, mm.
+    travel_mm: [f32; WHEELS],
+    segment: u16,
+    /// Travel of the wheels as last measured, µm.
+    wheels_um: [i64; WHEELS],
+    /// Cycles since the last swing began.
+    since_swing: u16,
+    /// The leg that swung last.
+    last: Option<Side>,
+    /// Duration of a swing, from those that were, s.
+    swing_s: f32,
+    steps: u16,
+    stopping: bool,
+}
+
+impl Walk {
+    /// Begins where the robot stands; `None` unless all its joints and feet were heard.
+    ///
+    /// # Errors
+    /// The first limit that the order violates.
+    pub fn new(
+        geometry: WalkGeometry,
+        order: WalkOrder,
+        feedback: &Feedback,
+        segment: u16,
+    ) -> Result<Option<Self>, ParamError> {
+        order.validate()?;
+        let leg = |side| Sensed::of(feedback, side).map(|sensed| Leg::new(side, &sensed));
+        let (Some(left), Some(right)) = (leg(Side::Left), leg(Side::Right)) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            geometry,
+            order,
+            legs: [left, right],
+            twist: Twist::default(),
+            travel_mm: [0.0; WHEELS],
+            segment,
+            wheels_um: feedback.wheels_um,
+            since_swing: u16::MAX,
+            last: None,
+            swing_s: SWING_S,
+            steps: 0,
+            stopping: false,
+        }))
+    }
+
+    /// Changes the order of a walk under way, or of one that is about to stop.
+    ///
+    /// # Errors
+    /// The first limit that the order violates.
+    pub fn change(&mut self, order: WalkOrder) -> Result<(), ParamError> {
+        order.validate()?;
+        self.order = order;
+        self.stopping = false;
+        Ok(())
+    }
+
+    /// Comes to a stop, both feet down.
+    pub fn stop(&mut self) {
+        self.stopping = true;
+    }
+
+    /// Steps done.
+    #[must_use]
+    pub const fn steps(&self) -> u16 {
+        self.steps
+    }
+
+    /// Number of the wheels' motion in use.
+    #[must_use]
+    pub const fn segment(&self) -> u16 {
+        self.segment
+    }
+
+    /// The references of this cycle.
+    pub fn setpoints(&mut self, now_us: u64, feedback: &Feedback) -> Setpoints {
+        let moved = self.moved(feedback);
+        let lift_mm = self.order.lift_mm.get().to_num::<f32>();
+        let plan_mm = (STROKE_MM.get().to_num::<f32>() + self.order.nose_mm.get().to_num::<f32>())
+            .clamp(0.0, STROKE_MM.get().to_num::<f32>());
+        let wanted = self.wanted();
+        self.since_swing = self.since_swing.saturating_add(1);
+        for leg in &mut self.legs {
+            let foothold = stance(wanted, &self.geometry, leg.side).begin_m;
+            if let Some(sensed) = Sensed::of(feedback, leg.side) {
+                let swung = !leg.stands();
+                leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm, plan_mm);
+                if swung && leg.stands() {
+                    let took = f32::from(self.since_swing) * CYCLE_S;
+                    self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
+                }
+            }
+        }
+        self.level(plan_mm);
+        if let Some(side) = self.next_swing(wanted)
+            && let Some(leg) = self.legs.get_mut(side.index())
+        {
+            leg.swing();
+            self.since_swing = 0;
+            self.last = Some(side);
+            self.steps = self.steps.saturating_add(1);
+        }
+        self.accelerate(wanted);
+        self.write(now_us, lift_mm, plan_mm)
+    }
+
+    /// What the ground has passed below since the last cycle, by the wheels: m and rad.
+    fn moved(&mut self, feedback: &Feedback) -> Twist {
+        let [left, right] = self.wheels_um;
+        let [now_left, now_right] = feedback.wheels_um;
+        self.wheels_um = feedback.wheels_um;
+        let metres = |now: i64, before: i64| now.saturating_sub(before) as f32 * 1e-6;
+        Twist::of_wheels(
+            &self.geometry,
+            [metres(now_left, left), metres(now_right, right)],
+        )
+    }
+
+    /// The motion asked for.
+    fn wanted(&self) -> Twist {
+        if self.stopping {
+            return Twist::default();
+        }
+        Twist {
+            forward_m_s: self.order.speed_mm_s.get().to_num::<f32>() * 1e-3,
+            turn_rad_s: self.order.turn_rad_s.to_num::<f32>(),
+        }
+    }
+
+    /// Keeps the mean height of the legs, and feet on the ground.
+    fn level(&mut self, plan_mm: f32) {
+        let [left, right] = self.legs;
+        let rise = plan_mm - 0.5 * (left.stand_mm + right.stand_mm);
+        for leg in self.legs.iter_mut().filter(|leg| leg.stands()) {
+            leg.level(rise);
+        }
+    }
+
+    /// Time left of a leg's stance at a motion, s.
+    fn left_s(&self, twist: Twist, leg: &Leg) -> f32 {
+        time_left_s(twist, &self.geometry, leg.side, leg.foot_m)
+    }
+
+    /// The leg that is to swing now, if any.
+    fn next_swing(&self, wanted: Twist) -> Option<Side> {
+        let [left, right] = &self.legs;
+        if wanted == Twist::default() || !left.stands() || !right.stands() {
+            return None;
+        }
+        let (next, other) = if self.left_s(wanted, left) <= self.left_s(wanted, right) {
+            (left, right)
+        } else {
+            (right, left)
+        };
+        if other.loaded < LOADED {
+            return None;
+        }
+        let cycle_s = self.stance_s(wanted) + self.swing_s;
+        let apart_s = match self.order.pattern {
+            WalkPattern::Alternate => 0.5 * cycle_s,
+            // The second of a pair follows at once, the first one a whole cycle after it did.
+            WalkPattern::Tandem if self.steps % 2 == 1 => 0.0,
+            WalkPattern::Tandem => cycle_s - self.swing_s,
+        };
+        let since_s = f32::from(self.since_swing) * CYCLE_S;
+        let spent = self.left_s(wanted, next) <= EXCHANGE_S;
+        (self.last.is_none() || since_s >= apart_s || spent).then_some(next.side)
+    }
+
+    /// The shorter of both legs' stances at a motion, s.
+    fn stance_s(&self, twist: Twist) -> f32 {
+        let [left, right] =
+            [Side::Left, Side::Right].map(|side| stance(twist, &self.geometry, side).duration_s);
+        left.min(right)
+    }
+
+    /// Brings the references' motion towards the one asked for, as fast as the feet allow.
+    fn accelerate(&mut self, wanted: Twist) {
+        // A new segment begins at the last reference sent.
+        if self
+            .travel_mm
+            .iter()
+            .any(|mm| libm::fabsf(*mm) > SEGMENT_MM)
+        {
+            self.travel_mm = [0.0; WHEELS];
+            self.segment = self.segment.wrapping_add(1);
+        }
+        let target = wanted.scaled(self.allowed(wanted));
+        let toward = |now: f32, to: f32, step: f32| now + (to - now).clamp(-step, step);
+        self.twist = Twist {
+            forward_m_s: toward(
+                self.twist.forward_m_s,
+                target.forward_m_s,
+                ACCELERATION_M_S2 * CYCLE_S,
+            ),
+            turn_rad_s: toward(
+                self.twist.turn_rad_s,
+                target.turn_rad_s,
+                TURN_RAD_S2 * CYCLE_S,
+            ),
+        };
+        for (side, travel) in [Side::Left, Side::Right]
+            .into_iter()
+            .zip(&mut self.travel_mm)
+        {
+            *travel += 1e3 * CYCLE_S * self.twist.wheel_m_s(&self.geometry, side);
+        }
+    }
+
+    /// Share of the motion asked for at which no standing foot runs out of reach before it may
+    /// swing.
+    fn allowed(&self, wanted: Twist) -> f32 {
+        let [left, right] = &self.legs;
+        let share = |leg: &Leg, other: &Leg| {
+            if !leg.stands() {
+                return 1.0;
+            }
+            let since_s = f32::from(self.since_swing) * CYCLE_S;
+            let wait_s = if !other.stands() {
+                (self.swing_s - since_s).max(0.2) + EXCHANGE_S
+            } else if self.left_s(wanted, leg) <= self.left_s(wanted, other) {
+                EXCHANGE_S
+            } else {
+                self.swing_s + EXCHANGE_S
+            };
+            (self.left_s(wanted, leg) / wait_s).min(1.0)
+        };
+        share(left, right).min(share(right, left))
+    }
+
+    /// Whether the robot has come to its stop.
+    fn over(&self) -> bool {
+        let still = self.twist == Twist::default();
+        self.stopping
+            && still
+            && self
+                .legs
+                .iter()
+                .all(|leg| leg.stands() && leg.loaded >= LOADED)
+    }
+
+    fn write(&mut self, now_us: u64, lift_mm: f32, plan_mm: f32) -> Setpoints {
+        let mut out = Setpoints::idle(now_us);
+        out.phase = if self.over() {
+            Phase::Done
+        } else {
+            Phase::Walk
+        };
+        out.step = self.steps;
+        out.stepping = self
+            .legs
+            .iter()
+            .find(|leg| !leg.stands())
+            .map(|leg| leg.side);
+        for leg in &mut self.legs {
+            let joints = leg.setpoints(self.twist, &self.geometry, lift_mm, plan_mm);
+            let cylinders = [Cylinder::Yaw, Cylinder::Horizontal, Cylinder::Vertical];
+            for (cylinder, joint) in cylinders.into_iter().zip(joints) {
+                if let Some(slot) = out.joints.get_mut(leg.side.joint(cylinder)) {
+                    *slot = Some(joint);
+                }
+            }
+        }
+        let wheel = |side: Side, travel: f32| {
+            let speed = 1e3 * self.twist.wheel_m_s(&self.geometry, side);
+            let travel_mm = PositionMm::from_f64(f64::from(travel));
+            WheelTravel {
+                travel_mm,
+                target_mm: travel_mm,
+                velocity_mm_s: VelocityMmS::from_f64(f64::from(speed)),
+            }
+        };
+        let [left, right] = self.travel_mm;
+        out.travel = Some(TravelSetpoint {
+            wheels: [wheel(Side::Left, left), wheel(Side::Right, right)],
+            segment: self.segment,
+        });
+        out
+    }
+}
