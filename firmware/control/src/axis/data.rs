@@ -46,6 +46,8 @@ pub struct AxisData {
     /// Both chambers are filled before the law drives, and it seats the piston at end stops. Without,
     /// chambers count as vented.
     pub precharged: bool,
+    /// The mass is learnt from moves, which must be free of loads that come and go in them.
+    pub learns_mass: bool,
     /// Full stroke, mm.
     pub stroke: PositionMm,
 }
@@ -72,6 +74,7 @@ impl Default for AxisData {
             band: const { PositionMm::new(I16F16::lit("0.12")) },
             release: PositionMm::ZERO,
             precharged: false,
+            learns_mass: true,
             stroke: PositionMm::from_int(180),
         }
     }

@@ -102,6 +102,8 @@ pub struct AxisModel {
     pub release: i32,
     /// Both chambers are filled before the law drives.
     pub precharged: bool,
+    /// The mass is learnt from moves.
+    pub learns_mass: bool,
     /// Square of the period of a swing on the air of both chambers, periods² per kg × 2^8.
     pub swing: i32,
 }
@@ -216,6 +218,7 @@ impl AxisModel {
             band,
             release,
             precharged,
+            learns_mass,
             swing,
         } = self;
         match quarter {
@@ -249,6 +252,7 @@ impl AxisModel {
                     band,
                     release,
                     precharged,
+                    learns_mass,
                     swing,
                 )
                     .hash(state);
@@ -399,6 +403,7 @@ impl AxisModel {
             band: number(raw(data.band)),
             release: data.release.raw(),
             precharged: data.precharged,
+            learns_mass: data.learns_mass,
             swing: ratio(
                 SWING,
                 swings.saturating_mul(period_us.wrapping_mul(period_us)),

@@ -379,7 +379,7 @@ impl Predictive {
                 [fill_a, vent_a, 0, 0]
             };
         }
-        if first {
+        if first && model.learns_mass {
             // Of the period before.
             self.learner.sample(model, now, force);
         }

@@ -231,6 +231,7 @@ fn gains(parameters: &JointParameters) -> JointGains {
             band: position(P::RestBand),
             release: position(P::RestRelease),
             precharged: parameters.get(P::Precharge) > 0,
+            learns_mass: parameters.get(P::MassLearning) != 0,
             stroke: position(P::StrokeMax),
         },
     }

@@ -103,6 +103,7 @@ fn raw(design: &Design, parameter: JointParam) -> Option<i32> {
         P::LineDelay => us(a.line_delay),
         P::RestBand => a.band.raw(),
         P::RestRelease => a.release.raw(),
+        P::MassLearning => i32::from(a.learns_mass),
         P::WatchdogCycles
         | P::HoldTime
         | P::ExhaustDuty

@@ -148,6 +148,7 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
         band: mm((2.5 * lsb_m).max(0.13 * free_step_m(axis)).max(2e-5)),
         release: PositionMm::ZERO,
         precharged: false,
+        learns_mass: true,
         stroke: mm(c.stroke_m),
     }
 }

@@ -49,6 +49,8 @@ pub(super) enum LegState {
 pub(super) struct Sensed {
     /// Foot from O4, m.
     pub foot_m: [f32; 2],
+    /// Strokes of yaw cylinder and b5.
+    pub plane: [PositionMm; 2],
     /// Stroke of b6, mm.
     pub height_mm: f32,
     /// Any switch of the foot is closed.
@@ -62,16 +64,14 @@ impl Sensed {
             feedback.strokes_mm.get(side.joint(cylinder)).copied()?
         };
         let metres = |mm: PositionMm| mm.get().to_num::<f32>() * 1e-3;
-        let [s2, s5, s6] = [
-            stroke(Cylinder::Yaw)?,
-            stroke(Cylinder::Horizontal)?,
-            stroke(Cylinder::Vertical)?,
-        ]
-        .map(metres);
+        let plane = [stroke(Cylinder::Yaw)?, stroke(Cylinder::Horizontal)?];
+        let [s2, s5] = plane.map(metres);
+        let s6 = metres(stroke(Cylinder::Vertical)?);
         let [x, y, _] = mirror::foot_of_strokes(side, [s2, s5, s6])?;
         let switches = feedback.feet.get(side.index()).copied()?;
         Some(Self {
             foot_m: [x, y],
+            plane,
             height_mm: s6 * 1e3,
             touches: switches.is_some_and(FootSwitches::any),
         })
@@ -115,7 +115,10 @@ impl Leg {
             loaded: 0,
             open: 0,
             followed_mm: 0.0,
-            last: [JointSetpoint::default(); 2],
+            last: sensed.plane.map(|reference_mm| JointSetpoint {
+                reference_mm,
+                ..JointSetpoint::default()
+            }),
         }
     }
 
