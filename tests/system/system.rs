@@ -17,6 +17,7 @@ mod fault_matrix;
 mod figures;
 mod foot_sides;
 mod long_runs;
+mod moving_mass;
 mod off_data;
 mod plant_check;
 mod precharge;

@@ -33,9 +33,8 @@ const RADIUS_MIN_M: f32 = 0.01;
 const STROKE_M: f32 = 0.18;
 /// Stroke kept free at either end of b5, m: what a stance may stray.
 const MARGIN_M: f32 = 0.0075;
-/// Longest way of a foot across the leg in one stance, m: ±17° where it is farthest out, of the
-/// ±18° that the yaw cylinder turns.
-const SIDEWAYS_M: f32 = 0.05;
+/// Tangent of the farthest planned yaw of a leg: 16.5° of the 18° that its cylinder turns.
+const YAW_TANGENT: f32 = 0.296;
 
 /// Farthest and nearest distance of a planned foothold from the yaw axis, m.
 pub(super) const OUT_M: f32 = RADIUS_MIN_M + STROKE_M - MARGIN_M;
@@ -106,8 +105,10 @@ pub(super) fn stance(twist: Twist, geometry: &WalkGeometry, side: Side) -> Stanc
     let middle = 0.5 * (OUT_M + IN_M);
     let [ux, uy] = twist.ground_m_s(geometry, side, [middle, 0.0]);
     let along = (OUT_M - IN_M) / libm::fabsf(ux);
-    let across = SIDEWAYS_M / libm::fabsf(uy);
-    let duration_s = along.min(across);
+    // Both ends at the farthest yaw: |uy| T = tan ψ (x_begin + x_end), one of them far out.
+    let across =
+        2.0 * YAW_TANGENT * OUT_M / (libm::fabsf(uy) + YAW_TANGENT * libm::fabsf(ux));
+    let duration_s = if uy == 0.0 { along } else { along.min(across) };
     if !duration_s.is_finite() {
         return Stance {
             begin_m: [middle, 0.0],
@@ -141,14 +142,14 @@ pub(super) fn time_left_s(
     } else {
         f32::INFINITY
     };
-    // The leg yaws as far as ±SIDEWAYS/2 at its farthest, less nearer in.
-    let room = 0.5 * SIDEWAYS_M * (x / OUT_M).clamp(0.2, 1.0);
-    let across = if uy == 0.0 {
+    // The foot meets the line of the farthest yaw: ±(y + uy t) = tan ψ (x + ux t).
+    let closing = libm::fabsf(uy) - YAW_TANGENT * ux;
+    let across = if uy == 0.0 || closing <= 0.0 {
         f32::INFINITY
     } else {
-        (room - y * libm::copysignf(1.0, uy)) / libm::fabsf(uy)
+        (YAW_TANGENT * x - libm::copysignf(y, y * uy)) / closing
     };
-    along.min(across.max(0.0)).max(0.0)
+    along.min(across).max(0.0)
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! | state | b6 | b5 and yaw | ends when |
 //! |---|---|---|---|
 //! | stance | holds where it touched, less what keeps the nose | follow the ground | the walk lets it swing |
-//! | lift | up by the lift | follow the ground until half of it | half of the lift is done |
-//! | reach | up | to the foothold | four fifths of the way are done |
+//! | lift | up by the lift | follow the ground | the foot is clear of the ground |
+//! | reach | up | to the foothold | most of the way is done |
 //! | lower | down to the plan, then slowly further | at the foothold | a switch of the foot closes |
 
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -15,8 +15,11 @@ use crate::layer1::params::STROKE_MM;
 use crate::mirror;
 use crate::setpoint::{Cylinder, Feedback, JointSetpoint, OnLinkLoss, Reflex};
 
-/// Share of the way to the foothold after which the foot goes down.
-const LOWER_FROM: f32 = 0.8;
+/// A foot is clear of the ground after half of the lift, or after so much of it, mm.
+const CLEAR_MM: f32 = 25.0;
+/// Share of the way to the foothold after which the foot goes down: what is left takes as long as
+/// the way down.
+const LOWER_FROM: f32 = 0.7;
 /// A foot that should have touched searches the ground at this speed, mm per cycle (100 mm/s).
 const SEARCH_MM: f32 = 1.0;
 /// Stroke by which a stance presses on beyond the first touch, mm: it takes its share of the load
@@ -163,8 +166,8 @@ impl Leg {
             LegState::Stance => self.follow(moved, geometry),
             LegState::Lift(from_mm) => {
                 self.follow(moved, geometry);
-                let half = 0.5 * lift_mm.min(from_mm);
-                if sensed.height_mm <= from_mm - half {
+                let clear = CLEAR_MM.min(0.5 * lift_mm.min(from_mm));
+                if sensed.height_mm <= from_mm - clear {
                     self.enter(LegState::Reach(distance(sensed.foot_m, foothold)));
                 }
             }
