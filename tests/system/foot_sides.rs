@@ -143,9 +143,7 @@ fn each_side_of_the_right_foot_is_felt_as_that_side() {
             leg: wheeleg_config::LegChoice::Right,
         };
         // The right foot comes down where the left one would, less the track of the feet.
-        for patch in &mut scenario.ground {
-            patch.y_m = patch.y_m.map(|y| y - 0.40);
-        }
+        scenario.ground.terrain = beside(&scenario.ground.terrain);
         let recording = run(&scenario);
         assert_side(&recording, 1, side);
     }
@@ -156,7 +154,7 @@ fn each_side_of_the_right_foot_is_felt_as_that_side() {
 fn without_the_ledge_the_foot_comes_down_flat_and_later() {
     let mut scenario = scenario("left");
     let (ledge_ns, _) = touchdown(&run(&scenario), 0);
-    scenario.ground.clear();
+    scenario.ground = wheeleg_config::terrain::Ground::default();
     let recording = run(&scenario);
     let (flat_ns, _) = touchdown(&recording, 0);
     assert!(flat_ns > ledge_ns + 30_000_000, "{flat_ns} {ledge_ns}");

@@ -24,7 +24,7 @@ pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg", "wheele
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
-    "walk",
+    "walk", "slope-10",
 );
 
 /// A robot by built-in name, or by path to a TOML file.

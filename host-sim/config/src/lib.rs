@@ -6,6 +6,7 @@
 //! * **robot**: a file with every parameter of the simulated robot and its boards
 //! * **axis**: the same of one cylinder on a test bench
 //! * **scenario**: what happens in a run: robot, start pose, events by time, targets, faults
+//! * **terrain**: the ground of a scenario, in parts; each has a kind and a material
 //! * **source**: where a value is from: PAPER, DATASHEET, ASSUMED, IDENTIFIED
 //! * **fingerprint**: hash of names, values and units of a robot; equal files of other layout
 //!   have the same
@@ -27,6 +28,7 @@ mod relations;
 mod robot;
 mod scenario;
 mod suggest;
+pub mod terrain;
 pub mod timing;
 
 pub use axis::AxisConfig;
@@ -41,7 +43,5 @@ pub use quantity::{brief, pretty};
 pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
-pub use scenario::{
-    EventAction, GroundPatch, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet,
-};
+pub use scenario::{EventAction, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet};
 pub use suggest::closest;

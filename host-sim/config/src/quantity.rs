@@ -49,6 +49,8 @@ pub enum Dimension {
     Damping,
     /// Gain from speed to a pure number.
     PerVelocity,
+    /// Angle.
+    Angle,
     /// Angular velocity.
     AngularVelocity,
     /// Voltage.
@@ -95,6 +97,7 @@ impl Dimension {
             Self::Stiffness => &[("N/m", 1.0), ("N/mm", 1e3), ("kN/m", 1e3)],
             Self::Damping => &[("N s/m", 1.0), ("N s/mm", 1e3)],
             Self::PerVelocity => &[("s/m", 1.0), ("s/mm", 1e3)],
+            Self::Angle => &[("deg", PI / 180.0), ("rad", 1.0)],
             Self::AngularVelocity => &[("rad/s", 1.0), ("deg/s", PI / 180.0), ("rpm", PI / 30.0)],
             Self::Voltage => &[("V", 1.0), ("mV", 1e-3)],
             Self::Resistance => &[("ohm", 1.0), ("kohm", 1e3)],

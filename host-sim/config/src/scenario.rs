@@ -9,6 +9,7 @@ use super::error::ConfigError;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
+use super::terrain::{self, Ground};
 use crate::faults::FaultSpec;
 
 /// A leg.
@@ -67,19 +68,6 @@ pub struct ScenarioEvent {
     pub action: EventAction,
 }
 
-/// A block on the floor, its walls vertical. Axes as MODEL.md:
-/// x forward, y left, origin on the ground below the middle of the wheel axle
-/// at the start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GroundPatch {
-    /// From and to, m.
-    pub x_m: [f64; 2],
-    /// From and to, m.
-    pub y_m: [f64; 2],
-    /// Height of the top over the floor, m; where blocks overlap, each is touched on its own.
-    pub height_m: f64,
-}
-
 /// Which of the paper's and the project's targets a run is held against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TargetSet {
@@ -119,8 +107,8 @@ pub struct Scenario {
     pub motion: Motion,
     /// What happens to it, in order of time.
     pub events: Vec<ScenarioEvent>,
-    /// Uneven ground.
-    pub ground: Vec<GroundPatch>,
+    /// What it stands on.
+    pub ground: Ground,
     /// Faults that are injected; those of the command line are added.
     pub faults: Vec<FaultSpec>,
     /// What it is held against.
@@ -136,7 +124,7 @@ const TOP: [&str; 10] = [
     "targets",
     "motion",
     "events",
-    "ground",
+    "terrain",
     "faults",
 ];
 
@@ -196,8 +184,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
     let name = r.name(&top, "name");
     let description = r.text(&top, "description");
     let robot = r.text(&top, "robot");
-    let duration = required(
-        r,
+    let duration = r.required(
         &top,
         &scalar(
             "duration",
@@ -227,11 +214,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         events.extend(event(r, &entry, duration));
     }
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-    let mut ground = Vec::new();
-    for i in 0..r.array_len("ground") {
-        let entry = r.entry("ground", i);
-        ground.extend(patch(r, &entry));
-    }
+    let ground = terrain::read(r, &TOP);
     let faults = r.texts(&top, "faults", |text| {
         let fault = text.parse::<FaultSpec>().map_err(|e| e.to_string())?;
         match duration.filter(|end_s| fault.from_s >= *end_s) {
@@ -254,25 +237,6 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         faults,
         targets: targets?,
     })
-}
-
-fn required(r: &mut Reader, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
-    if entry.get(spec.key).is_none() {
-        let place = if entry.path.is_empty() {
-            "at the top of the file".to_owned()
-        } else {
-            format!("in [{}]", entry.path)
-        };
-        let example = r.example(spec.key, spec.dimension);
-        r.problem(
-            Some(entry.span.clone()),
-            format!("`{}` is missing {place}", spec.key),
-            "expected here",
-            Some(example),
-        );
-        return None;
-    }
-    r.quantity(entry, spec).and_then(|v| v.first().copied())
 }
 
 #[derive(Clone, Copy)]
@@ -331,9 +295,9 @@ fn motion(r: &mut Reader) -> Option<Motion> {
             };
             let height = command::spec(&argument::HEIGHT);
             let rate = command::spec(&argument::RATE);
-            let length = required(r, &entry, &length);
-            let height = required(r, &entry, &height);
-            let rate = required(r, &entry, &rate);
+            let length = r.required(&entry, &length);
+            let height = r.required(&entry, &height);
+            let rate = r.required(&entry, &rate);
             Some(Motion::Sinusoid {
                 leg: leg?,
                 length_m: length?,
@@ -361,7 +325,7 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         latest,
         "time of the event, within the duration of the scenario",
     );
-    let at_s = required(r, entry, &at);
+    let at_s = r.required(entry, &at);
     let actions = [
         ("kill-master", ActionKind::KillMaster),
         ("e-stop", ActionKind::EStop),
@@ -382,45 +346,5 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
     Some(ScenarioEvent {
         at_s: at_s?,
         action,
-    })
-}
-
-fn patch(r: &mut Reader, entry: &Entry) -> Option<GroundPatch> {
-    r.reject_misplaced(entry, &["x", "y", "height"], &TOP);
-    let mut range = |key: &'static str, doc: &'static str| -> Option<[f64; 2]> {
-        let spec = FieldSpec {
-            components: 2,
-            ..scalar(key, Dimension::Length, -100.0, 100.0, doc)
-        };
-        if entry.get(key).is_none() {
-            return required(r, entry, &spec).map(|_| [0.0; 2]);
-        }
-        let values = r.quantity(entry, &spec)?;
-        let range = [values[0], values[1]];
-        if range[0] >= range[1] {
-            let span = entry.get(key).and_then(|(k, i)| i.span().or(Some(k)));
-            let message = format!(
-                "`{}.{key}` must run from the smaller to the larger value",
-                entry.path
-            );
-            r.problem(span, message, "empty", None);
-            return None;
-        }
-        Some(range)
-    };
-    let x_m = range("x", "from and to, forward of the axle");
-    let y_m = range("y", "from and to, left of the middle");
-    let height = scalar(
-        "height",
-        Dimension::Length,
-        0.0,
-        0.3,
-        "height of the top over the floor",
-    );
-    let height_m = required(r, entry, &height);
-    Some(GroundPatch {
-        x_m: x_m?,
-        y_m: y_m?,
-        height_m: height_m?,
     })
 }

@@ -4,6 +4,7 @@
 //! The chassis floats: fourteen velocities ([`crate::dynamics::floating`]). Wheels turn on their
 //! own and roll, slip or leave the ground as the contacts have it.
 
+mod bound;
 mod contacts;
 mod stand;
 mod touching;

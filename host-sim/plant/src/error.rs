@@ -68,6 +68,11 @@ pub enum PlantError {
     /// More switching edges are under way in a line than the model can hold.
     #[error("valve {0}: more edges under way in its line than the model holds")]
     EdgeQueueFull(usize),
+    /// The robot does not stand at rest in its start pose where it starts.
+    #[error(
+        "the robot does not stand on its wheels and feet at the start place, x = 0 and y = 0, heading along x"
+    )]
+    NotStanding,
     /// The mechanics could not be evaluated (closed loop cannot close, singular inertia).
     #[error("mechanics: {0}")]
     Mechanics(String),

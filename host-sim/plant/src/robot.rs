@@ -205,7 +205,7 @@ impl Plant {
         }
         let c = &params.cylinders;
         let cylinder = |i: usize| CylinderModel::new(&c[i], &params.gas);
-        Ok(Self {
+        let plant = Self {
             params: params.clone(),
             assembly: Assembly {
                 cylinders: [
@@ -231,7 +231,18 @@ impl Plant {
                 },
                 step_ns: params.step_ns,
             },
-        })
+        };
+        let mechanics = &plant.assembly.mechanics;
+        let step_s = params.step_ns as f64 * 1e-9;
+        mechanics.check_contacts(plant.lengths_m(&params.initial_stroke_m), step_s)?;
+        Ok(plant)
+    }
+
+    /// Joint lengths at these strokes \[m\].
+    fn lengths_m(&self, stroke_m: &[f64; 6]) -> [[f64; 3]; 2] {
+        let zero = &self.assembly.mechanics.stroke_zero_m;
+        let of = |i: usize| zero[i] + stroke_m[i];
+        [[of(0), of(1), of(2)], [of(3), of(4), of(5)]]
     }
 
     /// Parameters the robot was built from.
@@ -248,21 +259,18 @@ impl Plant {
     /// a piston between its stops hangs on its seals as far as they bear.
     ///
     /// # Errors
-    /// [`PlantError::Mechanics`] if the mechanism cannot stand in that pose.
+    /// [`PlantError::NotStanding`] if the robot cannot stand in that pose on the ground at the
+    /// world's origin.
     pub fn initial_state(&self, seed: u64) -> Result<PlantState, PlantError> {
         let assembly = &self.assembly;
         let mechanics = &assembly.mechanics;
         let mut stroke = self.params.initial_stroke_m;
         let mut bristle = [0.0; 6];
-        let length = |stroke: &[f64; 6]| {
-            let of = |i: usize| mechanics.stroke_zero_m[i] + stroke[i];
-            [[of(0), of(1), of(2)], [of(3), of(4), of(5)]]
-        };
-        let mut motion = BodyMotion::at_rest(self.start(length(&stroke)));
+        let mut motion = BodyMotion::at_rest(self.start(self.lengths_m(&stroke)));
         // Stops and ground are stiff, so each round shrinks the error some
         // hundredfold; six reach rounding.
         for _ in 0..6 {
-            motion.state.lengths_m = length(&stroke);
+            motion.state.lengths_m = self.lengths_m(&stroke);
             mechanics.stand(&mut motion)?;
             let needed = mechanics.holding_forces_n(&motion)?;
             for (i, cylinder) in assembly.cylinders.iter().enumerate() {
@@ -303,28 +311,23 @@ impl Plant {
         })
     }
 
-    /// Wheels just on the ground at the world's origin, heading along X, level with the ground
-    /// between them.
+    /// Wheels just on the ground at the world's origin, heading along X. The chassis is level with
+    /// the plane through the ground below both wheels and between the feet.
     fn start(&self, lengths_m: [[f64; 3]; 2]) -> FloatingState {
         let mut state = FloatingState::at_rest(lengths_m);
         let ground = self.assembly.mechanics.touching.terrain();
-        let high = Vector3::z() * 10.0;
-        // Where a fall straight down from above meets the ground: a few steps of its distance.
-        let mut place = high;
-        for _ in 0..200 {
-            let Some(near) = ground.nearest(&place) else {
-                break;
-            };
-            place.z -= near.distance_m;
-        }
-        let normal = ground
-            .nearest(&place)
-            .map_or(Vector3::z(), |near| near.normal);
+        let body = &self.params.body;
+        let half = 0.5 * self.params.spatial.track_m;
+        let ahead = body.o4_m[0] + lengths_m[0][1].max(lengths_m[1][1]);
+        let at = |x: f64, y: f64| Vector3::new(x, y, ground.height_m(x, y).unwrap_or(0.0));
+        let (left, right) = (at(0.0, half), at(0.0, -half));
+        let (middle, across) = (0.5 * (left + right), left - right);
+        let normal = (at(ahead, 0.0) - middle).cross(&across).normalize();
         // Forward stays in the X–Z plane.
         let left = normal.cross(&Vector3::x()).normalize();
         let axes = Matrix3::from_columns(&[left.cross(&normal), left, normal]);
         state.orientation = UnitQuaternion::from_matrix(&axes);
-        state.position_m = place + self.params.body.wheel_radius_m * normal;
+        state.position_m = middle + body.wheel_radius_m * normal;
         state
     }
 

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
+use crate::hash::StateHasher;
 pub use plane::Plane;
 pub use solid::Solid;
 pub use surface::{Disc, Near, Surface};
@@ -46,6 +47,20 @@ impl Surface for Shape {
         match self {
             Self::Plane(s) => s.top_m(),
             Self::Solid(s) => s.top_m(),
+        }
+    }
+
+    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        match self {
+            Self::Plane(s) => s.height_m(x_m, y_m),
+            Self::Solid(s) => s.height_m(x_m, y_m),
+        }
+    }
+
+    fn feed(&self, hasher: &mut StateHasher) {
+        match self {
+            Self::Plane(s) => s.feed(hasher),
+            Self::Solid(s) => s.feed(hasher),
         }
     }
 }
@@ -113,11 +128,30 @@ impl Terrain {
         self.parts.iter().try_for_each(|p| p.material.validate())
     }
 
+    /// BLAKE3 of every part and its material.
+    #[must_use]
+    pub fn digest(&self) -> [u8; 32] {
+        let mut hasher = StateHasher::new();
+        for part in &self.parts {
+            part.shape.feed(&mut hasher);
+            hasher.f64(part.material.mu_static);
+            hasher.f64(part.material.mu_kinetic);
+        }
+        hasher.finish()
+    }
+
     /// No part of it is higher \[m\].
     #[must_use]
     pub fn top_m(&self) -> f64 {
         let tops = self.parts.iter().map(|p| p.shape.top_m());
         tops.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Height of the ground at a place \[m\]; `None` where there is none.
+    #[must_use]
+    pub fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        let heights = self.parts.iter().map(|p| p.shape.height_m(x_m, y_m));
+        heights.flatten().reduce(f64::max)
     }
 
     /// Signed distance of a point from the nearest part \[m\], and the normal there.

@@ -11,7 +11,6 @@ use wheeleg_master::layer1::params::Pattern;
 use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
-use wheeleg_plant::terrain::{Material, Part, Shape, Solid, Terrain};
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::operator::side;
@@ -56,22 +55,8 @@ pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
     };
     plant.initial_stroke_m[..3].copy_from_slice(&left);
     plant.initial_stroke_m[3..].copy_from_slice(&right);
-    plant.terrain = terrain(scenario);
+    plant.terrain = scenario.ground.terrain.clone();
     plant
-}
-
-/// The floor with the scenario's blocks on it.
-fn terrain(scenario: &Scenario) -> Terrain {
-    let mut terrain = Terrain::default();
-    for p in &scenario.ground {
-        let middle = [p.x_m, p.y_m].map(|[from, to]| 0.5 * (from + to));
-        let half = [p.x_m, p.y_m].map(|[from, to]| 0.5 * (to - from));
-        terrain.parts.push(Part {
-            shape: Shape::Solid(Solid::block(middle, half, 0.0, [-1.0, p.height_m])),
-            material: Material::ROUGH,
-        });
-    }
-    terrain
 }
 
 /// The master's configuration; [`super::world::World`] adds the sample time of

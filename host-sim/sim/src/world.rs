@@ -14,6 +14,7 @@ mod traffic;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
+use wheeleg_plant::PlantError;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::Address;
 use wheeleg_remote_link as link;
@@ -147,9 +148,14 @@ impl World {
             )
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
-        let state = plant
-            .initial_state(seed)
-            .map_err(|e| refused("plant", &e))?;
+        let state = plant.initial_state(seed).map_err(|e| match e {
+            PlantError::NotStanding => SimError::simulation(
+                e.to_string(),
+                "correct the scenario's [[terrain]]: a plane there is less steep than 22°, and \
+                 wheels and feet find no rock, edge or hole below them",
+            ),
+            other => refused("plant", &other),
+        })?;
         let mut boards = Vec::new();
         for address in Address::nodes() {
             boards.push(Board::new(address, robot.node.of(address))?);

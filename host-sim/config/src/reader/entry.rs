@@ -31,6 +31,24 @@ impl Entry {
         keys.map(|(key, span, _)| (key.as_str(), span.clone()))
     }
 
+    /// The table that a field holds, if it holds one.
+    pub(crate) fn table(&self, key: &str) -> Option<Entry> {
+        let (key_span, item) = self.get(key)?;
+        let table = item.as_table_like()?;
+        Some(Entry {
+            path: self.field_path(key),
+            fields: fields(table),
+            span: item.span().unwrap_or(key_span),
+        })
+    }
+
+    /// All fields in one line, in the order of the file.
+    pub(crate) fn text(&self) -> String {
+        let fields = self.fields.iter();
+        let all = fields.map(|(key, _, item)| format!("{key} = {}", item.to_string().trim()));
+        all.collect::<Vec<_>>().join(", ")
+    }
+
     pub(crate) fn field_path(&self, key: &str) -> String {
         if self.path.is_empty() {
             key.to_owned()

@@ -34,7 +34,10 @@ impl Reader {
             );
             return None;
         }
-        let inner = self.stated(entry, spec.key, &spec.dimension.unit_names(), &example)?;
+        let inner = match self.bare_number(entry, spec) {
+            Some(number) => number,
+            None => self.stated(entry, spec.key, &spec.dimension.unit_names(), &example)?,
+        };
         let source = self.source(&inner);
         let (factor, unit) = self.unit(&inner, spec, &example)?;
         let Some((value_key, value)) = inner.get("value") else {
@@ -97,6 +100,40 @@ impl Reader {
         Some(written.into_iter().map(|v| v * factor).collect())
     }
 
+    /// A pure number needs no unit where no source is asked for.
+    fn bare_number(&self, entry: &Entry, spec: &FieldSpec) -> Option<Entry> {
+        let (key, item) = entry.get(spec.key)?;
+        let bare = item.is_integer() || item.is_float() || item.is_array();
+        (spec.dimension == Dimension::Number && !self.source_required && bare).then(|| {
+            let span = item.span().unwrap_or(key);
+            Entry {
+                path: entry.field_path(spec.key),
+                fields: vec![("value".to_owned(), span.clone(), item)],
+                span,
+            }
+        })
+    }
+
+    /// Reads a quantity that must be there.
+    pub(crate) fn required(&mut self, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
+        if entry.get(spec.key).is_some() {
+            return self.quantity(entry, spec).and_then(|v| v.first().copied());
+        }
+        let place = if entry.path.is_empty() {
+            "at the top of the file".to_owned()
+        } else {
+            format!("in [{}]", entry.path)
+        };
+        let example = self.example(spec.key, spec.dimension);
+        self.problem(
+            Some(entry.span.clone()),
+            format!("`{}` is missing {place}", spec.key),
+            "expected here",
+            Some(example),
+        );
+        None
+    }
+
     /// Reads a quantity that has exactly one unit, its `range` for help: value, position
     /// of the value, source.
     pub(crate) fn table_quantity(
@@ -155,6 +192,7 @@ impl Reader {
             (true, _) => {
                 format!("write `{key} = {{ value = …, unit = \"{unit}\", source = \"…\" }}`")
             }
+            (false, Dimension::Number) => format!("write `{key} = …`, a number without unit"),
             (false, Dimension::Flag) => format!("write `{key} = true` or `{key} = false`"),
             (false, _) => format!(
                 "write `{key} = {{ value = …, unit = \"{unit}\" }}`, or `{key} = \"… {unit}\"`"
@@ -225,6 +263,10 @@ impl Reader {
         let path = &inner.path;
         if spec.dimension == Dimension::Flag && inner.get("unit").is_none() {
             return Some((1.0, "flag".into()));
+        }
+        let pure = spec.dimension == Dimension::Number && !self.source_required;
+        if pure && inner.get("unit").is_none() {
+            return Some((1.0, "1".into()));
         }
         let Some((key, item)) = inner.get("unit") else {
             self.problem(

@@ -33,14 +33,14 @@ impl BodyMechanics {
     /// Puts the robot into the pose in which it stands, starting from where it is.
     ///
     /// # Errors
-    /// [`PlantError::Mechanics`] if it does not stand on its feet in this pose.
+    /// [`PlantError::NotStanding`] if it does not stand on its feet in this pose.
     pub fn stand(&self, motion: &mut BodyMotion) -> Result<(), PlantError> {
         motion.contacts = ContactStates::default();
         self.balance(motion, &UPRIGHT, false)?;
         self.balance(motion, &ALL, true)?;
         let scene = self.scene(motion)?;
         if scene.loads.feet.iter().all(|foot| foot.normal_n <= 0.0) {
-            return Err(not_standing());
+            return Err(PlantError::NotStanding);
         }
         Ok(())
     }
@@ -78,7 +78,7 @@ impl BodyMechanics {
                 slope.set_column(column, &((&error - moved) / DIFFERENCE));
                 slope[(column, column)] += size / STEP;
             }
-            let step = slope.lu().solve(&error).ok_or_else(not_standing)?;
+            let step = slope.lu().solve(&error).ok_or(PlantError::NotStanding)?;
             let longest = step.amax();
             let step = step * (STEP / longest.max(STEP));
             let mut shift = Velocity::zeros();
@@ -91,7 +91,7 @@ impl BodyMechanics {
                 return Ok(());
             }
         }
-        Err(not_standing())
+        Err(PlantError::NotStanding)
     }
 
     /// What pushes the chassis after a small shift, and the robot there.
@@ -118,8 +118,4 @@ impl BodyMechanics {
         let error = DVector::from_iterator(along.len(), along.iter().map(|i| force[*i]));
         Ok((error, moved))
     }
-}
-
-fn not_standing() -> PlantError {
-    PlantError::Mechanics("the robot does not stand on its feet in this pose".into())
 }

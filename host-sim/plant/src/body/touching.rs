@@ -203,6 +203,12 @@ impl Touching {
         &self.params
     }
 
+    /// Radius of the wheels \[m\].
+    #[must_use]
+    pub fn wheel_radius_m(&self) -> f64 {
+        self.wheel_radius_m
+    }
+
     /// The ground.
     #[must_use]
     pub fn terrain(&self) -> &Terrain {

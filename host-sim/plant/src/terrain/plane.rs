@@ -3,6 +3,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::hash::StateHasher;
+
 use super::surface::{Disc, Near, Surface};
 
 /// Everything below a plane.
@@ -31,6 +33,15 @@ impl Plane {
         Self {
             normal: Vector3::new(-sin * up_x, -sin * up_y, cos),
             offset_m: 0.0,
+        }
+    }
+
+    /// The same plane, higher by `height_m` \[m\].
+    #[must_use]
+    pub fn raised(self, height_m: f64) -> Self {
+        Self {
+            offset_m: self.offset_m + self.normal.z * height_m,
+            ..self
         }
     }
 
@@ -71,5 +82,16 @@ impl Surface for Plane {
         } else {
             f64::INFINITY
         }
+    }
+
+    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        let n = &self.normal;
+        Some((self.offset_m - n.x * x_m - n.y * y_m) / n.z)
+    }
+
+    fn feed(&self, hasher: &mut StateHasher) {
+        hasher.bytes(b"plane");
+        let values = self.normal.iter().chain([&self.offset_m]);
+        values.for_each(|v| hasher.f64(*v));
     }
 }

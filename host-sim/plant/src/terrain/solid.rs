@@ -9,6 +9,8 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::hash::StateHasher;
+
 use super::surface::{Disc, Near, Surface};
 
 /// Most faces of a solid.
@@ -260,5 +262,27 @@ impl Surface for Solid {
 
     fn top_m(&self) -> f64 {
         self.top_m
+    }
+
+    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        // Along a vertical line, each face bounds the body from above, below or the side.
+        let mut highest = f64::INFINITY;
+        for f in &self.faces {
+            let left = f.offset_m - f.normal.x * x_m - f.normal.y * y_m;
+            if f.normal.z > 1e-9 {
+                highest = highest.min(left / f.normal.z);
+            } else if f.normal.z > -1e-9 && left < 0.0 {
+                return None;
+            }
+        }
+        Some(highest)
+    }
+
+    fn feed(&self, hasher: &mut StateHasher) {
+        hasher.bytes(b"solid");
+        for face in &self.faces {
+            let values = face.normal.iter().chain([&face.offset_m]);
+            values.for_each(|v| hasher.f64(*v));
+        }
     }
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::hash::StateHasher;
+
 /// The closest place of a surface, seen from a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Near {
@@ -34,4 +36,10 @@ pub trait Surface {
 
     /// No part of it is higher \[m\].
     fn top_m(&self) -> f64;
+
+    /// Height of the surface above a place \[m\]; `None` where it has none.
+    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64>;
+
+    /// Adds the surface to a hash.
+    fn feed(&self, hasher: &mut StateHasher);
 }

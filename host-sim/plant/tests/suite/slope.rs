@@ -49,3 +49,84 @@ fn static_loads_on_planes_are_those_of_moments() {
     assert!((feet_at[0] - 31.5).abs() < 1.5, "{feet_at:?}");
     assert!((feet_at[4] - 5.6).abs() < 1.5, "{feet_at:?}");
 }
+
+fn on(degrees: f64, azimuth_deg: f64) -> wheeleg_plant::PlantParams {
+    let mut params = wheeleg_2003();
+    params.terrain.parts = vec![Part {
+        shape: Shape::Plane(Plane::sloping(
+            degrees.to_radians(),
+            azimuth_deg.to_radians(),
+        )),
+        material: Material::ROUGH,
+    }];
+    params
+}
+
+/// Up, down and across: nothing pushes the chassis, and wheels and feet touch.
+#[test]
+fn the_start_is_an_equilibrium_whichever_way_the_slope_runs() {
+    for azimuth in [0.0, 45.0, 90.0, 180.0, -135.0] {
+        let params = on(15.0, azimuth);
+        let plant = Plant::new(&params).unwrap();
+        let state = plant.initial_state(1).unwrap();
+        let scene = plant.assembly.mechanics.scene(&state.core.motion).unwrap();
+        let contacts = &scene.loads.contacts;
+        let total: Vector3<f64> = contacts.all().iter().map(|w| w.force_n).sum();
+        let weight = params.body.total_mass_kg() * 9.81;
+        let error = total - Vector3::new(0.0, 0.0, weight);
+        assert!(error.norm() < 1e-6, "{azimuth}: {error}");
+        let o = plant.outputs(&state);
+        // The chassis lies as the plane does, within what contacts and legs give way.
+        let slope = 15.0_f64.to_radians();
+        let across = azimuth.to_radians();
+        let up = state.core.motion.state.orientation * Vector3::z();
+        let normal = Vector3::new(
+            -slope.sin() * across.cos(),
+            -slope.sin() * across.sin(),
+            slope.cos(),
+        );
+        assert!(up.angle(&normal) < 0.02, "{azimuth}: {up} {normal}");
+        assert!(o.wheel_normal_n.iter().all(|n| *n > 20.0), "{o:?}");
+        assert_eq!(o.chassis_normal_n, 0.0);
+    }
+}
+
+/// Tip-back is at 24.2 degrees with the legs drawn in; the plant says so in words.
+#[test]
+fn too_steep_a_start_is_refused() {
+    let plant = Plant::new(&on(26.0, 0.0)).unwrap();
+    let error = plant.initial_state(1).unwrap_err();
+    assert_eq!(error, wheeleg_plant::PlantError::NotStanding);
+    assert!(error.to_string().contains("start place"), "{error}");
+}
+
+/// Bounds of the step: 3.2e6 N/m at a foot, whose lightest part is the vertical rod.
+#[test]
+fn a_contact_too_stiff_for_the_step_is_named() {
+    let refused = |change: fn(&mut wheeleg_plant::PlantParams)| {
+        let mut params = wheeleg_2003();
+        change(&mut params);
+        match Plant::new(&params).map(drop) {
+            Err(wheeleg_plant::PlantError::Parameter { name, max, .. }) => Some((name, max)),
+            other => {
+                assert_eq!(other, Ok(()));
+                None
+            }
+        }
+    };
+    let (name, max) = refused(|p| p.contacts.foot.law.stiffness_n_m = 5e6).unwrap();
+    assert_eq!(name, "contact.stiffness_n_m");
+    assert!((max / 3.2e6 - 1.0).abs() < 0.1, "{max}");
+    assert!(refused(|p| p.contacts.foot.law.stiffness_n_m = 2.5e6).is_none());
+    let (name, max) = refused(|p| p.contacts.wheel.law.bristle_stiffness_n_m = 5e7).unwrap();
+    assert_eq!(name, "wheel_contact.bristle_stiffness_n_m");
+    assert!(max > 1e7, "{max}");
+    let (name, _) = refused(|p| p.contacts.foot.law.bristle_damping_n_s_m = 2e3).unwrap();
+    assert_eq!(name, "contact.bristle_damping_n_s_m");
+    // Half the step bears four times the stiffness.
+    let finer = refused(|p| {
+        p.step_ns = 50_000;
+        p.contacts.foot.law.stiffness_n_m = 5e6;
+    });
+    assert!(finer.is_none());
+}

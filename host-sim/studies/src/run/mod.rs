@@ -261,6 +261,12 @@ fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotConfig,
     for fault in &scenario.faults {
         recorder.provenance("fault", fault.to_string());
     }
+    for part in &scenario.ground.parts {
+        recorder.provenance("terrain", part.as_str());
+    }
+    if let Some(fingerprint) = scenario.ground.fingerprint() {
+        recorder.provenance("terrain fingerprint", fingerprint);
+    }
     for p in &robot.parameters {
         recorder.provenance(
             "parameter",

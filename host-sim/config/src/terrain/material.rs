@@ -1,0 +1,47 @@
+//! What a part of the terrain is made of.
+//!
+//! A hard material is known by its friction. Soils belong here, too: names of this table, with
+//! what the plant needs for them.
+
+use wheeleg_plant::terrain::Material;
+
+use super::fields::{Fields, number};
+use crate::reader::Reader;
+
+/// Rubber on wet ice, ASSUMED.
+const ICE: Material = Material {
+    mu_static: 0.1,
+    mu_kinetic: 0.05,
+};
+
+const MATERIALS: [(&str, Material); 3] = [
+    ("rock", Material::ROUGH),
+    ("floor", Material::ROUGH),
+    ("ice", ICE),
+];
+
+/// Reads `material`, a name or its frictions; rock if it is left out.
+pub(super) fn read(r: &mut Reader, fields: &mut Fields<'_>) -> Option<Material> {
+    if !fields.has("material") {
+        return Some(Material::ROUGH);
+    }
+    let entry = fields.entry;
+    let Some(table) = entry.table("material") else {
+        return r.choice(entry, "material", &MATERIALS);
+    };
+    let mut own = Fields::new(&table, &[]);
+    let most = number("mu_static", [0.0, 10.0], "static friction");
+    let mu_static = own.required(r, &most);
+    let most = mu_static.unwrap_or(10.0);
+    let kinetic = number(
+        "mu_kinetic",
+        [0.0, most],
+        "kinetic friction, at most the static one",
+    );
+    let mu_kinetic = own.required(r, &kinetic);
+    own.reject_others(r);
+    Some(Material {
+        mu_static: mu_static?,
+        mu_kinetic: mu_kinetic?,
+    })
+}

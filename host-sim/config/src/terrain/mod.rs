@@ -1,0 +1,144 @@
+//! The ground of a scenario: sections `[[terrain]]`, each a part with its material.
+//!
+//! Axes as MODEL.md: the world's origin is the start place, x ahead, y to the left, z up. Parts
+//! add up: a body touches each on its own. Where no part reaches everywhere (`plane`), the others
+//! lie on a level floor of rock.
+
+mod fields;
+mod material;
+mod solids;
+
+use wheeleg_plant::terrain::{Material, Part, Plane, Shape, Terrain};
+
+use super::reader::{Entry, Reader};
+use fields::{Fields, angle, length};
+
+/// The ground of a scenario.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ground {
+    /// For the plant.
+    pub terrain: Terrain,
+    /// Each part as the file has it, for logs and reports.
+    pub parts: Vec<String>,
+}
+
+impl Ground {
+    /// BLAKE3 of the terrain with all that data files and seeds made of it, 64 hexadecimal
+    /// digits; `None` for the plain floor of a scenario without parts.
+    #[must_use]
+    pub fn fingerprint(&self) -> Option<String> {
+        let digest = || blake3::Hash::from(self.terrain.digest());
+        (!self.parts.is_empty()).then(|| digest().to_hex().to_string())
+    }
+}
+
+/// A kind of part.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Plane,
+    Block,
+    Step,
+    Stairs,
+    Ramp,
+}
+
+const KINDS: [(&str, Kind); 5] = [
+    ("plane", Kind::Plane),
+    ("block", Kind::Block),
+    ("step", Kind::Step),
+    ("stairs", Kind::Stairs),
+    ("ramp", Kind::Ramp),
+];
+
+impl Kind {
+    /// Whether there is ground everywhere with such a part alone.
+    fn is_everywhere(self) -> bool {
+        matches!(self, Self::Plane)
+    }
+}
+
+/// Reads all parts; `top` are the fields at the top of the file.
+pub(super) fn read(r: &mut Reader, top: &[&str]) -> Ground {
+    let mut parts = Vec::new();
+    let mut entries = Vec::new();
+    for i in 0..r.array_len("terrain") {
+        let entry = r.entry("terrain", i);
+        let kind = r.choice(&entry, "kind", &KINDS);
+        parts.push(entry.text());
+        entries.extend(kind.map(|kind| (kind, entry)));
+    }
+    // What lies on the ground needs the ground first.
+    let (everywhere, lying): (Vec<_>, Vec<_>) = entries
+        .into_iter()
+        .partition(|(kind, _)| kind.is_everywhere());
+    let mut terrain = Terrain { parts: Vec::new() };
+    for (kind, entry) in &everywhere {
+        let added = part(r, *kind, entry, &terrain, top);
+        terrain.parts.extend(added.unwrap_or_default());
+    }
+    if everywhere.is_empty() {
+        terrain = Terrain::default();
+    }
+    let below = terrain.clone();
+    for (kind, entry) in &lying {
+        let added = part(r, *kind, entry, &below, top);
+        terrain.parts.extend(added.unwrap_or_default());
+    }
+    Ground { terrain, parts }
+}
+
+/// Reads one part; `below` is the ground that it lies on.
+fn part(
+    r: &mut Reader,
+    kind: Kind,
+    entry: &Entry,
+    below: &Terrain,
+    top: &[&str],
+) -> Option<Vec<Part>> {
+    let mut fields = Fields::new(entry, top);
+    let material = material::read(r, &mut fields);
+    let shapes = match kind {
+        Kind::Plane => plane(r, &mut fields),
+        Kind::Block => solids::block(r, &mut fields, below),
+        Kind::Step => solids::step(r, &mut fields, below),
+        Kind::Stairs => solids::stairs(r, &mut fields, below),
+        Kind::Ramp => solids::ramp(r, &mut fields, below),
+    };
+    fields.reject_others(r);
+    Some(of(shapes?, material?))
+}
+
+/// These shapes, all of one material.
+fn of(shapes: Vec<Shape>, material: Material) -> Vec<Part> {
+    let part = |shape| Part { shape, material };
+    shapes.into_iter().map(part).collect()
+}
+
+/// Steepest plane, degrees.
+const STEEPEST_DEG: f64 = 60.0;
+
+fn plane(r: &mut Reader, fields: &mut Fields<'_>) -> Option<Vec<Shape>> {
+    let slope = angle(
+        "slope",
+        [-STEEPEST_DEG, STEEPEST_DEG],
+        "how steeply the plane rises",
+    );
+    let azimuth = angle(
+        "azimuth",
+        [-360.0, 360.0],
+        "direction in which the plane rises, from ahead to the left",
+    );
+    let height = length(
+        "height",
+        [-1000.0, 1000.0],
+        "height of the plane at the start place",
+    );
+    let slope = fields.or(r, &slope, 0.0);
+    let azimuth = fields.or(r, &azimuth, 0.0);
+    let height = fields.or(r, &height, 0.0);
+    let plane = match slope? {
+        0.0 => Plane::level(height?),
+        slope => Plane::sloping(slope, azimuth?).raised(height?),
+    };
+    Some(vec![Shape::Plane(plane)])
+}

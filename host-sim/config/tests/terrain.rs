@@ -1,0 +1,160 @@
+//! The ground of a scenario: what is accepted, and what is said of the rest.
+
+use std::f64::consts::SQRT_2;
+
+use wheeleg_config::{ConfigError, Scenario};
+use wheeleg_plant::terrain::{Material, Shape, Surface};
+
+fn parse(terrain: &str) -> Result<Scenario, ConfigError> {
+    let head = "name = \"t\"\ndescription = \"d\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+                seed = 1\ntargets = \"none\"\n\n[motion]\nkind = \"stand\"\n\n";
+    Scenario::parse("my.toml", &format!("{head}{terrain}"))
+}
+
+fn accepted(terrain: &str) -> Scenario {
+    parse(terrain).unwrap_or_else(|e| panic!("{}", report(&e)))
+}
+
+fn report(error: &ConfigError) -> String {
+    let lines = error
+        .problems()
+        .iter()
+        .map(|p| format!("{} | {}\n", p.summary(), p.help_text().unwrap_or("")));
+    lines.collect()
+}
+
+fn refused(terrain: &str, parts: &[&str]) {
+    let report = report(&parse(terrain).expect_err("must be refused"));
+    for part in parts {
+        assert!(report.contains(part), "`{part}` is not in:\n{report}");
+    }
+}
+
+#[test]
+fn without_a_section_and_below_loose_parts_the_floor_is_level_rock() {
+    let bare = accepted("");
+    assert_eq!(bare.ground, wheeleg_config::terrain::Ground::default());
+    let block = accepted(
+        "[[terrain]]\nkind = \"block\"\nx = { value = [1.0, 2.0], unit = \"m\" }\n\
+         y = { value = [-50, 50], unit = \"cm\" }\nheight = \"30 mm\"\n",
+    );
+    let ground = &block.ground.terrain;
+    assert_eq!(ground.parts.len(), 2);
+    assert_eq!(ground.height_m(1.5, 0.0), Some(0.03));
+    assert_eq!(ground.height_m(0.0, 0.0), Some(0.0));
+    assert_eq!(ground.height_m(1.5, 0.6), Some(0.0));
+}
+
+#[test]
+fn parts_stand_on_the_plane_below_them() {
+    let scenario = accepted(
+        "[[terrain]]\nkind = \"stairs\"\nat = \"1 m\"\nrise = \"100 mm\"\nrun = \"0.3 m\"\ncount = 3\n\n\
+         [[terrain]]\nkind = \"plane\"\nslope = \"10 deg\"\nmaterial = \"ice\"\n",
+    );
+    let ground = &scenario.ground.terrain;
+    let slope = 10.0_f64.to_radians().tan();
+    let height = |x: f64| ground.height_m(x, 0.0).expect("ground");
+    assert!((height(0.5) - 0.5 * slope).abs() < 1e-12);
+    // The middles of the treads are at 1.15, 1.45 and, of the landing, 2.6 m.
+    for (x, middle, rise) in [(1.05, 1.15, 0.1), (1.45, 1.45, 0.2), (2.6, 2.6, 0.3)] {
+        let expected = middle * slope + rise;
+        assert!((height(x) - expected).abs() < 1e-12, "{x}: {}", height(x));
+    }
+    assert_eq!(ground.parts[0].material.mu_static, 0.1);
+    assert_eq!(ground.parts[1].material, Material::ROUGH);
+}
+
+#[test]
+fn an_azimuth_turns_the_slope_and_the_ascent() {
+    let scenario = accepted(
+        "[[terrain]]\nkind = \"plane\"\nslope = \"20 deg\"\nazimuth = \"90 deg\"\n\
+         height = \"2 m\"\nmaterial = { mu_static = 0.3, mu_kinetic = 0.25 }\n",
+    );
+    let ground = &scenario.ground.terrain;
+    let height = ground.height_m(5.0, 1.0).expect("ground");
+    assert!((height - 2.0 - 20.0_f64.to_radians().tan()).abs() < 1e-12);
+    let Shape::Plane(plane) = &ground.parts[0].shape else {
+        panic!("a plane");
+    };
+    assert!(plane.normal().x.abs() < 1e-12 && plane.normal().y < -0.3);
+    assert_eq!(ground.parts[0].material.mu_kinetic, 0.25);
+
+    let step = accepted(
+        "[[terrain]]\nkind = \"step\"\nat = \"1 m\"\nheight = \"5 cm\"\nazimuth = \"45 deg\"\n",
+    );
+    let ground = &step.ground.terrain;
+    let along = |far: f64| ground.height_m(far / SQRT_2, far / SQRT_2);
+    assert_eq!(along(0.99), Some(0.0));
+    assert!((along(1.01).expect("ground") - 0.05).abs() < 1e-12);
+}
+
+#[test]
+fn a_ramp_rises_from_rear_to_front_and_turns() {
+    let ramp = accepted(
+        "[[terrain]]\nkind = \"ramp\"\nx = { value = [1.0, 3.0], unit = \"m\" }\n\
+         y = { value = [-1.0, 1.0], unit = \"m\" }\nheight = { value = [0.0, 40.0], unit = \"cm\" }\n\
+         turn = \"90 deg\"\n",
+    );
+    let solid = &ramp.ground.terrain.parts[1].shape;
+    // Turned to the left about (2, 0): what was ahead is now to the left.
+    let height = solid.height_m(2.0, 0.5).expect("ground");
+    assert!((height - 0.3).abs() < 1e-12, "{height}");
+}
+
+#[test]
+fn every_mistake_is_told_with_field_value_and_range() {
+    refused(
+        "[[terrain]]\nkind = \"plain\"\n\n[[terrain]]\nkind = \"plane\"\nslop = \"10 deg\"\n\n\
+         [[terrain]]\nkind = \"plane\"\nslope = \"80 deg\"\nmaterial = \"rok\"\n",
+        &[
+            "my.toml:12: `terrain[0].kind` = \"plain\" is not known; accepted: \"plane\", \"block\"",
+            "did you mean \"plane\"?",
+            "my.toml:16: unknown field `slop` in [terrain[1]]",
+            "did you mean `slope`?",
+            "my.toml:20: `terrain[2].slope` = 80 deg is out of range: allowed -60 to 60 deg",
+            "my.toml:21: `terrain[2].material` = \"rok\" is not known; accepted: \"rock\", \"floor\", \"ice\"",
+            "did you mean \"rock\"?",
+        ],
+    );
+    refused(
+        "[[terrain]]\nkind = \"block\"\nx = { value = [2.0, 1.0], unit = \"m\" }\ncount = 3\n",
+        &[
+            "`terrain[0].x` must run from the smaller to the larger value",
+            "`y` is missing in [terrain[0]]",
+            "`height` is missing in [terrain[0]]",
+            "unknown field `count`",
+        ],
+    );
+    refused(
+        "[[terrain]]\nkind = \"plane\"\nmaterial = { mu_static = 0.3, mu_kinetic = 0.4 }\n",
+        &["`terrain[0].material.mu_kinetic` = 0.4 is out of range: allowed 0 to 0.3"],
+    );
+    refused(
+        "[[terrain]]\nkind = \"stairs\"\nat = \"1 m\"\nrise = \"0.1 m\"\nrun = \"0.3 m\"\n",
+        &[
+            "`terrain[0].count` is missing",
+            "a whole number from 1 to 1000",
+        ],
+    );
+    refused(
+        "[[terrain]]\nkind = \"stairs\"\nat = \"1 m\"\nrise = \"0.1 m\"\nrun = \"0.3 m\"\ncount = 0\n",
+        &["`terrain[0].count` = 0 must be a whole number from 1 to 1000"],
+    );
+    refused(
+        "[terrain]\nkind = \"plane\"\n",
+        &["`terrain` must be a list of tables", "[[terrain]]"],
+    );
+}
+
+#[test]
+fn the_fingerprint_follows_every_number() {
+    let of = |slope: &str| {
+        let text = format!("[[terrain]]\nkind = \"plane\"\nslope = \"{slope}\" # steep\n");
+        accepted(&text).ground
+    };
+    let (a, b) = (of("10 deg"), of("10.000001 deg"));
+    assert_eq!(a.fingerprint(), of("10.0 deg").fingerprint());
+    assert_ne!(a.fingerprint(), b.fingerprint());
+    assert_eq!(accepted("").ground.fingerprint(), None);
+    assert_eq!(a.parts, ["kind = \"plane\", slope = \"10 deg\""]);
+}
