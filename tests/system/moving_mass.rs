@@ -39,7 +39,10 @@ fn boards_are_told_the_mass_that_their_piston_feels() {
             let felt = felt_kg(&plant, &state, joint);
             (least, most) = (least.min(felt), most.max(felt));
         }
-        println!("joint {}: told {told_kg:.2} kg, felt {least:.2} to {most:.2} kg", joint + 1);
+        println!(
+            "joint {}: told {told_kg:.2} kg, felt {least:.2} to {most:.2} kg",
+            joint + 1
+        );
         assert!(
             told_kg > 0.6 * least && told_kg < 1.6 * most,
             "joint {}: told {told_kg} kg, felt {least} to {most} kg",

@@ -12,6 +12,7 @@
 //!   have the same
 
 pub mod axis;
+mod bars;
 pub mod builtin;
 mod command;
 mod commissioned;
@@ -32,6 +33,7 @@ pub mod terrain;
 pub mod timing;
 
 pub use axis::AxisConfig;
+pub use bars::{Bar, Measure};
 pub use drawing::Drawing;
 pub use error::{ConfigError, Problem};
 pub use law::LawChoice;

@@ -4,6 +4,7 @@ use wheeleg_master::argument;
 use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_master::layer1::walk::WalkOrder;
 
+use super::bars::{self, Bar};
 use super::command;
 use super::error::ConfigError;
 use super::params::FieldSpec;
@@ -113,9 +114,11 @@ pub struct Scenario {
     pub faults: Vec<FaultSpec>,
     /// What it is held against.
     pub targets: TargetSet,
+    /// What its way over the ground is held against, beside the targets.
+    pub bars: Vec<Bar>,
 }
 
-const TOP: [&str; 10] = [
+const TOP: [&str; 11] = [
     "name",
     "description",
     "robot",
@@ -126,6 +129,7 @@ const TOP: [&str; 10] = [
     "events",
     "terrain",
     "faults",
+    "bars",
 ];
 
 const TARGETS: [(&str, TargetSet); 10] = [
@@ -215,6 +219,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
     }
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let ground = terrain::read(r, &TOP);
+    let bars = bars::read(r, &TOP);
     let faults = r.texts(&top, "faults", |text| {
         let fault = text.parse::<FaultSpec>().map_err(|e| e.to_string())?;
         match duration.filter(|end_s| fault.from_s >= *end_s) {
@@ -236,6 +241,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         ground,
         faults,
         targets: targets?,
+        bars,
     })
 }
 

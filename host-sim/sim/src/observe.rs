@@ -290,6 +290,7 @@ impl Observer {
             Phase::Lower => 3,
             Phase::Push => 5,
             Phase::Rest => 4,
+            Phase::Walk => 6,
             _ => 0,
         };
         let moving = phase != 0 || record.phase == Phase::Trajectory;

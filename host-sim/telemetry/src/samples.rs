@@ -304,7 +304,7 @@ samples! {
         alive: bool, "flag", 0, Master;
         /// Step of the gait, counted from 1; 0 before the first.
         step: u32, "1", 0, Master;
-        /// Gait phase within the step: 0 none, 1 unload, 2 lift and reach, 3 lower, 4 rest, 5 push.
+        /// Gait phase within the step: 0 none, 1 unload, 2 lift and reach, 3 lower, 4 rest, 5 push; 6 walk, each leg at its own time.
         phase: u8, "code", 0, Master;
         /// Link-loss action sent for the stepping leg: 0 hold, 1 hold then exhaust.
         link_loss_action: u8, "code", 0, Master;

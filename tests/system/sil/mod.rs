@@ -57,6 +57,7 @@ fn with_events(motion: Motion, duration_s: f64, events: &[(f64, EventAction)]) -
             })
             .collect(),
         targets: TargetSet::None,
+        bars: Vec::new(),
         ..scenario("three-step")
     }
 }

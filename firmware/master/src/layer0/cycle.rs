@@ -207,6 +207,9 @@ impl Layer0 {
     }
 
     fn sense_feet(&mut self, now_us: u64, events: &mut Events) {
+        let strokes = self.senses().vertical_mm.map(Option::unwrap_or_default);
+        let [left_mm, right_mm] = strokes;
+        let shorter_mm = left_mm.limit(PositionMm::ZERO, right_mm);
         for side in [Side::Left, Side::Right] {
             let node = self.nodes.get(side.joint(Cylinder::Vertical));
             let Some(reply) = node.and_then(|node| node.reply) else {
@@ -219,7 +222,9 @@ impl Layer0 {
                 *foot = Some(now);
             }
             let watch = self.foot_watches.get_mut(side.index());
-            if let Some(stuck) = watch.and_then(|watch| watch.sample(now)) {
+            if let Some(stuck) =
+                watch.and_then(|watch| watch.sample(now, reply.joint_position(), shorter_mm))
+            {
                 let warning = if stuck.closed {
                     Warning::SwitchStuckClosed
                 } else {

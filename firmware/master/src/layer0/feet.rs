@@ -1,10 +1,17 @@
 //! Foot switches that cannot be right.
 //!
-//! Of the four switches of a foot, one that never changes while the other three are all
-//! closed and then all open, or the other way round, each for a while, is stuck. A foot
-//! on an edge, or one that touches with its front alone, changes the switches it stands
-//! on, and leaves the others open in two steps out of two: three that agree are needed
-//! to find a fourth wrong. It takes a step to know; the gait does not wait for it.
+//! A foot may stand on an edge or tilted: that a switch stays open while the foot's other three
+//! are closed, or closed while they are open, says nothing yet. Two things do:
+//!
+//! * **Stuck closed.** In the air, clear of where the foot stood, nothing can close it. Seen in
+//!   two swings without its having opened in between, it is stuck.
+//! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as
+//!   the ground does where it is even. Three times in a row the other three closed, and it did
+//!   not: uneven ground would have closed it once.
+//!
+//! It takes some steps to know; the gait does not wait for it.
+
+use wheeleg_units::PositionMm;
 
 use crate::contact::FootSwitches;
 
@@ -15,20 +22,48 @@ const ALL: u8 = 0x0F;
 /// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes
 /// to roll onto its sole.
 const AGREE: u8 = 20;
+/// A foot that is drawn up by so much, mm, from where its other three switches were closed last
+/// is in the air.
+const CLEAR_MM: i16 = 15;
+/// Legs extended at least so far, mm, have their soles in the plane of the wheels.
+const LEVEL_MM: i16 = 175;
+/// Swings in which a switch must stay closed.
+const SWINGS: u8 = 2;
+/// Stances in which a switch must stay open.
+const STANCES: u8 = 3;
 
 /// One switch against the other three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct One {
-    /// Cycles for which the others have been closed, or open, all three.
-    agreed: [u8; 2],
+    /// Cycles of this swing, or of this stance, in which the others have agreed.
+    agreed: u8,
+    /// Swings in which it stayed closed.
+    closed: u8,
+    /// Stances in which it stayed open.
+    open: u8,
     /// Told of already.
     told: bool,
+}
+
+/// What a foot does, as far as its switches can be judged by it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Place {
+    /// Neither.
+    #[default]
+    Between,
+    /// Clear of the ground.
+    Air,
+    /// On it, all legs extended.
+    Ground,
 }
 
 /// The switches of one foot, watched.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FootWatch {
     last: Option<u8>,
+    place: Place,
+    /// Stroke of b6 when three switches were closed last.
+    stood: Option<PositionMm>,
     switches: [One; SWITCHES],
 }
 
@@ -42,9 +77,33 @@ pub struct Stuck {
 }
 
 impl FootWatch {
-    /// Takes the switches of a cycle; gives one that has just been found stuck.
-    pub fn sample(&mut self, now: FootSwitches) -> Option<Stuck> {
+    /// Takes the switches of a cycle, with the stroke of the leg's b6 and the shorter of both
+    /// legs' strokes; gives a switch that has just been found stuck.
+    pub fn sample(
+        &mut self,
+        now: FootSwitches,
+        b6_mm: PositionMm,
+        shorter_mm: PositionMm,
+    ) -> Option<Stuck> {
         let now = now.0 & ALL;
+        if now.count_ones() >= 3 {
+            self.stood = Some(b6_mm);
+        }
+        let clear = PositionMm::from_int(CLEAR_MM);
+        let drawn_up = self
+            .stood
+            .is_some_and(|stood| stood.saturating_sub(b6_mm) >= clear);
+        let place = match now.count_ones() {
+            0 | 1 if drawn_up => Place::Air,
+            3 | 4 if shorter_mm >= PositionMm::from_int(LEVEL_MM) => Place::Ground,
+            _ => Place::Between,
+        };
+        if place != self.place {
+            self.place = place;
+            for one in &mut self.switches {
+                one.agreed = 0;
+            }
+        }
         let changed = self.last.map_or(0, |last| last ^ now);
         self.last = Some(now);
         let mut found = None;
@@ -52,19 +111,22 @@ impl FootWatch {
             if changed & bit != 0 {
                 *one = One::default();
             }
-            let others = ALL & !bit;
-            let [closed, open] = &mut one.agreed;
-            if now & others == others {
-                *closed = closed.saturating_add(1);
-            } else if now & others == 0 {
-                *open = open.saturating_add(1);
+            let others = now & ALL & !bit;
+            let (count, times, closed) = match place {
+                Place::Air if others == 0 && now & bit != 0 => (&mut one.closed, SWINGS, true),
+                Place::Ground if others == ALL & !bit && now & bit == 0 => {
+                    (&mut one.open, STANCES, false)
+                }
+                _ => continue,
+            };
+            one.agreed = one.agreed.saturating_add(1);
+            if one.agreed == AGREE {
+                *count = count.saturating_add(1);
             }
-            if !one.told && *closed >= AGREE && *open >= AGREE {
+            if !one.told && *count >= times {
                 one.told = true;
-                found = Some(Stuck {
-                    switch: FootSwitches(bit),
-                    closed: now & bit != 0,
-                });
+                let switch = FootSwitches(bit);
+                found = Some(Stuck { switch, closed });
             }
         }
         found
@@ -76,37 +138,45 @@ mod tests {
     use super::*;
     use crate::contact::{FRONT, INNER, OUTER, REAR};
 
-    /// What is told over cycles with these switches, each pattern for so many.
-    fn stuck_switches(patterns: &[(u8, u32)]) -> Vec<Stuck> {
+    /// A pattern, the stroke of b6 and for how many cycles.
+    type Stretch = (u8, i16, u32);
+
+    /// What is told over these stretches; the other leg stands at `other_mm`.
+    fn stuck_switches(stretches: &[Stretch], other_mm: i16) -> Vec<Stuck> {
         let mut watch = FootWatch::default();
-        let cycles = patterns.iter().flat_map(|(raw, n)| (0..*n).map(|_| *raw));
-        cycles
-            .filter_map(|raw| watch.sample(FootSwitches(raw)))
-            .collect()
+        let mut found = Vec::new();
+        for (raw, b6, cycles) in stretches {
+            for _ in 0..*cycles {
+                let b6_mm = PositionMm::from_int(*b6);
+                let shorter_mm = b6_mm.limit(PositionMm::ZERO, PositionMm::from_int(other_mm));
+                found.extend(watch.sample(FootSwitches(*raw), b6_mm, shorter_mm));
+            }
+        }
+        found
     }
 
     #[test]
-    fn each_switch_that_sticks_is_told_once_in_a_step() {
+    fn each_switch_that_sticks_is_told_once() {
         for bit in [FRONT, OUTER, REAR, INNER] {
             for closed in [false, true] {
                 let stick = |raw: u8| if closed { raw | bit } else { raw & !bit };
-                let step = [(stick(0), 100), (stick(ALL), 200)];
+                let stand = (stick(ALL), 180, 200);
+                let step = [(stick(0), 100, 100), stand];
                 let stuck = Stuck {
                     switch: FootSwitches(bit),
                     closed,
                 };
-                assert_eq!(stuck_switches(&[step, step, step].concat()), [stuck]);
-                // Not before the other three have been both.
-                assert_eq!(stuck_switches(&[(stick(0), 500)]), []);
-                assert_eq!(stuck_switches(&[(stick(ALL), 500)]), []);
-                assert_eq!(stuck_switches(&[(stick(0), 100), (stick(ALL), 19)]), []);
+                let walk = [&[stand][..], &step, &step, &step].concat();
+                assert_eq!(stuck_switches(&walk, 180), [stuck]);
+                // Not before it has been seen often enough.
                 assert_eq!(
-                    stuck_switches(&[(stick(0), 100), (stick(ALL), 20)]),
-                    [stuck]
+                    stuck_switches(&[&[stand][..], &step[..1]].concat(), 180),
+                    []
                 );
                 // Mended, and stuck again.
-                let again = [&step[..], &[(0, 50), (ALL, 50)], &step[..]].concat();
-                assert_eq!(stuck_switches(&again), [stuck, stuck]);
+                let mended = [(0, 100, 50), (ALL, 180, 50)];
+                let again = [&walk[..], &mended, &walk, &step].concat();
+                assert_eq!(stuck_switches(&again, 180), [stuck, stuck]);
             }
         }
     }
@@ -114,20 +184,34 @@ mod tests {
     #[test]
     fn a_foot_that_walks_rolls_or_stands_on_an_edge_has_no_stuck_switch() {
         let walk = [
-            (0, 100),
-            (FRONT, 3),
-            (FRONT | OUTER | INNER, 15),
-            (ALL, 200),
-            (REAR, 10),
+            (0, 100, 100),
+            (FRONT, 170, 3),
+            (FRONT | OUTER | INNER, 179, 15),
+            (ALL, 180, 200),
+            (REAR, 180, 10),
         ];
-        assert_eq!(stuck_switches(&[walk, walk, walk].concat()), []);
+        assert_eq!(stuck_switches(&[walk, walk, walk].concat(), 180), []);
         for touching in [FRONT, FRONT | OUTER, OUTER, REAR] {
-            let step = [(0, 100), (touching, 200)];
-            assert_eq!(
-                stuck_switches(&[step, step, step].concat()),
-                [],
-                "{touching}"
-            );
+            let step = [(0, 100, 100), (touching, 180, 200)];
+            let steps = [step, step, step, step].concat();
+            assert_eq!(stuck_switches(&steps, 180), [], "{touching}");
         }
+    }
+
+    #[test]
+    fn a_tilted_robot_has_no_stuck_switch() {
+        // Nose down: the rear of the sole never closes, the front closes long before the rest.
+        let step = [
+            (0, 100, 100),
+            (FRONT, 160, 40),
+            (FRONT | OUTER | INNER, 161, 200),
+            (FRONT, 161, 40),
+        ];
+        let steps = [step, step, step, step, step].concat();
+        assert_eq!(stuck_switches(&steps, 160), []);
+        // One leg extended into a hollow, the other not.
+        let deep = steps.iter().map(|(raw, b6, n)| (*raw, b6 + 20, *n));
+        let deep: Vec<Stretch> = deep.collect();
+        assert_eq!(stuck_switches(&deep, 160), []);
     }
 }

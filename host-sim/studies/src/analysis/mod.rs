@@ -12,6 +12,7 @@ mod target;
 #[cfg(test)]
 pub(crate) mod testing;
 mod three_step;
+mod travel;
 
 use std::collections::VecDeque;
 
@@ -26,10 +27,12 @@ pub(crate) use safe_state::commanded_open;
 use sinusoid::SinusoidMeter;
 pub use target::{Judgement, Target};
 use three_step::ThreeStepMeter;
+use travel::TravelMeter;
 
 use wheeleg_config::{EventAction, LegChoice, Motion, RobotConfig, Scenario, TargetSet};
 use wheeleg_telemetry::{
-    FootSample, JointSample, MasterSample, Recording, Row, SampleRef, Sink, Taken,
+    BodySample, FootSample, JointSample, MasterSample, Recording, Row, SampleRef, Sink, Taken,
+    WheelSample,
 };
 
 /// What the analysis found.
@@ -103,6 +106,7 @@ pub struct Analyser<'a> {
     /// tells of it after it was.
     recent: VecDeque<(usize, Row<JointSample>)>,
     meter: Meter,
+    travel: Option<TravelMeter>,
     delays: Option<DelayMeter>,
     shift: Option<ShiftMeter>,
     contacts: Option<ContactMeter>,
@@ -127,6 +131,7 @@ impl<'a> Analyser<'a> {
             start_s: None,
             recent: VecDeque::new(),
             meter: Meter::None,
+            travel: (!scenario.bars.is_empty()).then(TravelMeter::default),
             delays: None,
             shift: None,
             contacts: steps.then(ContactMeter::default),
@@ -151,6 +156,9 @@ impl<'a> Analyser<'a> {
 
     /// The motion began when the master was in a step for the first time.
     fn master(&mut self, t_s: f64, master: &MasterSample) {
+        if let Some(travel) = &mut self.travel {
+            travel.master(master);
+        }
         if self.start_s.is_some() || master.step == 0 {
             return;
         }
@@ -213,7 +221,25 @@ impl<'a> Analyser<'a> {
         }
     }
 
+    fn body(&mut self, t_s: f64, body: &BodySample) {
+        if let Some(travel) = &mut self.travel {
+            travel.body(t_s, body);
+        }
+    }
+
+    fn wheel(&mut self, wheel: usize, row: &Row<WheelSample>) {
+        if let Meter::SafeState(meter) = &mut self.meter {
+            meter.wheel(wheel, row);
+        }
+        if let Some(travel) = &mut self.travel {
+            travel.wheel(wheel, row.t_s(), &row.v);
+        }
+    }
+
     fn foot(&mut self, foot: usize, t_ns: u64, sample: &FootSample) {
+        if let Some(travel) = &mut self.travel {
+            travel.foot(foot, sample);
+        }
         let moving = usize::from(self.moving == Some(LegChoice::Right));
         if let Some(contacts) = self.contacts.as_mut().filter(|_| foot == moving) {
             contacts.foot(t_ns, sample);
@@ -250,6 +276,9 @@ impl<'a> Analyser<'a> {
             Meter::FootSide(bit) => contact::side_targets(&analysis.contacts, bit),
             Meter::None => Vec::new(),
         };
+        if let Some(travel) = self.travel {
+            analysis.targets.extend(travel.targets(&self.scenario.bars));
+        }
         analysis
     }
 }
@@ -265,11 +294,8 @@ impl Sink for Analyser<'_> {
             }
             SampleRef::Foot(v) => self.foot(number, t_ns, v),
             SampleRef::Master(v) => self.master(t_ns as f64 * 1e-9, v),
-            SampleRef::Wheel(v) => {
-                if let Meter::SafeState(meter) = &mut self.meter {
-                    meter.wheel(number, &row(t_ns, v));
-                }
-            }
+            SampleRef::Wheel(v) => self.wheel(number, &row(t_ns, v)),
+            SampleRef::Body(v) => self.body(t_ns as f64 * 1e-9, v),
             SampleRef::Supply(v) => {
                 if let Meter::SafeState(meter) = &mut self.meter {
                     meter.supply(&row(t_ns, v));
@@ -303,13 +329,20 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
     for (joint, rows) in recording.joints.iter().enumerate() {
         rows.iter().for_each(|r| analyser.joint(joint, r));
     }
-    for (foot, rows) in recording.feet.iter().enumerate() {
-        rows.iter().for_each(|r| analyser.foot(foot, r.t_ns, &r.v));
+    for (wheel, rows) in recording.wheels.iter().enumerate() {
+        rows.iter().for_each(|r| analyser.wheel(wheel, r));
+    }
+    // The way of the robot sees its feet as they are at the time.
+    let mut feet = recording.feet.each_ref().map(|rows| rows.iter().peekable());
+    for body in &recording.body {
+        for (foot, rows) in feet.iter_mut().enumerate() {
+            while let Some(r) = rows.next_if(|r| r.t_ns <= body.t_ns) {
+                analyser.foot(foot, r.t_ns, &r.v);
+            }
+        }
+        analyser.body(body.t_s(), &body.v);
     }
     if let Meter::SafeState(meter) = &mut analyser.meter {
-        for (wheel, rows) in recording.wheels.iter().enumerate() {
-            rows.iter().for_each(|r| meter.wheel(wheel, r));
-        }
         recording.supply.iter().for_each(|r| meter.supply(r));
     }
     analyser.finish()

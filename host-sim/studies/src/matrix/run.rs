@@ -92,6 +92,7 @@ impl Robots {
             events: Vec::new(),
             faults: Vec::new(),
             targets: TargetSet::None,
+            bars: Vec::new(),
             ..self.scenario.clone()
         }
     }

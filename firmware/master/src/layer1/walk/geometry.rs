@@ -106,8 +106,7 @@ pub(super) fn stance(twist: Twist, geometry: &WalkGeometry, side: Side) -> Stanc
     let [ux, uy] = twist.ground_m_s(geometry, side, [middle, 0.0]);
     let along = (OUT_M - IN_M) / libm::fabsf(ux);
     // Both ends at the farthest yaw: |uy| T = tan ψ (x_begin + x_end), one of them far out.
-    let across =
-        2.0 * YAW_TANGENT * OUT_M / (libm::fabsf(uy) + YAW_TANGENT * libm::fabsf(ux));
+    let across = 2.0 * YAW_TANGENT * OUT_M / (libm::fabsf(uy) + YAW_TANGENT * libm::fabsf(ux));
     let duration_s = if uy == 0.0 { along } else { along.min(across) };
     if !duration_s.is_finite() {
         return Stance {

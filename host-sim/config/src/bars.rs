@@ -1,0 +1,149 @@
+//! Bars: what a run's way over the ground is held against, each a measure with its band.
+
+use super::params::FieldSpec;
+use super::quantity::Dimension;
+use super::reader::{Entry, Reader};
+
+macro_rules! measures {
+    ($($(#[doc = $doc:literal])* $name:ident = $key:literal, $dimension:ident, $unit:literal;)*) => {
+        /// What is measured of the whole robot.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Measure {
+            $($(#[doc = $doc])* $name,)*
+        }
+
+        impl Measure {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$name,)*];
+
+            /// Name in files and in reports.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$name => $key,)* }
+            }
+
+            /// Its unit in reports.
+            #[must_use]
+            pub const fn unit(self) -> &'static str {
+                match self { $(Self::$name => $unit,)* }
+            }
+
+            /// What it is.
+            #[must_use]
+            pub const fn meaning(self) -> &'static str {
+                match self { $(Self::$name => concat!($($doc),*).trim_ascii(),)* }
+            }
+
+            const fn dimension(self) -> Dimension {
+                match self { $(Self::$name => Dimension::$dimension,)* }
+            }
+        }
+    };
+}
+
+measures! {
+    /// Mean forward speed from 3 s on.
+    Speed = "speed", Velocity, "mm/s";
+    /// Way of the middle of the axle, forward positive.
+    Distance = "distance", Length, "m";
+    /// Height that the middle of the axle has gained.
+    Climb = "climb", Length, "m";
+    /// Mean slip of the wheels from 3 s on: 1 - way of the chassis / way of the rims.
+    Slip = "slip", Number, "1";
+    /// Share of the time with at least one foot loaded (more than 1 N).
+    Supported = "supported", Number, "%";
+    /// Largest roll to either side, against the start.
+    Roll = "roll", Angle, "deg";
+    /// Largest pitch to either side, against the start.
+    Pitch = "pitch", Angle, "deg";
+    /// Heading at the end, to the left positive, against the start; full turns count.
+    Heading = "heading", Angle, "deg";
+    /// Way over change of heading, from 3 s on.
+    Radius = "radius", Length, "m";
+    /// Largest force of the ground on the chassis: nose, tail or belly.
+    ChassisForce = "chassis-force", Force, "N";
+    /// Swings of the legs.
+    Steps = "steps", Count, "1";
+}
+
+impl Measure {
+    /// Factor from SI to its unit in reports.
+    #[must_use]
+    pub fn per_si(self) -> f64 {
+        self.dimension().factor(self.unit()).map_or(1.0, f64::recip)
+    }
+}
+
+/// A measure and the band in which it is to be, SI; at least one end is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bar {
+    /// What is measured.
+    pub measure: Measure,
+    /// Smallest allowed.
+    pub min: Option<f64>,
+    /// Largest allowed.
+    pub max: Option<f64>,
+    /// The run fails without it; otherwise it informs.
+    pub required: bool,
+}
+
+/// Reads all `[[bars]]`; `top` are the fields at the top of the file.
+pub(super) fn read(r: &mut Reader, top: &[&str]) -> Vec<Bar> {
+    let mut bars = Vec::new();
+    for i in 0..r.array_len("bars") {
+        let entry = r.entry("bars", i);
+        bars.extend(bar(r, &entry, top));
+    }
+    bars
+}
+
+fn bar(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Bar> {
+    r.reject_misplaced(entry, &["measure", "min", "max", "info"], top);
+    let names: Vec<(&str, Measure)> = Measure::ALL.iter().map(|m| (m.name(), *m)).collect();
+    let measure = r.choice(entry, "measure", &names)?;
+    let mut end = |key: &'static str| {
+        let spec = FieldSpec {
+            key,
+            dimension: measure.dimension(),
+            min: -1e6,
+            max: 1e6,
+            components: 1,
+            integer: false,
+            doc: "end of the band",
+        };
+        entry.get(key).map(|_| r.required(entry, &spec))
+    };
+    let (min, max) = (end("min"), end("max"));
+    let info = entry.get("info").map(|_| {
+        let spec = FieldSpec {
+            key: "info",
+            dimension: Dimension::Flag,
+            min: 0.0,
+            max: 1.0,
+            components: 1,
+            integer: true,
+            doc: "it informs only",
+        };
+        r.required(entry, &spec)
+    });
+    let problem = match (min, max) {
+        (None, None) => "a bar needs `min`, `max` or both",
+        (Some(Some(min)), Some(Some(max))) if min > max => "`min` is above `max`",
+        _ => "",
+    };
+    if !problem.is_empty() {
+        let message = format!("`{}`: {problem}", entry.path);
+        r.problem(Some(entry.span.clone()), message, "in this bar", None);
+        return None;
+    }
+    let required = match info {
+        Some(value) => value? == 0.0,
+        None => true,
+    };
+    Some(Bar {
+        measure,
+        min: min.map_or(Some(None), |v| v.map(Some))?,
+        max: max.map_or(Some(None), |v| v.map(Some))?,
+        required,
+    })
+}
