@@ -50,7 +50,7 @@ measures! {
     Climb = "climb", Length, "m";
     /// Mean slip of the wheels from 3 s on: 1 - way of the chassis / way of the rims.
     Slip = "slip", Number, "1";
-    /// Share of the time with at least one foot loaded (more than 1 N).
+    /// Share of the time from 3 s on with at least one foot loaded (more than 1 N).
     Supported = "supported", Number, "%";
     /// Largest roll to either side, against the start.
     Roll = "roll", Angle, "deg";

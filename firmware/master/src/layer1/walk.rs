@@ -138,7 +138,7 @@ impl Walk {
             let foothold = stance(wanted, &self.geometry, leg.side).begin_m;
             if let Some(sensed) = Sensed::of(feedback, leg.side) {
                 let swung = !leg.stands();
-                leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm, plan_mm);
+                leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
                 if swung && leg.stands() {
                     let took = f32::from(self.since_swing) * CYCLE_S;
                     self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
@@ -146,7 +146,8 @@ impl Walk {
             }
         }
         self.level(plan_mm);
-        if let Some(side) = self.next_swing(wanted)
+        let next = self.next_swing(wanted);
+        if let Some((side, 0)) = next
             && let Some(leg) = self.legs.get_mut(side.index())
         {
             leg.swing();
@@ -154,8 +155,11 @@ impl Walk {
             self.last = Some(side);
             self.steps = self.steps.saturating_add(1);
         }
+        for leg in &mut self.legs {
+            leg.rises_in = next.and_then(|(side, cycles)| (side == leg.side).then_some(cycles));
+        }
         self.accelerate(wanted);
-        self.write(now_us, lift_mm, plan_mm)
+        self.write(now_us, lift_mm)
     }
 
     /// What the ground has passed below since the last cycle, by the wheels: m and rad.
@@ -195,8 +199,8 @@ impl Walk {
         time_left_s(twist, &self.geometry, leg.side, leg.foot_m)
     }
 
-    /// The leg that is to swing now, if any.
-    fn next_swing(&self, wanted: Twist) -> Option<Side> {
+    /// The leg that swings next, if any, and in how many cycles as things stand: 0 is now.
+    fn next_swing(&self, wanted: Twist) -> Option<(Side, u8)> {
         let [left, right] = &self.legs;
         if wanted == Twist::default() || !left.stands() || !right.stands() {
             return None;
@@ -206,7 +210,7 @@ impl Walk {
         } else {
             (right, left)
         };
-        if other.loaded < LOADED {
+        if other.loaded == 0 {
             return None;
         }
         let cycle_s = self.stance_s(wanted) + self.swing_s;
@@ -218,7 +222,15 @@ impl Walk {
         };
         let since_s = f32::from(self.since_swing) * CYCLE_S;
         let spent = self.left_s(wanted, next) <= EXCHANGE_S;
-        (self.last.is_none() || since_s >= apart_s || spent).then_some(next.side)
+        let apart = if self.last.is_none() || spent {
+            0.0
+        } else {
+            libm::ceilf((apart_s - since_s) / CYCLE_S)
+        };
+        // A float to integer `as` saturates, and maps what is not a number to 0.
+        let cycles = (apart as u16).max(LOADED.saturating_sub(other.loaded));
+        let cycles = u8::try_from(cycles).ok()?;
+        Some((next.side, cycles))
     }
 
     /// The shorter of both legs' stances at a motion, s.
@@ -293,7 +305,7 @@ impl Walk {
                 .all(|leg| leg.stands() && leg.loaded >= LOADED)
     }
 
-    fn write(&mut self, now_us: u64, lift_mm: f32, plan_mm: f32) -> Setpoints {
+    fn write(&mut self, now_us: u64, lift_mm: f32) -> Setpoints {
         let mut out = Setpoints::idle(now_us);
         out.phase = if self.over() {
             Phase::Done
@@ -307,7 +319,7 @@ impl Walk {
             .find(|leg| !leg.stands())
             .map(|leg| leg.side);
         for leg in &mut self.legs {
-            let joints = leg.setpoints(self.twist, &self.geometry, lift_mm, plan_mm);
+            let joints = leg.setpoints(self.twist, &self.geometry, lift_mm);
             let cylinders = [Cylinder::Yaw, Cylinder::Horizontal, Cylinder::Vertical];
             for (cylinder, joint) in cylinders.into_iter().zip(joints) {
                 if let Some(slot) = out.joints.get_mut(leg.side.joint(cylinder)) {

@@ -47,7 +47,6 @@ impl Unwrapped {
 pub(super) struct TravelMeter {
     last_s: Option<f64>,
     way_m: f64,
-    time_s: f64,
     later_way_m: f64,
     later_time_s: f64,
     height_m: Ends,
@@ -73,7 +72,6 @@ impl TravelMeter {
         self.last_s = Some(t_s);
         let way_m = 1e-3 * v.speed_mm_s * dt_s;
         self.way_m += way_m;
-        self.time_s += dt_s;
         let heading_deg = self.heading.add(v.yaw_deg);
         if t_s >= FROM_S {
             self.later_way_m += way_m;
@@ -84,7 +82,7 @@ impl TravelMeter {
         against_start(&mut self.roll_deg, v.roll_deg);
         against_start(&mut self.pitch_deg, v.pitch_deg);
         self.chassis_n = self.chassis_n.max(v.chassis_force_n);
-        if self.foot_n.iter().any(|n| *n > LOADED_N) {
+        if t_s >= FROM_S && self.foot_n.iter().any(|n| *n > LOADED_N) {
             self.supported_s += dt_s;
         }
     }
@@ -119,7 +117,7 @@ impl TravelMeter {
                 let rims_m = 0.5 * (left? + right?);
                 (rims_m.abs() > 1e-3).then(|| 1.0 - self.later_way_m / rims_m)
             }
-            Measure::Supported => (self.time_s > 0.0).then(|| self.supported_s / self.time_s),
+            Measure::Supported => (self.later_time_s > 0.0).then(|| self.supported_s / self.later_time_s),
             Measure::Roll => largest(&self.roll_deg),
             Measure::Pitch => largest(&self.pitch_deg),
             Measure::Heading => Some(self.heading.sum_deg.to_radians()),

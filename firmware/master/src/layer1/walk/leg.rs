@@ -5,7 +5,7 @@
 //! | stance | holds where it touched, less what keeps the nose | follow the ground | the walk lets it swing |
 //! | lift | up by the lift | follow the ground | the foot is clear of the ground |
 //! | reach | up | to the foothold | most of the way is done |
-//! | lower | down to the plan, then slowly further | at the foothold | a switch of the foot closes |
+//! | lower | down to just above the plan, then slowly on | at the foothold | a switch of the foot closes |
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -13,15 +13,19 @@ use super::geometry::{Twist, WalkGeometry};
 use crate::contact::{FootSwitches, Side};
 use crate::layer1::params::STROKE_MM;
 use crate::mirror;
-use crate::setpoint::{Cylinder, Feedback, JointSetpoint, OnLinkLoss, Reflex};
+use crate::setpoint::{Ahead, Cylinder, Feedback, JointSetpoint, OnLinkLoss, Reflex};
 
 /// A foot is clear of the ground after half of the lift, or after so much of it, mm.
-const CLEAR_MM: f32 = 25.0;
+const CLEAR_MM: f32 = 20.0;
 /// Share of the way to the foothold after which the foot goes down: what is left takes as long as
 /// the way down.
-const LOWER_FROM: f32 = 0.7;
-/// A foot that should have touched searches the ground at this speed, mm per cycle (100 mm/s).
+const LOWER_FROM: f32 = 0.6;
+/// From so far above the ground that is expected, mm, …
+const APPROACH_MM: f32 = 10.0;
+/// … a foot goes down at this speed until it touches, mm per cycle (100 mm/s).
 const SEARCH_MM: f32 = 1.0;
+/// The slow way begins when the piston is as near to its begin as this, mm.
+const SEARCH_FROM_MM: f32 = 5.0;
 /// Stroke by which a stance presses on beyond the first touch, mm: it takes its share of the load
 /// (`terrain` study: 4 mm against the air's stiffness give about 10 N).
 pub(super) const PRESS_MM: f32 = 4.0;
@@ -31,6 +35,9 @@ const NOSE_MM: f32 = 0.3;
 const LOST: u16 = 5;
 /// Farthest that a standing leg extends after lost ground, mm.
 const FOLLOW_MM: f32 = 20.0;
+/// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
+/// presses less.
+const ANNOUNCED: u8 = 8;
 /// From measurement to the middle of the cycle in which a reference holds, s.
 const LEAD_S: f32 = 0.02;
 
@@ -43,7 +50,7 @@ pub(super) enum LegState {
     Lift(f32),
     /// Foot on its way over so many m.
     Reach(f32),
-    /// Foot goes down; searched so far beyond the plan, mm.
+    /// Foot goes down, b6 as far as this, mm.
     Lower(f32),
 }
 
@@ -90,6 +97,10 @@ pub(super) struct Leg {
     pub foot_m: [f32; 2],
     /// Stroke of b6 at which the leg stands, mm.
     pub stand_mm: f32,
+    /// Stroke of b6 at which it has found the ground last, mm.
+    ground_mm: f32,
+    /// Cycles until it is going to rise, if it is.
+    pub rises_in: Option<u8>,
     /// Cycles since the state began.
     pub cycles: u16,
     /// Cycles for which the foot has been loaded without a break.
@@ -110,10 +121,12 @@ impl Leg {
             state: if sensed.touches {
                 LegState::Stance
             } else {
-                LegState::Lower(0.0)
+                LegState::Lower(sensed.height_mm)
             },
             foot_m: sensed.foot_m,
             stand_mm: sensed.height_mm,
+            ground_mm: sensed.height_mm,
+            rises_in: None,
             cycles: 0,
             loaded: 0,
             open: 0,
@@ -140,8 +153,7 @@ impl Leg {
     }
 
     /// One cycle: `moved` is what the ground has passed below, m and rad; `foothold` where the
-    /// swing is to end, `lift_mm` its height, `plan_mm` the stroke of b6 at which ground is
-    /// expected.
+    /// swing is to end, `lift_mm` its height.
     pub(super) fn advance(
         &mut self,
         sensed: &Sensed,
@@ -149,7 +161,6 @@ impl Leg {
         geometry: &WalkGeometry,
         foothold: [f32; 2],
         lift_mm: f32,
-        plan_mm: f32,
     ) {
         self.cycles = self.cycles.saturating_add(1);
         self.loaded = if sensed.touches {
@@ -174,19 +185,18 @@ impl Leg {
             LegState::Reach(way_m) => {
                 self.foot_m = foothold;
                 if distance(sensed.foot_m, foothold) <= (1.0 - LOWER_FROM) * way_m {
-                    self.enter(LegState::Lower(0.0));
+                    self.enter(LegState::Lower((self.ground_mm - APPROACH_MM).max(0.0)));
                 }
             }
-            LegState::Lower(searched_mm) => {
+            LegState::Lower(to_mm) => {
                 if sensed.touches {
                     self.foot_m = sensed.foot_m;
+                    self.ground_mm = sensed.height_mm;
                     self.stand_mm = (sensed.height_mm + PRESS_MM).min(full_mm());
                     self.followed_mm = 0.0;
                     self.enter(LegState::Stance);
-                } else if sensed.height_mm >= plan_mm + searched_mm - 3.0 {
-                    // Where ground was expected there is none.
-                    let searched = (searched_mm + SEARCH_MM).min(full_mm() - plan_mm);
-                    self.state = LegState::Lower(searched.max(0.0));
+                } else if sensed.height_mm >= to_mm - SEARCH_FROM_MM {
+                    self.state = LegState::Lower((to_mm + SEARCH_MM).min(full_mm()));
                 }
             }
         }
@@ -216,7 +226,6 @@ impl Leg {
         speed: Twist,
         geometry: &WalkGeometry,
         lift_mm: f32,
-        plan_mm: f32,
     ) -> [JointSetpoint; 3] {
         let airborne = matches!(self.state, LegState::Lift(_) | LegState::Reach(_));
         let follows = matches!(self.state, LegState::Stance | LegState::Lift(_));
@@ -240,10 +249,16 @@ impl Leg {
             LegState::Stance => (self.stand_mm, Reflex::None),
             LegState::Lift(from_mm) => (from_mm - lift_mm, Reflex::None),
             LegState::Reach(_) => (self.stand_mm - lift_mm, Reflex::None),
-            LegState::Lower(searched_mm) => (plan_mm + searched_mm, Reflex::StopOnTouch),
+            LegState::Lower(to_mm) => (to_mm, Reflex::StopOnTouch),
         };
+        let rises = self.rises_in.filter(|_| self.stands());
+        let rises = rises.filter(|cycles| (1..=ANNOUNCED).contains(cycles));
         let mut vertical = JointSetpoint {
             reference_mm: stroke_mm(height_mm),
+            ahead: rises.map(|cycles| Ahead {
+                reference_mm: stroke_mm(height_mm - lift_mm),
+                cycles,
+            }),
             reflex,
             ..JointSetpoint::default()
         };
