@@ -52,6 +52,7 @@ impl Layer1 {
                 if moving {
                     return Err(Refusal::Moving);
                 }
+                order.validate().map_err(Refusal::Parameter)?;
                 let geometry = self.walks.ok_or(Refusal::WheelsNotStreamed)?;
                 let segment = self.segment.wrapping_add(1);
                 let walk = Walk::new(geometry, order, &self.feedback, segment)

@@ -17,10 +17,14 @@ fn usual(argument: &'static Argument) -> Value {
     let seconds = |us| Value::Micros(us);
     match (argument.name, argument.kind) {
         ("period", _) => seconds(3_333_333),
+        ("lift", ArgumentKind::Length(_)) => Value::Fixed(I16F16::lit("60")),
         ("lift", _) => seconds(100_000),
         ("reach", _) => seconds(500_000),
         ("lower", _) => seconds(1_000_000),
         ("push", _) => seconds(2_000_000),
+        ("nose", _) => Value::Fixed(I16F16::lit("-20")),
+        ("turn", _) => Value::Fixed(I16F16::lit("0.05")),
+        ("speed", _) => Value::Fixed(I16F16::lit("120")),
         ("push_acceleration", _) => Value::Fixed(I16F16::lit("600")),
         ("left", _) => Value::Fixed(I16F16::ZERO),
         ("steps" | "joint", _) => Value::Whole(3),
@@ -139,6 +143,12 @@ fn forced(command: Command, name: &str, value: Value) -> Option<Command> {
             "yaw_s2" => gait.yaw_s2_mm = mm(v),
             "push_speed" => gait.push_speed_mm_s = VelocityMmS::new(v),
             _ => gait.push_acceleration_mm_s2 = v,
+        },
+        (Command::Walk(order), _, Value::Fixed(v)) => match name {
+            "speed" => order.speed_mm_s = VelocityMmS::new(v),
+            "turn" => order.turn_rad_s = v,
+            "lift" => order.lift_mm = mm(v),
+            _ => order.nose_mm = mm(v),
         },
         (
             Command::FootTrajectory {

@@ -7,6 +7,7 @@ use wheeleg_master::event::{EVENT_DEPTH, Event, Events, HoldReason};
 use wheeleg_master::fifo::{POLICIES, WhenFull, push_drop_oldest, take_newest};
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_master::layer1::params::GaitParams;
+use wheeleg_master::layer1::walk::WalkOrder;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -66,6 +67,7 @@ fn all() -> Vec<Command> {
             side,
             shape: FootShape::default(),
         },
+        Command::Walk(WalkOrder::default()),
     ]
 }
 

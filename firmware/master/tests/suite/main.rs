@@ -14,4 +14,5 @@ mod parameters;
 mod questions;
 mod senses;
 mod stops;
+mod walk;
 mod whole_gait;

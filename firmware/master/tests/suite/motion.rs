@@ -39,7 +39,7 @@ impl Ideal {
             self.segment = Some(travel.segment);
             self.base_um = self.feedback.travel_um;
         }
-        let travelled = travel.travel_mm.to_f64();
+        let travelled = travel.wheels[0].travel_mm.to_f64();
         self.feedback.travel_um = self.base_um + (travelled * 1e3).round() as i64;
         let mut out = [0.0; 6];
         for (i, joint) in setpoints.joints.iter().enumerate() {
@@ -261,7 +261,10 @@ fn push_starts_from_the_stroke_reached() {
         out.joints[1].unwrap().reference_mm,
         PositionMm::from_int(170)
     );
-    assert_eq!(out.travel.unwrap().target_mm, PositionMm::from_int(170));
+    assert_eq!(
+        out.travel.unwrap().wheels[0].target_mm,
+        PositionMm::from_int(170)
+    );
 }
 
 #[test]

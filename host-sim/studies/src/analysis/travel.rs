@@ -117,7 +117,9 @@ impl TravelMeter {
                 let rims_m = 0.5 * (left? + right?);
                 (rims_m.abs() > 1e-3).then(|| 1.0 - self.later_way_m / rims_m)
             }
-            Measure::Supported => (self.later_time_s > 0.0).then(|| self.supported_s / self.later_time_s),
+            Measure::Supported => {
+                (self.later_time_s > 0.0).then(|| self.supported_s / self.later_time_s)
+            }
             Measure::Roll => largest(&self.roll_deg),
             Measure::Pitch => largest(&self.pitch_deg),
             Measure::Heading => Some(self.heading.sum_deg.to_radians()),

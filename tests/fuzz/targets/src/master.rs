@@ -11,6 +11,7 @@ use wheeleg_master::event::Event;
 use wheeleg_master::layer0::STALL_CYCLES;
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_master::layer1::params::{GaitParams, STROKE_MM};
+use wheeleg_master::layer1::walk::{WalkOrder, WalkPattern};
 use wheeleg_protocol::{
     Address, FaultBits, InputBits, Message, NODES, SCHEMA_HASH, SlotReply, Sync, SyncFlags,
     SyncSlots,
@@ -86,7 +87,7 @@ impl<'a> Arbitrary<'a> for AnyCommand {
         let raw: i32 = u.arbitrary()?;
         // Strokes in their range and beyond.
         let stroke_mm = PositionMm::from_raw(raw >> 7);
-        let command = match u.int_in_range(0..=24_u8)? {
+        let command = match u.int_in_range(0..=26_u8)? {
             0 | 1 => Command::JointReference { joint, stroke_mm },
             2 => Command::TransmitPosition { joint },
             3 => Command::OpenAllValves { joint },
@@ -122,6 +123,7 @@ impl<'a> Arbitrary<'a> for AnyCommand {
             20 | 21 => Command::StartGait,
             22 => Command::StopGait,
             23 => Command::SetGait(any_gait(u)?),
+            24 | 25 => Command::Walk(any_walk(u)?),
             _ if u.ratio(1, 2_u8)? => any_service(u, joint, raw)?,
             _ => Command::FootTrajectory {
                 side,
@@ -160,6 +162,24 @@ fn any_gait(u: &mut Unstructured<'_>) -> arbitrary::Result<GaitParams> {
 }
 
 /// Any shape, with floats of every kind, infinite and NaN among them.
+fn any_walk(u: &mut Unstructured<'_>) -> arbitrary::Result<WalkOrder> {
+    // In their ranges for the most part.
+    let mut number = |range: i32| -> arbitrary::Result<i32> {
+        Ok(u.int_in_range(-range..=range)? << 16 >> u.int_in_range(0..=2_u8)?)
+    };
+    Ok(WalkOrder {
+        speed_mm_s: VelocityMmS::from_raw(number(200)?),
+        turn_rad_s: fixed::types::I16F16::from_bits(number(1)? >> 2),
+        lift_mm: PositionMm::from_raw(number(180)?.abs()),
+        nose_mm: PositionMm::from_raw(-number(120)?.abs()),
+        pattern: if u.arbitrary()? {
+            WalkPattern::Tandem
+        } else {
+            WalkPattern::Alternate
+        },
+    })
+}
+
 fn any_shape(u: &mut Unstructured<'_>) -> arbitrary::Result<FootShape> {
     let mut length = || Ok(PositionMm::from_raw(u.arbitrary::<i32>()? >> 8));
     let [forward_mm, left_mm, height_mm] = [length()?, length()?, length()?];

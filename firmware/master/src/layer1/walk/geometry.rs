@@ -33,8 +33,9 @@ const RADIUS_MIN_M: f32 = 0.01;
 const STROKE_M: f32 = 0.18;
 /// Stroke kept free at either end of b5, m: what a stance may stray.
 const MARGIN_M: f32 = 0.0075;
-/// Tangent of the farthest planned yaw of a leg: 16.5° of the 18° that its cylinder turns.
-const YAW_TANGENT: f32 = 0.296;
+/// Tangent of the farthest planned yaw of a leg: 14.6° of the 18° that its cylinder turns, because
+/// the way of a foot in a turn is bent.
+const YAW_TANGENT: f32 = 0.26;
 
 /// Farthest and nearest distance of a planned foothold from the yaw axis, m.
 pub(super) const OUT_M: f32 = RADIUS_MIN_M + STROKE_M - MARGIN_M;
@@ -104,23 +105,31 @@ pub(super) struct Stance {
 pub(super) fn stance(twist: Twist, geometry: &WalkGeometry, side: Side) -> Stance {
     let middle = 0.5 * (OUT_M + IN_M);
     let [ux, uy] = twist.ground_m_s(geometry, side, [middle, 0.0]);
-    let along = (OUT_M - IN_M) / libm::fabsf(ux);
-    // Both ends at the farthest yaw: |uy| T = tan ψ (x_begin + x_end), one of them far out.
-    let across = 2.0 * YAW_TANGENT * OUT_M / (libm::fabsf(uy) + YAW_TANGENT * libm::fabsf(ux));
-    let duration_s = if uy == 0.0 { along } else { along.min(across) };
-    if !duration_s.is_finite() {
+    let longest_s = |out: f32| {
+        let along = (out - IN_M) / libm::fabsf(ux);
+        // Both ends at the farthest yaw: |uy| T = tan ψ (x_begin + x_end), one of them far out.
+        let across = 2.0 * YAW_TANGENT * out / (libm::fabsf(uy) + YAW_TANGENT * libm::fabsf(ux));
+        if uy == 0.0 { along } else { along.min(across) }
+    };
+    let tangent = |out: f32, duration_s: f32| {
+        // Yawed equally far to both sides.
+        uy * duration_s / (2.0 * out - libm::fabsf(ux) * duration_s)
+    };
+    if !longest_s(OUT_M).is_finite() {
         return Stance {
             begin_m: [middle, 0.0],
             duration_s: f32::INFINITY,
         };
     }
-    let (dx, dy) = (ux * duration_s, uy * duration_s);
+    // A yawed leg reaches less far forward.
+    let yaw = tangent(OUT_M, longest_s(OUT_M));
+    let out = OUT_M / libm::sqrtf(1.0 + yaw * yaw);
+    let duration_s = longest_s(out);
+    let dx = ux * duration_s;
     // Drawn towards the robot it begins far out; pushed away from it, it ends there.
-    let begin = if dx <= 0.0 { OUT_M } else { OUT_M - dx };
-    let tangent = dy / (2.0 * begin + dx);
-    let shorter = 1.0 / libm::sqrtf(1.0 + tangent * tangent);
+    let begin = if dx <= 0.0 { out } else { out - dx };
     Stance {
-        begin_m: [begin * shorter, -tangent * begin * shorter],
+        begin_m: [begin, -tangent(out, duration_s) * begin],
         duration_s,
     }
 }

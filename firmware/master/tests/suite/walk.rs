@@ -1,0 +1,293 @@
+//! A walk against an ideal robot: pistons that follow their references at a limited speed, wheels
+//! that follow theirs, and a nose that lies on the feet: what reaches as far down as the other leg,
+//! within what the air gives way, touches the ground.
+
+use fixed::types::I16F16;
+use wheeleg_master::contact::{FootSwitches, Side};
+use wheeleg_master::layer1::walk::{Walk, WalkGeometry, WalkOrder, WalkPattern};
+use wheeleg_master::mirror;
+use wheeleg_master::setpoint::{Cylinder, Feedback, Phase, Setpoints};
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+/// Speed of a piston, mm per cycle.
+const PISTON_MM: f64 = 3.0;
+
+struct Robot {
+    walk: Walk,
+    strokes: [f64; 6],
+    /// Depth of the ground below each foot, mm.
+    ground: [f64; 2],
+    wheels_mm: [f64; 2],
+    origin_mm: [f64; 2],
+    segment: u16,
+    now_us: u64,
+    last: Setpoints,
+}
+
+fn order(speed_mm_s: i16, turn_rad_s: &str) -> WalkOrder {
+    WalkOrder {
+        speed_mm_s: VelocityMmS::from_int(speed_mm_s),
+        turn_rad_s: turn_rad_s.parse().expect("a number"),
+        ..WalkOrder::default()
+    }
+}
+
+impl Robot {
+    fn new(order: WalkOrder) -> Self {
+        let strokes = [90.0, 0.0, 180.0, 90.0, 90.0, 180.0];
+        let ground = [0.0; 2];
+        let feedback = sensed(&strokes, &ground, [0.0; 2]);
+        let walk = Walk::new(WalkGeometry::default(), order, &feedback, 7);
+        Self {
+            walk: walk.expect("in range").expect("all heard"),
+            strokes,
+            ground,
+            wheels_mm: [0.0; 2],
+            origin_mm: [0.0; 2],
+            segment: 7,
+            now_us: 0,
+            last: Setpoints::idle(0),
+        }
+    }
+
+    fn touches(&self, side: Side) -> bool {
+        touches(&self.strokes, &self.ground, side)
+    }
+
+    /// Foot of a leg from its yaw axis, m.
+    fn foot_m(&self, side: Side) -> [f64; 2] {
+        let first = side.joint(Cylinder::Yaw);
+        let strokes = [0, 1, 2].map(|i| (self.strokes[first + i] * 1e-3) as f32);
+        let [x, y, _] = mirror::foot_of_strokes(side, strokes).expect("closes");
+        [x.into(), y.into()]
+    }
+
+    fn cycle(&mut self) -> Setpoints {
+        self.now_us += 10_000;
+        let feedback = sensed(&self.strokes, &self.ground, self.wheels_mm);
+        let out = self.walk.setpoints(self.now_us, &feedback);
+        for (stroke, joint) in self.strokes.iter_mut().zip(out.joints) {
+            let to = joint.expect("every joint is led").reference_mm.to_f64();
+            *stroke += (to - *stroke).clamp(-PISTON_MM, PISTON_MM);
+        }
+        let travel = out.travel.expect("the wheels are led");
+        if travel.segment != self.segment {
+            self.segment = travel.segment;
+            self.origin_mm = self.wheels_mm;
+        }
+        for (i, wheel) in travel.wheels.iter().enumerate() {
+            self.wheels_mm[i] = self.origin_mm[i] + wheel.travel_mm.to_f64();
+        }
+        self.last = out;
+        out
+    }
+
+    fn run(&mut self, seconds: f64) {
+        for _ in 0..(seconds * 100.0) as u32 {
+            self.cycle();
+        }
+    }
+}
+
+/// Whether a foot reaches as far down as the other, or as the air lets it, mm.
+fn touches(strokes: &[f64; 6], ground: &[f64; 2], side: Side) -> bool {
+    let down = |side: Side| strokes[side.joint(Cylinder::Vertical)] - ground[side.index()];
+    down(side) >= down(side.other()) - 3.5
+}
+
+fn sensed(strokes: &[f64; 6], ground: &[f64; 2], wheels_mm: [f64; 2]) -> Feedback {
+    let switches = |side: Side| {
+        let touches = touches(strokes, ground, side);
+        Some(FootSwitches(if touches { 0x0F } else { 0 }))
+    };
+    Feedback {
+        strokes_mm: strokes.map(|mm| Some(PositionMm::from_f64(mm))),
+        feet: [switches(Side::Left), switches(Side::Right)],
+        wheels_um: wheels_mm.map(|mm| (mm * 1e3) as i64),
+        motion_allowed: true,
+        ..Feedback::default()
+    }
+}
+
+#[test]
+fn a_foot_rises_only_when_the_other_has_been_loaded_for_100_ms() {
+    for pattern in [WalkPattern::Alternate, WalkPattern::Tandem] {
+        let mut robot = Robot::new(WalkOrder {
+            pattern,
+            ..order(120, "0")
+        });
+        let mut loaded = [0_u32; 2];
+        let mut rises = [0_u32; 2];
+        let mut before = [180.0; 2];
+        for _ in 0..2000 {
+            let out = robot.cycle();
+            for side in [Side::Left, Side::Right] {
+                let wanted = out.joints[side.joint(Cylinder::Vertical)]
+                    .unwrap()
+                    .reference_mm;
+                // A rise is asked for in one step.
+                if wanted.to_f64() < before[side.index()] - 15.0 {
+                    rises[side.index()] += 1;
+                    // The tenth cycle is this one.
+                    assert!(loaded[side.other().index()] >= 9, "{side:?} {loaded:?}");
+                }
+                before[side.index()] = wanted.to_f64();
+            }
+            for side in [Side::Left, Side::Right] {
+                let count = &mut loaded[side.index()];
+                *count = if robot.touches(side) { *count + 1 } else { 0 };
+            }
+            assert!(robot.touches(Side::Left) || robot.touches(Side::Right) || out.step < 2);
+        }
+        assert!(rises.iter().all(|n| *n >= 4), "{pattern:?} {rises:?}");
+        assert!(rises[0].abs_diff(rises[1]) <= 1, "{pattern:?} {rises:?}");
+    }
+}
+
+#[test]
+fn standing_feet_stay_where_they_are_on_the_ground() {
+    // Straight, back, in a turn and on the spot: the feet go with the ground below them.
+    for (speed, turn) in [
+        (100, "0"),
+        (-80, "0"),
+        (60, "0.07"),
+        (0, "0.08"),
+        (60, "-0.05"),
+    ] {
+        let mut robot = Robot::new(order(speed, turn));
+        robot.run(6.0);
+        let mut worst = 0.0_f64;
+        for _ in 0..600 {
+            let before = (
+                robot.wheels_mm,
+                [Side::Left, Side::Right].map(|s| robot.foot_m(s)),
+            );
+            let stood = [Side::Left, Side::Right].map(|s| robot.touches(s));
+            robot.cycle();
+            // What the wheels have moved, as the robot turns about the middle of its axle.
+            let [left, right] = [0, 1].map(|i| 1e-3 * (robot.wheels_mm[i] - before.0[i]));
+            let (way, turned) = (0.5 * (left + right), (right - left) / 0.56);
+            for side in [Side::Left, Side::Right] {
+                if !stood[side.index()] || !robot.touches(side) {
+                    continue;
+                }
+                let hip = if side == Side::Left { 0.2 } else { -0.2 };
+                let [x, y] = before.1[side.index()];
+                let wanted = [x - way + turned * (y + hip), y - turned * (x + 0.6)];
+                let now = robot.foot_m(side);
+                let off = (now[0] - wanted[0]).hypot(now[1] - wanted[1]);
+                worst = worst.max(off);
+            }
+        }
+        // A step of the reference where the leg's geometry is tightest.
+        assert!(
+            worst < 1.0e-3,
+            "{speed} {turn}: {} mm in a cycle",
+            1e3 * worst
+        );
+    }
+}
+
+#[test]
+fn speed_and_turn_are_those_of_the_order_and_change_while_walking() {
+    let mut robot = Robot::new(order(60, "0"));
+    robot.run(6.0);
+    let travelled = |robot: &mut Robot, seconds: f64| {
+        let before = robot.wheels_mm;
+        robot.run(seconds);
+        [0, 1].map(|i| (robot.wheels_mm[i] - before[i]) / seconds)
+    };
+    let [left, right] = travelled(&mut robot, 10.0);
+    assert!(
+        (left - 60.0).abs() < 1.0 && (right - 60.0).abs() < 1.0,
+        "{left} {right}"
+    );
+    robot.walk.change(order(40, "0.05")).expect("in range");
+    robot.run(2.0);
+    let [left, right] = travelled(&mut robot, 10.0);
+    let turn = (right - left) / 560.0;
+    assert!((turn - 0.05).abs() < 0.002, "{turn}");
+    assert!((0.5 * (left + right) - 40.0).abs() < 1.0);
+}
+
+#[test]
+fn a_walk_is_accelerated_by_0_3_m_s2_at_most_and_stops_with_both_feet_down() {
+    let mut robot = Robot::new(order(150, "0"));
+    let mut last = 0.0;
+    for i in 0..3000 {
+        if i == 1500 {
+            robot.walk.stop();
+        }
+        let out = robot.cycle();
+        let speed = out.travel.unwrap().wheels[0].velocity_mm_s.to_f64();
+        assert!((speed - last).abs() < 3.1, "{last} {speed}");
+        last = speed;
+        if out.phase == Phase::Done {
+            assert!(robot.touches(Side::Left) && robot.touches(Side::Right));
+            assert_eq!(speed, 0.0);
+            assert!(robot.walk.steps() > 4);
+            return;
+        }
+    }
+    panic!("it has not stopped");
+}
+
+#[test]
+fn no_foot_is_dragged_where_a_swing_takes_long() {
+    // The ground is out of reach for the left foot: the wheels wait.
+    let mut robot = Robot::new(order(120, "0"));
+    robot.run(8.0);
+    robot.ground[0] = 60.0;
+    robot.run(6.0);
+    let speed = robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64();
+    assert!(speed.abs() < 2.0, "{speed} mm/s");
+    // The standing foot is still inside its reach.
+    let [x, _] = robot.foot_m(Side::Right);
+    assert!(x > 0.012, "{x}");
+    // It goes on when there is ground again.
+    robot.ground[0] = 0.0;
+    robot.run(3.0);
+    assert!(robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64() > 50.0);
+}
+
+#[test]
+fn a_walk_goes_on_for_longer_than_the_references_can_tell() {
+    // 32 m are the end of their format.
+    let mut robot = Robot::new(order(120, "0"));
+    robot.run(400.0);
+    assert!(robot.wheels_mm[0] > 38_000.0, "{:?}", robot.wheels_mm);
+    assert!(robot.segment > 7);
+}
+
+#[test]
+fn what_is_out_of_range_is_refused() {
+    let feedback = sensed(&[90.0; 6], &[0.0; 2], [0.0; 2]);
+    let wrong = [
+        order(151, "0"),
+        order(-151, "0"),
+        order(0, "0.2"),
+        WalkOrder {
+            lift_mm: PositionMm::from_int(19),
+            ..WalkOrder::default()
+        },
+        WalkOrder {
+            nose_mm: PositionMm::from_int(1),
+            ..WalkOrder::default()
+        },
+        WalkOrder {
+            turn_rad_s: I16F16::MIN,
+            ..WalkOrder::default()
+        },
+    ];
+    for order in wrong {
+        assert!(Walk::new(WalkGeometry::default(), order, &feedback, 1).is_err());
+        let mut walk = Walk::new(WalkGeometry::default(), WalkOrder::default(), &feedback, 1);
+        let walk = walk.as_mut().expect("in range").as_mut().expect("heard");
+        assert!(walk.change(order).is_err());
+    }
+    // A board that was not heard: it is not known where the leg stands.
+    let mut deaf = feedback;
+    deaf.strokes_mm[4] = None;
+    let walk = Walk::new(WalkGeometry::default(), WalkOrder::default(), &deaf, 1);
+    assert!(walk.expect("in range").is_none());
+}
