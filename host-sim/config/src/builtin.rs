@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::error::{ConfigError, Problem};
+use super::terrain::Files;
 use super::{RobotConfig, Scenario, closest};
 
 macro_rules! embedded {
@@ -24,8 +25,14 @@ pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg", "wheele
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
-    "walk", "slope-10",
+    "walk", "slope-10", "rock-field", "height-map",
 );
+
+/// Data files of scenarios: name, content.
+pub const DATA: &[(&str, &[u8])] = &[(
+    "height-map.csv",
+    include_bytes!("../../scenarios/height-map.csv"),
+)];
 
 /// A robot by built-in name, or by path to a TOML file.
 ///
@@ -61,6 +68,9 @@ pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig,
 /// [`ConfigError`] if there is no such scenario or file, or if it is wrong.
 pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
+    if SCENARIOS.iter().any(|(name, ..)| *name == name_or_path) {
+        return Scenario::parse_with(&file, &text, &Files::BuiltIn);
+    }
     Scenario::parse(&file, &text)
 }
 

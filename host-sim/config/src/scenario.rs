@@ -10,7 +10,7 @@ use super::error::ConfigError;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
-use super::terrain::{self, Ground};
+use super::terrain::{self, Files, Ground};
 use crate::faults::FaultSpec;
 
 /// A leg.
@@ -170,19 +170,25 @@ const fn scalar(
 }
 
 impl Scenario {
-    /// Reads a scenario from TOML text; `file` is the name for messages.
+    /// Reads a scenario from TOML text; `file` is its path, for messages and for the data files
+    /// beside it.
     ///
     /// # Errors
     /// [`ConfigError`] with every problem found.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_with(file, text, &Files::beside(file))
+    }
+
+    /// As [`Self::parse`], with the data files elsewhere.
+    pub(crate) fn parse_with(file: &str, text: &str, files: &Files) -> Result<Self, ConfigError> {
         let what = format!("the scenario file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
-        let scenario = read(&mut r);
+        let scenario = read(&mut r, files);
         r.finish(&what, scenario).map(|(scenario, _)| scenario)
     }
 }
 
-fn read(r: &mut Reader) -> Option<Scenario> {
+fn read(r: &mut Reader, files: &Files) -> Option<Scenario> {
     let top = r.table("")?;
     r.reject_unknown(&top, &TOP);
     let name = r.name(&top, "name");
@@ -218,7 +224,7 @@ fn read(r: &mut Reader) -> Option<Scenario> {
         events.extend(event(r, &entry, duration));
     }
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-    let ground = terrain::read(r, &TOP);
+    let ground = terrain::read(r, &TOP, files);
     let bars = bars::read(r, &TOP);
     let faults = r.texts(&top, "faults", |text| {
         let fault = text.parse::<FaultSpec>().map_err(|e| e.to_string())?;

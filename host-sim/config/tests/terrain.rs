@@ -24,7 +24,7 @@ fn report(error: &ConfigError) -> String {
 }
 
 fn refused(terrain: &str, parts: &[&str]) {
-    let report = report(&parse(terrain).expect_err("must be refused"));
+    let report = report(&parse(terrain).map(drop).expect_err("must be refused"));
     for part in parts {
         assert!(report.contains(part), "`{part}` is not in:\n{report}");
     }
@@ -157,4 +157,171 @@ fn the_fingerprint_follows_every_number() {
     assert_ne!(a.fingerprint(), b.fingerprint());
     assert_eq!(accepted("").ground.fingerprint(), None);
     assert_eq!(a.parts, ["kind = \"plane\", slope = \"10 deg\""]);
+}
+
+const ROCKS: &str = "[[terrain]]\nkind = \"rocks\"\nx = { value = [1.0, 5.0], unit = \"m\" }\n\
+     y = { value = [-1.0, 1.0], unit = \"m\" }\nseed = 4\ncover = 0.2\n\
+     size = { value = [100, 200], unit = \"mm\" }\n";
+
+#[test]
+fn rocks_lie_on_what_is_below_them() {
+    let slope = "[[terrain]]\nkind = \"plane\"\nslope = \"20 deg\"\n\n";
+    let ground = accepted(&format!("{ROCKS}exposed = \"50 %\"\n\n{slope}")).ground;
+    let rocks: Vec<_> = ground.terrain.parts[1..]
+        .iter()
+        .map(|part| match &part.shape {
+            Shape::Ellipsoid(rock) => *rock,
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert!((60..200).contains(&rocks.len()), "{}", rocks.len());
+    for rock in &rocks {
+        // Half buried: their centres lie in the slope.
+        let centre = rock.centre_m();
+        assert!((centre.z - 20.0_f64.to_radians().tan() * centre.x).abs() < 1e-12);
+    }
+    let again = accepted(&format!("{ROCKS}exposed = \"50 %\"\n\n{slope}")).ground;
+    assert_eq!(ground.fingerprint(), again.fingerprint());
+    let other = accepted(&format!(
+        "{}\n{slope}",
+        ROCKS.replace("seed = 4", "seed = 5")
+    ));
+    assert_ne!(ground.fingerprint(), other.ground.fingerprint());
+}
+
+#[test]
+fn a_hundred_thousand_rocks_are_made_in_a_moment() {
+    let many = ROCKS
+        .replace("[1.0, 5.0]", "[1.0, 61.0]")
+        .replace("[-1.0, 1.0]", "[-30.0, 30.0]")
+        .replace("[100, 200]", "[60, 130]");
+    let begun = std::time::Instant::now();
+    let scenario = accepted(&many);
+    let taken = begun.elapsed().as_secs_f64();
+    let count = scenario.ground.terrain.parts.len();
+    println!("{count} parts in {taken:.2} s");
+    assert!(count > 95_000, "{count}");
+    assert!(taken < 10.0, "{taken} s");
+}
+
+#[test]
+fn rocks_that_cannot_be_are_refused() {
+    refused(
+        &ROCKS.replace("0.2", "0.7"),
+        &["`terrain[0].cover` = 0.7 is out of range: allowed 0 to 0.5"],
+    );
+    refused(
+        &ROCKS
+            .replace("[1.0, 5.0]", "[1.0, 900.0]")
+            .replace("[-1.0, 1.0]", "[-100.0, 100.0]"),
+        &[
+            "these rocks cannot be: it takes more than",
+            "make `cover` or the area smaller",
+        ],
+    );
+    refused(
+        &ROCKS.replace("[100, 200]", "[200, 100]"),
+        &["`terrain[0].size` must run from the smaller to the larger value"],
+    );
+}
+
+/// A scenario with a map beside it.
+fn with_map(content: &[u8], file: &str, more: &str) -> Result<Scenario, ConfigError> {
+    static COUNT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    let name = format!("wheeleg-terrain-{}-{count}", std::process::id());
+    let folder = std::env::temp_dir().join(name);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    std::fs::write(folder.join("map.csv"), content).expect("written");
+    std::fs::write(folder.join("map.png"), content).expect("written");
+    let text = format!(
+        "name = \"t\"\ndescription = \"d\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\nseed = 1\n\
+         targets = \"none\"\n\n[motion]\nkind = \"stand\"\n\n[[terrain]]\nkind = \"heightmap\"\n\
+         file = \"{file}\"\ncell = \"50 cm\"\norigin = {{ value = [-1.0, 2.0], unit = \"m\" }}\n{more}"
+    );
+    let scenario = folder.join("scenario.toml");
+    let result = Scenario::parse(&scenario.to_string_lossy(), &text);
+    std::fs::remove_dir_all(&folder).expect("removed");
+    result
+}
+
+#[test]
+fn a_map_lies_beside_the_scenario() {
+    let map = b"0.1, 0.2, 0.3\n0.4, 0.5, 0.6\n";
+    let scenario = with_map(map, "map.csv", "scale = \"10 cm\"\noffset = \"-5 mm\"\n");
+    let ground = scenario.unwrap_or_else(|e| panic!("{}", report(&e))).ground;
+    assert_eq!(ground.terrain.parts.len(), 1, "no floor below it");
+    let height = |x, y| ground.terrain.height_m(x, y).expect("ground");
+    assert!((height(-1.0, 2.0) - 0.035).abs() < 1e-12);
+    assert!((height(0.0, 2.5) - 0.025).abs() < 1e-12);
+    // The path is no part of the run, the content is.
+    assert!(
+        ground.parts[0].contains("file = \"map.csv\""),
+        "{:?}",
+        ground.parts
+    );
+    let changed = with_map(
+        b"0.1, 0.2, 0.3\n0.4, 0.5, 0.61\n",
+        "map.csv",
+        "scale = \"10 cm\"\noffset = \"-5 mm\"\n",
+    );
+    assert_ne!(
+        ground.fingerprint(),
+        changed.expect("accepted").ground.fingerprint()
+    );
+}
+
+#[test]
+fn a_wrong_map_is_told_with_row_and_column() {
+    let refused = |content: &[u8], file: &str, more: &str, parts: &[&str]| {
+        let report = report(
+            &with_map(content, file, more)
+                .map(drop)
+                .expect_err("must be refused"),
+        );
+        for part in parts {
+            assert!(report.contains(part), "`{part}` is not in:\n{report}");
+        }
+    };
+    refused(
+        b"1,2\n3,oops\n4\n",
+        "map.csv",
+        "",
+        &[
+            "scenario.toml:13: `terrain[0].file` = \"map.csv\": row 2, column 2: \"oops\" is not a finite number",
+            "row 3 has 1 values, the first row 2",
+        ],
+    );
+    refused(
+        b"0,0,0\n0,0,5\n",
+        "map.csv",
+        "",
+        &[
+            "row 1, column 3: the height changes by 5 m",
+            "84.3",
+            "allowed are 75",
+        ],
+    );
+    refused(
+        b"1,2\n",
+        "map.csv",
+        "",
+        &["2 columns and 1 rows; allowed are 2 to 4096"],
+    );
+    refused(
+        b"1,2\n3,4\n",
+        "map.csv",
+        "offset = \"9999 m\"\n",
+        &["row 1, column 2: the height is 10001 m; allowed -10000 to 10000 m"],
+    );
+    refused(b"", "map.csv", "", &["it holds no numbers"]);
+    refused(b"", "gone.csv", "", &["gone.csv", "No such file"]);
+    refused(b"", ".", "", &["not a file"]);
+    refused(b"1,2", "map.png", "", &["`scale` is missing", "map.png"]);
+    refused(
+        b"1,2\n3,4\n",
+        "map.csv",
+        "\n[[terrain]]\nkind = \"heightmap\"\nfile = \"map.csv\"\ncell = \"1 m\"\norigin = { value = [0, 0], unit = \"m\" }\n",
+        &["`terrain[1]`: a terrain has one heightmap at most"],
+    );
 }

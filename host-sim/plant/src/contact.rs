@@ -95,7 +95,13 @@ impl ContactLaw {
     /// The law of one of `count` equal contacts that make up this one.
     #[must_use]
     pub fn shared_by(&self, count: usize) -> Self {
-        let share = 1.0 / count as f64;
+        self.scaled(1.0 / count as f64)
+    }
+
+    /// The law of a contact that bears this share of it.
+    #[must_use]
+    #[inline]
+    pub fn scaled(&self, share: f64) -> Self {
         Self {
             stiffness_n_m: share * self.stiffness_n_m,
             bristle_stiffness_n_m: share * self.bristle_stiffness_n_m,

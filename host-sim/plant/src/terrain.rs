@@ -4,18 +4,30 @@
 //! a wheel). A [`Surface`] answers both with its closest place: distance, outward normal, point.
 //! World axes: X and Y horizontal, Z up, gravity vertical whatever the slope.
 
+mod ellipsoid;
+mod height_map;
+mod index;
 mod plane;
+mod rim;
+mod rocks;
 mod solid;
 mod surface;
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
 use crate::hash::StateHasher;
+pub use ellipsoid::Ellipsoid;
+pub use height_map::{HeightMap, HeightMapError, STEEPEST_DEG};
+pub use index::Index;
 pub use plane::Plane;
+pub use rim::{Rim, RimTouch};
+pub use rocks::{MOST_ROCKS, RockError, RockField};
 pub use solid::Solid;
-pub use surface::{Disc, Near, Surface};
+pub use surface::{Ball, Disc, Near, Surface};
 
 /// A kind of surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,6 +36,22 @@ pub enum Shape {
     Plane(Plane),
     /// A convex body with flat faces.
     Solid(Solid),
+    /// A rock.
+    Ellipsoid(Ellipsoid),
+    /// Everything below a surface of measured heights.
+    HeightMap(Arc<HeightMap>),
+}
+
+impl Shape {
+    #[inline]
+    fn surface(&self) -> &dyn Surface {
+        match self {
+            Self::Plane(s) => s,
+            Self::Solid(s) => s,
+            Self::Ellipsoid(s) => s,
+            Self::HeightMap(s) => &**s,
+        }
+    }
 }
 
 impl Surface for Shape {
@@ -32,6 +60,8 @@ impl Surface for Shape {
         match self {
             Self::Plane(s) => s.to_point(point_m),
             Self::Solid(s) => s.to_point(point_m),
+            Self::Ellipsoid(s) => s.to_point(point_m),
+            Self::HeightMap(s) => s.to_point(point_m),
         }
     }
 
@@ -40,28 +70,25 @@ impl Surface for Shape {
         match self {
             Self::Plane(s) => s.to_disc(disc),
             Self::Solid(s) => s.to_disc(disc),
+            Self::Ellipsoid(s) => s.to_disc(disc),
+            Self::HeightMap(s) => s.to_disc(disc),
         }
     }
 
     fn top_m(&self) -> f64 {
-        match self {
-            Self::Plane(s) => s.top_m(),
-            Self::Solid(s) => s.top_m(),
-        }
+        self.surface().top_m()
     }
 
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
-        match self {
-            Self::Plane(s) => s.height_m(x_m, y_m),
-            Self::Solid(s) => s.height_m(x_m, y_m),
-        }
+        self.surface().height_m(x_m, y_m)
+    }
+
+    fn ball(&self) -> Option<Ball> {
+        self.surface().ball()
     }
 
     fn feed(&self, hasher: &mut StateHasher) {
-        match self {
-            Self::Plane(s) => s.feed(hasher),
-            Self::Solid(s) => s.feed(hasher),
-        }
+        self.surface().feed(hasher);
     }
 }
 
@@ -152,12 +179,5 @@ impl Terrain {
     pub fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
         let heights = self.parts.iter().map(|p| p.shape.height_m(x_m, y_m));
         heights.flatten().reduce(f64::max)
-    }
-
-    /// Signed distance of a point from the nearest part \[m\], and the normal there.
-    #[must_use]
-    pub fn nearest(&self, point_m: &Vector3<f64>) -> Option<Near> {
-        let all = self.parts.iter().map(|p| p.shape.to_point(point_m));
-        all.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
     }
 }

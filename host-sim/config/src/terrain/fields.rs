@@ -92,10 +92,23 @@ impl<'a> Fields<'a> {
 
     /// As [`Self::pair`], from the smaller to the larger value.
     pub(super) fn range(&mut self, r: &mut Reader, spec: &FieldSpec) -> Option<[f64; 2]> {
-        let [from, to] = self.pair(r, spec)?;
+        let [from, to] = self.ordered(r, spec)?;
         if from < to {
             return Some([from, to]);
         }
+        self.not_ordered(r, spec)
+    }
+
+    /// As [`Self::pair`], the first not larger than the second.
+    pub(super) fn ordered(&mut self, r: &mut Reader, spec: &FieldSpec) -> Option<[f64; 2]> {
+        let [from, to] = self.pair(r, spec)?;
+        if from <= to {
+            return Some([from, to]);
+        }
+        self.not_ordered(r, spec)
+    }
+
+    fn not_ordered<T>(&self, r: &mut Reader, spec: &FieldSpec) -> Option<T> {
         let span = self.entry.get(spec.key);
         let span = span.and_then(|(k, i)| i.span().or(Some(k)));
         let message = format!(

@@ -1,17 +1,21 @@
 //! The ground of a scenario: sections `[[terrain]]`, each a part with its material.
 //!
 //! Axes as MODEL.md: the world's origin is the start place, x ahead, y to the left, z up. Parts
-//! add up: a body touches each on its own. Where no part reaches everywhere (`plane`), the others
-//! lie on a level floor of rock.
+//! add up: a body touches each on its own. Where no part reaches everywhere (`plane`, `heightmap`),
+//! the others lie on a level floor of rock.
 
 mod fields;
+mod files;
+mod height_map;
 mod material;
+mod rocks;
 mod solids;
 
 use wheeleg_plant::terrain::{Material, Part, Plane, Shape, Terrain};
 
 use super::reader::{Entry, Reader};
 use fields::{Fields, angle, length};
+pub(crate) use files::Files;
 
 /// The ground of a scenario.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -40,25 +44,29 @@ enum Kind {
     Step,
     Stairs,
     Ramp,
+    Rocks,
+    HeightMap,
 }
 
-const KINDS: [(&str, Kind); 5] = [
+const KINDS: [(&str, Kind); 7] = [
     ("plane", Kind::Plane),
     ("block", Kind::Block),
     ("step", Kind::Step),
     ("stairs", Kind::Stairs),
     ("ramp", Kind::Ramp),
+    ("rocks", Kind::Rocks),
+    ("heightmap", Kind::HeightMap),
 ];
 
 impl Kind {
     /// Whether there is ground everywhere with such a part alone.
     fn is_everywhere(self) -> bool {
-        matches!(self, Self::Plane)
+        matches!(self, Self::Plane | Self::HeightMap)
     }
 }
 
 /// Reads all parts; `top` are the fields at the top of the file.
-pub(super) fn read(r: &mut Reader, top: &[&str]) -> Ground {
+pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files) -> Ground {
     let mut parts = Vec::new();
     let mut entries = Vec::new();
     for i in 0..r.array_len("terrain") {
@@ -67,13 +75,18 @@ pub(super) fn read(r: &mut Reader, top: &[&str]) -> Ground {
         parts.push(entry.text());
         entries.extend(kind.map(|kind| (kind, entry)));
     }
+    let is_map = |(kind, _): &&(Kind, Entry)| *kind == Kind::HeightMap;
+    if let Some((_, second)) = entries.iter().filter(is_map).nth(1) {
+        let message = format!("`{}`: a terrain has one heightmap at most", second.path);
+        r.problem(Some(second.span.clone()), message, "the second", None);
+    }
     // What lies on the ground needs the ground first.
     let (everywhere, lying): (Vec<_>, Vec<_>) = entries
         .into_iter()
         .partition(|(kind, _)| kind.is_everywhere());
     let mut terrain = Terrain { parts: Vec::new() };
     for (kind, entry) in &everywhere {
-        let added = part(r, *kind, entry, &terrain, top);
+        let added = part(r, *kind, entry, (&terrain, files), top);
         terrain.parts.extend(added.unwrap_or_default());
     }
     if everywhere.is_empty() {
@@ -81,18 +94,18 @@ pub(super) fn read(r: &mut Reader, top: &[&str]) -> Ground {
     }
     let below = terrain.clone();
     for (kind, entry) in &lying {
-        let added = part(r, *kind, entry, &below, top);
+        let added = part(r, *kind, entry, (&below, files), top);
         terrain.parts.extend(added.unwrap_or_default());
     }
     Ground { terrain, parts }
 }
 
-/// Reads one part; `below` is the ground that it lies on.
+/// Reads one part; `below` is the ground that it lies on, `files` where its data are.
 fn part(
     r: &mut Reader,
     kind: Kind,
     entry: &Entry,
-    below: &Terrain,
+    (below, files): (&Terrain, &Files),
     top: &[&str],
 ) -> Option<Vec<Part>> {
     let mut fields = Fields::new(entry, top);
@@ -103,6 +116,8 @@ fn part(
         Kind::Step => solids::step(r, &mut fields, below),
         Kind::Stairs => solids::stairs(r, &mut fields, below),
         Kind::Ramp => solids::ramp(r, &mut fields, below),
+        Kind::Rocks => rocks::rocks(r, &mut fields, below),
+        Kind::HeightMap => height_map::height_map(r, &mut fields, files),
     };
     fields.reject_others(r);
     Some(of(shapes?, material?))

@@ -13,8 +13,10 @@ const FAR_M: f64 = 100.0;
 /// Highest top over the ground, m.
 const HIGHEST_M: f64 = 10.0;
 
-const X: FieldSpec = length("x", [-1000.0, 1000.0], "from and to, ahead of the axle");
-const Y: FieldSpec = length("y", [-1000.0, 1000.0], "from and to, left of the middle");
+/// Along X.
+pub(super) const X: FieldSpec = length("x", [-1000.0, 1000.0], "from and to, ahead of the axle");
+/// Along Y.
+pub(super) const Y: FieldSpec = length("y", [-1000.0, 1000.0], "from and to, left of the middle");
 const HEIGHT: FieldSpec = length(
     "height",
     [0.0, HIGHEST_M],

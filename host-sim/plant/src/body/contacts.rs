@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::ContactLaw;
 use crate::error::{PlantError, check};
 use crate::hash::StateHasher;
+use crate::terrain::Rim;
 
 /// Spheres of a sole: centre, front, left, back, right.
 pub(super) const SPHERES: usize = 5;
@@ -167,6 +168,8 @@ pub struct ContactStates {
     pub feet: [[Grips; SPHERES]; 2],
     /// Discs of the left and the right wheel.
     pub wheels: [[Grips; DISCS]; 2],
+    /// Where the discs of the left and the right wheel are deepest in a height map.
+    pub rims: [[Rim; DISCS]; 2],
     /// Points of the chassis.
     pub chassis: [Grips; POINTS],
     /// Closed switches of the left and the right foot: front, left, back, right.
@@ -185,6 +188,9 @@ impl ContactStates {
         for grip in self.grips() {
             hasher.bytes(&grip.part.to_le_bytes());
             grip.stretch_m.iter().for_each(|v| hasher.f64(*v));
+        }
+        for rim in self.rims.iter().flatten() {
+            rim.feed(hasher);
         }
         for switch in self.switches.iter().flatten() {
             hasher.bytes(&[u8::from(*switch)]);

@@ -7,7 +7,11 @@ use super::contacts::{
 };
 use crate::contact::{ContactLaw, Touch};
 use crate::dynamics::floating::{Contacts, FloatingKin, Velocity, Wrench};
-use crate::terrain::{Disc, Near, Part, Surface, Terrain};
+use crate::terrain::{Disc, Index, Material, Near, Rim, Shape, Surface, Terrain};
+
+/// Rocks and solids farther than this from a foot are not looked for, where its height over the
+/// ground is asked for \[m\].
+const SIGHT_M: f64 = 0.3;
 
 /// Ground on one wheel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -68,6 +72,7 @@ pub struct Touching {
     points_m: [Vector3<f64>; POINTS],
     wheel_radius_m: f64,
     terrain: Terrain,
+    index: Index,
     top_m: f64,
     /// How far the ground has gone down under the feet alone \[m\].
     sunk_under_feet_m: f64,
@@ -95,54 +100,81 @@ fn velocity(twist: &[Vector3<f64>; 2], arm: &Vector3<f64>) -> Vector3<f64> {
     twist[1] + twist[0].cross(arm)
 }
 
-impl Sum {
-    /// One sphere, disc or point against every part near it; returns the deepest penetration.
+/// One sphere, disc or point against the parts near it.
+struct Pressing<'a> {
+    sum: &'a mut Sum,
+    law: &'a ContactLaw,
+    grips: &'a mut Grips,
+    radius_m: f64,
+    touched: [bool; SLOTS],
+    /// Deepest penetration \[m\].
+    deepest_m: f64,
+}
+
+impl<'a> Pressing<'a> {
     #[inline]
-    fn press(
-        &mut self,
-        law: &ContactLaw,
-        parts: &[Part],
-        grips: &mut Grips,
-        radius_m: f64,
-        near: impl Fn(&Part) -> Option<Near>,
-    ) -> f64 {
-        let mut touched = [false; SLOTS];
-        let mut deepest = 0.0_f64;
-        for (number, part) in (1..).zip(parts) {
-            let Some(near) = near(part) else { continue };
-            let depth_m = radius_m - near.distance_m;
-            if depth_m <= 0.0 {
-                continue;
-            }
-            let known = grips.iter().position(|g| g.part == number);
-            let slot = known.or_else(|| grips.iter().position(|g| g.part == 0));
-            let Some(slot) = slot else { continue };
-            touched[slot] = true;
-            grips[slot].part = number;
-            deepest = deepest.max(depth_m);
-            let point = near.point_m - radius_m * near.normal;
-            let arm = point - self.reference_m;
-            let touch = Touch {
-                depth_m,
-                normal: near.normal,
-                velocity_m_s: velocity(&self.now, &arm),
-                moved_m: self.step_s * velocity(&self.during, &arm),
-                material: part.material,
-            };
-            let force = law.force(&mut grips[slot].stretch_m, &touch);
-            self.normal_n += force.normal_n;
-            self.support_n += force.normal_n * near.normal;
-            self.wrench.force_n += force.force_n;
-            self.wrench.moment_n_m += arm.cross(&force.force_n);
+    fn new(sum: &'a mut Sum, law: &'a ContactLaw, grips: &'a mut Grips, radius_m: f64) -> Self {
+        Self {
+            sum,
+            law,
+            grips,
+            radius_m,
+            touched: [false; SLOTS],
+            deepest_m: 0.0,
         }
-        for (grip, touched) in grips.iter_mut().zip(touched) {
+    }
+
+    /// The closest place of one part, by its number from 1.
+    #[inline]
+    fn on(&mut self, number: u32, near: &Near, material: Material) {
+        let law = self.law;
+        self.with(law, number, near, material);
+    }
+
+    #[inline]
+    fn with(&mut self, law: &ContactLaw, number: u32, near: &Near, material: Material) {
+        let depth_m = self.radius_m - near.distance_m;
+        if depth_m <= 0.0 {
+            return;
+        }
+        let grips = &mut *self.grips;
+        let known = grips.iter().position(|g| g.part == number);
+        let slot = known.or_else(|| grips.iter().position(|g| g.part == 0));
+        let Some(slot) = slot else { return };
+        self.touched[slot] = true;
+        grips[slot].part = number;
+        self.deepest_m = self.deepest_m.max(depth_m);
+        let sum = &mut *self.sum;
+        let point = near.point_m - self.radius_m * near.normal;
+        let arm = point - sum.reference_m;
+        let touch = Touch {
+            depth_m,
+            normal: near.normal,
+            velocity_m_s: velocity(&sum.now, &arm),
+            moved_m: sum.step_s * velocity(&sum.during, &arm),
+            material,
+        };
+        let force = law.force(&mut grips[slot].stretch_m, &touch);
+        sum.normal_n += force.normal_n;
+        sum.support_n += force.normal_n * near.normal;
+        sum.wrench.force_n += force.force_n;
+        sum.wrench.moment_n_m += arm.cross(&force.force_n);
+    }
+
+    /// Lets go of what is not touched; gives the deepest penetration \[m\].
+    #[inline]
+    fn end(self) -> f64 {
+        for (grip, touched) in self.grips.iter_mut().zip(self.touched) {
             if !touched && grip.part != 0 {
                 *grip = Grip::default();
             }
         }
-        deepest
+        self.deepest_m
     }
 }
+
+/// Number of the second contact of a wheel with one part.
+const SECOND: u32 = 1 << 31;
 
 /// Nothing touches any more.
 #[inline]
@@ -190,6 +222,7 @@ impl Touching {
             ],
             points_m,
             wheel_radius_m,
+            index: Index::new(&terrain.parts),
             top_m: terrain.top_m(),
             terrain: terrain.clone(),
             sunk_under_feet_m: 0.0,
@@ -230,6 +263,46 @@ impl Touching {
         self.sunk_under_feet_m = depth_m;
     }
 
+    /// One sphere or point against the ground; gives its deepest penetration \[m\].
+    #[inline]
+    fn press_point(
+        &self,
+        sum: &mut Sum,
+        law: &ContactLaw,
+        grips: &mut Grips,
+        centre: &Vector3<f64>,
+        radius_m: f64,
+    ) -> f64 {
+        let mut pressing = Pressing::new(sum, law, grips, radius_m);
+        self.index.near(centre, radius_m, |number| {
+            let part = &self.terrain.parts[number as usize];
+            pressing.on(number + 1, &part.shape.to_point(centre), part.material);
+        });
+        pressing.end()
+    }
+
+    /// One disc against the ground.
+    #[inline]
+    fn press_disc(&self, sum: &mut Sum, grips: &mut Grips, rim: &mut Rim, disc: &Disc) {
+        let step_s = sum.step_s;
+        let law = &self.laws[1];
+        let mut pressing = Pressing::new(sum, law, grips, 0.0);
+        self.index.near(&disc.centre_m, disc.radius_m, |number| {
+            let part = &self.terrain.parts[number as usize];
+            if let Shape::HeightMap(map) = &part.shape {
+                let touches = rim.follow(map, disc, step_s);
+                for (touch, second) in touches.into_iter().zip([0, SECOND]) {
+                    let Some(touch) = touch else { continue };
+                    let law = law.scaled(touch.share);
+                    pressing.with(&law, (number + 1) | second, &touch.near, part.material);
+                }
+            } else if let Some(near) = part.shape.to_disc(disc) {
+                pressing.on(number + 1, &near, part.material);
+            }
+        });
+        pressing.end();
+    }
+
     /// Smallest height of a foot's spheres over the ground \[m\]; negative when pressed in.
     #[must_use]
     pub fn clearance_m(&self, kin: &FloatingKin, leg: usize) -> f64 {
@@ -237,10 +310,13 @@ impl Touching {
         let axes = kin.foot_axes(leg);
         let radius = self.params.foot.sphere_radius_m;
         let heights = SOLE.map(|direction| {
-            let near = self
-                .terrain
-                .nearest(&self.sphere_m(&sole, &axes, direction));
-            near.map_or(f64::INFINITY, |near| near.distance_m - radius)
+            let centre = self.sphere_m(&sole, &axes, direction);
+            let mut least = f64::INFINITY;
+            self.index.near(&centre, SIGHT_M, |part| {
+                let near = self.terrain.parts[part as usize].shape.to_point(&centre);
+                least = least.min(near.distance_m - radius);
+            });
+            least
         });
         heights.into_iter().fold(f64::INFINITY, f64::min)
     }
@@ -314,15 +390,9 @@ impl Touching {
         let axes = moving.kin.foot_axes(leg);
         for (k, direction) in SOLE.into_iter().enumerate() {
             let centre = self.sphere_m(sole, &axes, direction);
-            let near = |part: &Part| Some(part.shape.to_point(&centre));
-            let radius = foot.sphere_radius_m;
-            let depth = sum.press(
-                &self.laws[0],
-                &self.terrain.parts,
-                &mut grips[k],
-                radius,
-                near,
-            );
+            let radius_m = foot.sphere_radius_m;
+            let law = &self.laws[0];
+            let depth = self.press_point(&mut sum, law, &mut grips[k], &centre, radius_m);
             if k > 0 {
                 load.depth_m[k - 1] = depth;
             }
@@ -346,7 +416,7 @@ impl Touching {
         states: &mut ContactStates,
         load: &mut WheelLoad,
     ) -> Wrench {
-        let grips = &mut states.wheels[wheel];
+        let (grips, rims) = (&mut states.wheels[wheel], &mut states.rims[wheel]);
         let (wheel, body) = (&self.params.wheel, 2 + wheel);
         let r = self.wheel_radius_m;
         let rotation = moving.kin.rotation();
@@ -355,14 +425,14 @@ impl Touching {
         if centre.z - r - wheel.width_m > self.top_m {
             release(grips);
         } else {
-            for (grips, across) in grips.iter_mut().zip([1.0, 0.0, -1.0]) {
+            let discs = grips.iter_mut().zip(rims).zip([1.0, 0.0, -1.0]);
+            for ((grips, rim), across) in discs {
                 let disc = Disc {
                     centre_m: centre + across * wheel.width_m / DISCS as f64 * axis,
                     axis,
                     radius_m: r,
                 };
-                let near = |part: &Part| part.shape.to_disc(&disc);
-                sum.press(&self.laws[1], &self.terrain.parts, grips, 0.0, near);
+                self.press_disc(&mut sum, grips, rim, &disc);
             }
         }
         let spin = sum.now[0].dot(&axis);
@@ -399,8 +469,7 @@ impl Touching {
         let mut sum = moving.sum(4, *origin);
         for (grips, point) in states.chassis.iter_mut().zip(&self.points_m) {
             let place = origin + rotation * point;
-            let near = |part: &Part| Some(part.shape.to_point(&place));
-            sum.press(&self.laws[2], &self.terrain.parts, grips, 0.0, near);
+            self.press_point(&mut sum, &self.laws[2], grips, &place, 0.0);
         }
         *normal_n = sum.normal_n;
         sum.wrench

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::hash::StateHasher;
 
-use super::surface::{Disc, Near, Surface};
+use super::surface::{Ball, Disc, Near, Surface};
 
 /// Most faces of a solid.
 const FACES: usize = 6;
@@ -276,6 +276,13 @@ impl Surface for Solid {
             }
         }
         Some(highest)
+    }
+
+    fn ball(&self) -> Option<Ball> {
+        Some(Ball {
+            centre_m: self.centre_m,
+            radius_m: self.radius_m,
+        })
     }
 
     fn feed(&self, hasher: &mut StateHasher) {

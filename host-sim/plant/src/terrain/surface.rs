@@ -26,6 +26,15 @@ pub struct Disc {
     pub radius_m: f64,
 }
 
+/// A ball around a body of limited size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball {
+    /// Centre \[m\].
+    pub centre_m: Vector3<f64>,
+    /// Radius \[m\].
+    pub radius_m: f64,
+}
+
 /// Something that carries robots.
 pub trait Surface {
     /// Closest place to a point.
@@ -39,6 +48,11 @@ pub trait Surface {
 
     /// Height of the surface above a place \[m\]; `None` where it has none.
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64>;
+
+    /// A ball around the body; `None`: it has no limits.
+    fn ball(&self) -> Option<Ball> {
+        None
+    }
 
     /// Adds the surface to a hash.
     fn feed(&self, hasher: &mut StateHasher);

@@ -1,0 +1,276 @@
+//! A surface of measured heights on a square grid.
+//!
+//! Between the grid's values the surface is bicubic with the slopes of central differences at
+//! them (Catmull and Rom, 1974): it goes through every value, its slope is continuous, and a
+//! parabola is met exactly. Beyond the map its edge goes on level.
+//!
+//! The distance of a point is δ = (z − h) n_z, as from the tangent plane below it: exact on a
+//! plane, and at the surface; off it the error is of second order in δ.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::rim::{self, Rim};
+use super::surface::{Disc, Near, Surface};
+use crate::hash::StateHasher;
+
+/// Steepest slope between two neighbours, degrees.
+pub const STEEPEST_DEG: f64 = 75.0;
+/// Its tangent.
+const STEEPEST: f64 = 3.732_050_807_568_877;
+/// Most values along a side.
+const MOST: usize = 4096;
+
+/// Why there is no such map. Rows and columns count from 1.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum HeightMapError {
+    /// Too small, too large or not a rectangle.
+    #[error("the map has {columns} columns and {rows} rows; allowed are 2 to {MOST} of each")]
+    Size {
+        /// Values in a row.
+        columns: usize,
+        /// Rows.
+        rows: usize,
+    },
+    /// Too steep.
+    #[error(
+        "row {row}, column {column}: the height changes by {rise_m} m from here to its neighbour at \
+         row {next_row}, column {next_column}, {slope_deg:.1}°; allowed are {STEEPEST_DEG}°"
+    )]
+    Steep {
+        /// Row, from the top of the file.
+        row: usize,
+        /// Column.
+        column: usize,
+        /// Row of the neighbour.
+        next_row: usize,
+        /// Column of the neighbour.
+        next_column: usize,
+        /// Difference \[m\].
+        rise_m: f64,
+        /// Slope between the two, degrees.
+        slope_deg: f64,
+    },
+}
+
+/// Heights on a grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeightMap {
+    /// Row after row along X, rows along Y \[m\].
+    heights_m: Vec<f64>,
+    columns: usize,
+    rows: usize,
+    cell_m: f64,
+    origin_m: [f64; 2],
+    top_m: f64,
+}
+
+/// Height and slopes at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// Height \[m\].
+    pub(super) z: f64,
+    /// Slopes along X and Y.
+    pub(super) slope: [f64; 2],
+    /// Second derivatives by XX, XY, YY \[1/m\]; zero if nobody asked.
+    pub(super) bend: [f64; 3],
+}
+
+/// Weights of four neighbours for the value between the middle two, and of its derivatives.
+#[inline]
+fn weights<const BEND: bool>(u: f64) -> [[f64; 4]; 3] {
+    let (u2, u3) = (u * u, u * u * u);
+    [
+        [
+            0.5 * (2.0 * u2 - u - u3),
+            0.5 * (2.0 - 5.0 * u2 + 3.0 * u3),
+            0.5 * (u + 4.0 * u2 - 3.0 * u3),
+            0.5 * (u3 - u2),
+        ],
+        [
+            0.5 * (4.0 * u - 1.0 - 3.0 * u2),
+            0.5 * (9.0 * u2 - 10.0 * u),
+            0.5 * (1.0 + 8.0 * u - 9.0 * u2),
+            0.5 * (3.0 * u2 - 2.0 * u),
+        ],
+        if BEND {
+            [2.0 - 3.0 * u, 9.0 * u - 5.0, 4.0 - 9.0 * u, 3.0 * u - 1.0]
+        } else {
+            [0.0; 4]
+        },
+    ]
+}
+
+#[inline]
+fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
+}
+
+impl HeightMap {
+    /// From heights \[m\] as a picture has them: rows from the top of the picture, where Y is
+    /// largest, down; columns along X. `origin_m` is the place of the lower left value, X and Y;
+    /// `cell_m`, above 0, the distance of neighbours.
+    ///
+    /// # Errors
+    /// [`HeightMapError`] if it is no rectangle of 2 to 4096 rows and columns, or steeper than
+    /// 75° between neighbours.
+    pub fn new(
+        heights_m: &[f64],
+        columns: usize,
+        cell_m: f64,
+        origin_m: [f64; 2],
+    ) -> Result<Self, HeightMapError> {
+        let rows = heights_m.len() / columns.max(1);
+        let sides = 2..=MOST;
+        if !sides.contains(&columns) || !sides.contains(&rows) || rows * columns != heights_m.len()
+        {
+            return Err(HeightMapError::Size { columns, rows });
+        }
+        let mut steepest_m = 0.0_f64;
+        for row in 0..rows {
+            for column in 0..columns {
+                let here = heights_m[row * columns + column];
+                for (next_row, next_column) in [(row, column + 1), (row + 1, column)] {
+                    if next_row == rows || next_column == columns {
+                        continue;
+                    }
+                    let rise_m = heights_m[next_row * columns + next_column] - here;
+                    steepest_m = steepest_m.max(rise_m.abs());
+                    if rise_m.is_nan() || rise_m.abs() > STEEPEST * cell_m {
+                        return Err(HeightMapError::Steep {
+                            row: row + 1,
+                            column: column + 1,
+                            next_row: next_row + 1,
+                            next_column: next_column + 1,
+                            rise_m,
+                            slope_deg: (rise_m / cell_m).abs().atan().to_degrees(),
+                        });
+                    }
+                }
+            }
+        }
+        let from_below = heights_m.chunks_exact(columns).rev();
+        let heights_m: Vec<f64> = from_below.flatten().copied().collect();
+        let highest = heights_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Ok(Self {
+            heights_m,
+            columns,
+            rows,
+            cell_m,
+            origin_m,
+            // The cubics rise over the values by less than this (weights below 0 sum to 0.28).
+            top_m: highest + 0.28 * 6.0 * steepest_m,
+        })
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [self.columns, self.rows]
+    }
+
+    /// Least and largest X, and Y, of the map \[m\].
+    #[must_use]
+    pub fn extent_m(&self) -> [[f64; 2]; 2] {
+        let [x, y] = self.origin_m;
+        let along = |count: usize| (count - 1) as f64 * self.cell_m;
+        [[x, x + along(self.columns)], [y, y + along(self.rows)]]
+    }
+
+    /// Cell in which a coordinate lies, the place in it 0..1, and whether it is on the map.
+    #[inline]
+    fn locate(&self, at_m: f64, origin_m: f64, count: usize) -> (usize, f64, bool) {
+        let along = (at_m - origin_m) / self.cell_m;
+        let last = (count - 1) as f64;
+        let inside = along >= 0.0 && along <= last;
+        let along = along.clamp(0.0, last);
+        let cell = (along as usize).min(count - 2);
+        (cell, along - cell as f64, inside)
+    }
+
+    /// The surface at a place, with its second derivatives if `BEND`.
+    #[inline]
+    pub(super) fn place<const BEND: bool>(&self, x_m: f64, y_m: f64) -> Place {
+        let (i, u, inside_x) = self.locate(x_m, self.origin_m[0], self.columns);
+        let (j, v, inside_y) = self.locate(y_m, self.origin_m[1], self.rows);
+        let (along, up) = (weights::<BEND>(u), weights::<BEND>(v));
+        let last = [self.columns - 1, self.rows - 1];
+        // Along X, on each of four rows.
+        let four = |k: usize| {
+            let row = (j + k).saturating_sub(1).min(last[1]) * self.columns;
+            if i > 0 && i + 2 < self.columns {
+                let h = &self.heights_m[row + i - 1..row + i + 3];
+                [h[0], h[1], h[2], h[3]]
+            } else {
+                let column = [i.saturating_sub(1), i, i + 1, (i + 2).min(last[0])];
+                column.map(|c| self.heights_m[row + c])
+            }
+        };
+        let rows: [[f64; 4]; 4] = std::array::from_fn(four);
+        let lines = along.map(|weights| rows.map(|row| dot(&weights, &row)));
+        // Beyond the map nothing changes outwards.
+        let per = |inside: bool| if inside { 1.0 / self.cell_m } else { 0.0 };
+        let (per_x, per_y) = (per(inside_x), per(inside_y));
+        let bend = if BEND {
+            [
+                dot(&up[0], &lines[2]) * per_x * per_x,
+                dot(&up[1], &lines[1]) * per_x * per_y,
+                dot(&up[2], &lines[0]) * per_y * per_y,
+            ]
+        } else {
+            [0.0; 3]
+        };
+        Place {
+            z: dot(&up[0], &lines[0]),
+            slope: [
+                dot(&up[0], &lines[1]) * per_x,
+                dot(&up[1], &lines[0]) * per_y,
+            ],
+            bend,
+        }
+    }
+
+    /// Distance of a point from the tangent plane below it.
+    #[inline]
+    pub(super) fn near(&self, point_m: &Vector3<f64>) -> Near {
+        let place = self.place::<false>(point_m.x, point_m.y);
+        let [x, y] = place.slope;
+        let up = 1.0 / (1.0 + x * x + y * y).sqrt();
+        Near {
+            distance_m: (point_m.z - place.z) * up,
+            normal: Vector3::new(-x * up, -y * up, up),
+            point_m: *point_m,
+        }
+    }
+}
+
+impl Surface for HeightMap {
+    #[inline]
+    fn to_point(&self, point_m: &Vector3<f64>) -> Near {
+        self.near(point_m)
+    }
+
+    fn to_disc(&self, disc: &Disc) -> Option<Near> {
+        let mut rim = Rim::default();
+        rim.seed(self, disc);
+        let touches = rim::touches(self, disc, &rim);
+        let all = touches.into_iter().flatten().map(|touch| touch.near);
+        all.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+    }
+
+    fn top_m(&self) -> f64 {
+        self.top_m
+    }
+
+    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        Some(self.place::<false>(x_m, y_m).z)
+    }
+
+    fn feed(&self, hasher: &mut StateHasher) {
+        hasher.bytes(b"height map");
+        hasher.u64(self.columns as u64);
+        let sizes = [&self.cell_m, &self.origin_m[0], &self.origin_m[1]];
+        let values = sizes.into_iter().chain(&self.heights_m);
+        values.for_each(|v| hasher.f64(*v));
+    }
+}

@@ -1,0 +1,184 @@
+//! Which parts of the terrain may touch a body: a grid of square cells over all parts of limited
+//! size.
+//!
+//! Each part is in every cell that its ball covers. A query looks at the cells below the body and
+//! at the balls in them, so its cost depends on how many parts are near, not on how many there
+//! are. Nothing is allocated.
+
+use nalgebra::Vector3;
+
+use super::Part;
+use super::surface::{Ball, Surface};
+
+/// Parts that would cover more cells are looked at always.
+const CELLS: u64 = 64;
+
+/// A part in a cell.
+#[derive(Debug, Clone, Copy)]
+struct Item {
+    part: u32,
+    /// First cell that it covers, X and Y.
+    first: [u32; 2],
+    ball: Ball,
+}
+
+/// The grid, built once.
+#[derive(Debug, Clone, Default)]
+pub struct Index {
+    /// Parts without limits, and very large ones.
+    everywhere: Vec<u32>,
+    origin_m: [f64; 2],
+    cell_m: f64,
+    size: [u32; 2],
+    /// Where the items of a cell begin; one more at the end.
+    begins: Vec<u32>,
+    items: Vec<Item>,
+}
+
+/// Cells that a square covers: first and last, X and Y.
+type Covered = [[u32; 2]; 2];
+
+impl Index {
+    /// Sorts the parts into cells.
+    #[must_use]
+    pub fn new(parts: &[Part]) -> Self {
+        let mut index = Self::default();
+        let mut limited = Vec::new();
+        for (number, part) in (0..).zip(parts) {
+            match part.shape.ball() {
+                Some(ball) => limited.push((number, ball)),
+                None => index.everywhere.push(number),
+            }
+        }
+        let Some(middle) = limited.len().checked_sub(1).map(|last| last / 2) else {
+            return index;
+        };
+        // Cells of the size of the parts, but not many more cells than parts.
+        let mut sizes: Vec<f64> = limited.iter().map(|(_, b)| 2.0 * b.radius_m).collect();
+        sizes.sort_by(f64::total_cmp);
+        let typical = sizes[middle];
+        limited.retain(|(number, ball)| {
+            let small = 2.0 * ball.radius_m < 8.0 * typical;
+            if !small {
+                index.everywhere.push(*number);
+            }
+            small
+        });
+        let mut low = [f64::INFINITY; 2];
+        let mut high = [f64::NEG_INFINITY; 2];
+        for (_, ball) in &limited {
+            for i in 0..2 {
+                low[i] = low[i].min(ball.centre_m[i] - ball.radius_m);
+                high[i] = high[i].max(ball.centre_m[i] + ball.radius_m);
+            }
+        }
+        let span = [0, 1].map(|i| high[i] - low[i]);
+        let most = 65_536.0 + 16.0 * limited.len() as f64;
+        index.cell_m = typical.max((span[0] * span[1] / most).sqrt());
+        index.origin_m = low;
+        index.size = span.map(|s| (s / index.cell_m) as u32 + 1);
+        index.fill(&limited);
+        index
+    }
+
+    fn fill(&mut self, limited: &[(u32, Ball)]) {
+        let cells = (u64::from(self.size[0]) * u64::from(self.size[1])) as usize;
+        let mut counts = vec![0_u32; cells + 1];
+        let mut placed = Vec::new();
+        for (part, ball) in limited {
+            let Some(covered) = self.covered(&ball.centre_m, ball.radius_m) else {
+                continue;
+            };
+            let [wide, high] = [0, 1].map(|i| u64::from(covered[1][i] - covered[0][i]) + 1);
+            if wide * high > CELLS {
+                self.everywhere.push(*part);
+                continue;
+            }
+            self.each(covered, |cell| counts[cell + 1] += 1);
+            placed.push((*part, *ball, covered));
+        }
+        self.everywhere.sort_unstable();
+        for i in 0..cells {
+            counts[i + 1] += counts[i];
+        }
+        self.begins = counts.clone();
+        let Some((first, ball, covered)) = placed.first().copied() else {
+            return;
+        };
+        let blank = Item {
+            part: first,
+            first: covered[0],
+            ball,
+        };
+        self.items = vec![blank; counts[cells] as usize];
+        let mut items = std::mem::take(&mut self.items);
+        for (part, ball, covered) in placed {
+            let item = Item {
+                part,
+                first: covered[0],
+                ball,
+            };
+            self.each(covered, |cell| {
+                items[counts[cell] as usize] = item;
+                counts[cell] += 1;
+            });
+        }
+        self.items = items;
+    }
+
+    /// Cells below a body; `None`: it is beside the grid.
+    #[inline]
+    fn covered(&self, centre_m: &Vector3<f64>, reach_m: f64) -> Option<Covered> {
+        let mut covered = [[0; 2]; 2];
+        for i in 0..2 {
+            let at = centre_m[i] - self.origin_m[i];
+            let (low, high) = (at - reach_m, at + reach_m);
+            if high < 0.0 || low >= f64::from(self.size[i]) * self.cell_m {
+                return None;
+            }
+            let last = self.size[i] - 1;
+            covered[0][i] = (low.max(0.0) / self.cell_m) as u32;
+            covered[1][i] = ((high / self.cell_m) as u32).min(last);
+            covered[0][i] = covered[0][i].min(last);
+        }
+        Some(covered)
+    }
+
+    #[inline]
+    fn each(&self, [from, to]: Covered, mut f: impl FnMut(usize)) {
+        for y in from[1]..=to[1] {
+            for x in from[0]..=to[0] {
+                f(y as usize * self.size[0] as usize + x as usize);
+            }
+        }
+    }
+
+    /// Gives every part that may be within `reach_m` of a place, each once, in an order that does
+    /// not depend on the place.
+    #[inline]
+    pub fn near(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32)) {
+        self.everywhere.iter().for_each(|part| f(*part));
+        if self.items.is_empty() {
+            return;
+        }
+        let Some(covered) = self.covered(centre_m, reach_m) else {
+            return;
+        };
+        let [from, to] = covered;
+        for y in from[1]..=to[1] {
+            for x in from[0]..=to[0] {
+                let cell = y as usize * self.size[0] as usize + x as usize;
+                let items = self.begins[cell] as usize..self.begins[cell + 1] as usize;
+                for item in &self.items[items] {
+                    // A part in several of these cells is given in the first of them.
+                    let first = [item.first[0].max(from[0]), item.first[1].max(from[1])];
+                    let reach = item.ball.radius_m + reach_m;
+                    let apart = (centre_m - item.ball.centre_m).norm_squared();
+                    if first == [x, y] && apart <= reach * reach {
+                        f(item.part);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Where the rim of a disc is deepest in a height map.
+//!
+//! The depth along the rim has as many peaks as the ground below it has bumps, and a wheel stands
+//! on two at most in its plane. The two highest are followed: one step of Newton's method in every
+//! step of the plant keeps a peak, which moves by some micrometres meanwhile. Every millisecond
+//! all of the lower rim is looked at anew, so that a bump which has come near is found before it
+//! touches.
+//!
+//! Two peaks that run into each other are one. Each then bears less, to half, so that the force
+//! does not jump.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::height_map::HeightMap;
+use super::surface::{Disc, Near};
+use crate::hash::StateHasher;
+
+/// Angles at which the rim is looked at.
+const LOOKS: usize = 25;
+/// Farthest of them from the lowest point \[rad\]: 84°.
+const SIDE: f64 = 1.466_076_571_675_237;
+/// Time until it is looked at again \[s\].
+const AGAIN_S: f64 = 1e-3;
+/// Peaks farther than this above the ground are let go \[m\].
+const NEAR_M: f64 = 0.02;
+/// Peaks nearer to each other share the load \[rad\]: 15°.
+const SHARING: f64 = 0.261_799_387_799_149_4;
+/// Peaks nearer than this are one \[rad\].
+const ONE: f64 = 1e-3;
+/// A peak that is found this near to one that was followed is that one \[rad\].
+const SAME: f64 = 0.1;
+/// Longest step of Newton's method \[rad\].
+const STEP: f64 = 0.05;
+/// Steps on a peak that has just been found.
+const FIRST: usize = 8;
+
+/// Peaks of one disc, carried over from step to step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rim {
+    /// Angles from the lowest point of the disc, about its axis \[rad\]. A peak keeps its place.
+    angle_rad: [f64; 2],
+    /// Which of them there are.
+    there: [bool; 2],
+    /// Time until the whole rim is looked at again \[s\].
+    due_s: f64,
+}
+
+/// The ground at one peak.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RimTouch {
+    /// The place.
+    pub near: Near,
+    /// Share of a whole contact that it bears, ½ to 1.
+    pub share: f64,
+}
+
+/// Axes of a disc's plane: down, and the direction in which angles grow.
+struct Axes([Vector3<f64>; 2]);
+
+impl Axes {
+    /// `None` for a disc that lies on its side.
+    #[inline]
+    fn of(disc: &Disc) -> Option<Self> {
+        let down = (-Vector3::z() + disc.axis.z * disc.axis).try_normalize(1e-9)?;
+        Some(Self([down, disc.axis.cross(&down)]))
+    }
+
+    /// Unit vectors outwards and along the rim.
+    #[inline]
+    fn at(&self, angle: f64) -> [Vector3<f64>; 2] {
+        let (s, c) = libm::sincos(angle);
+        let [down, across] = &self.0;
+        [c * down + s * across, c * across - s * down]
+    }
+}
+
+/// One step of Newton's method towards the peak of h − z along the rim.
+#[inline]
+fn climb(map: &HeightMap, disc: &Disc, axes: &Axes, angle: f64) -> f64 {
+    let [out, along] = axes.at(angle);
+    let point = disc.centre_m + disc.radius_m * out;
+    let place = map.place::<true>(point.x, point.y);
+    let ([sx, sy], [xx, xy, yy]) = (place.slope, place.bend);
+    let rise = sx * along.x + sy * along.y - along.z;
+    let bend = xx * along.x * along.x + 2.0 * xy * along.x * along.y + yy * along.y * along.y;
+    let fall = disc.radius_m * bend - (sx * out.x + sy * out.y - out.z);
+    // Where it is not a peak yet, uphill.
+    let step = if fall < -1e-6 {
+        -rise / fall
+    } else {
+        STEP.copysign(rise)
+    };
+    angle + step.clamp(-STEP, STEP)
+}
+
+impl Rim {
+    /// Looks at the whole lower rim.
+    pub(super) fn seed(&mut self, map: &HeightMap, disc: &Disc) {
+        let before = *self;
+        self.there = [false; 2];
+        self.due_s = AGAIN_S;
+        let lowest = disc.centre_m.z - disc.radius_m;
+        if lowest > map_top(map) + NEAR_M {
+            return;
+        }
+        let Some(axes) = Axes::of(disc) else { return };
+        let angle = |k: usize| (2.0 * k as f64 / (LOOKS - 1) as f64 - 1.0) * SIDE;
+        let far = |angle: f64| {
+            let [out, _] = axes.at(angle);
+            map.near(&(disc.centre_m + disc.radius_m * out)).distance_m
+        };
+        let distances: [f64; LOOKS] = std::array::from_fn(|k| far(angle(k)));
+        let mut best: [Option<(f64, f64)>; 2] = [None; 2];
+        for k in 1..LOOKS - 1 {
+            let here = distances[k];
+            if here >= distances[k - 1] || here > distances[k + 1] || here > NEAR_M {
+                continue;
+            }
+            let found = Some((here, angle(k)));
+            let deeper = |other: &Option<(f64, f64)>| other.is_none_or(|(d, _)| here < d);
+            if deeper(&best[0]) {
+                best = [found, best[0]];
+            } else if deeper(&best[1]) {
+                best[1] = found;
+            }
+        }
+        for (_, start) in best.into_iter().flatten() {
+            let peak = (0..FIRST).fold(start, |a, _| climb(map, disc, &axes, a));
+            let same = |k: &usize| before.there[*k] && (before.angle_rad[*k] - peak).abs() < SAME;
+            let place = (0..2).find(same);
+            self.put(place.unwrap_or(usize::from(before.there[0])), peak);
+        }
+    }
+
+    /// Adds a peak, if it is not there, in this place if that is free.
+    fn put(&mut self, place: usize, peak: f64) {
+        let is_known = |k: usize| self.there[k] && (self.angle_rad[k] - peak).abs() < ONE;
+        if is_known(0) || is_known(1) {
+            return;
+        }
+        let place = if self.there[place] { 1 - place } else { place };
+        if !self.there[place] {
+            self.angle_rad[place] = peak;
+            self.there[place] = true;
+        }
+    }
+
+    /// Follows the peaks over a step of so many seconds; 0: the disc as it is.
+    pub fn follow(&mut self, map: &HeightMap, disc: &Disc, step_s: f64) -> [Option<RimTouch>; 2] {
+        self.due_s -= step_s;
+        // Half a nanosecond, for rounding: plant steps are whole nanoseconds.
+        if self.due_s <= 5e-10 {
+            self.seed(map, disc);
+        } else if let Some(axes) = Axes::of(disc) {
+            let before = *self;
+            self.there = [false; 2];
+            for place in (0..2).filter(|place| before.there[*place]) {
+                self.put(place, climb(map, disc, &axes, before.angle_rad[place]));
+            }
+        }
+        touches(map, disc, self)
+    }
+
+    /// Adds the state to a hash; a rim that has never been near a map adds nothing.
+    pub fn feed(&self, hasher: &mut StateHasher) {
+        if self.due_s > 0.0 {
+            hasher.bytes(&self.there.map(u8::from));
+            let values = self.angle_rad.iter().chain([&self.due_s]);
+            values.for_each(|v| hasher.f64(*v));
+        }
+    }
+}
+
+/// No part of a map is higher \[m\].
+#[inline]
+fn map_top(map: &HeightMap) -> f64 {
+    use super::surface::Surface;
+    map.top_m()
+}
+
+/// The ground at the peaks.
+#[inline]
+pub(super) fn touches(map: &HeightMap, disc: &Disc, rim: &Rim) -> [Option<RimTouch>; 2] {
+    let mut touches = [None; 2];
+    let Some(axes) = Axes::of(disc) else {
+        return touches;
+    };
+    let share = if rim.there == [true; 2] {
+        let apart = (rim.angle_rad[0] - rim.angle_rad[1]).abs();
+        let u = (apart / SHARING).min(1.0);
+        0.5 + 0.5 * u * u * (3.0 - 2.0 * u)
+    } else {
+        1.0
+    };
+    for place in (0..2).filter(|place| rim.there[*place]) {
+        let [out, _] = axes.at(rim.angle_rad[place]);
+        let near = map.near(&(disc.centre_m + disc.radius_m * out));
+        touches[place] = Some(RimTouch { near, share });
+    }
+    touches
+}
