@@ -8,6 +8,7 @@ use crate::config::UniqueId;
 use crate::contact::{Sector, Side};
 use crate::dispatcher::{Refusal, Ticket};
 use crate::finding::Finding;
+use crate::layer1::walk::Felt;
 
 /// Why all axes were told to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,6 +172,11 @@ pub enum Event {
         /// First joint (1..=6) out of tolerance.
         joint: u8,
     },
+    /// A walk has met something, and answers.
+    Walk(
+        /// What.
+        Felt,
+    ),
     /// The gait is over.
     GaitDone {
         /// Steps done.

@@ -5,6 +5,7 @@ use wheeleg_master::command::CommandCode;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
+use wheeleg_master::layer1::walk::Felt;
 use wheeleg_protocol::param::params_at;
 use wheeleg_protocol::{
     Address, Fault, FaultBits, LinkQuality, LogEntry, LogEvent, NackReason, NodeMode,
@@ -418,8 +419,20 @@ const fn master_kind(event: &MasterEvent) -> EventKind {
         | MasterEvent::Link { .. }
         | MasterEvent::NodeBack(_)
         | MasterEvent::Homed
+        | MasterEvent::Walk(_)
         | MasterEvent::GaitDone { .. }
         | MasterEvent::TrajectoryDone => EventKind::Info,
+    }
+}
+
+const fn felt_name(felt: Felt) -> &'static str {
+    match felt {
+        Felt::Bump(_) => "bump",
+        Felt::NoGround(_) => "no_ground",
+        Felt::LostGround(_) => "lost_ground",
+        Felt::TipGuard => "tip_guard",
+        Felt::BackOff => "back_off",
+        Felt::Stuck => "stuck",
     }
 }
 
@@ -446,6 +459,7 @@ const fn master_code(event: &MasterEvent) -> &'static str {
         MasterEvent::Hold(_) => "hold",
         MasterEvent::Homed => "homed",
         MasterEvent::HomingFailed { .. } => "homing_failed",
+        MasterEvent::Walk(felt) => felt_name(*felt),
         MasterEvent::GaitDone { .. } => "gait_done",
         MasterEvent::TrajectoryDone => "trajectory_done",
         MasterEvent::TouchDown { .. } => "touch_down",
@@ -465,7 +479,10 @@ fn master_detail(event: &MasterEvent) -> String {
         MasterEvent::Hold(reason) => hold_name(reason).to_owned(),
         MasterEvent::TouchDown { side, .. }
         | MasterEvent::FootSwitch { side, .. }
-        | MasterEvent::LiftOff(side) => side_name(*side).to_owned(),
+        | MasterEvent::LiftOff(side)
+        | MasterEvent::Walk(Felt::Bump(side) | Felt::NoGround(side) | Felt::LostGround(side)) => {
+            side_name(*side).to_owned()
+        }
         _ => String::new(),
     }
 }

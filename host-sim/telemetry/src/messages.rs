@@ -10,6 +10,7 @@ use wheeleg_master::config::UniqueId;
 use wheeleg_master::contact::Side as FootSide;
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
 use wheeleg_master::finding::Finding;
+use wheeleg_master::layer1::walk::Felt;
 use wheeleg_protocol::param::params_at;
 use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord, LinkQuality};
 
@@ -221,6 +222,7 @@ fn master(event: &MasterEvent) -> String {
         MasterEvent::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
         MasterEvent::Homed => "start pose reached".to_owned(),
         MasterEvent::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
+        MasterEvent::Walk(felt) => walk(felt),
         MasterEvent::GaitDone { steps } => format!("gait over after {steps} steps"),
         MasterEvent::TrajectoryDone => "foot trajectory over".to_owned(),
         MasterEvent::TouchDown { side, sector } => match sector {
@@ -243,6 +245,31 @@ fn master(event: &MasterEvent) -> String {
 }
 
 /// Name of a side or sector inside a sentence.
+/// What a walk has met, and what it does.
+fn walk(felt: Felt) -> String {
+    match felt {
+        Felt::Bump(side) => format!(
+            "{} foot runs against something in its swing: it is lifted higher, or set down there",
+            word(side)
+        ),
+        Felt::NoGround(side) => format!(
+            "{} leg finds no ground at its full length: the nose goes down, then the foot is set nearer",
+            word(side)
+        ),
+        Felt::LostGround(side) => {
+            format!("{} foot has lost the ground and follows it", word(side))
+        }
+        Felt::TipGuard => "no foot carries: the wheels slow down".to_owned(),
+        Felt::BackOff => {
+            "no progress for 3 s: the robot backs off and lifts its feet higher".to_owned()
+        }
+        Felt::Stuck => {
+            "no progress after three tries: the robot stands. Turn it, or lead it another way"
+                .to_owned()
+        }
+    }
+}
+
 fn word(name: impl std::fmt::Debug) -> String {
     format!("{name:?}").to_lowercase()
 }

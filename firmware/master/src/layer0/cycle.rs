@@ -221,9 +221,15 @@ impl Layer0 {
             if let Some(foot) = self.feet.get_mut(side.index()) {
                 *foot = Some(now);
             }
+            // A leg that carries nothing is in its swing.
+            let vertical = self.setpoints.joints.get(side.joint(Cylinder::Vertical));
+            let swings = vertical
+                .copied()
+                .flatten()
+                .is_some_and(|joint| joint.on_link_loss == OnLinkLoss::HoldThenExhaust);
             let watch = self.foot_watches.get_mut(side.index());
-            if let Some(stuck) =
-                watch.and_then(|watch| watch.sample(now, reply.joint_position(), shorter_mm))
+            if let Some(stuck) = watch
+                .and_then(|watch| watch.sample(now, reply.joint_position(), shorter_mm, swings))
             {
                 let warning = if stuck.closed {
                     Warning::SwitchStuckClosed

@@ -3,7 +3,7 @@
 //! A foot may stand on an edge or tilted: that a switch stays open while the foot's other three
 //! are closed, or closed while they are open, says nothing yet. Two things do:
 //!
-//! * **Stuck closed.** In the air, clear of where the foot stood, nothing can close it. Seen in
+//! * **Stuck closed.** In a swing, clear of where the foot stood, nothing should close it. Seen in
 //!   two swings without its having opened in between, it is stuck.
 //! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as
 //!   the ground does where it is even. Three times in a row the other three closed, and it did
@@ -22,8 +22,7 @@ const ALL: u8 = 0x0F;
 /// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes
 /// to roll onto its sole.
 const AGREE: u8 = 20;
-/// A foot that is drawn up by so much, mm, from where its other three switches were closed last
-/// is in the air.
+/// A swinging foot that is drawn up by so much, mm, from where it stood is in the air.
 const CLEAR_MM: i16 = 15;
 /// Legs extended at least so far, mm, have their soles in the plane of the wheels.
 const LEVEL_MM: i16 = 175;
@@ -62,7 +61,7 @@ enum Place {
 pub struct FootWatch {
     last: Option<u8>,
     place: Place,
-    /// Stroke of b6 when three switches were closed last.
+    /// Stroke of b6 when the foot was not swinging last.
     stood: Option<PositionMm>,
     switches: [One; SWITCHES],
 }
@@ -77,16 +76,17 @@ pub struct Stuck {
 }
 
 impl FootWatch {
-    /// Takes the switches of a cycle, with the stroke of the leg's b6 and the shorter of both
-    /// legs' strokes; gives a switch that has just been found stuck.
+    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs'
+    /// strokes, and whether the leg swings; gives a switch that has just been found stuck.
     pub fn sample(
         &mut self,
         now: FootSwitches,
         b6_mm: PositionMm,
         shorter_mm: PositionMm,
+        swings: bool,
     ) -> Option<Stuck> {
         let now = now.0 & ALL;
-        if now.count_ones() >= 3 {
+        if !swings {
             self.stood = Some(b6_mm);
         }
         let clear = PositionMm::from_int(CLEAR_MM);
@@ -94,7 +94,7 @@ impl FootWatch {
             .stood
             .is_some_and(|stood| stood.saturating_sub(b6_mm) >= clear);
         let place = match now.count_ones() {
-            0 | 1 if drawn_up => Place::Air,
+            0 | 1 if swings && drawn_up => Place::Air,
             3 | 4 if shorter_mm >= PositionMm::from_int(LEVEL_MM) => Place::Ground,
             _ => Place::Between,
         };
@@ -149,7 +149,7 @@ mod tests {
             for _ in 0..*cycles {
                 let b6_mm = PositionMm::from_int(*b6);
                 let shorter_mm = b6_mm.limit(PositionMm::ZERO, PositionMm::from_int(other_mm));
-                found.extend(watch.sample(FootSwitches(*raw), b6_mm, shorter_mm));
+                found.extend(watch.sample(FootSwitches(*raw), b6_mm, shorter_mm, *b6 <= 120));
             }
         }
         found

@@ -252,6 +252,9 @@ impl Layer1 {
             }
             Mode::Walk(walk) => {
                 let out = walk.setpoints(now_us, &self.feedback);
+                for felt in walk.take_felt() {
+                    events.push(now_us, Event::Walk(felt));
+                }
                 self.segment = walk.segment();
                 let steps = walk.steps();
                 if out.phase == Phase::Done {

@@ -11,6 +11,7 @@
 //! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the
 //!   standing foot has room for it.
 
+mod felt;
 mod geometry;
 mod leg;
 mod order;
@@ -20,9 +21,10 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 use super::params::{ParamError, STROKE_MM};
 use crate::contact::Side;
 use crate::setpoint::{Cylinder, Feedback, Phase, Setpoints, TravelSetpoint, WHEELS, WheelTravel};
+pub use felt::Felt;
 pub use geometry::WalkGeometry;
 use geometry::{Twist, stance, time_left_s};
-use leg::{Leg, Sensed};
+use leg::{FOLLOW_MM, Leg, Sensed, TIPPING_MM};
 pub use order::{WalkOrder, WalkPattern};
 
 /// Bus cycle, s.
@@ -40,6 +42,23 @@ const SWING_MIN_S: f32 = 0.6;
 const SWING_MAX_S: f32 = 3.0;
 /// From the touch of one foot to the rise of the other, s: [`LOADED`] and a cycle each way.
 const EXCHANGE_S: f32 = 0.12;
+/// The references wait for wheels that are behind by so much, mm, and stand still at twice that.
+const LEAD_MM: f32 = 40.0;
+/// Feet that have moved less than this, m, …
+const PROGRESS_M: f32 = 0.005;
+/// … in so many cycles (3 s) of a walk make no progress.
+const PATIENCE: u16 = 300;
+/// The robot then backs off for so many cycles (1 s) at this speed, m/s, …
+const BACK_OFF: u16 = 100;
+const BACK_M_S: f32 = 0.05;
+/// … and lifts its feet higher, mm, …
+const HIGHER_MM: f32 = 40.0;
+/// … until it has come so far, m, …
+const FREE_M: f32 = 0.5;
+/// … or has tried so many times.
+const TRIES: u8 = 3;
+/// Things met that wait to be told; a leg each and the robot can meet one in a cycle.
+const FELT: usize = 4;
 /// The wheels' references begin anew after this distance, mm, far below what they can tell.
 const SEGMENT_MM: f32 = 4000.0;
 
@@ -64,6 +83,18 @@ pub struct Walk {
     swing_s: f32,
     steps: u16,
     stopping: bool,
+    /// What the references of the wheels are ahead of them, mm.
+    lead_mm: [f32; WHEELS],
+    /// What the standing feet have moved since there was progress, m, and since when, cycles.
+    progress_m: f32,
+    idle: u16,
+    /// Way since the last try to get on, m.
+    free_m: f32,
+    tries: u8,
+    /// Cycles of backing off that are left.
+    back_off: u16,
+    tipping: bool,
+    felt: [Option<Felt>; FELT],
 }
 
 impl Walk {
@@ -95,6 +126,14 @@ impl Walk {
             swing_s: SWING_S,
             steps: 0,
             stopping: false,
+            lead_mm: [0.0; WHEELS],
+            progress_m: 0.0,
+            idle: 0,
+            free_m: 0.0,
+            tries: 0,
+            back_off: 0,
+            tipping: false,
+            felt: [None; FELT],
         }))
     }
 
@@ -120,6 +159,11 @@ impl Walk {
         self.steps
     }
 
+    /// What it has met since it was asked last.
+    pub fn take_felt(&mut self) -> impl Iterator<Item = Felt> + use<> {
+        core::mem::take(&mut self.felt).into_iter().flatten()
+    }
+
     /// Number of the wheels' motion in use.
     #[must_use]
     pub const fn segment(&self) -> u16 {
@@ -134,23 +178,30 @@ impl Walk {
             .clamp(0.0, STROKE_MM.get().to_num::<f32>());
         let wanted = self.wanted();
         self.since_swing = self.since_swing.saturating_add(1);
-        for leg in &mut self.legs {
+        let mut progress_m = 0.0;
+        let mut met = [None; WHEELS];
+        for (leg, met) in self.legs.iter_mut().zip(&mut met) {
             let foothold = stance(wanted, &self.geometry, leg.side).begin_m;
             if let Some(sensed) = Sensed::of(feedback, leg.side) {
-                let swung = !leg.stands();
-                leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
-                if swung && leg.stands() {
+                let stood = leg.stands();
+                if stood {
+                    progress_m += leg.moved_m(&sensed);
+                }
+                *met = leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
+                if !stood && leg.stands() {
                     let took = f32::from(self.since_swing) * CYCLE_S;
                     self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
                 }
             }
         }
+        met.into_iter().flatten().for_each(|felt| self.meet(felt));
         self.level(plan_mm);
+        self.watch_progress(wanted, progress_m);
         let next = self.next_swing(wanted);
         if let Some((side, 0)) = next
             && let Some(leg) = self.legs.get_mut(side.index())
         {
-            leg.swing();
+            leg.swing(if self.tries > 0 { HIGHER_MM } else { 0.0 });
             self.since_swing = 0;
             self.last = Some(side);
             self.steps = self.steps.saturating_add(1);
@@ -162,22 +213,65 @@ impl Walk {
         self.write(now_us, lift_mm)
     }
 
+    /// Keeps what was met until it is told; the oldest counts.
+    fn meet(&mut self, felt: Felt) {
+        if let Some(free) = self.felt.iter_mut().find(|slot| slot.is_none()) {
+            *free = Some(felt);
+        }
+    }
+
+    /// Backs off where the feet make no progress, and gives up after some tries.
+    fn watch_progress(&mut self, wanted: Twist, progress_m: f32) {
+        self.free_m += progress_m;
+        if self.free_m > FREE_M {
+            self.tries = 0;
+        }
+        if self.back_off > 0 {
+            self.back_off = self.back_off.saturating_sub(1);
+            return;
+        }
+        self.progress_m += progress_m;
+        self.idle = self.idle.saturating_add(1);
+        if wanted == Twist::default() || self.progress_m > PROGRESS_M {
+            self.progress_m = 0.0;
+            self.idle = 0;
+        } else if self.idle > PATIENCE {
+            self.idle = 0;
+            self.free_m = 0.0;
+            if self.tries < TRIES {
+                self.tries = self.tries.saturating_add(1);
+                self.back_off = BACK_OFF;
+                self.meet(Felt::BackOff);
+            } else {
+                self.stopping = true;
+                self.meet(Felt::Stuck);
+            }
+        }
+    }
+
     /// What the ground has passed below since the last cycle, by the wheels: m and rad.
     fn moved(&mut self, feedback: &Feedback) -> Twist {
         let [left, right] = self.wheels_um;
         let [now_left, now_right] = feedback.wheels_um;
         self.wheels_um = feedback.wheels_um;
         let metres = |now: i64, before: i64| now.saturating_sub(before) as f32 * 1e-6;
-        Twist::of_wheels(
-            &self.geometry,
-            [metres(now_left, left), metres(now_right, right)],
-        )
+        let way = [metres(now_left, left), metres(now_right, right)];
+        for (lead, way) in self.lead_mm.iter_mut().zip(way) {
+            *lead -= 1e3 * way;
+        }
+        Twist::of_wheels(&self.geometry, way)
     }
 
     /// The motion asked for.
     fn wanted(&self) -> Twist {
         if self.stopping {
             return Twist::default();
+        }
+        if self.back_off > 0 {
+            return Twist {
+                forward_m_s: -libm::copysignf(BACK_M_S, self.order.speed_mm_s.get().to_num()),
+                turn_rad_s: 0.0,
+            };
         }
         Twist {
             forward_m_s: self.order.speed_mm_s.get().to_num::<f32>() * 1e-3,
@@ -187,11 +281,26 @@ impl Walk {
 
     /// Keeps the mean height of the legs, and feet on the ground.
     fn level(&mut self, plan_mm: f32) {
-        let [left, right] = self.legs;
-        let rise = plan_mm - 0.5 * (left.stand_mm + right.stand_mm);
-        for leg in self.legs.iter_mut().filter(|leg| leg.stands()) {
-            leg.level(rise);
+        let [left, right] = &self.legs;
+        let stands = left.stands() && right.stands();
+        let hang = stands && left.hangs() && right.hangs();
+        if hang && !self.tipping {
+            self.meet(Felt::TipGuard);
         }
+        self.tipping = hang;
+        let [left, right] = &self.legs;
+        let rise = if left.wants_nose_down() || right.wants_nose_down() {
+            -plan_mm
+        } else {
+            plan_mm - 0.5 * (left.stand_mm + right.stand_mm)
+        };
+        let most_mm = if hang { TIPPING_MM } else { FOLLOW_MM };
+        let mut met = [None; WHEELS];
+        let standing = self.legs.iter_mut().filter(|leg| leg.stands());
+        for (leg, met) in standing.zip(&mut met) {
+            *met = leg.level(rise, most_mm);
+        }
+        met.into_iter().flatten().for_each(|felt| self.meet(felt));
     }
 
     /// Time left of a leg's stance at a motion, s.
@@ -202,7 +311,7 @@ impl Walk {
     /// The leg that swings next, if any, and in how many cycles as things stand: 0 is now.
     fn next_swing(&self, wanted: Twist) -> Option<(Side, u8)> {
         let [left, right] = &self.legs;
-        if wanted == Twist::default() || !left.stands() || !right.stands() {
+        if wanted == Twist::default() || self.back_off > 0 || !left.stands() || !right.stands() {
             return None;
         }
         let (next, other) = if self.left_s(wanted, left) <= self.left_s(wanted, right) {
@@ -269,13 +378,26 @@ impl Walk {
             .into_iter()
             .zip(&mut self.travel_mm)
         {
-            *travel += 1e3 * CYCLE_S * self.twist.wheel_m_s(&self.geometry, side);
+            let step = 1e3 * CYCLE_S * self.twist.wheel_m_s(&self.geometry, side);
+            *travel += step;
+            if let Some(lead) = self.lead_mm.get_mut(side.index()) {
+                *lead += step;
+            }
         }
     }
 
     /// Share of the motion asked for at which no standing foot runs out of reach before it may
-    /// swing.
+    /// swing, and the wheels follow; nothing while no foot carries.
     fn allowed(&self, wanted: Twist) -> f32 {
+        if self.tipping {
+            return 0.0;
+        }
+        let behind = [Side::Left, Side::Right]
+            .into_iter()
+            .zip(self.lead_mm)
+            .map(|(side, lead)| lead * libm::copysignf(1.0, wanted.wheel_m_s(&self.geometry, side)))
+            .fold(0.0, f32::max);
+        let follows = (2.0 - behind / LEAD_MM).clamp(0.0, 1.0);
         let [left, right] = &self.legs;
         let share = |leg: &Leg, other: &Leg| {
             if !leg.stands() {
@@ -291,7 +413,7 @@ impl Walk {
             };
             (self.left_s(wanted, leg) / wait_s).min(1.0)
         };
-        share(left, right).min(share(right, left))
+        follows.min(share(left, right)).min(share(right, left))
     }
 
     /// Whether the robot has come to its stop.

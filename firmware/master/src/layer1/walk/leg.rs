@@ -9,6 +9,7 @@
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::felt::Felt;
 use super::geometry::{Twist, WalkGeometry};
 use crate::contact::{FootSwitches, Side};
 use crate::layer1::params::STROKE_MM;
@@ -31,10 +32,29 @@ const SEARCH_FROM_MM: f32 = 5.0;
 pub(super) const PRESS_MM: f32 = 4.0;
 /// Fastest change of a standing leg's height, mm per cycle (30 mm/s).
 const NOSE_MM: f32 = 0.3;
+/// A bump lifts a foot by so much more, mm.
+const HIGHER_MM: f32 = 40.0;
+/// A foot that reaches slower than this, mm per cycle (10 mm/s), …
+const STALLED_MM: f32 = 0.1;
+/// … for so many cycles, from so many after the begin of the reach on, has run against something.
+const STALLED: u16 = 20;
+const STARTED: u16 = 25;
+/// A foot that finds no ground is set nearer by so much, m, …
+const NEARER_M: f32 = 0.06;
+/// … after so many cycles at full length (1.5 s), …
+const PATIENCE: u16 = 150;
+/// … so many times.
+const TRIES: u8 = 2;
+/// A leg is at its full length from here on, mm.
+const FULL_MM: f32 = 178.0;
+/// Cycles at full length, without ground, after which the nose goes down.
+const NO_GROUND: u16 = 20;
 /// Cycles with all switches open after which a standing foot has lost the ground (50 ms).
 const LOST: u16 = 5;
 /// Farthest that a standing leg extends after lost ground, mm.
-const FOLLOW_MM: f32 = 20.0;
+pub(super) const FOLLOW_MM: f32 = 20.0;
+/// The same while no foot carries: a leg that extends lifts the nose.
+pub(super) const TIPPING_MM: f32 = 10.0;
 /// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
 /// presses less.
 const ANNOUNCED: u8 = 8;
@@ -109,6 +129,16 @@ pub(super) struct Leg {
     open: u16,
     /// What it has extended after lost ground in this stance, mm.
     followed_mm: f32,
+    /// What this swing is lifted beyond the order, mm.
+    higher_mm: f32,
+    /// Cycles for which the reach has not gone on.
+    stalled: u16,
+    /// Cycles at full length without ground.
+    without: u16,
+    /// Footholds of this swing that had no ground.
+    tries: u8,
+    /// Foot of the last cycle, m.
+    before_m: [f32; 2],
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
 }
@@ -131,6 +161,11 @@ impl Leg {
             loaded: 0,
             open: 0,
             followed_mm: 0.0,
+            higher_mm: 0.0,
+            stalled: 0,
+            without: 0,
+            tries: 0,
+            before_m: sensed.foot_m,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
                 reference_mm,
                 ..JointSetpoint::default()
@@ -147,13 +182,25 @@ impl Leg {
         self.cycles = 0;
     }
 
-    /// Begins a swing.
-    pub(super) fn swing(&mut self) {
+    /// Begins a swing, `higher_mm` above the order's.
+    pub(super) fn swing(&mut self, higher_mm: f32) {
+        self.higher_mm = higher_mm;
+        self.tries = 0;
         self.enter(LegState::Lift(self.stand_mm));
     }
 
+    /// At full length it finds no ground: the nose is to go down.
+    pub(super) fn wants_nose_down(&self) -> bool {
+        matches!(self.state, LegState::Lower(_)) && self.without > NO_GROUND
+    }
+
+    /// What its foot has moved in this cycle, as it was measured, m.
+    pub(super) fn moved_m(&self, sensed: &Sensed) -> f32 {
+        distance(sensed.foot_m, self.before_m)
+    }
+
     /// One cycle: `moved` is what the ground has passed below, m and rad; `foothold` where the
-    /// swing is to end, `lift_mm` its height.
+    /// swing is to end, `lift_mm` its height. Tells what it has met.
     pub(super) fn advance(
         &mut self,
         sensed: &Sensed,
@@ -161,45 +208,93 @@ impl Leg {
         geometry: &WalkGeometry,
         foothold: [f32; 2],
         lift_mm: f32,
-    ) {
+    ) -> Option<Felt> {
         self.cycles = self.cycles.saturating_add(1);
-        self.loaded = if sensed.touches {
-            self.loaded.saturating_add(1)
-        } else {
-            0
-        };
-        self.open = if sensed.touches {
-            0
-        } else {
-            self.open.saturating_add(1)
-        };
+        let count = |cycles: u16, on: bool| if on { cycles.saturating_add(1) } else { 0 };
+        self.loaded = count(self.loaded, sensed.touches);
+        self.open = count(self.open, !sensed.touches);
+        let lift_mm = lift_mm + self.higher_mm;
+        let slow = self.moved_m(sensed) < 1e-3 * STALLED_MM;
+        self.before_m = sensed.foot_m;
         match self.state {
-            LegState::Stance => self.follow(moved, geometry),
+            LegState::Stance => {
+                self.follow(moved, geometry);
+                None
+            }
             LegState::Lift(from_mm) => {
                 self.follow(moved, geometry);
                 let clear = CLEAR_MM.min(0.5 * lift_mm.min(from_mm));
                 if sensed.height_mm <= from_mm - clear {
+                    let foothold = self.nearer(foothold);
                     self.enter(LegState::Reach(distance(sensed.foot_m, foothold)));
+                    self.stalled = 0;
                 }
+                None
             }
             LegState::Reach(way_m) => {
-                self.foot_m = foothold;
-                if distance(sensed.foot_m, foothold) <= (1.0 - LOWER_FROM) * way_m {
-                    self.enter(LegState::Lower((self.ground_mm - APPROACH_MM).max(0.0)));
+                self.foot_m = self.nearer(foothold);
+                let left_m = distance(sensed.foot_m, self.foot_m);
+                if left_m <= (1.0 - LOWER_FROM) * way_m {
+                    self.lower();
+                    return None;
                 }
-            }
-            LegState::Lower(to_mm) => {
-                if sensed.touches {
+                let started = self.cycles > STARTED;
+                self.stalled = count(self.stalled, started && slow);
+                if self.stalled < STALLED && !(started && sensed.touches) {
+                    return None;
+                }
+                self.stalled = 0;
+                self.cycles = 0;
+                if lift_mm < self.stand_mm {
+                    self.higher_mm += HIGHER_MM;
+                } else {
+                    // As high as it goes: there.
                     self.foot_m = sensed.foot_m;
-                    self.ground_mm = sensed.height_mm;
-                    self.stand_mm = (sensed.height_mm + PRESS_MM).min(full_mm());
-                    self.followed_mm = 0.0;
-                    self.enter(LegState::Stance);
-                } else if sensed.height_mm >= to_mm - SEARCH_FROM_MM {
-                    self.state = LegState::Lower((to_mm + SEARCH_MM).min(full_mm()));
+                    self.lower();
                 }
+                Some(Felt::Bump(self.side))
             }
+            LegState::Lower(to_mm) => self.touch(sensed, to_mm),
         }
+    }
+
+    /// Goes down to just above the ground that is expected.
+    fn lower(&mut self) {
+        self.without = 0;
+        self.enter(LegState::Lower((self.ground_mm - APPROACH_MM).max(0.0)));
+    }
+
+    /// A foot on its way down.
+    fn touch(&mut self, sensed: &Sensed, to_mm: f32) -> Option<Felt> {
+        if sensed.touches {
+            self.foot_m = sensed.foot_m;
+            self.ground_mm = sensed.height_mm;
+            self.stand_mm = (sensed.height_mm + PRESS_MM).min(full_mm());
+            self.followed_mm = 0.0;
+            self.enter(LegState::Stance);
+            return None;
+        }
+        if sensed.height_mm >= to_mm - SEARCH_FROM_MM {
+            self.state = LegState::Lower((to_mm + SEARCH_MM).min(full_mm()));
+        }
+        if sensed.height_mm < FULL_MM {
+            return None;
+        }
+        self.without = self.without.saturating_add(1);
+        if self.without > PATIENCE && self.tries < TRIES {
+            self.tries = self.tries.saturating_add(1);
+            self.without = 0;
+            self.stand_mm = sensed.height_mm;
+            self.enter(LegState::Lift(sensed.height_mm));
+        }
+        (self.without == NO_GROUND).then_some(Felt::NoGround(self.side))
+    }
+
+    /// A foothold, set nearer to the middle of the reach for each one that had no ground.
+    fn nearer(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let middle = 0.1;
+        let nearer = (NEARER_M * f32::from(self.tries)).min(libm::fabsf(x - middle));
+        [x - libm::copysignf(nearer, x - middle), y]
     }
 
     /// The ground has passed below: a standing foot goes with it.
@@ -209,15 +304,23 @@ impl Leg {
         self.foot_m = [x + dx, y + dy];
     }
 
-    /// Height of a standing leg: `rise_mm` is wanted by the nose; lost ground is followed.
-    pub(super) fn level(&mut self, rise_mm: f32) {
-        if self.open > LOST && self.followed_mm < FOLLOW_MM {
+    /// All switches have been open for long.
+    pub(super) fn hangs(&self) -> bool {
+        self.open > LOST
+    }
+
+    /// Height of a standing leg: `rise_mm` is wanted by the nose; lost ground is followed, by
+    /// `most_mm` at most.
+    pub(super) fn level(&mut self, rise_mm: f32, most_mm: f32) -> Option<Felt> {
+        if self.hangs() && self.followed_mm < most_mm {
+            let first = self.followed_mm == 0.0;
             self.followed_mm += SEARCH_MM;
             self.stand_mm = (self.stand_mm + SEARCH_MM).min(full_mm());
-            return;
+            return first.then_some(Felt::LostGround(self.side));
         }
         let step = rise_mm.clamp(-NOSE_MM, NOSE_MM);
         self.stand_mm = (self.stand_mm + step).clamp(0.0, full_mm());
+        None
     }
 
     /// References: yaw, b5, b6. `speed` is the robot's.
@@ -227,6 +330,7 @@ impl Leg {
         geometry: &WalkGeometry,
         lift_mm: f32,
     ) -> [JointSetpoint; 3] {
+        let lift_mm = lift_mm + self.higher_mm;
         let airborne = matches!(self.state, LegState::Lift(_) | LegState::Reach(_));
         let follows = matches!(self.state, LegState::Stance | LegState::Lift(_));
         let velocity = if follows {
