@@ -85,8 +85,7 @@ pub struct Walk {
     stopping: bool,
     /// What the references of the wheels are ahead of them, mm.
     lead_mm: [f32; WHEELS],
-    /// What the standing feet have moved since there was progress, m, and since when, cycles.
-    progress_m: f32,
+    /// Cycles since a standing foot has moved.
     idle: u16,
     /// Way since the last try to get on, m.
     free_m: f32,
@@ -127,7 +126,6 @@ impl Walk {
             steps: 0,
             stopping: false,
             lead_mm: [0.0; WHEELS],
-            progress_m: 0.0,
             idle: 0,
             free_m: 0.0,
             tries: 0,
@@ -184,9 +182,7 @@ impl Walk {
             let foothold = stance(wanted, &self.geometry, leg.side).begin_m;
             if let Some(sensed) = Sensed::of(feedback, leg.side) {
                 let stood = leg.stands();
-                if stood {
-                    progress_m += leg.moved_m(&sensed);
-                }
+                progress_m += leg.way_m(&sensed, PROGRESS_M);
                 *met = leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
                 if !stood && leg.stands() {
                     let took = f32::from(self.since_swing) * CYCLE_S;
@@ -230,10 +226,8 @@ impl Walk {
             self.back_off = self.back_off.saturating_sub(1);
             return;
         }
-        self.progress_m += progress_m;
         self.idle = self.idle.saturating_add(1);
-        if wanted == Twist::default() || self.progress_m > PROGRESS_M {
-            self.progress_m = 0.0;
+        if wanted == Twist::default() || progress_m > 0.0 {
             self.idle = 0;
         } else if self.idle > PATIENCE {
             self.idle = 0;
@@ -419,12 +413,9 @@ impl Walk {
     /// Whether the robot has come to its stop.
     fn over(&self) -> bool {
         let still = self.twist == Twist::default();
-        self.stopping
-            && still
-            && self
-                .legs
-                .iter()
-                .all(|leg| leg.stands() && leg.loaded >= LOADED)
+        // One that gave up may stand with a foot in a hole.
+        let down = |leg: &Leg| leg.stands() && leg.loaded >= LOADED;
+        self.stopping && still && (self.tries >= TRIES || self.legs.iter().all(down))
     }
 
     fn write(&mut self, now_us: u64, lift_mm: f32) -> Setpoints {

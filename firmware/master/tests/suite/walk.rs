@@ -4,7 +4,7 @@
 
 use fixed::types::I16F16;
 use wheeleg_master::contact::{FootSwitches, Side};
-use wheeleg_master::layer1::walk::{Walk, WalkGeometry, WalkOrder, WalkPattern};
+use wheeleg_master::layer1::walk::{Felt, Walk, WalkGeometry, WalkOrder, WalkPattern};
 use wheeleg_master::mirror;
 use wheeleg_master::setpoint::{Cylinder, Feedback, Phase, Setpoints};
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -237,8 +237,8 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
     // The ground is out of reach for the left foot: the wheels wait.
     let mut robot = Robot::new(order(120, "0"));
     robot.run(8.0);
-    robot.ground[0] = 60.0;
-    robot.run(6.0);
+    robot.ground[0] = 300.0;
+    robot.run(3.0);
     let speed = robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64();
     assert!(speed.abs() < 2.0, "{speed} mm/s");
     // The standing foot is still inside its reach.
@@ -248,6 +248,41 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
     robot.ground[0] = 0.0;
     robot.run(3.0);
     assert!(robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64() > 50.0);
+}
+
+#[test]
+fn a_hole_is_reached_with_the_nose_down() {
+    let mut robot = Robot::new(order(100, "0"));
+    robot.run(8.0);
+    // Beyond the 20 mm that are left below the foot, within what the nose can give.
+    robot.ground[0] = 40.0;
+    let before = robot.wheels_mm[0];
+    robot.run(10.0);
+    assert!(robot.wheels_mm[0] - before > 700.0, "{:?}", robot.wheels_mm);
+}
+
+#[test]
+fn a_walk_that_cannot_go_on_backs_off_three_times_and_stands() {
+    let mut robot = Robot::new(order(120, "0"));
+    robot.run(8.0);
+    robot.ground[0] = 300.0;
+    let (mut tries, mut farthest) = (0, 0.0_f64);
+    for _ in 0..6000 {
+        let out = robot.cycle();
+        farthest = farthest.max(robot.wheels_mm[0]);
+        for felt in robot.walk.take_felt() {
+            tries += u32::from(felt == Felt::BackOff);
+            if felt == Felt::Stuck {
+                assert_eq!(tries, 3);
+            }
+        }
+        if out.phase == Phase::Done {
+            assert_eq!(tries, 3);
+            assert!(robot.wheels_mm[0] < farthest + 1.0);
+            return;
+        }
+    }
+    panic!("it tries for ever");
 }
 
 #[test]

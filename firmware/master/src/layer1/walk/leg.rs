@@ -139,6 +139,8 @@ pub(super) struct Leg {
     tries: u8,
     /// Foot of the last cycle, m.
     before_m: [f32; 2],
+    /// Foot from which progress counts, m.
+    anchor_m: [f32; 2],
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
 }
@@ -166,6 +168,7 @@ impl Leg {
             without: 0,
             tries: 0,
             before_m: sensed.foot_m,
+            anchor_m: sensed.foot_m,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
                 reference_mm,
                 ..JointSetpoint::default()
@@ -194,9 +197,18 @@ impl Leg {
         matches!(self.state, LegState::Lower(_)) && self.without > NO_GROUND
     }
 
-    /// What its foot has moved in this cycle, as it was measured, m.
-    pub(super) fn moved_m(&self, sensed: &Sensed) -> f32 {
-        distance(sensed.foot_m, self.before_m)
+    /// How far a standing foot has moved since it was asked last with a yes, m; 0 if it has not
+    /// moved by `least_m`, so that the noise of the sensors is no way.
+    pub(super) fn way_m(&mut self, sensed: &Sensed, least_m: f32) -> f32 {
+        if !self.stands() {
+            self.anchor_m = sensed.foot_m;
+        }
+        let way_m = distance(sensed.foot_m, self.anchor_m);
+        if way_m < least_m {
+            return 0.0;
+        }
+        self.anchor_m = sensed.foot_m;
+        way_m
     }
 
     /// One cycle: `moved` is what the ground has passed below, m and rad; `foothold` where the
@@ -214,7 +226,7 @@ impl Leg {
         self.loaded = count(self.loaded, sensed.touches);
         self.open = count(self.open, !sensed.touches);
         let lift_mm = lift_mm + self.higher_mm;
-        let slow = self.moved_m(sensed) < 1e-3 * STALLED_MM;
+        let slow = distance(sensed.foot_m, self.before_m) < 1e-3 * STALLED_MM;
         self.before_m = sensed.foot_m;
         match self.state {
             LegState::Stance => {
@@ -317,6 +329,13 @@ impl Leg {
             self.followed_mm += SEARCH_MM;
             self.stand_mm = (self.stand_mm + SEARCH_MM).min(full_mm());
             return first.then_some(Felt::LostGround(self.side));
+        }
+        if self.hangs() && most_mm >= FOLLOW_MM {
+            // Deeper than that it is a foothold of its own.
+            self.without = 0;
+            self.tries = 0;
+            self.enter(LegState::Lower(self.stand_mm));
+            return None;
         }
         let step = rise_mm.clamp(-NOSE_MM, NOSE_MM);
         self.stand_mm = (self.stand_mm + step).clamp(0.0, full_mm());
