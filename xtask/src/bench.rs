@@ -58,7 +58,9 @@ const C_PROGRAMS: [(&str, &[&str], &str); 7] = [
 ];
 
 /// Groups in the order in which they run.
-const GROUPS: [&str; 6] = ["leg", "robot", "pneu", "fuzzy", "filter", "proto"];
+const GROUPS: [&str; 7] = [
+    "leg", "robot", "terrain", "pneu", "fuzzy", "filter", "proto",
+];
 
 /// A program of a round.
 struct Program {

@@ -155,6 +155,15 @@ impl Terrain {
         self.parts.iter().try_for_each(|p| p.material.validate())
     }
 
+    /// The same without rocks.
+    #[must_use]
+    pub fn height_below_rocks_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        let others = self.parts.iter().map(|p| &p.shape);
+        let others = others.filter(|shape| !matches!(shape, Shape::Ellipsoid(_)));
+        let heights = others.map(|shape| shape.height_m(x_m, y_m));
+        heights.flatten().reduce(f64::max)
+    }
+
     /// BLAKE3 of every part and its material.
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {

@@ -9,7 +9,8 @@ import { footView, sideView, topView } from "./robot.js";
 
 /** @typedef {{geometry: import("./robot.js").Geometry, t: number[], start: number, end: number,
  *   commanded_mm: number[][], sensed_mm: number[][], load_n: number[][], switches: number[][],
- *   travel_mm: number[], pitch_deg: number[], supply_bar: number[],
+ *   travel_mm: number[], pitch_deg: number[], y_mm: number[], z_mm: number[], yaw_deg: number[], supply_bar: number[],
+ *   ground?: import("./ground.js").Ground,
  *   phases: import("./transport.js").Phase[], marks: import("./transport.js").Mark[]}} Motion */
 
 /** State of the robot at a time. @param {Motion} m @param {number} t s @returns {import("./robot.js").Pose} */
@@ -22,14 +23,15 @@ function pose(m, t) {
     load_n: value(m.load_n[side]),
     switches: held(m.t, m.switches[side], t),
   });
-  return { travel_mm: value(m.travel_mm), pitch_deg: value(m.pitch_deg), legs: [legState(0), legState(1)] };
+  const place = { y_mm: value(m.y_mm), z_mm: value(m.z_mm), yaw_deg: value(m.yaw_deg) };
+  return { travel_mm: value(m.travel_mm), pitch_deg: value(m.pitch_deg), ...place, legs: [legState(0), legState(1)] };
 }
 
 /** The robot with its transport, below which everything follows. @param {HTMLElement} place @param {Motion} motion @param {Player} player */
 function showMotion(place, motion, player) {
   const pictures = { side: svg("svg"), top: svg("svg"), left: svg("svg"), right: svg("svg") };
-  const side = sideView(pictures.side, motion.geometry);
-  const top = topView(pictures.top, motion.geometry);
+  const side = sideView(pictures.side, motion.geometry, motion.ground);
+  const top = topView(pictures.top, motion.geometry, motion.ground);
   const feet = [footView(pictures.left, "Left"), footView(pictures.right, "Right")];
   const readings = html("dl", { class: "readings" });
   const reading = (name) => {

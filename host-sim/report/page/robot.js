@@ -3,13 +3,16 @@
 // cylinders and feet are the file's; the shape of the chassis is ours. A view makes its elements
 // once; `update` then writes transforms and the few attributes that changed.
 import { svg, set, say } from "./dom.js";
+import { oblique, points, tenth } from "./projection.js";
+import { terrainAbove, terrainSide } from "./ground.js";
 
 /** @typedef {{crank_mm: number, p4_mm: [number, number], o4_mm: [number, number, number], stroke_zero_mm: [number, number, number],
  *   foot_pad_mm: number, sole_radius_mm: number, wheel_radius_mm: number, track_mm: number}} Geometry */
 /** Strokes of yaw, horizontal and vertical cylinder.
  * @typedef {[number, number, number]} Strokes */
 /** @typedef {{commanded_mm: Strokes, sensed_mm: Strokes, load_n: number, switches: number}} Leg */
-/** @typedef {{travel_mm: number, pitch_deg: number, legs: [Leg, Leg]}} Pose */
+/** Where the middle of the axle is, if it is known, and how the legs are.
+ * @typedef {{travel_mm: number, pitch_deg: number, y_mm?: number, z_mm?: number, yaw_deg?: number, legs: [Leg, Leg]}} Pose */
 
 const SIDES = [
   { name: "left", class: "leg-L", y: 1, yaw_z: 288 },
@@ -42,11 +45,7 @@ export function leg(g, side, [yaw, horizontal, vertical]) {
   };
 }
 
-const tenth = (v) => Math.round(v * 10) / 10;
-/** Oblique projection: depth goes right and up, x and z stay true. */
-const oblique = (x, y, z) => [tenth(x + 0.26 * y), tenth(-(z + 0.2 * y))];
-const points = (list) => list.map((p) => p.join(",")).join(" ");
-const put = (line, [x1, y1], [x2, y2]) => set(line, { x1: tenth(x1), y1: tenth(y1), x2: tenth(x2), y2: tenth(y2) });
+export const put = (line, [x1, y1], [x2, y2]) => set(line, { x1: tenth(x1), y1: tenth(y1), x2: tenth(x2), y2: tenth(y2) });
 const bar = (parent, name, width) => svg("line", { class: name, "stroke-width": width }, parent);
 
 /** A wheel seen from its side; returns what turns it. */
@@ -111,12 +110,13 @@ function groundSide(picture) {
   return { ticks, shadows };
 }
 
-/** The robot from its right side. @param {SVGElement} picture @param {Geometry} g */
-export function sideView(picture, g) {
+/** The robot from its right side, on a level floor or on a terrain. @param {SVGElement} picture @param {Geometry} g
+ * @param {import("./ground.js").Ground} [terrain] */
+export function sideView(picture, g, terrain) {
   set(picture, { viewBox: "-392 -492 1310 606", role: "img", preserveAspectRatio: "xMidYMax meet" });
   picture.classList.add("robot");
   const title = svg("title", {}, picture);
-  const { ticks, shadows } = groundSide(picture);
+  const { ticks, shadows } = terrain ? terrainSide(picture, g, terrain) : groundSide(picture);
   const root = svg("g", {}, picture);
   const farWheel = wheelSide(root, g, g.track_mm / 2);
   chassisSide(root);
@@ -142,7 +142,9 @@ export function sideView(picture, g) {
   return {
     /** @param {Pose} pose */
     update(pose) {
-      set(ticks, { transform: `translate(${tenth(-pose.travel_mm)},0)` });
+      // The axle stays where it is in the picture; a terrain goes up and down below it.
+      const down = terrain ? (pose.z_mm ?? g.wheel_radius_mm) - g.wheel_radius_mm : 0;
+      set(ticks, { transform: `translate(${tenth(-pose.travel_mm)},${tenth(down)})` });
       const degrees = (pose.travel_mm / g.wheel_radius_mm) * (180 / Math.PI);
       farWheel(degrees);
       nearWheel(degrees);
@@ -170,7 +172,7 @@ export function sideView(picture, g) {
           set(part.commanded, { transform: `translate(${oblique(...asked.o6, 0)})` });
           part.setCommanded(asked.sole);
         }
-        set(shadows[i], { cx: x, cy: y, opacity: tenth(Math.max(0.2, 1 - at.sole / 120)) });
+        if (shadows[i]) set(shadows[i], { cx: x, cy: y, opacity: tenth(Math.max(0.2, 1 - at.sole / 120)) });
         const length = state.load_n > 0.5 ? 18 + Math.min(150, state.load_n * 2.2) : 0;
         set(part.load, { d: length > 0 ? `M${x - 52},${y} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
         set(part.tag, { x: tenth(x - 24), y: tenth(y - 378) });
@@ -180,11 +182,13 @@ export function sideView(picture, g) {
   };
 }
 
-/** The robot from above: forward is right, left is up. @param {SVGElement} picture @param {Geometry} g */
-export function topView(picture, g) {
+/** The robot from above: forward is right, left is up. @param {SVGElement} picture @param {Geometry} g
+ * @param {import("./ground.js").Ground} [terrain] */
+export function topView(picture, g, terrain) {
   set(picture, { viewBox: "-330 -330 1190 660", role: "img", preserveAspectRatio: "xMidYMid meet" });
   picture.classList.add("robot");
   say(svg("title", {}, picture), "Robot from above");
+  const place = terrain ? terrainAbove(picture, terrain) : undefined;
   const { rear, front, half } = BODY;
   svg("line", { x1: 0, x2: 0, y1: -g.track_mm / 2, y2: g.track_mm / 2, class: "r-axle", "stroke-width": 22 }, picture);
   for (const y of [-g.track_mm / 2, g.track_mm / 2]) svg("rect", { x: -g.wheel_radius_mm, y: y - WHEEL_WIDTH / 2, width: 2 * g.wheel_radius_mm, height: WHEEL_WIDTH, rx: 12, class: "r-tyre-face" }, picture);
@@ -210,6 +214,7 @@ export function topView(picture, g) {
   return {
     /** @param {Pose} pose */
     update(pose) {
+      place?.(pose);
       SIDES.forEach((side, i) => {
         const [state, part] = [pose.legs[i], legs[i]];
         const at = leg(g, side.y, state.sensed_mm);

@@ -15,15 +15,17 @@ mod measure;
 mod pneu;
 mod proto;
 mod robot;
+mod terrain;
 
 use std::process::ExitCode;
 
 /// A group of cases and what runs it.
 type Group = (&'static str, fn());
 
-const GROUPS: [Group; 6] = [
+const GROUPS: [Group; 7] = [
     ("leg", leg::run),
     ("robot", robot::run),
+    ("terrain", terrain::run),
     ("pneu", pneu::run),
     ("fuzzy", control::fuzzy),
     ("filter", control::filter),

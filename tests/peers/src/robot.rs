@@ -1,5 +1,5 @@
 //! Forward dynamics of whole robots: the reference tree of 14 coordinates, and the robot that a run
-//! steps; then its whole plant.
+//! steps.
 
 use std::hint::black_box;
 
@@ -10,10 +10,8 @@ use wheeleg_plant::dynamics::chain::reference::{ROBOT14, robot_state};
 use wheeleg_plant::dynamics::floating::{
     Contacts, FloatingParams, FloatingRobot, FloatingState as OwnState,
 };
-use wheeleg_plant::testing::wheeleg_2003;
-use wheeleg_plant::{Inputs, Plant};
 
-use crate::measure::{put_ns, put_realtime, repetitions, scale, timed};
+use crate::measure::{put_ns, repetitions, timed};
 
 #[inline(never)]
 fn robot_fd(
@@ -39,35 +37,6 @@ pub(crate) fn run() {
     let check = format!("nv=14 sum={sum:.3}");
     put_ns("robot_fd_14dof", "", took, repetitions, &check);
     own_floating_robot();
-    plant();
-}
-
-/// The whole plant in steps of 100 µs, valves and wheels at work: what a run steps, without
-/// firmware, bus and log.
-fn plant() {
-    let built = Plant::new(&wheeleg_2003());
-    let Ok((plant, mut state)) = built.and_then(|p| p.initial_state(1).map(|s| (p, s))) else {
-        return;
-    };
-    let ticks = (20_000.0 * scale()) as usize + 1;
-    let took = timed(|| {
-        for tick in 0..ticks {
-            let _ = plant.tick(&mut state, black_box(&commands(tick)));
-        }
-    });
-    let check = format!("x={:.3} m", plant.outputs(&state).position_m[0]);
-    put_realtime("plant_flat", "", took, ticks as f64 * 1e-3, &check);
-}
-
-/// Both legs up and down by turns, valves in pulses, the wheels driving: one step takes a second.
-fn commands(tick: usize) -> Inputs {
-    let mut inputs = Inputs::default();
-    let (leg, up) = (tick / 1000 % 2, tick % 1000 < 400);
-    let on = if tick % 20 < 10 { 1000 } else { 0 };
-    inputs.valve_on_us[3 * leg + 2] = if up { [0, on, on, 0] } else { [on, 0, 0, on] };
-    inputs.bridge_duty = [0.2; 2];
-    inputs.bridge_enabled = [true; 2];
-    inputs
 }
 
 /// No reference: the engine of every run, both legs with closed loops, no contact.

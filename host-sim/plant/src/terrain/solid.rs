@@ -101,6 +101,19 @@ impl Solid {
         }
     }
 
+    /// Its corners seen from above, in turn \[m\].
+    #[must_use]
+    pub fn outline_m(&self) -> [[f64; 2]; 4] {
+        // Faces 1 to 4 are the walls: front, rear, left, right.
+        [[1, 3], [2, 3], [2, 4], [1, 4]].map(|walls| {
+            let corner: Vector3<f64> = walls
+                .iter()
+                .map(|wall| self.faces[*wall].offset_m * self.faces[*wall].normal)
+                .sum();
+            [corner.x, corner.y]
+        })
+    }
+
     fn holds(&self, point: &Vector3<f64>) -> bool {
         self.faces
             .iter()

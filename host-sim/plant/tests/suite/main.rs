@@ -14,6 +14,7 @@ mod height_map;
 mod kinematic_laws;
 mod never_nan;
 mod noc;
+mod rigid_ground;
 mod rk4;
 mod robot;
 mod rocks;

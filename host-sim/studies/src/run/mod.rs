@@ -2,6 +2,7 @@
 
 mod boards;
 mod figures;
+mod ground;
 mod html;
 mod motion;
 mod report;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::figures::Source;
+use super::ground::GroundPicture;
 use wheeleg_config::Drawing;
 use wheeleg_telemetry::{MasterSample, Row};
 
@@ -24,6 +25,12 @@ pub(super) struct Motion {
     switches: [Vec<u8>; 2],
     travel_mm: Vec<f64>,
     pitch_deg: Vec<f64>,
+    y_mm: Vec<f64>,
+    z_mm: Vec<f64>,
+    yaw_deg: Vec<f64>,
+    /// None: a level floor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ground: Option<GroundPicture>,
     supply_bar: Vec<f64>,
     phases: Vec<Phase>,
     marks: Vec<Mark>,
@@ -106,6 +113,10 @@ impl Motion {
             }),
             travel_mm: sampled(&recording.body, &instants, |s| rounded(s.x_mm)),
             pitch_deg: sampled(&recording.body, &instants, |s| rounded(s.pitch_deg)),
+            y_mm: sampled(&recording.body, &instants, |s| rounded(s.y_mm)),
+            z_mm: sampled(&recording.body, &instants, |s| rounded(s.z_mm)),
+            yaw_deg: sampled(&recording.body, &instants, |s| rounded(s.yaw_deg)),
+            ground: GroundPicture::new(source),
             supply_bar: sampled(&recording.supply, &instants, |s| rounded(s.pressure_bar)),
             t: t.into_iter().map(rounded).collect(),
             phases: phases(source, end),
