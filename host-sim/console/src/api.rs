@@ -23,6 +23,7 @@ use crate::catalogue::fault_list;
 use crate::guard::Hosts;
 use crate::hex;
 use crate::page::Page;
+use crate::record::folder;
 use crate::request::FRAME_MAX;
 use crate::session::{self, Context};
 
@@ -61,6 +62,7 @@ pub(crate) fn router(server: Arc<Server>) -> Router {
         .route("/commands", get(commands))
         .route("/events", get(events))
         .route("/faults", get(faults))
+        .route("/recordings", get(recordings))
         .route("/stop", post(stop))
         .fallback(|| async {
             problem(
@@ -255,6 +257,23 @@ async fn faults(State(server): State<Arc<Server>>) -> Response {
         "active": server.context.hub.active_faults(),
     });
     json_text(list.to_string())
+}
+
+/// Most recordings of one answer.
+const RECORDINGS: usize = 256;
+
+async fn recordings(State(server): State<Arc<Server>>) -> Response {
+    let root = server.context.recordings.clone();
+    let list = tokio::task::spawn_blocking(move || folder::list(&root, RECORDINGS)).await;
+    let list = list
+        .unwrap_or_default()
+        .into_iter()
+        .map(|(summary, bytes)| {
+            let mut value = json!(summary);
+            value["log_bytes"] = json!(bytes);
+            value
+        });
+    json_text(json!({ "recordings": list.collect::<Vec<_>>() }).to_string())
 }
 
 async fn stop(State(server): State<Arc<Server>>) -> Response {

@@ -15,6 +15,7 @@ mod list;
 mod log;
 mod params;
 mod plant;
+mod replay;
 mod run;
 mod serve;
 mod tune;
@@ -72,6 +73,8 @@ enum Command {
     Serve(serve::ServeArgs),
     /// See and drive the robot that `wheeleg serve` runs.
     Ctl(ctl::CtlArgs),
+    /// Repeat a recording of `wheeleg serve`, and compare it with what was recorded.
+    Replay(replay::ReplayArgs),
     /// List the built-in scenarios and robots.
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
@@ -112,6 +115,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
+        Some(Command::Replay(args)) => replay::command(&args),
         Some(Command::Serve(args)) => serve::command(&args),
         Some(Command::Ctl(args)) => ctl::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),
