@@ -20,6 +20,7 @@ mod run;
 mod serve;
 mod tune;
 mod usage;
+mod view;
 
 use std::fmt::Display;
 use std::io::Write as _;
@@ -101,6 +102,8 @@ enum Command {
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
+    /// Open a log as a page: the robot plays it; two logs are compared.
+    View(view::ViewArgs),
     /// Recover the log of a run that was killed.
     Log(log::LogArgs),
     /// Tell in what the bus interface of this program differs from another.
@@ -131,6 +134,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Tune(args)) => tune::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
+        Some(Command::View(args)) => view::command(&args),
         Some(Command::Log(args)) => log::command(&args),
         Some(Command::Interface(args)) => interface::command(&args),
     };
