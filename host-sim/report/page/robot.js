@@ -46,6 +46,7 @@ const tenth = (v) => Math.round(v * 10) / 10;
 /** Oblique projection: depth goes right and up, x and z stay true. */
 const oblique = (x, y, z) => [tenth(x + 0.26 * y), tenth(-(z + 0.2 * y))];
 const points = (list) => list.map((p) => p.join(",")).join(" ");
+/** @param {Element} line @param {number[]} from @param {number[]} to */
 const put = (line, [x1, y1], [x2, y2]) => set(line, { x1: tenth(x1), y1: tenth(y1), x2: tenth(x2), y2: tenth(y2) });
 const bar = (parent, name, width) => svg("line", { class: name, "stroke-width": width }, parent);
 
@@ -206,6 +207,7 @@ export function topView(picture, g) {
     svg("circle", { cx: g.o4_mm[0], cy: -side.y * g.o4_mm[1], r: 22, class: "r-post" }, group);
     return part;
   });
+  /** @param {number[]} point */
   const flat = ([x, y]) => [tenth(x), tenth(-y)];
   return {
     /** @param {Pose} pose */

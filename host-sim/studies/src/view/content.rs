@@ -58,6 +58,8 @@ impl LoggedEvent {
 pub(super) struct Content {
     pub(super) signals: BTreeMap<Signal, Thin>,
     pub(super) events: Vec<LoggedEvent>,
+    /// What happened before the record, from power-up on.
+    pub(super) start_up: Vec<String>,
     /// Events beyond those listed.
     pub(super) more_events: u64,
     /// What went into the run, by kind.
@@ -148,6 +150,7 @@ impl Content {
         let mut content = Self {
             signals: BTreeMap::new(),
             events: Vec::new(),
+            start_up: Vec::new(),
             more_events: 0,
             head: Vec::new(),
             first_ns: None,
@@ -226,6 +229,12 @@ impl Content {
 
     fn event(&mut self, logged: &Logged<'_>) {
         let [kind, code, detail, text] = texts(logged, ["kind", "code", "detail", "text"]);
+        if logged.number("start_up_us").is_some_and(|us| us > 0.0) {
+            if self.start_up.len() < EVENTS {
+                self.start_up.push(text);
+            }
+            return;
+        }
         let board = logged.number("board").unwrap_or_default();
         let fault = logged.number("fault").unwrap_or_default() as u64;
         let (who, what) = match text.split_once(": ") {

@@ -88,7 +88,7 @@ impl Thin {
                 (high, low)
             };
             points.push((first.0 as f64 * 1e-9, first.1));
-            if first.0 != second.0 {
+            if first != second {
                 points.push((second.0 as f64 * 1e-9, second.1));
             }
         }
@@ -136,7 +136,12 @@ mod tests {
             points.len()
         );
         assert!(points.windows(2).all(|pair| pair[0].0 <= pair[1].0));
-        assert!(points.contains(&(246.914, 9.0)) && points.contains(&(444.444, -7.0)));
+        for (t, value) in [(246.914, 9.0), (444.444, -7.0)] {
+            let found = points
+                .iter()
+                .any(|p| (p.0 - t).abs() < 1e-9 && p.1 == value);
+            assert!(found, "{value} at {t} s");
+        }
         assert_eq!(thin.range(), Some((-7.0, 9.0)));
     }
 
