@@ -1,5 +1,5 @@
 //! The report of a run and the page of its log, opened in a browser that is not ours, a robot
-//! driven from it, and the types of the page's scripts.
+//! driven from it and from Python, and the types of the page's scripts.
 
 use std::path::{Path, PathBuf};
 
@@ -60,6 +60,17 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             .arg(release.join("wheeleg"))
             .arg(target_dir().join("console-shots"))
             .arg(axe()?))?;
+        Ok(())
+    });
+}
+
+/// A robot driven by a program of its own, with the client that we give away.
+pub(crate) fn client(report: &mut Report) {
+    report.step("console from Python", || {
+        rust::build(&["--bin", "wheeleg"])?;
+        run(command(tools::python()?)
+            .arg("tests/python/check_client.py")
+            .arg(target_dir().join("release").join("wheeleg")))?;
         Ok(())
     });
 }

@@ -82,7 +82,7 @@ struct Instants {
 }
 
 impl Instants {
-    fn push(&mut self, t_ns: u64, row: impl FnOnce() -> Vec<f64>) {
+    fn push(&mut self, t_ns: u64, row: Vec<f64>) {
         if self.period_ns == 0 {
             self.period_ns = PERIOD_NS;
         }
@@ -90,7 +90,7 @@ impl Instants {
         if !t_ns.is_multiple_of(self.period_ns) || newest.is_some_and(|newest| t_ns <= newest) {
             return;
         }
-        self.rows.push((t_ns, row()));
+        self.rows.push((t_ns, row));
         if self.rows.len() > INSTANTS {
             self.period_ns = self.period_ns.saturating_mul(2);
             let period_ns = self.period_ns;
@@ -206,9 +206,11 @@ impl Content {
                 content.phase(logged.t_ns, phase_name(phase, step));
             }
             if Some(logged.channel) == last_joint {
-                content
-                    .robot
-                    .push(logged.t_ns, || drawn.iter().map(|s| now(*s)).collect());
+                // Before everything was measured once, there is nothing to show: no zeros.
+                let row = drawn.iter().map(|s| latest.get(s).copied()).collect();
+                if let Some(row) = row {
+                    content.robot.push(logged.t_ns, row);
+                }
             }
             let ms = logged.t_ns / 1_000_000;
             if ms >= looked_ms + 100 {

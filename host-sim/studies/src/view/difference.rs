@@ -15,8 +15,9 @@ pub(super) struct Difference {
     pub(super) largest_s: f64,
     /// When they are first [`APART_MM`] apart, s.
     pub(super) apart_s: Option<f64>,
-    /// Times that both logs have.
+    /// Times that both logs have, and the last of them, s.
     pub(super) times: u64,
+    pub(super) until_s: f64,
 }
 
 /// The six joints.
@@ -33,6 +34,7 @@ fn of(joint: &'static str, a: &[(u64, f32)], b: &[(u64, f32)]) -> Difference {
         largest_s: 0.0,
         apart_s: None,
         times: 0,
+        until_s: 0.0,
     };
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     while let (Some((a_ns, here)), Some((b_ns, there))) = (a.peek(), b.peek()) {
@@ -46,6 +48,7 @@ fn of(joint: &'static str, a: &[(u64, f32)], b: &[(u64, f32)]) -> Difference {
         }
         let (t_s, apart_mm) = (*a_ns as f64 * 1e-9, (here - there).abs());
         difference.times += 1;
+        difference.until_s = t_s;
         if f64::from(apart_mm) > difference.largest_mm {
             difference.largest_mm = f64::from(apart_mm);
             difference.largest_s = t_s;
@@ -76,7 +79,7 @@ mod tests {
             (found.times, found.largest_mm, found.largest_s),
             (2, 3.0, 4.0)
         );
-        assert_eq!(found.apart_s, Some(4.0));
+        assert_eq!((found.apart_s, found.until_s), (Some(4.0), 4.0));
         assert_eq!(of("joint", &a, &[]).times, 0);
     }
 }

@@ -151,7 +151,10 @@ pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
     match (logs, largest) {
         ([_, _], None) => "The two logs have no time in common".to_owned(),
         ([_, _], Some(d)) if d.largest_mm == 0.0 => {
-            "The strokes of the two logs are equal".to_owned()
+            format!(
+                "The strokes of the two logs are equal up to {:.2} s, the last time that both have",
+                d.until_s
+            )
         }
         ([_, _], Some(d)) => format!(
             "The strokes of the two logs differ by up to {:.3} mm: {}, at {:.2} s",
