@@ -21,7 +21,7 @@ from wheeleg import Refused, Robot
 
 @contextlib.contextmanager
 def served(program, home):
-    """`wheeleg serve` in a home of its own: address, keys, folder of recordings."""
+    """`wheeleg serve` in a home of its own: address, keys, folder of recordings, process."""
     recordings = home / "recordings"
     arguments = [program, "serve", "stand", "--listen", "127.0.0.1:0", "--recordings", str(recordings)]
     environment = dict(os.environ, XDG_STATE_HOME=str(home))
@@ -29,7 +29,7 @@ def served(program, home):
     try:
         address = process.stdout.readline().split()[1].removeprefix("http://").rstrip("/")
         keys = {name: (home / "wheeleg" / f"{name}.key").read_text() for name in ("control", "view")}
-        yield address, keys, recordings
+        yield address, keys, recordings, process.pid
     finally:
         process.terminate()
         process.wait()
@@ -45,7 +45,7 @@ def refused(reason, act):
 
 
 def main(program):
-    with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings):
+    with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings, _):
         try:
             Robot(address, "0" * 64)
             raise AssertionError("a wrong key opens")
@@ -86,4 +86,5 @@ def main(program):
     print("every channel read; armed, moved, stopped, recorded and repeated from Python")
 
 
-main(sys.argv[1])
+if __name__ == "__main__":
+    main(sys.argv[1])

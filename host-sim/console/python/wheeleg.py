@@ -103,7 +103,7 @@ class Robot:
         return self._wait(lambda: self._state, 5)
 
     def subscribe(self, *channels, hz=50):
-        """Asks for samples; `hz` is 1 to 50."""
+        """Asks for samples; `hz` is 1 to 50, or "all"."""
         self._answered({"op": "subscribe", "channels": list(channels), "hz": hz}, 5)
 
     def latest(self, channel):
