@@ -1,11 +1,12 @@
 """Drives a simulated robot from its console's page, in a browser, as an operator does.
 
-    python3 check_console.py WHEELEG [SCREENSHOTS]
+    python3 check_console.py WHEELEG SCREENSHOTS AXE
 
 Without a key and with a wrong one nothing is shown. With the right one: ready, walk, stop the gait,
 provoke a fault, read its remedy, stop with Esc from within a field. Who has the view key may look and
-stop. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
-nothing is wider than the window, and STOP can be seen and hit.
+stop. Signals are plotted, frozen and zoomed; what is done is recorded, and repeats to the bit. Wheels are driven
+by hand: who lets go holds. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
+nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
 import os
@@ -15,6 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from accessible import findings
 from playwright.sync_api import sync_playwright
 
 SIZES = [(1280, 720), (1024, 768), (400, 800)]
@@ -36,7 +38,8 @@ class Console:
 
     def __init__(self, program, home):
         environment = dict(os.environ, XDG_STATE_HOME=str(home))
-        arguments = [program, "serve", "stand", "--listen", "127.0.0.1:0"]
+        self.recordings = home / "recordings"
+        arguments = [program, "serve", "stand", "--listen", "127.0.0.1:0", "--recordings", str(self.recordings)]
         self.process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True)
         first = self.process.stdout.readline()
         self.address = first.split()[1].rstrip("/")
@@ -96,6 +99,92 @@ def walks(page):
     return False
 
 
+def records(page, begin):
+    """Begins or ends a recording, and waits until it is so."""
+    page.locator("button", has_text="Record" if begin else "Stop recording").first.click()
+    shown = "Stop recording" if begin else "Record"
+    try:
+        page.wait_for_selector(f"section[aria-label=Recording] button:has-text('{shown}')", timeout=5000)
+    except Exception:
+        problems.append(f"recording: {page.inner_text('.answer')!r}")
+
+
+def repeats(program, console):
+    """What was recorded of this session is repeated to the bit."""
+    folder = console.recordings / "0001"
+    done = subprocess.run([program, "replay", str(folder)], capture_output=True, text=True)
+    expect(done.returncode == 0, f"the recording does not repeat: {done.stdout} {done.stderr}")
+
+
+def plots(page, folder):
+    expect(page.locator(".scope-plot").count() == 1, "there is not one plot at first")
+    page.select_option("select[aria-label='Add a plot']", label="Feet, load")
+    page.select_option("select[aria-label='Add a plot']", label="/body pitch_deg")
+    expect(page.locator(".scope-plot").count() == 3, "plots are not added")
+    page.wait_for_timeout(1500)
+    numbers = "() => [...document.querySelectorAll('.scope-plot .legend b')].map((b) => b.textContent)"
+    expect("–" not in page.evaluate(numbers), f"plots have no values: {page.evaluate(numbers)}")
+    page.get_by_role("button", name="Freeze").click()
+    canvas = page.locator(".scope-plot canvas").first
+    image = "canvas => canvas.toDataURL()"
+    before = canvas.evaluate(image)
+    page.wait_for_timeout(400)
+    expect(canvas.evaluate(image) == before, "a frozen plot goes on")
+    area = page.locator(".scope-plot .plot-area").first
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 30)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 30, steps=4)
+    page.mouse.up()
+    expect(canvas.evaluate(image) != before, "a drag does not zoom")
+    times = page.eval_on_selector_all(".scope-plot .plot-area", "list => list.map((a) => a.getAttribute('aria-valuenow'))")
+    expect(len(set(times)) == 1, f"the cursor is not one over all plots: {times}")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save as CSV").click()
+    table = Path(download.value.path()).read_text().splitlines()
+    expect(len(table) > 30 and any("/body.pitch_deg" in row for row in table), f"the table has {len(table)} rows")
+    page.screenshot(path=folder / "plots.png", full_page=True)
+    page.get_by_role("button", name="Go on").click()
+    page.locator(".scope-plot .close").last.click()
+    expect(page.locator(".scope-plot").count() == 2, "a plot cannot be closed")
+
+
+def drives_by_hand(page):
+    button = page.get_by_role("button", name="Forward")
+    button.scroll_into_view_if_needed()
+    ticks = "() => document.querySelector('.views .side svg .r-ground').nextElementSibling.getAttribute('transform')"
+    before = page.evaluate(ticks)
+    box = button.bounding_box()
+    page.mouse.move(box["x"] + 10, box["y"] + 10)
+    page.mouse.down()
+    page.wait_for_timeout(1200)
+    page.mouse.up()
+    expect(page.evaluate(ticks) != before, f"held forward, the robot stays: {page.inner_text('.answer')!r}")
+    page.wait_for_timeout(800)
+    answer = page.inner_text(".answer")
+    expect(answer.strip().startswith("Hold"), f"who lets go does not hold: {answer!r}")
+    rest = page.evaluate(ticks)
+    page.wait_for_timeout(500)
+    moved = abs(float(page.evaluate(ticks).split("(")[1].split(",")[0]) - float(rest.split("(")[1].split(",")[0]))
+    expect(moved < 1.0, f"let go, the robot still moves: {moved} mm")
+    button.focus()
+    page.keyboard.down("ArrowDown")
+    page.wait_for_timeout(900)
+    page.keyboard.up("ArrowDown")
+    expect(page.evaluate(ticks) != rest, "the arrow key does not drive")
+
+
+def board_table(page):
+    page.locator("summary", has_text="Table").click()
+    row = page.locator(".boardtable tbody tr").nth(2)
+    try:
+        page.wait_for_function("() => /^[1-9]/.test(document.querySelectorAll('.boardtable tbody tr')[2].cells[3].textContent)", timeout=15000)
+    except Exception:
+        problems.append(f"the table of boards has no counts: {row.inner_text()!r}")
+    page.locator("summary", has_text="Table").click()
+
+
 def without_the_key(browser, console):
     page = opened(browser, console, "")
     expect("needs a key" in page.inner_text("body"), "without a key the page does not say what it needs")
@@ -111,10 +200,16 @@ def journey(browser, console, folder):
     page.wait_for_selector(".joint")
     expect(console.keys["control"] not in page.url, "the key stays in the address")
     expect(waits(page, "State", ["disarmed"]), f"at first: {cell(page, 'State')}")
+    records(page, True)
     expect(becomes_ready(page), f"Ready: {page.inner_text('.answer')!r}")
+    drives_by_hand(page)
+    expect(becomes_ready(page), f"Ready after driving: {page.inner_text('.answer')!r}")
+    plots(page, folder)
+    board_table(page)
     before = page.locator(".views .side svg").inner_html()
     expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
     expect(page.locator(".views .side svg").inner_html() != before, "the robot stands still on the page while it walks")
+    page.evaluate("scrollTo(0, 0)")
     page.screenshot(path=folder / "walking.png")
     if page.locator(".buttons button", has_text="Stop gait").count():
         press(page, "Stop gait")
@@ -133,7 +228,9 @@ def journey(browser, console, folder):
     expect(waits(page, "State", ["HOLD"]), f"after the fault: {cell(page, 'State')}")
     expect("No reading" in page.locator(".joint").nth(2).inner_text(), "the joint shows a reading all the same")
     expect(page.locator(".joint.blind").count() == 1, "other joints show no reading, too")
+    page.evaluate("scrollTo(0, 0)")
     page.screenshot(path=folder / "fault.png")
+    records(page, False)
 
     page.focus("input[aria-label='Target and value']")
     page.keyboard.press("Escape")
@@ -154,7 +251,7 @@ def looks_only(browser, console):
     page.context.close()
 
 
-def looks(page, folder):
+def looks(page, folder, axe):
     for scheme in ["light", "dark"]:
         page.emulate_media(color_scheme=scheme)
         for width, height in SIZES:
@@ -168,9 +265,12 @@ def looks(page, folder):
             seen = box["y"] >= 0 and box["y"] + box["height"] <= height and box["x"] + box["width"] <= width
             expect(hit and seen, f"{name}: STOP is at {box}")
             page.screenshot(path=folder / f"{name}.png")
+            page.screenshot(path=folder / f"{name}-whole.png", full_page=True)
+        for finding in findings(page, axe):
+            problems.append(f"{scheme}: {finding}")
 
 
-def main(program, folder):
+def main(program, folder, axe):
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as home, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
@@ -179,8 +279,9 @@ def main(program, folder):
             without_the_key(browser, console)
             page = journey(browser, console, folder)
             looks_only(browser, console)
-            looks(page, folder)
+            looks(page, folder, axe)
             console.end()
+            repeats(program, console)
             page.wait_for_selector(".banner:not([hidden])")
             expect(page.get_attribute("body", "data-state") == "stale", "what is old looks live")
             expect("reload" in page.inner_text(".banner:not(.alarm)"), "the lost server is not told")
@@ -193,4 +294,4 @@ def main(program, folder):
     print(f"driven from the page; screenshots in {folder}")
 
 
-main(sys.argv[1], Path(sys.argv[2] if len(sys.argv) > 2 else "console-shots"))
+main(sys.argv[1], Path(sys.argv[2]), sys.argv[3])

@@ -1,9 +1,9 @@
 """Opens the report of a run in a browser, as its reader does: from the disk, without a server.
 
-    python3 check_report.py RUN_DIR
+    python3 check_report.py RUN_DIR AXE
 
 At three sizes, light and dark: nothing is wider than the window, nothing is asked for from
-elsewhere, the console is empty. Figures are drawn and share a cursor, a drag zooms all of them,
+elsewhere, the console is empty, axe-core finds nothing. Figures are drawn and share a cursor, a drag zooms all of them,
 the robot plays. Without scripts verdict, tables and pictures are there. Screenshots go to
 RUN_DIR/browser.
 """
@@ -12,6 +12,7 @@ import shutil
 import sys
 from pathlib import Path
 
+from accessible import findings
 from playwright.sync_api import sync_playwright
 
 LARGEST_BYTES = 3_000_000
@@ -52,7 +53,7 @@ def cursors(page):
     )
 
 
-def looks(browser, report, folder):
+def looks(browser, report, folder, axe):
     for width, height in SIZES:
         for scheme in ["light", "dark"]:
             page = opened(browser, report, width, height, scheme)
@@ -64,6 +65,8 @@ def looks(browser, report, folder):
             expect(verdict and verdict["y"] < height / 2, f"{name}: the verdict does not come first")
             page.screenshot(path=folder / f"{name}.png")
             page.screenshot(path=folder / f"{name}-whole.png", full_page=True)
+            if width == SIZES[0][0]:
+                problems.extend(f"{name}: {finding}" for finding in findings(page, axe))
             page.context.close()
 
 
@@ -119,7 +122,7 @@ def without_scripts(browser, report):
     page.context.close()
 
 
-def main(run_dir):
+def main(run_dir, axe):
     report = (Path(run_dir) / "report.html").resolve()
     size = report.stat().st_size
     expect(size <= LARGEST_BYTES, f"the report has {size} bytes, more than {LARGEST_BYTES}")
@@ -130,7 +133,7 @@ def main(run_dir):
     folder.mkdir(exist_ok=True)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        looks(browser, report, folder)
+        looks(browser, report, folder, axe)
         journey(browser, report)
         without_scripts(browser, report)
         browser.close()

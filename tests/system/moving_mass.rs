@@ -4,7 +4,7 @@ use wheeleg_config::builtin;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::dynamics::floating::state::LEG;
 use wheeleg_plant::dynamics::floating::{FloatingRobot, FloatingState, Velocity};
-use wheeleg_protocol::JointParam;
+use wheeleg_protocol::param::JointParam;
 
 /// What a piston must push away to move a robot that hangs free, kg: 1/(M⁻¹)ᵢᵢ.
 fn felt_kg(robot: &FloatingRobot, state: &FloatingState, joint: usize) -> f64 {

@@ -22,6 +22,8 @@ mod off_data;
 mod plant_check;
 mod precharge;
 mod predictive_robot;
+#[cfg(unix)]
+mod recording;
 mod reference;
 mod restart;
 mod safe_states;

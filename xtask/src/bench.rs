@@ -16,12 +16,16 @@ use anyhow::{Context, Result};
 use crate::process::{cargo, command, output, root, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::tools::have;
+use crate::{rust, tools};
 
 use table::{Sample, Table};
 
 /// What `cargo xtask bench` takes.
 #[derive(clap::Args)]
 pub(crate) struct Options {
+    /// `console`: the console's numbers in wall time instead, beside their bars.
+    #[arg(value_enum)]
+    of: Option<Of>,
     /// Rounds; each runs every program once.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
@@ -40,6 +44,13 @@ pub(crate) struct Options {
     /// Print the table as JSON too, as one line of standard output (it begins with a brace).
     #[arg(long)]
     json: bool,
+}
+
+/// What is measured instead.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Of {
+    /// Answers, lateness, cost and memory of `wheeleg serve`.
+    Console,
 }
 
 /// A C program: name, sources below `tests/peers/c`, group of cases.
@@ -72,6 +83,16 @@ struct Program {
 
 /// Builds, runs the rounds, prints the tables.
 pub(crate) fn steps(report: &mut Report, options: &Options) {
+    if let Some(Of::Console) = options.of {
+        report.step("bench: console", || {
+            rust::build(&["--bin", "wheeleg"])?;
+            run(command(tools::python()?)
+                .arg("tests/python/bench_console.py")
+                .arg(target_dir().join("release").join("wheeleg")))?;
+            Ok(())
+        });
+        return;
+    }
     let folder = target_dir().join("xtask").join("peers");
     let references = report.step("bench: compile the C references", || {
         compile(&folder, &["-O3", "-march=native"])

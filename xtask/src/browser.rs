@@ -1,11 +1,12 @@
-//! The report of a run, opened in a browser that is not ours, and a robot driven from it.
+//! The report of a run and the page of its log, opened in a browser that is not ours, a robot
+//! driven from it and from Python, and the types of the page's scripts.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 
 use crate::process::{command, run, target_dir};
-use crate::report::{Report, StepError};
+use crate::report::{Report, StepError, StepResult};
 use crate::{rust, tools};
 
 /// The browser, and the Debian package that has it.
@@ -13,6 +14,11 @@ pub(crate) const CHROMIUM: &str = "chromium";
 
 /// Without a run there is nothing to open, which is a failure, not a skipped step.
 pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
+    report.step("types of the page's scripts", || {
+        let modules = tools::node_modules()?;
+        run(command(modules.join(".bin").join("tsc")).args(["--project", "tests/browser"]))?;
+        Ok(())
+    });
     report.step("report in a browser", || {
         let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
         if !tools::have(CHROMIUM) {
@@ -23,7 +29,23 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
         // A relative folder is meant from where the user stands, not from the root.
         run(command(python)
             .arg("tests/python/check_report.py")
-            .arg(std::path::absolute(run_dir)?))?;
+            .arg(std::path::absolute(run_dir)?)
+            .arg(axe()?))?;
+        Ok(())
+    });
+    report.step("log in a browser", || {
+        let run_dir = run_dir.ok_or_else(|| anyhow!("there is no log to open"))?;
+        if !tools::have(CHROMIUM) {
+            let install = format!("apt-get install -y {CHROMIUM}");
+            return Err(StepError::missing(CHROMIUM, install));
+        }
+        rust::build(&["--bin", "wheeleg"])?;
+        run(command(tools::python()?)
+            .arg("tests/python/check_view.py")
+            .arg(target_dir().join("release").join("wheeleg"))
+            .arg(std::path::absolute(run_dir)?.join("log.mcap"))
+            .arg(target_dir().join("view-shots"))
+            .arg(axe()?))?;
         Ok(())
     });
     report.step("console in a browser", || {
@@ -36,7 +58,24 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
         run(command(tools::python()?)
             .arg("tests/python/check_console.py")
             .arg(release.join("wheeleg"))
-            .arg(target_dir().join("console-shots")))?;
+            .arg(target_dir().join("console-shots"))
+            .arg(axe()?))?;
         Ok(())
     });
+}
+
+/// A robot driven by a program of its own, with the client that we give away.
+pub(crate) fn client(report: &mut Report) {
+    report.step("console from Python", || {
+        rust::build(&["--bin", "wheeleg"])?;
+        run(command(tools::python()?)
+            .arg("tests/python/check_client.py")
+            .arg(target_dir().join("release").join("wheeleg")))?;
+        Ok(())
+    });
+}
+
+/// The script that judges accessibility.
+fn axe() -> StepResult<PathBuf> {
+    Ok(tools::node_modules()?.join("axe-core").join("axe.min.js"))
 }

@@ -155,6 +155,7 @@ fn test(report: &mut Report) {
     let run = main_job::steps(report);
     mcap::steps(report, run.as_deref());
     browser::steps(report, run.as_deref());
+    browser::client(report);
     rigid_body::steps(report);
     plant::steps(report);
 }

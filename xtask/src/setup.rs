@@ -1,8 +1,8 @@
 //! `cargo xtask setup`: what the suite needs beside cargo and a C compiler. It says what it
 //! is going to install and how, then does it. No other command installs anything.
 //!
-//! Ways used: rustup (components and targets), cargo (tools), apt as root, pip into a virtual
-//! environment of our own below the target folder. Nothing else on the machine is touched.
+//! Ways used: rustup (components and targets), cargo (tools), apt as root, pip and npm into
+//! folders of our own below the target folder. Nothing else on the machine is touched.
 
 use std::fs;
 
@@ -10,7 +10,10 @@ use anyhow::Context;
 
 use crate::process::{ask, cargo, command, root, run, succeeds};
 use crate::report::{Report, StepError, StepResult};
-use crate::tools::{REQUIREMENTS, have, python, python_path, stamp, virtual_environment};
+use crate::tools::{
+    NODE_LOCK, NODE_PACKAGES, REQUIREMENTS, have, node_folder, node_modules, python, python_path,
+    stamp, virtual_environment,
+};
 use crate::{browser, fuzz, no_std, pil, qemu};
 
 /// Oldest Python that the scripts are written for.
@@ -31,9 +34,11 @@ enum Way {
     Cargo(&'static str, &'static str),
     /// A virtual environment with [`REQUIREMENTS`] in it.
     Python,
+    /// What [`NODE_LOCK`] names.
+    Node,
 }
 
-const NEEDS: [Need; 11] = [
+const NEEDS: [Need; 12] = [
     Need("rustfmt", || cargo_has("fmt"), Way::Component("rustfmt")),
     Need("clippy", || cargo_has("clippy"), Way::Component("clippy")),
     Need(
@@ -73,6 +78,11 @@ const NEEDS: [Need; 11] = [
         || python().is_ok(),
         Way::Python,
     ),
+    Need(
+        "the Node packages of tests/browser/package.json",
+        || node_modules().is_ok(),
+        Way::Node,
+    ),
 ];
 
 /// Installs what is missing; a step for each, which names the command where it cannot.
@@ -110,6 +120,9 @@ impl Way {
             ),
             Self::Cargo(name, version) => format!("cargo install --locked {name}@{version}"),
             Self::Python => format!("pip install --requirement {REQUIREMENTS}, below `target`"),
+            Self::Node => format!(
+                "npm ci with {NODE_LOCK}, below `target` (npm itself: apt-get install -y npm)"
+            ),
         }
     }
 
@@ -131,6 +144,9 @@ impl Way {
                 let _ = run(cargo().args(["install", "--locked", &exactly]));
             }
             Self::Python => return install_python(),
+            Self::Node if have("npm") => return install_node(),
+            // Its Debian package brings several hundred others: that is for a person to decide.
+            Self::Node => {}
         }
         Ok(())
     }
@@ -171,6 +187,25 @@ fn install_python() -> StepResult {
         .args(["--disable-pip-version-check", "--requirement"])
         .arg(root().join(REQUIREMENTS)))?;
     fs::copy(root().join(REQUIREMENTS), stamp()).context("the note of what is installed")?;
+    Ok(())
+}
+
+/// Makes the folder of the Node packages anew, exactly as they are pinned.
+fn install_node() -> StepResult {
+    let folder = node_folder();
+    if folder.exists() {
+        fs::remove_dir_all(&folder)
+            .with_context(|| format!("cannot remove {}", folder.display()))?;
+    }
+    fs::create_dir_all(&folder)?;
+    fs::copy(root().join(NODE_PACKAGES), folder.join("package.json"))?;
+    fs::copy(root().join(NODE_LOCK), folder.join("package-lock.json"))?;
+    run(command("npm").current_dir(&folder).args([
+        "ci",
+        "--no-audit",
+        "--no-fund",
+        "--ignore-scripts",
+    ]))?;
     Ok(())
 }
 

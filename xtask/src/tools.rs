@@ -11,6 +11,11 @@ use crate::report::{StepError, StepResult};
 /// Pinned Python packages of the test scripts and reference generators.
 pub(crate) const REQUIREMENTS: &str = "tests/python/requirements.txt";
 
+/// Pinned Node packages of the checks of the page.
+pub(crate) const NODE_PACKAGES: &str = "tests/browser/package.json";
+/// The same with everything that they need, and with hashes.
+pub(crate) const NODE_LOCK: &str = "tests/browser/package-lock.json";
+
 /// True if `program --version` works.
 pub(crate) fn have(program: &str) -> bool {
     succeeds(command(program).arg("--version"))
@@ -23,6 +28,23 @@ pub(crate) fn virtual_environment() -> PathBuf {
 /// Where the packages that are installed are noted.
 pub(crate) fn stamp() -> PathBuf {
     virtual_environment().join("requirements.installed")
+}
+
+/// Where the Node packages are.
+pub(crate) fn node_folder() -> PathBuf {
+    target_dir().join("node")
+}
+
+/// The folder `node_modules` with the pinned packages in it.
+pub(crate) fn node_modules() -> StepResult<PathBuf> {
+    let pinned = fs::read_to_string(root().join(NODE_LOCK)).context(NODE_LOCK)?;
+    let folder = node_folder();
+    let installed = fs::read_to_string(folder.join("package-lock.json"));
+    let modules = folder.join("node_modules");
+    if installed.is_ok_and(|installed| installed == pinned) && modules.join("axe-core").is_dir() {
+        return Ok(modules);
+    }
+    Err(StepError::not_set_up("the Node packages"))
 }
 
 /// The Python of our own virtual environment, with the pinned packages in it.

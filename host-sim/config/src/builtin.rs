@@ -34,6 +34,41 @@ pub const DATA: &[(&str, &[u8])] = &[(
     include_bytes!("../../scenarios/height-map.csv"),
 )];
 
+/// A file before it is read: its name, for messages, and its text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    /// Name of the file.
+    pub file: String,
+    /// What stands in it.
+    pub text: String,
+}
+
+/// The text of a scenario, by built-in name or path.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such scenario or file.
+pub fn scenario_source(name_or_path: &str) -> Result<Source, ConfigError> {
+    let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
+    Ok(Source { file, text })
+}
+
+/// The text of a robot, by built-in name or path.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such robot or file.
+pub fn robot_source(name_or_path: &str) -> Result<Source, ConfigError> {
+    let (file, text) = find("robot", name_or_path, ROBOTS)?;
+    Ok(Source { file, text })
+}
+
+/// The text of the robot that a scenario names; as [`robot_of`].
+///
+/// # Errors
+/// As [`robot_source`].
+pub fn robot_source_of(robot: &str, scenario: &str) -> Result<Source, ConfigError> {
+    robot_source(&named_by(robot, scenario))
+}
+
 /// A robot by built-in name, or by path to a TOML file.
 ///
 /// # Errors
@@ -49,17 +84,17 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
 /// # Errors
 /// As [`robot`].
 pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig, ConfigError> {
+    robot(&named_by(robot_name_or_path, scenario))
+}
+
+/// Name or path of the robot that a scenario names.
+fn named_by(robot: &str, scenario: &str) -> String {
     let built_in = |list: &[(&str, &str, &str)], name: &str| list.iter().any(|(n, ..)| *n == name);
-    if built_in(ROBOTS, robot_name_or_path)
-        || built_in(SCENARIOS, scenario)
-        || !is_path(robot_name_or_path)
-    {
-        return robot(robot_name_or_path);
+    if built_in(ROBOTS, robot) || built_in(SCENARIOS, scenario) || !is_path(robot) {
+        return robot.to_owned();
     }
-    let beside = Path::new(scenario)
-        .with_file_name("")
-        .join(robot_name_or_path);
-    robot(&beside.to_string_lossy())
+    let beside = Path::new(scenario).with_file_name("").join(robot);
+    beside.to_string_lossy().into_owned()
 }
 
 /// A scenario by built-in name, or by path to a TOML file.

@@ -15,7 +15,7 @@ use axum::http::header::{
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse as _, Response};
-use axum::routing::{get, post};
+use axum::routing::{MethodRouter, get, post};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -23,6 +23,7 @@ use crate::catalogue::fault_list;
 use crate::guard::Hosts;
 use crate::hex;
 use crate::page::Page;
+use crate::record::folder;
 use crate::request::FRAME_MAX;
 use crate::session::{self, Context};
 
@@ -52,16 +53,50 @@ struct Host(String);
 #[derive(Clone, Copy)]
 pub(crate) struct Peer(pub(crate) SocketAddr);
 
+/// The document of the HTTP API, OpenAPI 3.1.
+const OPENAPI: &str = include_str!("../openapi.json");
+
+/// Routes, and a list of them for comparison with the document.
+#[derive(Default)]
+struct Routes {
+    router: Router<Arc<Server>>,
+    #[cfg(test)]
+    listed: Vec<(&'static str, &'static str)>,
+}
+
+impl Routes {
+    fn with(
+        mut self,
+        method: &'static str,
+        path: &'static str,
+        route: MethodRouter<Arc<Server>>,
+    ) -> Self {
+        self.router = self.router.route(path, route);
+        #[cfg(test)]
+        self.listed.push((method, path));
+        #[cfg(not(test))]
+        let _ = method;
+        self
+    }
+}
+
+/// The HTTP API.
+fn api() -> Routes {
+    Routes::default()
+        .with("get", "/state", get(state))
+        .with("get", "/robot", get(robot))
+        .with("get", "/channels", get(channels))
+        .with("get", "/commands", get(commands))
+        .with("get", "/events", get(events))
+        .with("get", "/faults", get(faults))
+        .with("get", "/recordings", get(recordings))
+        .with("post", "/stop", post(stop))
+}
+
 /// All routes.
 pub(crate) fn router(server: Arc<Server>) -> Router {
-    let api = Router::new()
-        .route("/state", get(state))
-        .route("/robot", get(robot))
-        .route("/channels", get(channels))
-        .route("/commands", get(commands))
-        .route("/events", get(events))
-        .route("/faults", get(faults))
-        .route("/stop", post(stop))
+    let api = api()
+        .router
         .fallback(|| async {
             problem(
                 StatusCode::NOT_FOUND,
@@ -73,6 +108,10 @@ pub(crate) fn router(server: Arc<Server>) -> Router {
         .layer(middleware::from_fn_with_state(Arc::clone(&server), key));
     Router::new()
         .route("/ws", get(socket))
+        .route(
+            "/openapi.json",
+            get(|| async { json_text(OPENAPI.to_owned()) }),
+        )
         .nest("/api/v1", api)
         .fallback(get(page))
         .method_not_allowed_fallback(wrong_method)
@@ -257,6 +296,23 @@ async fn faults(State(server): State<Arc<Server>>) -> Response {
     json_text(list.to_string())
 }
 
+/// Most recordings of one answer.
+const RECORDINGS: usize = 256;
+
+async fn recordings(State(server): State<Arc<Server>>) -> Response {
+    let root = server.context.recordings.clone();
+    let list = tokio::task::spawn_blocking(move || folder::list(&root, RECORDINGS)).await;
+    let list = list
+        .unwrap_or_default()
+        .into_iter()
+        .map(|(summary, bytes)| {
+            let mut value = json!(summary);
+            value["log_bytes"] = json!(bytes);
+            value
+        });
+    json_text(json!({ "recordings": list.collect::<Vec<_>>() }).to_string())
+}
+
 async fn stop(State(server): State<Arc<Server>>) -> Response {
     match server.context.hub.stop().await {
         Some(now_us) => json_text(json!({ "stopped": true, "master_us": now_us }).to_string()),
@@ -265,5 +321,25 @@ async fn stop(State(server): State<Arc<Server>>) -> Response {
             "NOT CONFIRMED within 200 ms",
             "cut the air",
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn the_document_has_every_route_and_no_other() {
+        let document: Value = serde_json::from_str(OPENAPI).expect("JSON");
+        let paths = document["paths"].as_object().expect("paths");
+        let told = paths.iter().flat_map(|(path, item)| {
+            let methods = item.as_object().expect("methods").keys();
+            methods.map(|method| (method.clone(), path.clone()))
+        });
+        let told: BTreeSet<(String, String)> = told.collect();
+        let listed = api().listed.into_iter();
+        let listed = listed.map(|(method, path)| (method.to_owned(), path.to_owned()));
+        assert_eq!(told, listed.collect());
     }
 }

@@ -37,6 +37,10 @@ pub enum HostCode {
     Inject = 0x0305,
     /// A fault ends.
     EndFault = 0x0306,
+    /// A recording begins.
+    RecordStart = 0x0307,
+    /// The recording ends.
+    RecordStop = 0x0308,
 }
 
 /// A command that acts on the simulation, not on the robot.
@@ -116,6 +120,18 @@ pub const HOST_TABLE: &[HostInfo] = &[
         name: "EndFault",
         arguments: &[FAULT],
         effect: "Ends a fault.",
+    },
+    HostInfo {
+        code: HostCode::RecordStart,
+        name: "RecordStart",
+        arguments: &[],
+        effect: "Begins a recording: log, and every command with its time, so that it can be repeated.",
+    },
+    HostInfo {
+        code: HostCode::RecordStop,
+        name: "RecordStop",
+        arguments: &[],
+        effect: "Ends the recording.",
     },
 ];
 
@@ -290,7 +306,7 @@ mod tests {
             let arguments = shown["arguments"].as_array().expect("a list");
             assert_eq!(arguments.len(), row.arguments.len());
         }
-        assert_eq!(list[list.len() - 1]["code"], 0x0306);
+        assert_eq!(list[list.len() - 1]["code"], 0x0308);
         assert_eq!(catalogue.layout.len(), 16);
         assert_ne!(catalogue.layout, catalogue.commands);
     }

@@ -11,16 +11,15 @@ use serde_json::{Value, json};
 use tokio::sync::watch;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::command::{Command, CommandCode};
-use wheeleg_master::dispatcher::Reject;
-use wheeleg_master::setpoint::Phase;
-use wheeleg_telemetry::event::{hold_name, reject_name};
-use wheeleg_telemetry::messages::reject;
-use wheeleg_telemetry::{EventSample, OwnedSample, channels};
+use wheeleg_telemetry::event::hold_name;
+use wheeleg_telemetry::{OwnedSample, channels};
 
 use crate::catalogue::Catalogue;
 use crate::live::{Answer, Input, Moving, Report, Robot, Signals, Status};
 use crate::outbox::{Close, Outbox};
-use crate::request::{BadRequest, Body, HostCommand, Order};
+use crate::record;
+use crate::request::{BadRequest, Body, HostCommand, Order, Spoken};
+use crate::words::{done, event_json, outcome, phase_name, refused, rounded};
 
 /// How often the rings are emptied.
 pub(crate) const PERIOD: Duration = Duration::from_millis(5);
@@ -139,6 +138,7 @@ pub(crate) struct Hub {
     /// Channels and commands.
     pub(crate) catalogue: Catalogue,
     robot_name: String,
+    recordings: Arc<record::Shared>,
     stops: watch::Sender<Stops>,
 }
 
@@ -157,6 +157,7 @@ impl Hub {
     pub(crate) fn new(
         robot: Robot,
         robot_name: String,
+        recordings: Arc<record::Shared>,
     ) -> (Arc<Self>, std::thread::JoinHandle<()>) {
         let now = Instant::now();
         let hub = Self {
@@ -182,6 +183,7 @@ impl Hub {
             signals: robot.signals,
             catalogue: Catalogue::new(),
             robot_name,
+            recordings,
             stops: watch::Sender::new(Stops::default()),
         };
         (Arc::new(hub), robot.thread)
@@ -285,9 +287,10 @@ impl Hub {
             }
             Body::Give {
                 order,
+                spoken,
                 seen_us,
                 valid_us,
-            } => inner.give(id, n, order, seen_us, valid_us),
+            } => inner.give(id, n, (order, spoken), seen_us, valid_us),
         }
     }
 
@@ -302,7 +305,19 @@ impl Hub {
 
     /// The state, as told to everybody.
     pub(crate) fn state(&self) -> String {
-        self.inner().state(&self.robot_name, self.signals.dropped())
+        self.state_of(&self.inner())
+    }
+
+    fn state_of(&self, inner: &Inner) -> String {
+        let recording = self.recordings.status().map(|recording| {
+            json!({
+                "id": recording.id,
+                "since_us": recording.since_us,
+                "dropped": self.recordings.dropped(),
+                "failure": recording.failure,
+            })
+        });
+        inner.state(&self.robot_name, self.signals.dropped(), &recording)
     }
 
     /// The newest events, oldest first.
@@ -342,6 +357,11 @@ impl Hub {
                 now_us: status.now_us,
             });
         }
+        for (id, what) in self.recordings.take_answers() {
+            let answer = what.map_or_else(Answer::NotRecorded, |()| Answer::Done);
+            let now_us = inner.now_us();
+            inner.answered(id, now_us, answer);
+        }
         inner.take_samples();
         if now >= inner.batch_due {
             inner.batch_due = now + BATCH_PERIOD;
@@ -350,7 +370,7 @@ impl Hub {
         if now >= inner.state_due {
             inner.state_due = now + STATE_PERIOD;
             inner.tell_unknown(now);
-            let state = inner.state(&self.robot_name, self.signals.dropped());
+            let state = self.state_of(&inner);
             inner.tell_state(state);
         }
     }
@@ -385,7 +405,14 @@ impl Inner {
         }
     }
 
-    fn give(&mut self, id: ClientId, n: u64, order: Order, seen_us: u64, valid_us: u64) {
+    fn give(
+        &mut self,
+        id: ClientId,
+        n: u64,
+        (order, spoken): (Order, Spoken),
+        seen_us: u64,
+        valid_us: u64,
+    ) {
         let Some(client) = self.clients.get(&id) else {
             return;
         };
@@ -432,6 +459,7 @@ impl Inner {
                     seen_us,
                     valid_us,
                     command,
+                    spoken,
                 };
                 (input, what)
             }
@@ -651,7 +679,7 @@ impl Inner {
         }
     }
 
-    fn state(&self, robot: &str, dropped: u64) -> String {
+    fn state(&self, robot: &str, dropped: u64, recording: &Option<Value>) -> String {
         let Some(status) = self.status else {
             return r#"{"op":"state","master_us":0,"alive":false}"#.to_owned();
         };
@@ -700,6 +728,7 @@ impl Inner {
                 "dropped": dropped,
             },
             "faults": self.active_faults(),
+            "recording": recording,
             "boards": boards.collect::<Vec<_>>(),
             "clients": self.clients.len(),
         })
@@ -714,20 +743,6 @@ fn encode(moving: &Moving) -> Bytes {
     out.into()
 }
 
-fn event_json(t_ns: u64, event: &EventSample) -> Value {
-    json!({
-        "op": "event",
-        "t_ns": t_ns,
-        "kind": event.kind,
-        "code": event.code,
-        "detail": event.detail,
-        "board": event.board,
-        "fault": event.fault,
-        "command": event.command,
-        "text": event.text,
-    })
-}
-
 fn tell_event(clients: &BTreeMap<ClientId, Client>, events: &mut VecDeque<Value>, event: Value) {
     let text = Utf8Bytes::from(event.to_string());
     for client in clients.values() {
@@ -737,56 +752,4 @@ fn tell_event(clients: &BTreeMap<ClientId, Client>, events: &mut VecDeque<Value>
         events.pop_front();
     }
     events.push_back(event);
-}
-
-fn done(n: u64, now_us: u64) -> Value {
-    json!({ "op": "answer", "n": n, "status": "done", "master_us": now_us })
-}
-
-fn refused(n: u64, reason: &str, text: &str) -> Value {
-    json!({ "op": "answer", "n": n, "status": "refused", "reason": reason, "text": text })
-}
-
-fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
-    let rejected = |why: &Reject| refused(n, reject_name(why), &reject(why));
-    match answer {
-        Answer::Accepted | Answer::Done => done(n, time_us),
-        Answer::Rejected(why) => rejected(why),
-        Answer::Refused(why) => rejected(&Reject::Refused(*why)),
-        Answer::Paused => refused(n, "paused", "the clock stands: resume first"),
-        Answer::SeenInFuture => refused(
-            n,
-            "seen_in_future",
-            "`seen_us` is ahead of the master's time",
-        ),
-        Answer::NoMaster => refused(n, "no_master", "the master does not answer"),
-        Answer::TooFast => refused(
-            n,
-            "too_fast",
-            "above twice real time nobody can be in control: slow down, or release the control",
-        ),
-        Answer::Simulation(why) => refused(n, "simulation", &why.to_string()),
-    }
-}
-
-const fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "idle",
-        Phase::Homing => "homing",
-        Phase::Ready => "ready",
-        Phase::Unload => "unload",
-        Phase::Lift => "lift",
-        Phase::Reach => "reach",
-        Phase::Lower => "lower",
-        Phase::Push => "push",
-        Phase::Rest => "rest",
-        Phase::Done => "done",
-        Phase::Trajectory => "trajectory",
-        Phase::Hold => "hold",
-        Phase::Walk => "walk",
-    }
-}
-
-fn rounded(value: f64) -> f64 {
-    (value * 1e3).round() / 1e3
 }

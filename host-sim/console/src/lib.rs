@@ -9,6 +9,7 @@
 //! * **control**: the right to give commands; a lease of the master, held by one client
 //! * **beat**: what keeps the control: the holder has seen the robot as it was at a master time
 //! * **outbox**: what waits for one client
+//! * **recording**: a folder with the log of a live robot and all that it was given, in which it can be repeated
 
 mod api;
 mod catalogue;
@@ -23,13 +24,17 @@ mod mac;
 mod outbox;
 mod page;
 mod rate;
+mod record;
+pub mod replay;
 pub mod request;
 mod server;
 mod session;
+mod words;
 
 pub use api::SUBPROTOCOL;
 pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};
 pub use error::ConsoleError;
 pub use live::Live;
 pub use mac::Key;
+pub use record::{FOLDER, Summary};
 pub use server::{ADDRESS, Options, Server};

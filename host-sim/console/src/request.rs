@@ -2,7 +2,7 @@
 //! a value, nothing panics, and nothing grows beyond the frame.
 
 use fixed::types::I16F16;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::argument::{Argument, ArgumentKind, Value};
@@ -57,6 +57,8 @@ pub enum Body {
     Give {
         /// Which.
         order: Order,
+        /// The same as its sender wrote it.
+        spoken: Spoken,
         /// Newest master time that was shown, µs.
         seen_us: u64,
         /// How long after it the command may begin, µs.
@@ -64,6 +66,26 @@ pub enum Body {
     },
     /// Sound in form, and cannot be done.
     Refused(BadRequest),
+}
+
+/// A command as its sender wrote it: what a recording repeats.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spoken {
+    /// Name.
+    pub cmd: String,
+    /// Arguments by name.
+    pub args: Map<String, Json>,
+}
+
+impl Spoken {
+    /// The command that is meant.
+    ///
+    /// # Errors
+    /// [`BadRequest`] if there is none of this name with these arguments.
+    pub fn order(&self) -> Result<Order, BadRequest> {
+        order(&self.cmd, &self.args)
+    }
 }
 
 /// To whom a command goes.
@@ -90,6 +112,10 @@ pub enum HostCommand {
     Inject(FaultSpec),
     /// A fault ends.
     EndFault(FaultSpec),
+    /// A recording begins.
+    RecordStart,
+    /// The recording ends.
+    RecordStop,
 }
 
 /// Why a frame that is sound in form cannot be done.
@@ -197,14 +223,19 @@ fn body(raw: Raw) -> Result<Body, Malformed> {
             channels: None,
             hz: None,
             ..
-        } => match order(&name, &args).and_then(|order| Ok((valid_us(&order, valid_ms)?, order))) {
-            Ok((valid_us, order)) => Body::Give {
-                order,
-                seen_us,
-                valid_us,
-            },
-            Err(bad) => Body::Refused(bad),
-        },
+        } => {
+            let spoken = Spoken { cmd: name, args };
+            let order = spoken.order();
+            match order.and_then(|order| Ok((valid_us(&order, valid_ms)?, order))) {
+                Ok((valid_us, order)) => Body::Give {
+                    order,
+                    spoken,
+                    seen_us,
+                    valid_us,
+                },
+                Err(bad) => Body::Refused(bad),
+            }
+        }
         _ => return Err(Malformed),
     })
 }
@@ -358,6 +389,8 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
         }
         HostCode::Inject => HostCommand::Inject(fault()?),
         HostCode::EndFault => HostCommand::EndFault(fault()?),
+        HostCode::RecordStart => HostCommand::RecordStart,
+        HostCode::RecordStop => HostCommand::RecordStop,
     })
 }
 
@@ -378,6 +411,7 @@ mod tests {
             order: Order::Robot(Command::JointReference { joint, stroke_mm }),
             seen_us,
             valid_us,
+            ..
         } = body
         else {
             panic!("{body:?}");

@@ -24,6 +24,7 @@ use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};
 use crate::page::Page;
+use crate::record::{self, About};
 use crate::session::Context;
 
 /// Where the server listens unless it is told otherwise.
@@ -44,6 +45,10 @@ const BACKLOG: u32 = 256;
 pub struct Options {
     /// The robot.
     pub live: Live,
+    /// Folder for recordings.
+    pub recordings: PathBuf,
+    /// Whether the first recording begins with the power.
+    pub record: bool,
     /// Where to listen: an address of this computer.
     pub listen: SocketAddr,
     /// Who may drive, and who may look.
@@ -58,6 +63,7 @@ pub struct Server {
     hub: Arc<Hub>,
     runtime: Option<Runtime>,
     robot: Option<JoinHandle<()>>,
+    recorder: Option<JoinHandle<()>>,
 }
 
 impl std::fmt::Debug for Server {
@@ -73,10 +79,12 @@ impl Server {
     ///
     /// # Errors
     /// [`ConsoleError`] if the address is none of this computer's own or is in use, the page is
-    /// not there, or the robot cannot be built.
+    /// not there, the robot cannot be built, or the recording's folder cannot be made.
     pub fn start(options: Options) -> Result<Self, ConsoleError> {
         let Options {
             live,
+            recordings,
+            record,
             listen,
             keys,
             page,
@@ -111,13 +119,22 @@ impl Server {
         let name = live.robot.name.clone();
         let drawing = Drawing::of(&live.robot);
         let robot_json = json!({ "name": name, "drawing": drawing }).to_string();
-        let (hub, robot) = Hub::new(live::start(live)?, name);
+        let about = About::new(
+            &live.robot,
+            &live.robot_toml,
+            &live.scenario,
+            &live.scenario_toml,
+        );
+        let (feed, recordings) = record::start(&recordings, about, record)?;
+        let shared = Arc::clone(&recordings.shared);
+        let (hub, robot) = Hub::new(live::start(live, feed)?, name, shared);
         let server = Arc::new(api::Server {
             context: Arc::new(Context {
                 hub: Arc::clone(&hub),
                 robot_json,
                 keys,
                 wrong_keys: WrongKeys::default(),
+                recordings: recordings.root,
             }),
             hosts: Hosts::new(address),
             page,
@@ -129,6 +146,7 @@ impl Server {
             hub,
             runtime: Some(runtime),
             robot: Some(robot),
+            recorder: Some(recordings.thread),
         })
     }
 
@@ -160,6 +178,10 @@ impl Drop for Server {
         }
         if let Some(robot) = self.robot.take() {
             let _ = robot.join();
+        }
+        // It has what the robot's last cycle told.
+        if let Some(recorder) = self.recorder.take() {
+            let _ = recorder.join();
         }
     }
 }

@@ -1,6 +1,7 @@
 //! One client's connection: handshake, then frames in and whatever its outbox holds out.
 
 use std::net::IpAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -42,6 +43,8 @@ pub(crate) struct Context {
     pub(crate) keys: Keys,
     /// Wrong keys of the last minute.
     pub(crate) wrong_keys: WrongKeys,
+    /// Folder of the recordings.
+    pub(crate) recordings: PathBuf,
 }
 
 #[derive(Deserialize)]

@@ -3,11 +3,14 @@
 const SVG = "http://www.w3.org/2000/svg";
 
 /** An HTML element. Attributes that begin with "on" are listeners; null and false are left out.
- * @param {string} tag @param {Object<string, any>} [attributes] @param {...any} children */
+ * @template {keyof HTMLElementTagNameMap} T
+ * @param {T} tag @param {Object<string, any>} [attributes] @param {...any} children @returns {HTMLElementTagNameMap[T]} */
 export function html(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    // As an attribute a style is forbidden to the console's page; as a property it is not.
+    else if (name === "style") element.style.cssText = value;
     else if (value === true) element.setAttribute(name, "");
     else if (value != null && value !== false) element.setAttribute(name, String(value));
   }
@@ -18,7 +21,8 @@ export function html(tag, attributes = {}, ...children) {
 }
 
 /** An SVG element, added to its parent.
- * @param {string} tag @param {Object<string, any>} [attributes] @param {Element} [parent] */
+ * @template {keyof SVGElementTagNameMap} T
+ * @param {T} tag @param {Object<string, any>} [attributes] @param {Element} [parent] @returns {SVGElementTagNameMap[T]} */
 export function svg(tag, attributes = {}, parent) {
   const element = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
@@ -34,9 +38,9 @@ export function set(element, attributes) {
   }
 }
 
-/** Writes a text if it changed. @param {Node} node @param {string} text */
+/** Writes a text if it changed. @param {Node | null} node @param {string} text */
 export function say(node, text) {
-  if (node.textContent !== text) node.textContent = text;
+  if (node && node.textContent !== text) node.textContent = text;
 }
 
 /** A number with fixed decimals and a true minus sign; a dash where there is none.

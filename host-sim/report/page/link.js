@@ -41,12 +41,13 @@ const READERS = {
 };
 
 /** @typedef {{status: string, reason?: string, text?: string, holder?: string, age_ms?: number}} Answer */
+/** @typedef {{key: string, role: "control" | "view", name: string}} Identity */
 /** @typedef {{sample: (topic: string, t_us: number, values: Object<string, any>) => void, state: (state: any) => void,
  *   event: (event: any) => void, asked: (by: string) => void, closed: (why: string) => void}} Listener */
 
 /** One session. */
 export class Link {
-  /** @param {{key: string, role: "control" | "view", name: string}} identity @param {Listener} listener */
+  /** @param {Identity} identity @param {Listener} listener */
   constructor(identity, listener) {
     this.identity = identity;
     this.listener = listener;
@@ -56,6 +57,23 @@ export class Link {
     this.seen_us = 0;
     /** @type {Map<number, (answer: Answer) => void>} */
     this.waiting = new Map();
+    // What the handshake gives; nothing is sent before it.
+    const later = /** @type {any} */ (null);
+    /** @type {WebSocket} */
+    this.socket = later;
+    /** The session's key. @type {CryptoKey} */
+    this.key = later;
+    /** Nonces of both sides, and all that both MACs are over. @type {Uint8Array} */
+    this.server = later;
+    /** @type {Uint8Array} */
+    this.client = later;
+    /** @type {Uint8Array} */
+    this.common = later;
+    /** @type {{layout: string, commands: string}} */
+    this.hashes = later;
+    /** @type {Map<number, any>} */
+    this.channels = new Map();
+    this.session = "";
   }
 
   /** A document of the HTTP API. @param {string} path */
@@ -78,7 +96,7 @@ export class Link {
       let proof = Promise.resolve();
       socket.onclose = (close) => reject(new Error(close.reason || "the robot's server does not answer"));
       socket.onmessage = (message) => {
-        proof = proof.then(() => this.greet(JSON.parse(message.data))).then((done) => done && resolve(undefined)).catch(reject);
+        proof = proof.then(() => this.greet(JSON.parse(message.data))).then((done) => { if (done) resolve(undefined); }).catch(reject);
       };
     });
     socket.onclose = (close) => this.end(close.reason || "the connection has ended");

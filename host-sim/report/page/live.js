@@ -2,6 +2,9 @@
 import { html, svg, set, say, fixed, sign } from "./dom.js";
 import { sideView, topView, footView } from "./robot.js";
 import { Link } from "./link.js";
+import { HZ, Scope } from "./scope.js";
+import { LINKS, boardsView } from "./boards.js";
+import { driver } from "./drive.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
@@ -12,9 +15,8 @@ const VALVES = ["fill A", "vent A", "fill B", "vent B"];
 const STROKE_MM = 180;
 /** Faults that say of a reading that it is none: SensorRange, SensorRate. */
 const NO_READING = new Set([32, 33]);
-const TRAIL_S = 20;
 
-/** The key from the address, which must not stay there, or of this tab. */
+/** The key from the address, which must not stay there, or of this tab. @returns {import("./link.js").Identity | null} */
 function identity() {
   const given = /^#([kv])=([0-9a-f]{64})$/.exec(location.hash);
   if (given) {
@@ -27,8 +29,9 @@ function identity() {
   return key ? { key, role, name: "browser" } : null;
 }
 
-/** Newest values by channel, and when the newest sample came. */
-const now = { /** @type {Map<string, any>} */ of: new Map(), t_us: 0, heard_ms: -Infinity, /** @type {any} */ state: null };
+/** Newest values by channel, and when the newest sample came.
+ * @type {{of: Map<string, any>, t_us: number, heard_ms: number, state: any}} */
+const now = { of: new Map(), t_us: 0, heard_ms: -Infinity, state: null };
 /** @type {Link | null} */
 let link = null;
 /** Why the page shows nothing new. */
@@ -43,6 +46,7 @@ const button = (name, code, act) => html("button", { class: "btn", type: "button
 
 // ---- answers ----
 const answer = html("p", { class: "answer", role: "status" }, "Nothing was asked yet.");
+/** @param {string} what @param {import("./link.js").Answer} given */
 function tell(what, { status, text, reason, holder }) {
   const held = holder ? ` (${holder} is in control)` : "";
   const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `refused: ${text || reason}${held}`;
@@ -139,33 +143,14 @@ const joints = JOINTS.map((name, i) => {
   };
 });
 
-// ---- one joint over the last seconds ----
-const trail = { chosen: 3, /** @type {{t: number, asked: number, sensed: number}[]} */ rows: [] };
-const chooser = html("select", { "aria-label": "Joint of the plot", onchange: (e) => ((trail.chosen = Number(e.target.value)), (trail.rows = [])) }, JOINTS.map((name, i) => html("option", { value: i + 1, selected: i + 1 === trail.chosen }, name)));
-const plot = svg("svg", { viewBox: "0 0 600 150", class: "trail", preserveAspectRatio: "none", role: "img" });
-svg("title", {}, plot).textContent = "Stroke of the chosen joint over the last 20 s";
-for (const mm of [0, 60, 120, 180]) svg("line", { x1: 0, x2: 600, y1: 145 - (mm / 180) * 140, y2: 145 - (mm / 180) * 140, class: "grid" }, plot);
-const curves = { asked: svg("polyline", { class: "asked-line" }, plot), sensed: svg("polyline", { class: "sensed-line" }, plot) };
-function drawTrail() {
-  const end = now.t_us * 1e-6;
-  trail.rows = trail.rows.filter((row) => row.t > end - TRAIL_S);
-  const points = (of) => trail.rows.map((row) => `${(600 * (1 - (end - row.t) / TRAIL_S)).toFixed(1)},${(145 - (of(row) / 180) * 140).toFixed(1)}`).join(" ");
-  set(curves.asked, { points: points((row) => row.asked) });
-  set(curves.sensed, { points: points((row) => row.sensed) });
-}
-
 // ---- faults, boards, events ----
 const faults = html("ul", { class: "faults" });
-const boards = html("ol", { class: "boards" });
-const events = html("ol", { class: "events" });
-function showBoards(state) {
-  boards.replaceChildren(
-    ...state.boards.map((b) => {
-      const bad = !b.present || b.faults.length > 0;
-      return html("li", { class: bad ? "bad" : "" }, html("b", {}, String(b.address), sign(bad ? "alarm" : "met")), html("span", {}, b.present ? b.mode : "missing"));
-    }),
-  );
-  // One line for what many boards have.
+const boards = boardsView();
+/** @type {Scope | null} */
+let scope = null;
+const events = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
+/** One line for what many boards have. */
+function showFaults(state) {
   const rows = new Map();
   for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
   faults.replaceChildren(
@@ -173,7 +158,25 @@ function showBoards(state) {
     ...(rows.size === 0 ? [html("li", { class: "none" }, sign("met"), " No board has a fault.")] : []),
   );
 }
-let shownBoards = "";
+let shownFaults = "";
+
+// ---- recording ----
+const record = button("Record", "0x0307", () => command(recording() ? "RecordStop" : "RecordStart"));
+const recorded = html("p", { class: "effect", role: "status" }, "Not recording.");
+const recording = () => Boolean(now.state?.recording && !now.state.recording.failure);
+let lastRecording = "";
+function showRecording(state) {
+  const { recording: r } = state;
+  record.classList.toggle("on", recording());
+  say(record.firstElementChild, recording() ? "Stop recording" : "Record");
+  say(record.lastElementChild, recording() ? "0x0308" : "0x0307");
+  if (r?.failure) say(recorded, `Recording ${r.id} ended early: ${r.failure}. The robot goes on; make room, then record again.`);
+  else if (r) {
+    lastRecording = r.id;
+    say(recorded, `${r.id}, ${fixed((state.master_us - r.since_us) * 1e-6)} s${r.dropped > 0 ? `; ${r.dropped} messages lost: the disk is too slow` : ""}`);
+  } else say(recorded, lastRecording ? `Recorded: ${lastRecording}. On the command line, “wheeleg replay” repeats it and “wheeleg view” shows its log.` : "Not recording.");
+  recorded.classList.toggle("bad", Boolean(r?.failure) || (r?.dropped ?? 0) > 0);
+}
 
 // ---- forms ----
 /** @type {any[]} */
@@ -221,6 +224,7 @@ const walk = button("Walk", "StartGait", () => command(walking() ? "StopGait" : 
 const hold = button("Hold", "Space", () => command("Hold"));
 const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
+const byHand = driver(command);
 const mine = () => Boolean(link && now.state?.control?.session === link.session);
 const WALKING = new Set(["unload", "lift", "reach", "lower", "push", "rest", "trajectory"]);
 const walking = () => WALKING.has(now.state?.phase);
@@ -233,10 +237,16 @@ addEventListener("keydown", (key) => {
   } else if (key.key === " " && !inField && !(key.target instanceof HTMLButtonElement)) {
     key.preventDefault();
     command("Hold");
+  } else if (key.key === "?" && !inField) {
+    keys.open = !keys.open;
   }
 });
+const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, outside of a field"], ["↑ ↓", "drive by hand, on its buttons"], ["← →", "the cursor of the plots, by 20 ms; with Shift by 200 ms"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
 /** Who does not look does not drive. */
-const leaves = () => mine() && command("Hold");
+const leaves = () => {
+  byHand.stop();
+  if (mine()) command("Hold");
+};
 document.addEventListener("visibilitychange", () => document.hidden && leaves());
 addEventListener("pagehide", leaves);
 
@@ -268,17 +278,20 @@ function build({ robot, commands: list, faults: injectable }) {
         { class: "col" },
         html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), html("div", { class: "plan" }, pictures.top), html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
         html("section", { class: "joints", "aria-label": "Joints" }, joints.map((j) => j.root)),
-        html("section", { class: "panel strip", "data-live": true }, html("header", {}, html("h2", {}, "Stroke, last 20 s, 0 to 180 mm"), chooser, html("span", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), plot),
+        scope?.root,
       ),
       html(
         "div",
         { class: "col" },
         html("section", { class: "panel", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), answer),
         html("section", { class: "panel" }, html("h2", {}, "Faults"), faults),
-        html("section", { class: "panel", "data-live": true }, html("h2", {}, "Boards"), boards),
+        boards.root,
+        byHand.root,
+        html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded),
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
         html("section", { class: "panel" }, html("h2", {}, "Faults to try"), html("div", { class: "row" }, fault, target, inject), injected),
         html("section", { class: "panel eventlist" }, html("h2", {}, "Events"), events),
+        keys,
       ),
     ),
   );
@@ -299,11 +312,13 @@ function showState(state) {
   say(walk.firstElementChild, walking() ? "Stop gait" : "Walk");
   say(walk.lastElementChild, walking() ? "StopGait" : "StartGait");
   const looks = link?.identity.role !== "control";
-  for (const b of [take, ready, walk, hold, disarm, clear]) b.toggleAttribute("disabled", looks);
-  const key = JSON.stringify(state.boards);
-  if (key !== shownBoards) {
-    shownBoards = key;
-    showBoards(state);
+  for (const b of [take, ready, walk, hold, disarm, clear, record]) b.toggleAttribute("disabled", looks);
+  boards.state(state);
+  showRecording(state);
+  const key = JSON.stringify(state.boards.map((b) => b.faults));
+  if (key !== shownFaults) {
+    shownFaults = key;
+    showFaults(state);
   }
   const active = state.faults.join();
   if (injected.dataset.active !== active) {
@@ -330,7 +345,7 @@ function paint() {
   views.top.update(robot);
   robot.legs.forEach((state, i) => views.feet[i].update(state));
   joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
-  drawTrail();
+  scope?.paint(now.t_us * 1e-6);
   if (now.state) showState(now.state);
   say(head.link.value, `${fixed(now.t_us * 1e-6, 2)} s`);
   if (link) link.seen_us = Math.floor(now.t_us);
@@ -341,7 +356,8 @@ const listener = {
     now.of.set(topic, values);
     now.heard_ms = performance.now();
     now.t_us = Math.max(now.t_us, t_us);
-    if (topic === `/joint/${trail.chosen}`) trail.rows.push({ t: t_us * 1e-6, asked: values.commanded_mm, sensed: values.sensed_mm });
+    scope?.sample(topic, t_us * 1e-6, values);
+    if (topic.startsWith("/link/")) boards.link(topic, values);
   },
   state(state) {
     now.state = state;
@@ -372,8 +388,14 @@ async function begin() {
     const opened = new Link(who, listener);
     const about = await opened.open();
     link = opened;
+    const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", ...LINKS]);
+    scope = new Scope([...opened.channels.values()], (topic) => {
+      if (drawn.has(topic)) return;
+      drawn.add(topic);
+      link?.subscribe([topic], HZ);
+    });
     build(about);
-    await link.subscribe([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body"], 30);
+    await link.subscribe([...drawn], HZ);
     setInterval(() => mine() && link?.beat(), BEAT_MS);
   } catch (error) {
     page.replaceChildren(html("p", { class: "alone", role: "alert" }, error instanceof Error ? error.message : String(error)));

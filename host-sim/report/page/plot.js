@@ -40,8 +40,8 @@ export class Linked {
 }
 
 export class Plot {
-  /** @param {Panel} panel @param {Linked} linked plots that share cursor and zoom */
-  constructor(panel, linked) {
+  /** @param {Panel} panel @param {Linked} linked plots that share cursor and zoom @param {"h3" | "h4"} heading */
+  constructor(panel, linked, heading = "h4") {
     this.panel = panel;
     this.linked = linked;
     this.width = 0;
@@ -66,7 +66,7 @@ export class Plot {
       this.span,
       this.cursor,
     );
-    this.root = html("section", { class: "plot" }, html("header", {}, html("h4", {}, panel.title, html("span", { class: "unit" }, ` ${panel.unit}`)), html("div", { class: "legend" }, legend)), this.area);
+    this.root = html("section", { class: "plot" }, html("header", {}, html(heading, {}, panel.title, html("span", { class: "unit" }, ` ${panel.unit}`)), html("div", { class: "legend" }, legend)), this.area);
 
     new ResizeObserver(([entry]) => {
       this.width = entry.contentRect.width;

@@ -97,6 +97,7 @@ function showFigures(clock) {
 const groups = new Set();
 const place = document.getElementById("motion-view");
 const source = document.getElementById("motion-data");
+/** @type {Player | null} */
 let clock = null;
 if (place && source) {
   /** @type {Motion} */

@@ -45,6 +45,7 @@ export function leg(g, side, [yaw, horizontal, vertical]) {
   };
 }
 
+/** @param {Element} line @param {number[]} from @param {number[]} to */
 export const put = (line, [x1, y1], [x2, y2]) => set(line, { x1: tenth(x1), y1: tenth(y1), x2: tenth(x2), y2: tenth(y2) });
 const bar = (parent, name, width) => svg("line", { class: name, "stroke-width": width }, parent);
 
@@ -210,6 +211,7 @@ export function topView(picture, g, terrain) {
     svg("circle", { cx: g.o4_mm[0], cy: -side.y * g.o4_mm[1], r: 22, class: "r-post" }, group);
     return part;
   });
+  /** @param {number[]} point */
   const flat = ([x, y]) => [tenth(x), tenth(-y)];
   return {
     /** @param {Pose} pose */

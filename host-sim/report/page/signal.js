@@ -13,15 +13,17 @@ export function before(times, t) {
 }
 
 /** Value at `t`, on a straight line between two samples; null before the first, after the last and in a gap.
- * @param {ArrayLike<number>} times @param {ArrayLike<number>} values @param {number} t */
+ * @param {ArrayLike<number>} times @param {ArrayLike<number | null>} values @param {number} t @returns {number | null} */
 export function linear(times, values, t) {
   const last = times.length - 1;
   if (last < 0 || t < times[0] || t > times[last]) return null;
   const i = before(times, t);
-  if (i === last || values[i] == null || values[i + 1] == null) return i === last ? values[last] : null;
+  if (i === last) return values[last];
+  const [here, next] = [values[i], values[i + 1]];
+  if (here == null || next == null) return null;
   const width = times[i + 1] - times[i];
   const part = width > 0 ? (t - times[i]) / width : 1;
-  return values[i] + part * (values[i + 1] - values[i]);
+  return here + part * (next - here);
 }
 
 /** Value of the last sample at or before `t`. @param {ArrayLike<number>} times @param {ArrayLike<number>} values @param {number} t */

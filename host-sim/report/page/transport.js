@@ -50,11 +50,12 @@ export function transport(player, { phases, marks }) {
   const icon = html("span");
   const label = html("span");
   const play = html("button", { class: "btn", type: "button", onclick: () => (player.playing ? player.pause() : player.play()) }, icon, label);
-  const speed = html("button", { class: "btn", type: "button", "aria-label": "Speed" }, "× 1");
+  const speed = html("button", { class: "btn", type: "button", title: "Speed" }, "× 1");
   speed.addEventListener("click", () => {
     player.speed = SPEEDS[(SPEEDS.indexOf(player.speed) + 1) % SPEEDS.length];
     say(speed, `× ${player.speed}`);
   });
+  /** @type {boolean | null} */
   let shown = null;
   player.on((t) => {
     draw(t);

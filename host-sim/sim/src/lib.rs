@@ -30,6 +30,7 @@ mod hal;
 mod memory;
 mod observe;
 mod operator;
+mod provenance;
 mod rogue_nodes;
 mod session;
 mod setup;
@@ -49,6 +50,7 @@ pub use self::audit::LineAudit;
 pub use self::boards::{JointBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::error::SimError;
+pub use self::provenance::provenance;
 pub use self::session::Session;
 pub use self::world::BOARD_START_UP_NS;
 

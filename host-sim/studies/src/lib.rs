@@ -5,6 +5,7 @@
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`bench`]);
 //! * [`figures`]: the paper's figures and misprints;
 //! * [`study`]: what all of them do in the same way;
+//! * [`view`]: a log, or two, as a page;
 //! * [`check`], [`export`]: the model against others' numbers, and for others' programs.
 //!
 //! # Glossary
@@ -25,10 +26,12 @@ mod error;
 pub mod export;
 pub mod figures;
 pub mod matrix;
+mod motion;
 pub mod run;
 mod schemas;
 pub mod study;
 pub mod tune;
+pub mod view;
 
 pub use error::StudyError;
 pub use schemas::schemas;

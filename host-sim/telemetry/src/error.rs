@@ -70,6 +70,17 @@ pub enum LogError {
         path: PathBuf,
     },
 
+    /// A log of another program.
+    #[error("there is no message of a channel of Wheeleg in `{}`", path.display())]
+    #[diagnostic(
+        code(wheeleg::log),
+        help("it is a log of another program; `wheeleg channels` lists what ours hold")
+    )]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+
     /// A log of which nothing can be read.
     #[error("there is no message in `{}` that can be recovered", path.display())]
     #[diagnostic(

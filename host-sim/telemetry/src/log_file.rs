@@ -68,6 +68,12 @@ impl LogFile {
             flushed_ns: 0,
         })
     }
+
+    /// Why nothing more is written, as soon as that is so.
+    #[must_use]
+    pub fn failure(&self) -> Option<&LogError> {
+        self.failed.as_ref()
+    }
 }
 
 impl Sink for LogFile {

@@ -212,6 +212,12 @@ impl<'a> Recorder<'a> {
         self.disk_full = full;
     }
 
+    /// The hash of everything so far, 64 hexadecimal digits.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        self.hash.hex()
+    }
+
     /// Finishes the sinks and hands over what was kept.
     ///
     /// # Errors

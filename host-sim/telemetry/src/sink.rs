@@ -43,6 +43,14 @@ macro_rules! sample_ref {
                     $( Self::$name(sample) => sample.pack(out), )*
                 }
             }
+
+            /// The sample for a [`Sink`].
+            #[must_use]
+            pub fn as_ref(&self) -> SampleRef<'_> {
+                match self {
+                    $( Self::$name(sample) => SampleRef::$name(sample), )*
+                }
+            }
         }
 
         impl SampleRef<'_> {

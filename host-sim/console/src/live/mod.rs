@@ -8,7 +8,8 @@ mod sink;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_config::builtin::{self, Source};
+use wheeleg_config::{ConfigError, RobotConfig, Scenario};
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::HoldReason;
@@ -17,7 +18,7 @@ use wheeleg_protocol::{FaultBits, NodeMode};
 use wheeleg_sim::SimError;
 use wheeleg_telemetry::OwnedSample;
 
-use crate::request::HostCommand;
+use crate::request::{HostCommand, Spoken};
 
 pub(crate) use robot::{Robot, start};
 
@@ -35,10 +36,46 @@ pub struct Live {
     pub scenario: Scenario,
     /// The robot.
     pub robot: RobotConfig,
+    /// The scenario's file, for recordings.
+    pub scenario_toml: String,
+    /// The robot's file, for recordings.
+    pub robot_toml: String,
     /// Simulated over wall time; `None`: as fast as it goes.
     pub speed: Option<f64>,
     /// Whether the clock stands at first.
     pub paused: bool,
+}
+
+impl Live {
+    /// A robot in real time: `scenario` and `robot` are built in, or paths; without `robot`, the
+    /// scenario's.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if there is no such file, or if it is wrong.
+    pub fn load(scenario: &str, robot: Option<&str>) -> Result<Self, ConfigError> {
+        let source = builtin::scenario_source(scenario)?;
+        let parsed = Scenario::parse(&source.file, &source.text)?;
+        let robot = match robot {
+            Some(robot) => builtin::robot_source(robot)?,
+            None => builtin::robot_source_of(&parsed.robot, scenario)?,
+        };
+        Self::of(&source, &robot)
+    }
+
+    /// The same of files that are read already.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if one is wrong.
+    pub(crate) fn of(scenario: &Source, robot: &Source) -> Result<Self, ConfigError> {
+        Ok(Self {
+            scenario: Scenario::parse(&scenario.file, &scenario.text)?,
+            robot: RobotConfig::parse(&robot.file, &robot.text)?,
+            scenario_toml: scenario.text.clone(),
+            robot_toml: robot.text.clone(),
+            speed: Some(1.0),
+            paused: false,
+        })
+    }
 }
 
 /// What the hub asks of the robot.
@@ -54,6 +91,8 @@ pub(crate) enum Input {
         valid_us: u64,
         /// The command.
         command: Command,
+        /// The same as its sender wrote it.
+        spoken: Spoken,
     },
     /// A command to the simulation.
     Host {
@@ -103,6 +142,8 @@ pub(crate) enum Answer {
     TooFast,
     /// The simulation refuses.
     Simulation(Box<SimError>),
+    /// Nothing is recorded, or no longer.
+    NotRecorded(String),
 }
 
 /// How the robot is, at the end of a bus cycle.

@@ -1,5 +1,7 @@
 //! The loop of the robot's thread.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
@@ -10,7 +12,7 @@ use wheeleg_master::dispatcher::Request;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_protocol::FaultBits;
-use wheeleg_sim::{Boards, Session, SimError};
+use wheeleg_sim::{Boards, Session, SimError, provenance};
 use wheeleg_telemetry::{Keep, Recorder};
 
 use super::pace::Pace;
@@ -19,10 +21,13 @@ use super::{
     Answer, BoardStatus, INPUTS, Input, Live, Moving, REPORTS, Report, SAMPLES, Signals, Status,
 };
 use crate::catalogue::SPEED_OF_CONTROL;
-use crate::request::HostCommand;
+use crate::record::{Feed, FeedSink, Given};
+use crate::request::{HostCommand, Spoken};
 
 /// Both rings are read so often, ns of simulated time.
 const TICK_NS: u64 = 1_000_000;
+/// How often a recording gets the hash of everything until then, ns of simulated time.
+const HASH_NS: u64 = 1_000_000_000;
 /// Stack of the thread: a world is built on it in one piece.
 const STACK: usize = 16 << 20;
 /// Longest sleep, so that a stop is heard however slow the clock goes.
@@ -42,11 +47,12 @@ pub(crate) struct Robot {
     pub(crate) thread: JoinHandle<()>,
 }
 
-/// Powers a robot up in a thread of its own.
+/// Powers a robot up in a thread of its own. What it is given and what is sampled of it goes to
+/// `feed` as well.
 ///
 /// # Errors
 /// [`SimError`] if it cannot be built.
-pub(crate) fn start(live: Live) -> Result<Robot, SimError> {
+pub(crate) fn start(live: Live, feed: Feed) -> Result<Robot, SimError> {
     let (inputs, from_hub) = rtrb::RingBuffer::new(INPUTS);
     let (to_hub, reports) = rtrb::RingBuffer::new(REPORTS);
     let (to_samples, samples) = rtrb::RingBuffer::new(SAMPLES);
@@ -67,11 +73,15 @@ pub(crate) fn start(live: Live) -> Result<Robot, SimError> {
         let _ = built.send(Ok(()));
         let cycle = Duration::from_secs_f64(robot.bus.cycle_s);
         let pace = Pace::new(cycle, live.speed, live.paused, Instant::now());
-        let recorder =
-            Recorder::new(Keep::nothing()).with(RingSink::new(to_samples, Arc::clone(&beside)));
+        let feed = Rc::new(RefCell::new(feed));
+        let mut recorder = Recorder::new(Keep::nothing())
+            .with(RingSink::new(to_samples, Arc::clone(&beside)))
+            .with(FeedSink(Rc::clone(&feed)));
+        provenance(&mut recorder, scenario, robot, scenario.seed);
         Loop {
             session,
             recorder,
+            feed,
             pace,
             inputs: from_hub,
             reports: to_hub,
@@ -114,6 +124,7 @@ pub(crate) fn start(live: Live) -> Result<Robot, SimError> {
 struct Loop {
     session: Session,
     recorder: Recorder<'static>,
+    feed: Rc<RefCell<Feed>>,
     pace: Pace,
     inputs: rtrb::Consumer<Input>,
     reports: rtrb::Producer<Report>,
@@ -154,6 +165,27 @@ impl Loop {
             self.steps = self.steps.saturating_sub(1);
             self.cycle();
         }
+        let hash = self.recorder.hash();
+        self.feed.borrow_mut().close(self.recorded_us(), &hash);
+    }
+
+    /// Time up to which everything is in the recording, µs.
+    fn recorded_us(&self) -> u64 {
+        self.target_ns / 1_000
+    }
+
+    /// The robot was given something now.
+    fn given(&self, given: Given) {
+        let ms = self.target_ns / TICK_NS;
+        self.feed.borrow_mut().given(ms, given);
+    }
+
+    fn given_pace(&self) {
+        let pace = self.pace.status();
+        self.given(Given::Pace {
+            speed: pace.speed,
+            paused: pace.paused,
+        });
     }
 
     /// Simulates a bus cycle, listening at every tick.
@@ -169,6 +201,10 @@ impl Loop {
             }
             self.tell_outcomes();
         }
+        let recorded = self.feed.borrow_mut().is_running();
+        if recorded && self.target_ns.is_multiple_of(HASH_NS) {
+            self.given(Given::Hash(self.recorder.hash()));
+        }
         self.report_status();
     }
 
@@ -178,6 +214,7 @@ impl Loop {
         if seen_us != self.seen_us {
             self.seen_us = seen_us;
             self.session.beat(seen_us);
+            self.given(Given::Beat(seen_us));
         }
         for _ in 0..INPUTS {
             let Ok(input) = self.inputs.pop() else {
@@ -189,8 +226,12 @@ impl Loop {
                     seen_us,
                     valid_us,
                     command,
-                } => (id, self.request(id, seen_us, valid_us, command)),
-                Input::Host { id, command } => (id, self.host(command)),
+                    spoken,
+                } => {
+                    let deadline_us = seen_us.saturating_add(valid_us);
+                    (id, self.request(id, seen_us, deadline_us, command, spoken))
+                }
+                Input::Host { id, command } => (id, self.host(id, command)),
             };
             self.answer(id, answer);
         }
@@ -209,6 +250,7 @@ impl Loop {
             deadline_us: u64::MAX,
             command: Command::EmergencyStop,
         };
+        self.given(Given::Stop(stop.id));
         // A dead master takes none.
         if let Some(Ok(_)) = self.session.request(stop, &mut self.recorder) {
             self.stops = asked;
@@ -219,10 +261,16 @@ impl Loop {
         self.session.now_ns() / 1_000
     }
 
-    fn request(&mut self, id: u32, seen_us: u64, valid_us: u64, command: Command) -> Answer {
+    fn request(
+        &mut self,
+        id: u32,
+        seen_us: u64,
+        deadline_us: u64,
+        command: Command,
+        spoken: Spoken,
+    ) -> Answer {
         let now_us = self.now_us();
         let pace = self.pace.status();
-        let deadline_us = seen_us.saturating_add(valid_us);
         if self.failed {
             return Answer::NoMaster;
         }
@@ -242,6 +290,11 @@ impl Loop {
             deadline_us,
             command,
         };
+        self.given(Given::Command {
+            id,
+            deadline_us,
+            spoken,
+        });
         match self.session.request(request, &mut self.recorder) {
             Some(Ok(_)) => Answer::Accepted,
             Some(Err(why)) => Answer::Rejected(why),
@@ -249,7 +302,7 @@ impl Loop {
         }
     }
 
-    fn host(&mut self, command: HostCommand) -> Answer {
+    fn host(&mut self, id: u32, command: HostCommand) -> Answer {
         let now = Instant::now();
         match command {
             HostCommand::Pause => {
@@ -273,13 +326,29 @@ impl Loop {
             }
             HostCommand::Inject(fault) => return self.inject(&fault, true),
             HostCommand::EndFault(fault) => return self.inject(&fault, false),
+            HostCommand::RecordStart => {
+                let begun = self.feed.borrow_mut().begin(id, self.recorded_us());
+                return recorded(begun);
+            }
+            HostCommand::RecordStop => {
+                let hash = self.recorder.hash();
+                let ended = self
+                    .feed
+                    .borrow_mut()
+                    .end(Some(id), self.recorded_us(), hash);
+                return recorded(ended);
+            }
         }
+        self.given_pace();
         Answer::Done
     }
 
     fn inject(&mut self, fault: &wheeleg_config::faults::FaultSpec, begin: bool) -> Answer {
         match self.session.inject(fault, begin, &mut self.recorder) {
-            Ok(()) => Answer::Done,
+            Ok(()) => {
+                self.given(Given::Fault(*fault, begin));
+                Answer::Done
+            }
             Err(why) => Answer::Simulation(Box::new(why)),
         }
     }
@@ -346,5 +415,13 @@ impl Loop {
             pace: self.pace.status(),
             stops: self.stops,
         }
+    }
+}
+
+/// The recorder answers when its files are there.
+fn recorded(asked: Result<(), &str>) -> Answer {
+    match asked {
+        Ok(()) => Answer::Accepted,
+        Err(why) => Answer::NotRecorded(why.to_owned()),
     }
 }

@@ -3,7 +3,6 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use wheeleg_config::builtin;
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::Keys;
 use wheeleg_console::{Live, Options, Server};
@@ -13,7 +12,7 @@ pub(crate) struct Rig {
     pub(crate) server: Server,
     pub(crate) keys: Keys,
     pub(crate) url: Url,
-    _home: tempfile::TempDir,
+    pub(crate) home: tempfile::TempDir,
 }
 
 impl Rig {
@@ -22,16 +21,25 @@ impl Rig {
     }
 
     pub(crate) fn paced(speed: Option<f64>) -> Self {
+        Self::with(speed, false)
+    }
+
+    /// A robot that is recorded from power-up on.
+    pub(crate) fn recorded(speed: f64) -> Self {
+        Self::with(Some(speed), true)
+    }
+
+    fn with(speed: Option<f64>, record: bool) -> Self {
         let home = tempfile::tempdir().expect("a folder");
         let keys = Keys::open(home.path()).expect("keys");
         let live = Live {
-            scenario: builtin::scenario("three-step").expect("built in"),
-            robot: builtin::robot("wheeleg-2003").expect("built in"),
             speed,
-            paused: false,
+            ..Live::load("three-step", Some("wheeleg-2003")).expect("built in")
         };
         let server = Server::start(Options {
             live,
+            recordings: home.path().join("recordings"),
+            record,
             listen: "127.0.0.1:0".parse().expect("an address"),
             keys: keys.clone(),
             page: None,
@@ -42,7 +50,7 @@ impl Rig {
             server,
             keys,
             url,
-            _home: home,
+            home,
         }
     }
 

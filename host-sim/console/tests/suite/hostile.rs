@@ -238,14 +238,11 @@ fn an_address_of_the_network_and_one_in_use_are_refused_with_a_remedy() {
         ("0.0.0.0:0", "ssh -L"),
         (&rig.server.address().to_string(), "--listen"),
     ] {
-        let live = wheeleg_console::Live {
-            scenario: wheeleg_config::builtin::scenario("stand").expect("built in"),
-            robot: wheeleg_config::builtin::robot("wheeleg-2003").expect("built in"),
-            speed: Some(1.0),
-            paused: false,
-        };
+        let live = wheeleg_console::Live::load("stand", None).expect("built in");
         let refused = wheeleg_console::Server::start(wheeleg_console::Options {
             live,
+            recordings: rig.home.path().join("recordings"),
+            record: false,
             listen: listen.parse().expect("an address"),
             keys: rig.keys.clone(),
             page: None,

@@ -1,7 +1,9 @@
 //! The server over real sockets. What happens to the robot is judged in master time; the clock on
 //! the wall only bounds how long a test may take.
 
+mod api;
 mod common;
 mod control;
 mod hostile;
 mod looking;
+mod recording;

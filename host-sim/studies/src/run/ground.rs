@@ -1,9 +1,8 @@
 //! The terrain as the page draws it: heights along both wheels' tracks, and rocks and blocks from
 //! above.
 
-use serde::Serialize;
-
 use super::figures::Source;
+use crate::motion::GroundPicture;
 use wheeleg_plant::terrain::{Shape, Terrain};
 
 /// Distance between heights, m.
@@ -15,54 +14,37 @@ const ROCKS: usize = 3000;
 /// Longest track that is drawn, m.
 const LONGEST_M: f64 = 60.0;
 
-/// What the robot stands on.
-#[derive(Serialize)]
-pub(super) struct GroundPicture {
-    /// Where the heights begin, and their distance.
-    from_mm: f64,
-    step_mm: f64,
-    /// Heights along the tracks of the left and the right wheel at the start.
-    left_mm: Vec<f64>,
-    right_mm: Vec<f64>,
-    /// Middle, half length and half width, heading in degrees of what is seen of each rock.
-    rocks: Vec<[f64; 5]>,
-    /// Corners of each block.
-    blocks: Vec<[[f64; 2]; 4]>,
-}
-
 /// A tenth of a millimetre.
 fn mm(metres: f64) -> f64 {
     (metres * 1e4).round() / 10.0 + 0.0
 }
 
-impl GroundPicture {
-    /// Of a run on a terrain of its own.
-    pub(super) fn new(source: &Source<'_>) -> Option<Self> {
-        let ground = &source.scenario.ground;
-        if ground.parts.is_empty() {
-            return None;
-        }
-        let body = &source.recording.body;
-        let x_m = body.iter().map(|row| row.v.x_mm * 1e-3);
-        let (least, most) = x_m.fold((0.0_f64, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
-        let from = ((least - ROUND_M[0]) / STEP_M).floor() * STEP_M;
-        let to = (most + ROUND_M[1]).min(from + LONGEST_M);
-        let half = 0.5 * source.robot.spatial.track_m;
-        let terrain = &ground.terrain;
-        let count = ((to - from) / STEP_M) as usize + 1;
-        let heights = |y: f64| {
-            let at = |k: usize| terrain.height_m(from + k as f64 * STEP_M, y);
-            (0..count).map(|k| mm(at(k).unwrap_or(0.0))).collect()
-        };
-        Some(Self {
-            from_mm: mm(from),
-            step_mm: mm(STEP_M),
-            left_mm: heights(half),
-            right_mm: heights(-half),
-            rocks: rocks(terrain, [from, to]),
-            blocks: blocks(terrain),
-        })
+/// The ground of a run on a terrain of its own.
+pub(super) fn picture(source: &Source<'_>) -> Option<GroundPicture> {
+    let ground = &source.scenario.ground;
+    if ground.parts.is_empty() {
+        return None;
     }
+    let body = &source.recording.body;
+    let x_m = body.iter().map(|row| row.v.x_mm * 1e-3);
+    let (least, most) = x_m.fold((0.0_f64, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+    let from = ((least - ROUND_M[0]) / STEP_M).floor() * STEP_M;
+    let to = (most + ROUND_M[1]).min(from + LONGEST_M);
+    let half = 0.5 * source.robot.spatial.track_m;
+    let terrain = &ground.terrain;
+    let count = ((to - from) / STEP_M) as usize + 1;
+    let heights = |y: f64| {
+        let at = |k: usize| terrain.height_m(from + k as f64 * STEP_M, y);
+        (0..count).map(|k| mm(at(k).unwrap_or(0.0))).collect()
+    };
+    Some(GroundPicture {
+        from_mm: mm(from),
+        step_mm: mm(STEP_M),
+        left_mm: heights(half),
+        right_mm: heights(-half),
+        rocks: rocks(terrain, [from, to]),
+        blocks: blocks(terrain),
+    })
 }
 
 /// What is seen of the rocks from above, within a range of x.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::Summary;
 use super::boards::Boards;
 use super::figures::Source;
-use super::motion::Motion;
+use super::motion::motion;
 use crate::StudyError;
 use crate::analysis::{Judgement, StartDelay, Target};
 use wheeleg_protocol::NODE_NAMES;
@@ -172,7 +172,7 @@ pub(super) fn render(
         .targets
         .iter()
         .filter(|t| summary.complete && t.judgement() == Judgement::Missed);
-    let motion = Motion::new(source);
+    let motion = motion(source);
     // The start-up is a story of its own, told at time zero.
     let all = &source.recording.events;
     let start_up: Vec<String> = all

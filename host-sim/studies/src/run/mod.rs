@@ -21,7 +21,7 @@ use crate::StudyError;
 use crate::analysis::Analyser;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_config::{EventAction, LawChoice, RobotConfig, Scenario, builtin};
+use wheeleg_config::{EventAction, LawChoice, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
 use wheeleg_sim::{self as sil, Boards, DownTimes, SimError};
@@ -151,7 +151,7 @@ fn run_on(
         .with(LogFile::create(&job.folder().join("log.mcap"))?)
         .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?)
         .with(&mut analyser);
-    provenance(&mut recorder, &scenario, &robot, seed);
+    sil::provenance(&mut recorder, &scenario, &robot, seed);
     let duration_ms = (scenario.duration_s * 1e3).round() as u64;
     job.progress.begin(
         format!("{:.0} s simulated", scenario.duration_s),
@@ -250,30 +250,6 @@ fn reserve(folder: &Path) -> Option<File> {
         file.write_all(&vec![0; bytes]).ok()?;
         Some(file)
     })
-}
-
-/// What went into the run, as messages at time zero: part of the log and of
-/// the hash, so without paths and wall-clock times.
-fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotConfig, seed: u64) {
-    recorder.provenance("program", concat!("wheeleg ", env!("CARGO_PKG_VERSION")));
-    recorder.provenance("scenario", &scenario.name);
-    recorder.provenance("robot", &robot.name);
-    recorder.provenance("seed", seed.to_string());
-    for fault in &scenario.faults {
-        recorder.provenance("fault", fault.to_string());
-    }
-    for part in &scenario.ground.parts {
-        recorder.provenance("terrain", part.as_str());
-    }
-    if let Some(fingerprint) = scenario.ground.fingerprint() {
-        recorder.provenance("terrain fingerprint", fingerprint);
-    }
-    for p in &robot.parameters {
-        recorder.provenance(
-            "parameter",
-            format!("{} = {} {}", p.path, p.value_text(), p.unit),
-        );
-    }
 }
 
 /// Folder of a run's results where none is given.

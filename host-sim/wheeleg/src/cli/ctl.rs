@@ -88,6 +88,20 @@ enum CtlCommand {
         /// Simulated time over time of the clock on the wall, 0.1 to 10.
         speed: f64,
     },
+    /// Record: log, and every command with its time, so that `wheeleg replay` can repeat it.
+    Rec {
+        /// Begin or end.
+        #[arg(value_enum)]
+        what: Recording,
+    },
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Recording {
+    /// Begin a recording.
+    Start,
+    /// End it.
+    Stop,
 }
 
 /// Does what is asked of the server.
@@ -104,6 +118,10 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
         CtlCommand::Resume => host(args, "Resume", &json!({})),
         CtlCommand::Step { cycles } => host(args, "Step", &json!({ "cycles": cycles })),
         CtlCommand::Speed { speed } => host(args, "Speed", &json!({ "speed": speed })),
+        CtlCommand::Rec { what } => match what {
+            Recording::Start => host(args, "RecordStart", &json!({})),
+            Recording::Stop => host(args, "RecordStop", &json!({})),
+        },
     }
 }
 
@@ -143,6 +161,17 @@ fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
         state["pace"]["speed"],
         state["pace"]["paused"],
     );
+    if let Value::Object(recording) = &state["recording"] {
+        let _ = match &recording["failure"] {
+            Value::Null => writeln!(text, "recording {}", word(&recording["id"])),
+            failure => writeln!(
+                text,
+                "recording {} ended early: {}",
+                word(&recording["id"]),
+                word(failure)
+            ),
+        };
+    }
     for board in state["boards"].as_array().into_iter().flatten() {
         let _ = writeln!(text, "board {}  {}", board["address"], word(&board["mode"]));
         for fault in board["faults"].as_array().into_iter().flatten() {

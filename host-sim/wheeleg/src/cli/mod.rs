@@ -15,10 +15,12 @@ mod list;
 mod log;
 mod params;
 mod plant;
+mod replay;
 mod run;
 mod serve;
 mod tune;
 mod usage;
+mod view;
 
 use std::fmt::Display;
 use std::io::Write as _;
@@ -72,6 +74,8 @@ enum Command {
     Serve(serve::ServeArgs),
     /// See and drive the robot that `wheeleg serve` runs.
     Ctl(ctl::CtlArgs),
+    /// Repeat a recording of `wheeleg serve`, and compare it with what was recorded.
+    Replay(replay::ReplayArgs),
     /// List the built-in scenarios and robots.
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
@@ -98,6 +102,8 @@ enum Command {
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
     Check(check::CheckArgs),
+    /// Open a log as a page: the robot plays it; two logs are compared.
+    View(view::ViewArgs),
     /// Recover the log of a run that was killed.
     Log(log::LogArgs),
     /// Tell in what the bus interface of this program differs from another.
@@ -112,6 +118,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
+        Some(Command::Replay(args)) => replay::command(&args),
         Some(Command::Serve(args)) => serve::command(&args),
         Some(Command::Ctl(args)) => ctl::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),
@@ -127,6 +134,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Tune(args)) => tune::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
+        Some(Command::View(args)) => view::command(&args),
         Some(Command::Log(args)) => log::command(&args),
         Some(Command::Interface(args)) => interface::command(&args),
     };

@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::Args;
 use wheeleg_config::builtin;
 use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
-use wheeleg_console::{ADDRESS, ConsoleError, Live, Options, Server};
+use wheeleg_console::{ADDRESS, ConsoleError, FOLDER, Live, Options, Server};
 use wheeleg_studies::StudyError;
 
 use super::{print, stop_on_signals, tell};
@@ -34,6 +34,13 @@ pub(super) struct ServeArgs {
     /// Begin with the clock standing.
     #[arg(long)]
     paused: bool,
+    /// Record from power-up on: log, and every command with its time, so that `wheeleg replay`
+    /// can repeat it. The page and `wheeleg ctl rec start` begin a recording at any time.
+    #[arg(long)]
+    record: bool,
+    /// Folder in which each recording gets a folder of its own.
+    #[arg(long, value_name = "DIR", default_value = FOLDER)]
+    recordings: PathBuf,
     /// Make new keys: the old ones open nothing any more.
     #[arg(long)]
     new_key: bool,
@@ -60,11 +67,7 @@ fn parse_speed(text: &str) -> Result<Speed, String> {
 /// Serves until it is told to stop.
 pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
-    let scenario = builtin::scenario(&args.scenario)?;
-    let robot = match &args.robot {
-        Some(robot) => builtin::robot(robot)?,
-        None => builtin::robot_of(&scenario.robot, &args.scenario)?,
-    };
+    let live = Live::load(&args.scenario, args.robot.as_deref())?;
     let folder = keys::folder().map_err(refused)?;
     let open = if args.new_key {
         Keys::renew
@@ -74,16 +77,17 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     let keys = open(&folder).map_err(refused)?;
     let control = keys.control.to_hex();
     let live = Live {
-        scenario,
-        robot,
         speed: match args.speed {
             Speed::Times(speed) => Some(speed),
             Speed::Max => None,
         },
         paused: args.paused,
+        ..live
     };
     let server = Server::start(Options {
         live,
+        recordings: args.recordings.clone(),
+        record: args.record,
         listen: args.listen,
         keys,
         page: args.page_dir.clone(),
@@ -99,10 +103,14 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     }
     let _ = writeln!(
         text,
-        "to drive {}\nto look  {}\nCtrl-C ends it.",
+        "to drive {}\nto look  {}",
         folder.join(CONTROL_FILE).display(),
         folder.join(VIEW_FILE).display()
     );
+    if args.record {
+        let _ = writeln!(text, "records  {}", args.recordings.display());
+    }
+    text.push_str("Ctrl-C ends it.\n");
     print(&text)?;
     loop {
         if let Some(signal) = stop.signal() {

@@ -1,0 +1,133 @@
+//! The robot's side of a recording: everything goes into one ring, so that order is kept.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use wheeleg_telemetry::{SampleRef, Sink, Taken};
+
+use super::{Given, Note, Shared};
+use crate::live::Moving;
+
+/// Places of the ring that samples leave for inputs, begin and end.
+const RESERVE: usize = 2_048;
+/// How long the end of a recording may wait for its place when the robot is switched off.
+const LAST_WORDS: Duration = Duration::from_secs(5);
+
+/// Takes what the robot is given and what is sampled of it.
+pub(crate) struct Feed {
+    to: rtrb::Producer<Note>,
+    shared: Arc<Shared>,
+    /// Number of the newest recording.
+    number: u64,
+    running: bool,
+    dropped: u64,
+}
+
+impl Feed {
+    pub(super) fn new(to: rtrb::Producer<Note>, shared: Arc<Shared>, running: bool) -> Self {
+        Self {
+            to,
+            shared,
+            number: u64::from(running),
+            running,
+            dropped: 0,
+        }
+    }
+
+    /// Whether a recording is under way; false once its disk has failed.
+    pub(crate) fn is_running(&mut self) -> bool {
+        if self.running && self.shared.failed.load(Ordering::Acquire) == self.number {
+            self.running = false;
+        }
+        self.running
+    }
+
+    /// Begins a recording, or says why not.
+    pub(crate) fn begin(&mut self, request: u32, at_us: u64) -> Result<(), &'static str> {
+        if self.is_running() {
+            return Err("a recording is under way: stop it first");
+        }
+        let number = self.number + 1;
+        let note = Note::Begin {
+            number,
+            request,
+            at_us,
+        };
+        self.to.push(note).map_err(|_| "the recorder is busy")?;
+        (self.number, self.running, self.dropped) = (number, true, 0);
+        self.shared.dropped.store(0, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Ends the recording, or says why not. `hash` is of everything since power-up.
+    pub(crate) fn end(
+        &mut self,
+        request: Option<u32>,
+        at_us: u64,
+        hash: String,
+    ) -> Result<(), &'static str> {
+        if !self.is_running() {
+            return Err("nothing is being recorded");
+        }
+        let note = Note::End {
+            request,
+            at_us,
+            hash,
+            dropped: self.dropped,
+        };
+        self.to.push(note).map_err(|_| "the recorder is busy")?;
+        self.running = false;
+        Ok(())
+    }
+
+    /// Ends the recording of a robot that is switched off: it waits for the disk.
+    pub(crate) fn close(&mut self, at_us: u64, hash: &str) {
+        let begin = Instant::now();
+        while self.is_running()
+            && self.end(None, at_us, hash.to_owned()).is_err()
+            && begin.elapsed() < LAST_WORDS
+        {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// The robot was given something when it had been simulated up to `ms`.
+    pub(crate) fn given(&mut self, ms: u64, given: Given) {
+        if self.to.push(Note::Input { ms, given }).is_err() {
+            self.shared.gap.store(true, Ordering::Release);
+        }
+    }
+}
+
+/// The sink of a [`Feed`]: what is due in the log.
+pub(crate) struct FeedSink(pub(crate) Rc<RefCell<Feed>>);
+
+impl Sink for FeedSink {
+    fn take(&mut self, taken: &Taken<'_>) {
+        // What went into a run stands in every recording, whenever it begins.
+        let head = matches!(taken.sample, SampleRef::Provenance(_));
+        let mut feed = self.0.borrow_mut();
+        if !taken.due || !(feed.running || head) {
+            return;
+        }
+        let moving = Moving {
+            channel: taken.channel as u16,
+            number: 0,
+            t_ns: taken.t_ns,
+            sample: taken.sample.to_owned(),
+        };
+        let full = feed.to.slots() < RESERVE;
+        if full
+            || feed
+                .to
+                .push(Note::Sample(Box::new(moving), taken.lost))
+                .is_err()
+        {
+            feed.dropped += 1;
+            feed.shared.dropped.store(feed.dropped, Ordering::Relaxed);
+        }
+    }
+}

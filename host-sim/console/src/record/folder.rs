@@ -1,0 +1,226 @@
+//! The folder of a recording: `log.mcap`, `inputs.jsonl`, the robot's and the scenario's file, and
+//! `recording.json`, which says what it is of and how it ended.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use wheeleg_telemetry::{LogFile, OwnedSample, Sink as _, Taken};
+
+use super::About;
+use super::inputs::Line;
+use crate::live::Moving;
+
+/// The log.
+pub(crate) const LOG: &str = "log.mcap";
+/// What the robot was given.
+pub(crate) const INPUTS: &str = "inputs.jsonl";
+/// The robot's file.
+pub(crate) const ROBOT: &str = "robot.toml";
+/// The scenario's file.
+pub(crate) const SCENARIO: &str = "scenario.toml";
+/// What the recording is of, and how it ended.
+pub(crate) const SUMMARY: &str = "recording.json";
+
+/// Most recordings in one folder.
+const MOST: u32 = 9_999;
+
+/// Contents of `recording.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Name of its folder.
+    pub id: String,
+    /// Program that recorded it.
+    pub program: String,
+    /// Robot.
+    pub robot: String,
+    /// Scenario: ground and pose.
+    pub scenario: String,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Master time of its begin, µs.
+    pub begin_us: u64,
+    /// Master time of its end, µs; none while it is under way, or if it was cut short.
+    pub end_us: Option<u64>,
+    /// Hash of everything from power-up to its end.
+    pub hash: Option<String>,
+    /// Messages that the log lacks.
+    pub dropped: u64,
+    /// All inputs since power-up are there.
+    pub repeatable: bool,
+    /// Why it ended early.
+    pub failure: Option<String>,
+}
+
+/// A recording under way.
+pub(super) struct Folder {
+    path: PathBuf,
+    log: LogFile,
+    inputs: BufWriter<File>,
+    line: Vec<u8>,
+    /// Messages that were not to be written.
+    lost: u64,
+    /// What will stand in `recording.json`.
+    pub(super) summary: Summary,
+}
+
+/// A failure of a file, for a person.
+fn said(path: &Path, error: &std::io::Error) -> String {
+    format!("{}: {error}", path.display())
+}
+
+/// A folder of the next free number.
+fn numbered(root: &Path) -> Result<(String, PathBuf), String> {
+    fs::create_dir_all(root).map_err(|e| said(root, &e))?;
+    let taken = fs::read_dir(root).map_err(|e| said(root, &e))?;
+    let taken = taken.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse::<u32>().ok());
+    let next = taken.filter(|n| *n <= MOST).max().unwrap_or(0) + 1;
+    for number in next..=MOST {
+        let id = format!("{number:04}");
+        let path = root.join(&id);
+        match fs::create_dir(&path) {
+            Ok(()) => return Ok((id, path)),
+            // Another server has just taken it.
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+            Err(e) => return Err(said(&path, &e)),
+        }
+    }
+    Err(format!("{}: {MOST} recordings are there", root.display()))
+}
+
+impl Folder {
+    /// Makes a new folder; `before` are the inputs since power-up.
+    pub(super) fn create(
+        root: &Path,
+        about: &About,
+        begin_us: u64,
+        head: &[(u16, OwnedSample)],
+        before: Option<&[u8]>,
+    ) -> Result<Self, String> {
+        let (id, path) = numbered(root)?;
+        for (name, text) in [(ROBOT, &about.robot_toml), (SCENARIO, &about.scenario_toml)] {
+            let file = path.join(name);
+            fs::write(&file, text).map_err(|e| said(&file, &e))?;
+        }
+        let file = path.join(INPUTS);
+        let inputs = File::create_new(&file).map_err(|e| said(&file, &e))?;
+        let log = LogFile::create(&path.join(LOG)).map_err(|e| e.to_string())?;
+        let mut folder = Self {
+            log,
+            inputs: BufWriter::new(inputs),
+            line: Vec::with_capacity(256),
+            lost: 0,
+            summary: Summary {
+                id,
+                program: concat!("wheeleg ", env!("CARGO_PKG_VERSION")).to_owned(),
+                robot: about.robot.clone(),
+                scenario: about.scenario.clone(),
+                seed: about.seed,
+                begin_us,
+                end_us: None,
+                hash: None,
+                dropped: 0,
+                repeatable: before.is_some(),
+                failure: None,
+            },
+            path,
+        };
+        for (channel, sample) in head {
+            folder.put(*channel, 0, sample, false);
+        }
+        let written = folder.inputs.write_all(before.unwrap_or_default());
+        written.map_err(|e| said(&file, &e))?;
+        folder.flush()?;
+        folder.save()?;
+        Ok(folder)
+    }
+
+    /// Adds a sample to the log.
+    pub(super) fn sample(&mut self, moving: &Moving, lost: bool) -> Result<(), String> {
+        self.put(moving.channel, moving.t_ns, &moving.sample, lost);
+        self.log
+            .failure()
+            .map_or(Ok(()), |why| Err(why.to_string()))
+    }
+
+    fn put(&mut self, channel: u16, t_ns: u64, sample: &OwnedSample, lost: bool) {
+        self.lost += u64::from(lost);
+        self.log.take(&Taken {
+            channel: channel.into(),
+            number: 0,
+            t_ns,
+            sample: sample.as_ref(),
+            due: true,
+            lost,
+        });
+    }
+
+    /// Adds an input.
+    pub(super) fn input(&mut self, line: &Line) -> Result<(), String> {
+        self.line.clear();
+        line.push_to(&mut self.line);
+        let written = self.inputs.write_all(&self.line);
+        written.map_err(|e| said(&self.path.join(INPUTS), &e))
+    }
+
+    /// Hands the inputs to the operating system: a killed program loses no more than since then.
+    pub(super) fn flush(&mut self) -> Result<(), String> {
+        let flushed = self.inputs.flush();
+        flushed.map_err(|e| said(&self.path.join(INPUTS), &e))
+    }
+
+    /// Ends the recording. What can be written is written, whatever fails.
+    pub(super) fn finish(&mut self) -> Result<(), String> {
+        let log = self.log.finish().map_err(|e| e.to_string());
+        let inputs = self.flush();
+        self.summary.dropped += self.lost;
+        let failure = log.err().or(inputs.err());
+        self.summary.failure = self.summary.failure.take().or(failure);
+        let saved = self.save();
+        self.summary.failure.clone().map_or(saved, Err)
+    }
+
+    fn save(&self) -> Result<(), String> {
+        let path = self.path.join(SUMMARY);
+        // A part of the file would be worse than none.
+        let beside = self.path.join("recording.json.new");
+        let text = serde_json::to_string_pretty(&self.summary).map_err(|e| e.to_string())?;
+        fs::write(&beside, text + "\n")
+            .and_then(|()| fs::rename(&beside, &path))
+            .map_err(|e| {
+                let _ = fs::remove_file(&beside);
+                said(&path, &e)
+            })
+    }
+}
+
+/// Largest `recording.json`.
+const SUMMARY_MAX: u64 = 64 * 1024;
+
+/// Reads the `recording.json` of a folder.
+pub(crate) fn summary(folder: &Path) -> Result<Summary, String> {
+    let path = folder.join(SUMMARY);
+    let size = fs::metadata(&path).map_err(|e| said(&path, &e))?.len();
+    if size > SUMMARY_MAX {
+        return Err(format!("{}: {size} bytes are too many", path.display()));
+    }
+    let text = fs::read_to_string(&path).map_err(|e| said(&path, &e))?;
+    serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// The recordings of a folder, newest first, with the bytes of their logs.
+pub(crate) fn list(root: &Path, most: usize) -> Vec<(Summary, u64)> {
+    let Ok(entries) = fs::read_dir(root) else {
+        return Vec::new();
+    };
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| name.parse::<u32>().is_ok()).collect();
+    names.sort_unstable_by(|a, b| b.cmp(a));
+    let read = names.iter().filter_map(|name| {
+        let folder = root.join(name);
+        let bytes = fs::metadata(folder.join(LOG)).map_or(0, |m| m.len());
+        Some((summary(&folder).ok()?, bytes))
+    });
+    read.take(most).collect()
+}

@@ -1,0 +1,138 @@
+//! The file `inputs.jsonl` of a recording: a line of JSON for each thing that the robot was given.
+//!
+//! `ms` is the simulated time, since power-up, up to which the robot had been simulated; lines of
+//! the same `ms` are in the order in which it took them.
+
+use serde::{Deserialize, Serialize};
+
+use super::Given;
+use crate::request::Spoken;
+
+/// Longest line: a frame of a client and what is around it.
+pub(crate) const LINE_MAX: usize = 8 * 1024;
+
+/// A line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Line {
+    /// Simulated time, ms.
+    pub(crate) ms: u64,
+    /// What was given.
+    #[serde(flatten)]
+    pub(crate) input: Input,
+}
+
+/// What was given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Input {
+    /// The operator has seen the robot as it was at this time, µs.
+    Beat(u64),
+    /// A stop, by its number.
+    Stop(u32),
+    /// A command of the operator.
+    Command(CommandInput),
+    /// A fault begins.
+    FaultBegins(String),
+    /// A fault ends.
+    FaultEnds(String),
+    /// The clock goes otherwise. The robot does not notice; it stands here for who reads.
+    Pace(PaceInput),
+    /// Hash of everything until now.
+    Hash(String),
+}
+
+/// A command of the operator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct CommandInput {
+    /// Number of the request.
+    pub(crate) id: u32,
+    /// Master time by which it must begin, µs.
+    pub(crate) deadline_us: u64,
+    /// The command.
+    pub(crate) spoken: Spoken,
+}
+
+/// How the clock goes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PaceInput {
+    /// Simulated over wall time; none: as fast as it goes.
+    pub(crate) speed: Option<f64>,
+    /// It stands.
+    pub(crate) paused: bool,
+}
+
+impl Line {
+    pub(super) fn new(ms: u64, given: Given) -> Self {
+        // A fault begins or ends at its line: the time that its text could hold is none.
+        let name = |fault: &wheeleg_config::faults::FaultSpec| {
+            let text = fault.to_string();
+            text.split('@').next().unwrap_or_default().to_owned()
+        };
+        let input = match given {
+            Given::Beat(seen_us) => Input::Beat(seen_us),
+            Given::Stop(number) => Input::Stop(number),
+            Given::Command {
+                id,
+                deadline_us,
+                spoken,
+            } => Input::Command(CommandInput {
+                id,
+                deadline_us,
+                spoken,
+            }),
+            Given::Fault(fault, true) => Input::FaultBegins(name(&fault)),
+            Given::Fault(fault, false) => Input::FaultEnds(name(&fault)),
+            Given::Pace { speed, paused } => Input::Pace(PaceInput { speed, paused }),
+            Given::Hash(hash) => Input::Hash(hash),
+        };
+        Self { ms, input }
+    }
+
+    /// The line with its end.
+    pub(super) fn push_to(&self, out: &mut Vec<u8>) {
+        // Plain data is JSON: this cannot fail.
+        if serde_json::to_writer(&mut *out, self).is_ok() {
+            out.push(b'\n');
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let spoken =
+            serde_json::from_str(r#"{"cmd":"JointReference","args":{"joint":3,"stroke":120.3}}"#);
+        let given = [
+            Given::Beat(81_230_000),
+            Given::Stop(2),
+            Given::Command {
+                id: 7,
+                deadline_us: 81_730_000,
+                spoken: spoken.expect("a command"),
+            },
+            Given::Fault("supply-sag=3.25@0s".parse().expect("a fault"), true),
+            Given::Fault("pot-open:joint3@0s".parse().expect("a fault"), false),
+            Given::Pace {
+                speed: None,
+                paused: true,
+            },
+            Given::Hash("ab".to_owned()),
+        ];
+        for given in given {
+            let line = Line::new(12, given);
+            let mut text = Vec::new();
+            line.push_to(&mut text);
+            assert_eq!(text.iter().filter(|b| **b == b'\n').count(), 1);
+            let read: Line = serde_json::from_slice(&text).expect("a line");
+            assert_eq!(read, line);
+        }
+        let line = Line::new(
+            0,
+            Given::Fault("supply-sag=3.25@0s".parse().expect("a fault"), true),
+        );
+        assert_eq!(line.input, Input::FaultBegins("supply-sag=3.25".to_owned()));
+    }
+}

@@ -1,0 +1,218 @@
+//! Recordings of a live robot. The robot's thread tells what it was given and what was sampled, in
+//! one ring; a thread of its own writes that into a folder. A slow or full disk costs data, counted
+//! and told, never a tick.
+//!
+//! A recording can be repeated ([`crate::replay()`]): the seed and the robot are in its folder, and
+//! every input since power-up stands in it with the millisecond at which the robot's thread took
+//! it. So it may begin at any time; its log begins with it, its inputs with the power.
+
+mod feed;
+pub(crate) mod folder;
+pub(crate) mod inputs;
+mod writer;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+use wheeleg_config::faults::FaultSpec;
+use wheeleg_config::{RobotConfig, Scenario};
+
+use crate::error::ConsoleError;
+use crate::live::Moving;
+use crate::request::Spoken;
+
+pub(crate) use feed::{Feed, FeedSink};
+pub use folder::Summary;
+
+/// Where recordings go unless told otherwise.
+pub const FOLDER: &str = "runs/live";
+
+/// What may wait for the disk: some seconds of the log.
+const NOTES: usize = 32_768;
+
+/// What a recording is of.
+#[derive(Debug, Clone)]
+pub(crate) struct About {
+    /// Robot.
+    pub(crate) robot: String,
+    /// Scenario.
+    pub(crate) scenario: String,
+    /// Seed of all noise.
+    pub(crate) seed: u64,
+    /// Text of the robot's file.
+    pub(crate) robot_toml: String,
+    /// Text of the scenario's file.
+    pub(crate) scenario_toml: String,
+}
+
+impl About {
+    pub(crate) fn new(
+        robot: &RobotConfig,
+        robot_toml: &str,
+        scenario: &Scenario,
+        scenario_toml: &str,
+    ) -> Self {
+        Self {
+            robot: robot.name.clone(),
+            scenario: scenario.name.clone(),
+            seed: scenario.seed,
+            robot_toml: robot_toml.to_owned(),
+            scenario_toml: scenario_toml.to_owned(),
+        }
+    }
+}
+
+/// What the robot's thread tells.
+#[derive(Debug)]
+enum Note {
+    /// A recording begins.
+    Begin {
+        /// Number of the recording since the start of the program.
+        number: u64,
+        /// Number of the request at the hub.
+        request: u32,
+        /// Master time, µs.
+        at_us: u64,
+    },
+    /// The recording ends.
+    End {
+        /// Number of the request at the hub, if somebody asked.
+        request: Option<u32>,
+        /// Master time, µs.
+        at_us: u64,
+        /// Hash of everything since power-up.
+        hash: String,
+        /// Samples for which there was no room in the ring.
+        dropped: u64,
+    },
+    /// The robot was given something.
+    Input {
+        /// Simulated time up to which the robot had been simulated, ms.
+        ms: u64,
+        /// What.
+        given: Given,
+    },
+    /// Something for the log.
+    Sample(Box<Moving>, bool),
+}
+
+/// What a robot is given.
+#[derive(Debug)]
+pub(crate) enum Given {
+    /// The operator has seen it as it was at this time, µs.
+    Beat(u64),
+    /// A stop, by its number.
+    Stop(u32),
+    /// A command of the operator.
+    Command {
+        /// Number of the request.
+        id: u32,
+        /// Master time by which it must begin, µs.
+        deadline_us: u64,
+        /// The command.
+        spoken: Spoken,
+    },
+    /// A fault begins, or ends.
+    Fault(FaultSpec, bool),
+    /// The clock goes otherwise; the robot does not notice.
+    Pace {
+        /// Simulated over wall time.
+        speed: Option<f64>,
+        /// It stands.
+        paused: bool,
+    },
+    /// Hash of everything until now: where a repetition is compared.
+    Hash(String),
+}
+
+/// How a recording stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Status {
+    /// Its id.
+    pub(crate) id: String,
+    /// Master time of its begin, µs.
+    pub(crate) since_us: u64,
+    /// Why it ended early.
+    pub(crate) failure: Option<String>,
+}
+
+/// What all threads know of recordings. The robot's thread touches atomics alone.
+#[derive(Debug, Default)]
+pub(crate) struct Shared {
+    /// Number of the last recording that failed.
+    failed: AtomicU64,
+    /// Samples of the recording for which there was no room.
+    dropped: AtomicU64,
+    /// An input since power-up found no room: nothing can be repeated any more.
+    gap: AtomicBool,
+    status: Mutex<Option<Status>>,
+    answers: Mutex<Vec<(u32, Result<(), String>)>>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shared {
+    /// The recording that is under way, or the last one if it failed.
+    pub(crate) fn status(&self) -> Option<Status> {
+        locked(&self.status).clone()
+    }
+
+    /// Samples of the recording for which there was no room.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// What came of requests, until it is taken.
+    pub(crate) fn take_answers(&self) -> Vec<(u32, Result<(), String>)> {
+        std::mem::take(&mut locked(&self.answers))
+    }
+}
+
+/// Recordings of one server.
+#[derive(Debug)]
+pub(crate) struct Recordings {
+    pub(crate) shared: Arc<Shared>,
+    /// Folder in which each has a folder.
+    pub(crate) root: PathBuf,
+    pub(crate) thread: JoinHandle<()>,
+}
+
+/// Starts the thread that writes; with `at_once`, the first recording begins with the power.
+///
+/// # Errors
+/// [`ConsoleError::Other`] if the first recording's folder cannot be made.
+pub(crate) fn start(
+    root: &Path,
+    about: About,
+    at_once: bool,
+) -> Result<(Feed, Recordings), ConsoleError> {
+    let shared = Arc::new(Shared::default());
+    let (to, from) = rtrb::RingBuffer::new(NOTES);
+    let mut writer = writer::Writer::new(from, Arc::clone(&shared), root.to_owned(), about);
+    if at_once {
+        writer.begin(1, 0).map_err(|what| {
+            ConsoleError::other(
+                format!("nothing can be recorded: {what}"),
+                "give a folder that can be written with --record DIR, or leave it out",
+            )
+        })?;
+    }
+    let thread = std::thread::Builder::new()
+        .name("recorder".to_owned())
+        .spawn(move || writer.run())
+        .map_err(|e| {
+            let what = format!("the recorder's thread cannot be started: {e}");
+            ConsoleError::other(what, "end other programs, then try again")
+        })?;
+    let feed = Feed::new(to, Arc::clone(&shared), at_once);
+    let recordings = Recordings {
+        shared,
+        root: root.to_owned(),
+        thread,
+    };
+    Ok((feed, recordings))
+}

@@ -1,0 +1,77 @@
+//! Messages of the server to its clients, as JSON.
+
+use serde_json::{Value, json};
+use wheeleg_master::dispatcher::Reject;
+use wheeleg_master::setpoint::Phase;
+use wheeleg_telemetry::EventSample;
+use wheeleg_telemetry::event::reject_name;
+use wheeleg_telemetry::messages::reject;
+
+use crate::live::Answer;
+
+pub(crate) fn event_json(t_ns: u64, event: &EventSample) -> Value {
+    json!({
+        "op": "event",
+        "t_ns": t_ns,
+        "kind": event.kind,
+        "code": event.code,
+        "detail": event.detail,
+        "board": event.board,
+        "fault": event.fault,
+        "command": event.command,
+        "text": event.text,
+    })
+}
+
+pub(crate) fn done(n: u64, now_us: u64) -> Value {
+    json!({ "op": "answer", "n": n, "status": "done", "master_us": now_us })
+}
+
+pub(crate) fn refused(n: u64, reason: &str, text: &str) -> Value {
+    json!({ "op": "answer", "n": n, "status": "refused", "reason": reason, "text": text })
+}
+
+pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
+    let rejected = |why: &Reject| refused(n, reject_name(why), &reject(why));
+    match answer {
+        Answer::Accepted | Answer::Done => done(n, time_us),
+        Answer::Rejected(why) => rejected(why),
+        Answer::Refused(why) => rejected(&Reject::Refused(*why)),
+        Answer::Paused => refused(n, "paused", "the clock stands: resume first"),
+        Answer::SeenInFuture => refused(
+            n,
+            "seen_in_future",
+            "`seen_us` is ahead of the master's time",
+        ),
+        Answer::NoMaster => refused(n, "no_master", "the master does not answer"),
+        Answer::TooFast => refused(
+            n,
+            "too_fast",
+            "above twice real time nobody can be in control: slow down, or release the control",
+        ),
+        Answer::Simulation(why) => refused(n, "simulation", &why.to_string()),
+        Answer::NotRecorded(why) => refused(n, "recording", why),
+    }
+}
+
+pub(crate) const fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Idle => "idle",
+        Phase::Homing => "homing",
+        Phase::Ready => "ready",
+        Phase::Unload => "unload",
+        Phase::Lift => "lift",
+        Phase::Reach => "reach",
+        Phase::Lower => "lower",
+        Phase::Push => "push",
+        Phase::Rest => "rest",
+        Phase::Done => "done",
+        Phase::Trajectory => "trajectory",
+        Phase::Hold => "hold",
+        Phase::Walk => "walk",
+    }
+}
+
+pub(crate) fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}

@@ -1,0 +1,216 @@
+//! Recordings: what an operator did is repeated to the bit, however the recording ended; a folder
+//! that is none, or was tampered with, is told.
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use wheeleg_console::client::http;
+use wheeleg_console::replay::{Replayed, replay};
+use wheeleg_telemetry::first_difference;
+
+use crate::common::{Rig, done, refusal};
+
+fn folder(rig: &Rig, id: &str) -> PathBuf {
+    rig.home.path().join("recordings").join(id)
+}
+
+fn repeated(folder: &Path) -> Replayed {
+    replay(folder, None, &mut |_, _| ControlFlow::Continue(())).expect("a recording")
+}
+
+fn error(folder: &Path) -> String {
+    let told = replay(folder, None, &mut |_, _| ControlFlow::Continue(()));
+    told.expect_err("no recording").to_string()
+}
+
+fn copied(folder: &Path) -> tempfile::TempDir {
+    let copy = tempfile::tempdir().expect("a folder");
+    for entry in fs::read_dir(folder).expect("there") {
+        let from = entry.expect("there").path();
+        fs::copy(&from, copy.path().join(from.file_name().expect("a name"))).expect("copied");
+    }
+    copy
+}
+
+/// An operator arms, moves, tries a fault, stops, and is gone.
+fn drive(rig: &Rig) {
+    let mut driver = rig.driver("driver");
+    let args = json!({ "joint": 3, "stroke": 120.3 });
+    driver
+        .carry_out("JointReference", &args, 500)
+        .expect("sent");
+    rig.until("a while later", |state| {
+        state["master_us"].as_u64() > Some(2_000_000)
+    });
+    let fault = json!({ "fault": "pot-open:joint3" });
+    driver.carry_out("Inject", &fault, 500).expect("sent");
+    rig.until("held", |state| !state["hold"].is_null());
+    driver.carry_out("EndFault", &fault, 500).expect("sent");
+    let (status, _) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
+    assert_eq!(status, 200);
+    drop(driver);
+    rig.until("free", |state| state["control"].is_null());
+}
+
+#[test]
+fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
+    let rig = Rig::recorded(1.0);
+    drive(&rig);
+    let folder = folder(&rig, "0001");
+    let Rig { server, home, .. } = rig;
+    drop(server);
+    let log = home.path().join("again.mcap");
+    let told = replay(&folder, Some(&log), &mut |_, _| ControlFlow::Continue(()));
+    let told = told.expect("a recording");
+    assert!(told.is_same() && !told.cut_short, "{told:?}");
+    // One hash per second, and that of the end.
+    assert!(told.compared > told.end_ms / 1_000, "{told:?}");
+    assert_eq!(told.summary.hash.as_ref(), Some(&told.hash));
+    assert_eq!(told.summary.dropped, 0);
+    let first = first_difference(&folder.join("log.mcap"), &log).expect("two logs");
+    assert_eq!(first, None);
+
+    // One digit of one command makes another session, and the second in which it does is told.
+    let other = copied(&folder);
+    let inputs = other.path().join("inputs.jsonl");
+    let text = fs::read_to_string(&inputs).expect("inputs");
+    assert!(text.contains("120.3"), "{text}");
+    fs::write(&inputs, text.replace("120.3", "120.4")).expect("written");
+    let line = text.lines().find(|line| line.contains("120.3"));
+    let line: Value = serde_json::from_str(line.expect("a line")).expect("JSON");
+    let given_ms = line["ms"].as_u64().expect("a time");
+    let told = repeated(other.path());
+    let (from_ms, to_ms) = told.parted.expect("another session");
+    assert!(!told.is_same());
+    assert!(
+        (from_ms..=to_ms).contains(&given_ms),
+        "{given_ms}: {told:?}"
+    );
+    assert!(to_ms - from_ms <= 1_000, "{told:?}");
+
+    // A program that was killed leaves no end, and perhaps half a line.
+    let killed = copied(&folder);
+    let mut summary: Value =
+        serde_json::from_slice(&fs::read(killed.path().join("recording.json")).expect("read"))
+            .expect("JSON");
+    summary["end_us"] = Value::Null;
+    summary["hash"] = Value::Null;
+    fs::write(killed.path().join("recording.json"), summary.to_string()).expect("written");
+    fs::write(killed.path().join("inputs.jsonl"), &text[..text.len() - 9]).expect("written");
+    let told = repeated(killed.path());
+    assert!(told.is_same() && told.cut_short, "{told:?}");
+    assert!(told.compared >= 2, "{told:?}");
+}
+
+#[test]
+fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
+    let rig = Rig::new();
+    let mut driver = rig.driver("driver");
+    assert_eq!(refusal(&mut driver, "RecordStop", &json!({})), "recording");
+    done(&mut driver, "RecordStart");
+    let state = rig.until("recorded", |state| !state["recording"].is_null());
+    assert_eq!(state["recording"]["id"], "0001");
+    assert_eq!(state["recording"]["failure"], Value::Null);
+    assert_eq!(refusal(&mut driver, "RecordStart", &json!({})), "recording");
+    let mut other = rig.control("other");
+    crate::common::look(&mut other, "state");
+    assert_eq!(
+        refusal(&mut other, "RecordStop", &json!({})),
+        "control_held"
+    );
+    done(&mut driver, "Stand");
+    done(&mut driver, "RecordStop");
+    let state = rig.until("no longer", |state| state["recording"].is_null());
+    assert_eq!(state["armed"], true);
+    done(&mut driver, "RecordStart");
+    done(&mut driver, "RecordStop");
+    let list = || {
+        let (status, list) =
+            http(&rig.url, "GET", "recordings", &rig.keys.view).expect("an answer");
+        assert_eq!(status, 200);
+        list["recordings"].as_array().expect("a list").clone()
+    };
+    let list = list();
+    let ids: Vec<&Value> = list.iter().map(|r| &r["id"]).collect();
+    assert_eq!(ids, ["0002", "0001"]);
+    assert!(list[1]["log_bytes"].as_u64() > Some(10_000), "{list:?}");
+    let first = repeated(&folder(&rig, "0001"));
+    assert!(first.is_same(), "{first:?}");
+    assert!(first.summary.begin_us > 0 && first.inputs > 2);
+    let second = repeated(&folder(&rig, "0002"));
+    assert!(
+        second.is_same() && second.end_ms > first.end_ms,
+        "{second:?}"
+    );
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_told_and_the_robot_goes_on() {
+    let rig = Rig::new();
+    fs::write(rig.home.path().join("recordings"), "a file").expect("written");
+    let mut driver = rig.driver("driver");
+    assert_eq!(refusal(&mut driver, "RecordStart", &json!({})), "recording");
+    let begin = Instant::now();
+    // The place can be freed, and then it can.
+    fs::remove_file(rig.home.path().join("recordings")).expect("removed");
+    done(&mut driver, "RecordStart");
+    done(&mut driver, "RecordStop");
+    assert!(begin.elapsed() < Duration::from_secs(10));
+    assert!(repeated(&folder(&rig, "0001")).is_same());
+    assert_eq!(rig.state()["armed"], true);
+}
+
+#[test]
+fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line() {
+    let nothing = tempfile::tempdir().expect("a folder");
+    assert!(error(nothing.path()).contains("recording.json"));
+    let folder = {
+        let rig = Rig::recorded(2.0);
+        rig.until("ready", |state| state["ready"] == true);
+        let folder = folder(&rig, "0001");
+        drop(rig.server);
+        copied(&folder)
+    };
+    let inputs = folder.path().join("inputs.jsonl");
+    for (lines, wanted) in [
+        (
+            "{\"ms\":5,\"stop\":1}\n{\"ms\":4,\"stop\":2}\n",
+            "line 2: `ms` is 4",
+        ),
+        ("{\"ms\":99999999999999,\"stop\":1}\n", "line 1: `ms`"),
+        ("{\"ms\":1,\"fly\":1}\n", "line 1"),
+        ("\u{0}\u{1}\n", "line 1"),
+        (
+            "{\"ms\":1,\"command\":{\"id\":1,\"deadline_us\":9,\"spoken\":{\"cmd\":\"Fly\",\"args\":{}}}}\n",
+            "no command \"Fly\"",
+        ),
+        (
+            "{\"ms\":1,\"command\":{\"id\":1,\"deadline_us\":9,\"spoken\":{\"cmd\":\"Pause\",\"args\":{}}}}\n",
+            "Pause is no command of the robot",
+        ),
+        (
+            "{\"ms\":1,\"fault_begins\":\"pot-open:joint9\"}\n",
+            "joint9",
+        ),
+    ] {
+        fs::write(&inputs, lines).expect("written");
+        let told = error(folder.path());
+        assert!(
+            told.contains("inputs.jsonl") && told.contains(wanted),
+            "{told}"
+        );
+    }
+    let long = format!("{{\"ms\":1,\"fault_begins\":\"{}\"}}\n", "x".repeat(9_000));
+    fs::write(&inputs, long).expect("written");
+    assert!(error(folder.path()).contains("too long"));
+    fs::remove_file(&inputs).expect("removed");
+    assert!(error(folder.path()).contains("inputs.jsonl"));
+    let summary = folder.path().join("recording.json");
+    fs::write(&summary, "x".repeat(100_000)).expect("written");
+    assert!(error(folder.path()).contains("100000 bytes"));
+    fs::write(&summary, "{}").expect("written");
+    assert!(error(folder.path()).contains("recording.json"));
+}

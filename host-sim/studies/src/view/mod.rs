@@ -1,0 +1,155 @@
+//! Opens the log of a run, or of a live session, as one page: the robot plays it, its signals are
+//! drawn over one clock, its events can be gone to. Two logs are laid over each other and compared.
+//!
+//! A log may be anybody's, may break off, and may be long: memory does not grow with it, but for
+//! the strokes of two that are compared.
+
+mod content;
+mod difference;
+mod page;
+mod signals;
+mod thin;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use wheeleg_config::{Drawing, builtin};
+
+use self::content::{Content, Span};
+use self::signals::Signal;
+use crate::StudyError;
+use crate::study::Progress;
+
+/// What to look at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// One log, or two that are compared.
+    pub logs: Vec<PathBuf>,
+    /// Robot after which it is drawn, instead of the log's: built in, or a file.
+    pub robot: Option<String>,
+    /// Begin of the part that is looked at, s.
+    pub from_s: f64,
+    /// Its end, s.
+    pub to_s: f64,
+    /// Further signals, `/joint/3.force_net_n`.
+    pub signals: Vec<String>,
+    /// The page; beside the first log unless given.
+    pub out: Option<PathBuf>,
+}
+
+/// A page that was made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Viewed {
+    /// Where it is.
+    pub page: PathBuf,
+    /// What it says first.
+    pub verdict: String,
+    /// Logs that break off.
+    pub broken_off: Vec<PathBuf>,
+}
+
+/// A log with its name.
+struct Named {
+    name: String,
+    content: Content,
+}
+
+/// Makes the page; `None` if it was stopped before: no page is written then.
+///
+/// # Errors
+/// [`StudyError`] if a log cannot be read or is none of this program's, a signal or the robot does
+/// not exist, nothing is in the part that is looked at, or the page cannot be written.
+pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, StudyError> {
+    let mut groups = signals::groups();
+    if let Some(asked) = signals::asked(&options.signals)? {
+        groups.insert(0, asked);
+    }
+    let curves = groups.iter().flat_map(|g| &g.plots).flat_map(|p| &p.curves);
+    let wanted: Vec<Signal> = curves.map(|curve| curve.signal).collect();
+    let span = span(options)?;
+    let compared = options.logs.len() > 1;
+    let mut logs = Vec::new();
+    for path in &options.logs {
+        progress.begin(format!("reading {}", path.display()), 0);
+        let content = Content::read(path, span, &wanted, compared, &mut |ms| {
+            progress.at(ms);
+            if progress.is_stopped() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })?;
+        if progress.is_stopped() {
+            return Ok(None);
+        }
+        if content.first_ns.is_none() {
+            return Err(StudyError::refused(
+                format!(
+                    "{}: no sample is in the part that was asked for",
+                    path.display()
+                ),
+                "leave out --from and --to to see where the log begins and ends",
+            ));
+        }
+        let name = path.display().to_string();
+        logs.push(Named { name, content });
+    }
+    let differences = match logs.as_slice() {
+        [one, other] => difference::differences(&one.content, &other.content),
+        _ => Vec::new(),
+    };
+    let (geometry, drawn_as) = geometry(options, &logs[0].content)?;
+    let text = page::make(&logs, &groups, &differences, geometry, drawn_as.as_deref())?;
+    let page = options.out.clone().unwrap_or_else(|| beside(&options.logs));
+    std::fs::write(&page, text).map_err(|e| StudyError::output("write", &page, e))?;
+    progress.clear();
+    let broken_off = options.logs.iter().zip(&logs);
+    let broken_off = broken_off.filter(|(_, log)| !log.content.end.whole);
+    Ok(Some(Viewed {
+        page,
+        verdict: page::verdict(&logs, &differences),
+        broken_off: broken_off.map(|(path, _)| path.clone()).collect(),
+    }))
+}
+
+/// The part that is looked at.
+fn span(options: &Options) -> Result<Span, StudyError> {
+    let Options { from_s, to_s, .. } = *options;
+    if !(from_s >= 0.0 && to_s > from_s) {
+        return Err(StudyError::refused(
+            format!("from {from_s} s to {to_s} s is no part of a log"),
+            "give --from from 0 on, and --to after it",
+        ));
+    }
+    // The casts saturate: the end of no log is as late.
+    Ok(Span {
+        from_ns: (from_s * 1e9) as u64,
+        to_ns: (to_s * 1e9) as u64,
+    })
+}
+
+/// Sizes by which the robot is drawn, and whose they are.
+fn geometry(options: &Options, log: &Content) -> Result<(Drawing, Option<String>), StudyError> {
+    if let Some(name) = &options.robot {
+        let robot = builtin::robot(name)?;
+        return Ok((Drawing::of(&robot), Some(robot.name)));
+    }
+    // A name in a log opens no file.
+    let known = |name: &str| {
+        builtin::ROBOTS
+            .iter()
+            .any(|(built_in, ..)| *built_in == name)
+    };
+    let named = log.about("robot").filter(|name| known(name));
+    let robot = builtin::robot(named.unwrap_or(builtin::DEFAULT_ROBOT))?;
+    Ok((Drawing::of(&robot), Some(robot.name)))
+}
+
+/// The page beside the first log: `log.mcap` gives `log.html`.
+fn beside(logs: &[PathBuf]) -> PathBuf {
+    let first = logs.first().map_or(Path::new("log"), PathBuf::as_path);
+    match logs {
+        [_, _] => first.with_file_name("compared.html"),
+        _ => first.with_extension("html"),
+    }
+}

@@ -1,0 +1,238 @@
+//! The page of one log, or of two.
+
+use serde::Serialize;
+use wheeleg_config::Drawing;
+use wheeleg_report::plot::{Content as Drawn, Figure, Panel, line};
+use wheeleg_report::{Picture, json, page, pictures};
+
+use super::Named;
+use super::difference::Difference;
+use super::signals::{Curve, Group, Plot};
+use crate::StudyError;
+
+const TIME: &str = "time of the log [s]";
+/// Most marks of faults in a panel.
+const MARKS: usize = 20;
+/// Share of an axis that stays free above and below.
+const MARGIN: f64 = 0.05;
+
+#[derive(Serialize)]
+struct Line {
+    t: f64,
+    kind: String,
+    text: String,
+    log: usize,
+}
+
+/// What is said of a log.
+#[derive(Serialize)]
+struct About {
+    name: String,
+    robot: String,
+    scenario: String,
+    program: String,
+    seed: String,
+    from: f64,
+    to: f64,
+    messages: u64,
+    others: u64,
+    whole: bool,
+    more_events: u64,
+    faults: usize,
+}
+
+#[derive(Serialize)]
+struct DifferenceLine {
+    joint: &'static str,
+    largest_mm: f64,
+    at: f64,
+    apart: Option<f64>,
+    times: u64,
+}
+
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    verdict: String,
+    logs: Vec<About>,
+    motion: Option<String>,
+    drawn_as: Option<&'a str>,
+    figures: Vec<Picture<'a>>,
+    events: Vec<Line>,
+    start_up: &'a [String],
+    differences: Vec<DifferenceLine>,
+    head: &'a [(String, String)],
+    version: &'a str,
+}
+
+fn figure(group: &Group, logs: &[Named]) -> Figure {
+    let panels = group.plots.iter().map(|plot| panel(plot, logs)).collect();
+    Figure {
+        id: group.id.to_owned(),
+        title: group.title.to_owned(),
+        caption: group.caption.to_owned(),
+        panels,
+    }
+}
+
+fn panel(plot: &Plot, logs: &[Named]) -> Panel {
+    let ends = logs.iter().map(|log| log.content.range());
+    let x_range = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| {
+        (a.0.min(b.0), a.1.max(b.1))
+    });
+    let mut y_range = plot.least;
+    let mut lines = Vec::new();
+    for (i, log) in logs.iter().enumerate() {
+        for curve in &plot.curves {
+            let Some(thin) = log.content.signals.get(&curve.signal) else {
+                continue;
+            };
+            if let Some((low, high)) = thin.range() {
+                y_range = (y_range.0.min(low), y_range.1.max(high));
+            }
+            let colour = if i == 0 { curve.colour } else { curve.other };
+            lines.push(line(&label(curve, i, logs), colour, 1, thin.points()));
+        }
+    }
+    let margin = MARGIN * (y_range.1 - y_range.0).max(1e-6);
+    let y_range = (y_range.0 - margin, y_range.1 + margin);
+    let content = Drawn::lines((plot.unit, y_range), lines);
+    let x_range = (x_range.0, x_range.1.max(x_range.0 + 1e-3));
+    let mut panel = Panel::new(plot.title.clone(), x_range, 120, content).over(TIME);
+    let faults = logs[0]
+        .content
+        .faults()
+        .map(|event| event.t_ns as f64 * 1e-9);
+    panel.marks = faults.take(MARKS).collect();
+    panel.on_clock = true;
+    panel
+}
+
+/// What the legend says: of two logs, also which.
+fn label(curve: &Curve, log: usize, logs: &[Named]) -> String {
+    let which = match (logs.len(), log) {
+        (1, _) => "",
+        (_, 0) => "first log",
+        _ => "second log",
+    };
+    match (curve.label.as_str(), which) {
+        (label, "") => label.to_owned(),
+        ("", which) => which.to_owned(),
+        (label, which) => format!("{label}, {which}"),
+    }
+}
+
+fn about(log: &Named) -> About {
+    let content = &log.content;
+    let known = |kind| content.about(kind).unwrap_or("not said").to_owned();
+    let (from, to) = content.range();
+    About {
+        name: log.name.clone(),
+        robot: known("robot"),
+        scenario: known("scenario"),
+        program: known("program"),
+        seed: known("seed"),
+        from,
+        to,
+        messages: content.end.messages,
+        others: content.end.others,
+        whole: content.end.whole,
+        more_events: content.more_events,
+        faults: content.faults().count(),
+    }
+}
+
+/// The sentence at the head.
+pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
+    let largest = differences
+        .iter()
+        .filter(|d| d.times > 0)
+        .max_by(|a, b| a.largest_mm.total_cmp(&b.largest_mm));
+    match (logs, largest) {
+        ([_, _], None) => "The two logs have no time in common".to_owned(),
+        ([_, _], Some(d)) if d.largest_mm == 0.0 => {
+            format!(
+                "The strokes of the two logs are equal up to {:.2} s, the last time that both have",
+                d.until_s
+            )
+        }
+        ([_, _], Some(d)) => format!(
+            "The strokes of the two logs differ by up to {:.3} mm: {}, at {:.2} s",
+            d.largest_mm,
+            d.joint.to_lowercase(),
+            d.largest_s
+        ),
+        _ => single(&logs[0]),
+    }
+}
+
+fn single(log: &Named) -> String {
+    let content = &log.content;
+    let (from, to) = content.range();
+    let name = |kind| content.about(kind).unwrap_or("an unnamed one");
+    let what = format!(
+        "{:.2} s of {} on {}",
+        to - from,
+        name("robot"),
+        name("scenario")
+    );
+    let faults = content.faults().count();
+    match content.faults().next() {
+        None => format!("{what}: no fault"),
+        Some(first) => format!(
+            "{what}: {faults} {}, the first at {:.2} s: {}",
+            if faults == 1 { "fault" } else { "faults" },
+            first.t_ns as f64 * 1e-9,
+            first.text()
+        ),
+    }
+}
+
+/// Makes the page.
+pub(super) fn make(
+    logs: &[Named],
+    groups: &[Group],
+    differences: &[Difference],
+    geometry: Drawing,
+    drawn_as: Option<&str>,
+) -> Result<String, StudyError> {
+    let verdict = verdict(logs, differences);
+    let figures: Vec<(Figure, String)> = groups
+        .iter()
+        .map(|group| (figure(group, logs), String::new()))
+        .collect();
+    let motion = logs[0].content.motion(geometry);
+    let mut events: Vec<Line> = Vec::new();
+    for (i, log) in logs.iter().enumerate() {
+        events.extend(log.content.events.iter().map(|event| Line {
+            t: event.t_ns as f64 * 1e-9,
+            kind: event.kind.clone(),
+            text: event.text(),
+            log: i + 1,
+        }));
+    }
+    events.sort_by(|a, b| a.t.total_cmp(&b.t));
+    let differences: Vec<DifferenceLine> = differences
+        .iter()
+        .map(|d| DifferenceLine {
+            joint: d.joint,
+            largest_mm: d.largest_mm,
+            at: d.largest_s,
+            apart: d.apart_s,
+            times: d.times,
+        })
+        .collect();
+    let values = Page {
+        verdict,
+        logs: logs.iter().map(about).collect(),
+        motion: (!motion.is_empty()).then(|| json(&motion)),
+        drawn_as,
+        figures: pictures(&figures),
+        events,
+        start_up: &logs[0].content.start_up,
+        differences,
+        head: &logs[0].content.head,
+        version: env!("CARGO_PKG_VERSION"),
+    };
+    Ok(page(include_str!("template.html"), values)?)
+}

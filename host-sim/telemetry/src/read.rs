@@ -1,0 +1,296 @@
+//! A log, message by message. What is read may be anybody's: a file that breaks off, that is of
+//! another program, or that is made to do harm.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Read as _, Seek as _};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+use mcap::{MAGIC, McapError};
+use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
+
+use super::samples::channels;
+use crate::LogError;
+
+/// Largest record that is read, bytes: ours have at most 4 MB and a message.
+const MAX_RECORD: usize = 64 << 20;
+/// Largest message that is read, bytes.
+const MAX_MESSAGE: usize = 64 * 1024;
+
+/// One message.
+#[derive(Debug, Clone, Copy)]
+pub struct Logged<'a> {
+    /// Index of its channel in [`channels`](crate::channels).
+    pub channel: usize,
+    /// Simulated time, ns.
+    pub t_ns: u64,
+    /// Its values, JSON.
+    payload: &'a [u8],
+}
+
+/// How the reading of a log ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Read {
+    /// Messages of channels of this program.
+    pub messages: u64,
+    /// Messages that are none of this program's, or too long.
+    pub others: u64,
+    /// The log has its end; false where its writer was killed or its disk was full.
+    pub whole: bool,
+}
+
+/// Reads `path` and gives its messages in their order, until `take` breaks.
+///
+/// # Errors
+/// [`LogError::Output`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log,
+/// [`LogError::Foreign`] if it has messages, and none of a channel of this program,
+/// [`LogError::Empty`] if it has none.
+pub fn read(
+    path: &Path,
+    take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
+) -> Result<Read, LogError> {
+    let unreadable = |e| LogError::output("read the log", path, e);
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut magic = Vec::new();
+    let mut begin = file.by_ref().take(MAGIC.len() as u64);
+    begin.read_to_end(&mut magic).map_err(unreadable)?;
+    if magic != MAGIC {
+        return Err(LogError::NotALog { path: path.into() });
+    }
+    file.rewind().map_err(unreadable)?;
+    let options = LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(MAX_RECORD);
+    let places: BTreeMap<&str, usize> = channels().iter().map(|c| c.topic).zip(0..).collect();
+    let mut end = Read {
+        messages: 0,
+        others: 0,
+        whole: true,
+    };
+    for message in MessageReader::new_with_options(BufReader::new(file), options) {
+        let message = match message {
+            Ok(message) => message,
+            Err(McapError::Io(e)) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
+                return Err(unreadable(e));
+            }
+            // The place where it breaks off.
+            Err(_) => {
+                end.whole = false;
+                break;
+            }
+        };
+        let channel = places.get(message.channel.topic.as_str());
+        let Some(channel) = channel.filter(|_| message.data.len() <= MAX_MESSAGE) else {
+            end.others += 1;
+            continue;
+        };
+        end.messages += 1;
+        let logged = Logged {
+            channel: *channel,
+            t_ns: message.log_time,
+            payload: &message.data,
+        };
+        if take(logged).is_break() {
+            break;
+        }
+    }
+    match end {
+        Read { messages: 1.., .. } => Ok(end),
+        Read { others: 1.., .. } => Err(LogError::Foreign { path: path.into() }),
+        _ => Err(LogError::Empty { path: path.into() }),
+    }
+}
+
+/// A value of a message.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scalar {
+    /// Number; a flag is 0 or 1.
+    Number(f64),
+    /// Text.
+    Text(String),
+}
+
+impl Logged<'_> {
+    /// Gives the fields whose names `wanted` has, with their place in it. What else stands in the
+    /// message is passed over, and so is the rest of one that is no JSON.
+    pub fn fields(&self, wanted: &[&str], take: &mut dyn FnMut(usize, Scalar)) {
+        let mut json = serde_json::Deserializer::from_slice(self.payload);
+        let _ = json.deserialize_map(Fields { wanted, take });
+    }
+
+    /// The number of a field; `None` if it has none.
+    #[must_use]
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let mut found = None;
+        self.fields(&[name], &mut |_, value| {
+            if let Scalar::Number(number) = value {
+                found = Some(number);
+            }
+        });
+        found
+    }
+}
+
+struct Fields<'a> {
+    wanted: &'a [&'a str],
+    take: &'a mut dyn FnMut(usize, Scalar),
+}
+
+impl<'de> Visitor<'de> for Fields<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        while let Some(name) = map.next_key::<std::borrow::Cow<'de, str>>()? {
+            let Some(place) = self.wanted.iter().position(|wanted| *wanted == name) else {
+                map.next_value::<IgnoredAny>()?;
+                continue;
+            };
+            match map.next_value::<serde_json::Value>()? {
+                serde_json::Value::Bool(flag) => {
+                    (self.take)(place, Scalar::Number(f64::from(u8::from(flag))));
+                }
+                serde_json::Value::Number(number) => {
+                    if let Some(number) = number.as_f64().filter(|n| n.is_finite()) {
+                        (self.take)(place, Scalar::Number(number));
+                    }
+                }
+                serde_json::Value::String(text) => (self.take)(place, Scalar::Text(text)),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BodySample, FootSample, Recorder};
+
+    fn log(path: &Path) {
+        let mut recorder = Recorder::create(path).expect("created");
+        for ms in 0..1_000_u64 {
+            let body = BodySample {
+                x_mm: ms as f64,
+                ..BodySample::default()
+            };
+            recorder.body(ms * 1_000_000, body);
+            recorder.foot(ms * 1_000_000, 1, FootSample::default());
+        }
+        drop(recorder.finish().expect("finished"));
+    }
+
+    fn bodies(path: &Path) -> Result<(Vec<f64>, Read), LogError> {
+        let mut values = Vec::new();
+        let end = read(path, &mut |logged| {
+            if channels()[logged.channel].topic == "/body" {
+                values.extend(logged.number("x_mm"));
+            }
+            ControlFlow::Continue(())
+        })?;
+        Ok((values, end))
+    }
+
+    #[test]
+    fn messages_come_with_their_values_whole_or_broken_off() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        log(&path);
+        let (values, end) = bodies(&path).expect("a log");
+        assert!(end.whole && values.len() == 100, "{end:?} {}", values.len());
+        assert_eq!((values[0], values[99]), (0.0, 990.0));
+        let bytes = std::fs::read(&path).expect("read");
+        let mut last = 0;
+        for cut in (0..bytes.len()).step_by(bytes.len() / 40) {
+            std::fs::write(&path, &bytes[..cut]).expect("written");
+            match bodies(&path) {
+                Ok((values, end)) => {
+                    assert!(values.len() >= last && !end.whole || values.len() == 100);
+                    last = values.len();
+                }
+                Err(LogError::NotALog { .. }) => assert!(cut < 8),
+                Err(LogError::Empty { .. }) => assert_eq!(last, 0),
+                Err(other) => panic!("{other}"),
+            }
+        }
+        assert!(last > 20, "{last}");
+    }
+
+    #[test]
+    fn rubbish_is_an_answer_and_nothing_grows() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        log(&path);
+        let sound = std::fs::read(&path).expect("read");
+        let mut seed = 1_u64;
+        let mut random = |below: usize| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) as usize % below
+        };
+        for _ in 0..300 {
+            let mut bytes = sound.clone();
+            for _ in 0..=random(8) {
+                let at = MAGIC.len() + random(bytes.len() - MAGIC.len());
+                bytes[at] = random(256) as u8;
+            }
+            std::fs::write(&path, &bytes).expect("written");
+            let _ = bodies(&path);
+        }
+        std::fs::write(&path, "no log").expect("written");
+        assert!(matches!(bodies(&path), Err(LogError::NotALog { .. })));
+        assert!(matches!(
+            bodies(&folder.path().join("none")),
+            Err(LogError::Output { .. })
+        ));
+    }
+
+    #[test]
+    fn a_log_of_another_program_is_told() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        let file = std::io::BufWriter::new(File::create(&path).expect("created"));
+        let mut log = mcap::Writer::new(file).expect("a log");
+        let id = log.add_channel(0, "/camera", "json", &BTreeMap::new());
+        let header = mcap::records::MessageHeader {
+            channel_id: id.expect("a channel"),
+            sequence: 0,
+            log_time: 0,
+            publish_time: 0,
+        };
+        log.write_to_known_channel(&header, b"{}").expect("written");
+        log.finish().expect("finished");
+        drop(log);
+        let told = bodies(&path).expect_err("foreign").to_string();
+        assert!(told.contains("no message of a channel"), "{told}");
+    }
+
+    #[test]
+    fn fields_are_numbers_flags_and_texts_and_the_rest_is_passed_over() {
+        let logged = Logged {
+            channel: 0,
+            t_ns: 0,
+            payload: br#"{"a":[1,{"b":2}],"b":-2.5,"c":true,"d":"x","e":1e999,"f":null}"#,
+        };
+        assert_eq!(logged.number("b"), Some(-2.5));
+        assert_eq!(logged.number("c"), Some(1.0));
+        for none in ["a", "d", "e", "f", "g"] {
+            assert_eq!(logged.number(none), None, "{none}");
+        }
+        let mut text = None;
+        logged.fields(&["d"], &mut |_, value| text = Some(value));
+        assert_eq!(text, Some(Scalar::Text("x".to_owned())));
+        let broken = Logged {
+            payload: br#"{"b":1,"c"#,
+            ..logged
+        };
+        assert_eq!(broken.number("b"), Some(1.0));
+    }
+}

@@ -1,0 +1,122 @@
+//! `wheeleg replay`: a recorded live session, once more.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use serde_json::json;
+use wheeleg_console::replay::{Replayed, replay};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::study::Progress;
+
+use super::serve::refused;
+use super::{TARGETS_MISSED, print, stop_on_signals, tell};
+
+/// Arguments of `wheeleg replay`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Exit codes: 0 the robot did the same to the bit; 1 it did not, or there is nothing to compare with; 2 error."
+)]
+pub(super) struct ReplayArgs {
+    /// Folder of a recording, such as runs/live/0001.
+    folder: PathBuf,
+    /// Write the log, from power-up on, to this file.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Print what came of it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Repeats and compares.
+pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
+    let stop = stop_on_signals()?;
+    let progress = Progress::new("replay", stop.clone());
+    let mut begun = false;
+    let replayed = replay(&args.folder, args.log.as_deref(), &mut |ms, of_ms| {
+        if !begun {
+            begun = true;
+            progress.begin(format!("{:.0} s", of_ms as f64 * 1e-3), of_ms);
+        }
+        progress.at(ms);
+        if stop.is_asked() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    progress.clear();
+    let replayed = replayed.map_err(refused)?;
+    let printed = if args.json {
+        print(&format!("{:#}\n", as_json(&replayed)))
+    } else {
+        print(&as_text(&replayed))
+    };
+    if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {
+        tell("stopped; what was repeated until then is compared");
+        return Ok(ExitCode::from(signal.exit_code()));
+    }
+    printed?;
+    Ok(if replayed.is_same() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(TARGETS_MISSED)
+    })
+}
+
+fn as_json(replayed: &Replayed) -> serde_json::Value {
+    json!({
+        "recording": replayed.summary,
+        "end_s": replayed.end_ms as f64 * 1e-3,
+        "inputs": replayed.inputs,
+        "hash": replayed.hash,
+        "hashes_compared": replayed.compared,
+        "same": replayed.is_same(),
+        "parted_between_s": replayed.parted.map(|(a, b)| [a as f64 * 1e-3, b as f64 * 1e-3]),
+        "stopped": replayed.stopped,
+        "cut_short": replayed.cut_short,
+    })
+}
+
+fn as_text(replayed: &Replayed) -> String {
+    let summary = &replayed.summary;
+    let s = |ms: u64| ms as f64 * 1e-3;
+    let verdict = match replayed.parted {
+        None if replayed.compared == 0 => {
+            "there is no hash in the recording to compare with".to_owned()
+        }
+        None => format!(
+            "the robot did the same to the bit: {} hashes compared",
+            replayed.compared
+        ),
+        Some((from, to)) => {
+            let why = if summary.program == concat!("wheeleg ", env!("CARGO_PKG_VERSION")) {
+                "the program may have been built from other sources"
+            } else {
+                "another program recorded it"
+            };
+            format!(
+                "the robot did something else from between {:.3} s and {:.3} s on; {why}: {}",
+                s(from),
+                s(to),
+                summary.program
+            )
+        }
+    };
+    let cut_short = if replayed.cut_short || summary.end_us.is_none() {
+        "the recording was cut short; it is repeated as far as it goes\n"
+    } else {
+        ""
+    };
+    format!(
+        "{cut_short}{verdict}\nrecording {}: {} on {}, seed {}\ntime    {:.3} s since power-up, {} inputs\nhash    {}\n",
+        summary.id,
+        summary.robot,
+        summary.scenario,
+        summary.seed,
+        s(replayed.end_ms),
+        replayed.inputs,
+        replayed.hash
+    )
+}

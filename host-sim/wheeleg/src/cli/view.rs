@@ -1,0 +1,71 @@
+//! `wheeleg view`: a log, or two, as one page.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use wheeleg_studies::StudyError;
+use wheeleg_studies::study::Progress;
+use wheeleg_studies::view::{Options, view};
+
+use super::{print, stop_on_signals, tell};
+
+/// Arguments of `wheeleg view`.
+#[derive(Debug, Args)]
+pub(super) struct ViewArgs {
+    /// A log, `log.mcap` of a run or of a recording; two are laid over each other.
+    #[arg(required = true, num_args = 1..=2, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Begin of the part to look at, in seconds of the log.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    from: f64,
+    /// Its end [default: that of the log].
+    #[arg(long, value_name = "S")]
+    to: Option<f64>,
+    /// Another signal to draw, such as /joint/3.force_net_n; may be given several times.
+    /// `wheeleg channels` lists them.
+    #[arg(long = "signal", value_name = "CHANNEL.FIELD")]
+    signals: Vec<String>,
+    /// Robot by whose sizes it is drawn (built in, or path of a TOML file), instead of the log's.
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    /// The page [default: beside the first log, log.html].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Makes the page and says where it is.
+pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
+    let stop = stop_on_signals()?;
+    let progress = Progress::new("view", stop.clone());
+    let options = Options {
+        logs: args.logs.clone(),
+        robot: args.robot.clone(),
+        from_s: args.from,
+        to_s: args.to.unwrap_or(f64::INFINITY),
+        signals: args.signals.clone(),
+        out: args.out.clone(),
+    };
+    let viewed = view(&options, &progress);
+    progress.clear();
+    match (viewed?, stop.signal()) {
+        (Some(viewed), _) => {
+            for log in &viewed.broken_off {
+                tell(&format!(
+                    "{} breaks off: what was written until then is shown",
+                    log.display()
+                ));
+            }
+            print(&format!(
+                "{}\npage    {}\n",
+                viewed.verdict,
+                viewed.page.display()
+            ))
+        }
+        (None, Some(signal)) => {
+            tell("stopped; no page is written, and the log stays as it is");
+            Ok(ExitCode::from(signal.exit_code()))
+        }
+        (None, None) => Ok(ExitCode::SUCCESS),
+    }
+}

@@ -1,0 +1,90 @@
+"""Drives a simulated robot with the Python client, `host-sim/console/python/wheeleg.py`.
+
+    python3 check_client.py WHEELEG
+
+Every channel is read; a robot is armed, moved and recorded; what is wrong is refused by name; a viewer may
+look and stop; a program whose connection is cut loses the control.
+"""
+
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "host-sim/console/python"))
+from wheeleg import Refused, Robot
+
+
+@contextlib.contextmanager
+def served(program, home):
+    """`wheeleg serve` in a home of its own: address, keys, folder of recordings, process."""
+    recordings = home / "recordings"
+    arguments = [program, "serve", "stand", "--listen", "127.0.0.1:0", "--recordings", str(recordings)]
+    environment = dict(os.environ, XDG_STATE_HOME=str(home))
+    process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True)
+    try:
+        address = process.stdout.readline().split()[1].removeprefix("http://").rstrip("/")
+        keys = {name: (home / "wheeleg" / f"{name}.key").read_text() for name in ("control", "view")}
+        yield address, keys, recordings, process.pid
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def refused(reason, act):
+    try:
+        act()
+    except Refused as error:
+        assert error.reason == reason, f"{error.reason}, not {reason}"
+        return
+    raise AssertionError(f"not refused: {reason}")
+
+
+def main(program):
+    with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings, _):
+        try:
+            Robot(address, "0" * 64)
+            raise AssertionError("a wrong key opens")
+        except urllib.error.HTTPError as error:
+            assert error.code == 401, error
+        with Robot(address, keys["control"]) as robot:
+            robot.until(lambda state: state["ready"])
+            topics = [c["topic"] for c in robot.get("channels")["channels"]]
+            told = [topic for topic in topics if not topic.startswith(("/run", "/events", "/link"))]
+            robot.subscribe(*topics)
+            for topic in told:
+                assert robot.latest(topic)["t_ns"] > 0, topic
+            refused("not_in_control", lambda: robot.command("Arm"))
+            with robot.control():
+                robot.command("RecordStart")
+                robot.command("Arm")
+                refused("bad_argument", lambda: robot.command("JointReference", joint=9, stroke=1.0))
+                robot.command("JointReference", joint=2, stroke=60.0)
+                begin = time.monotonic()
+                while abs(robot.latest("/joint/2")["sensed_mm"] - 60.0) > 5.0:
+                    assert time.monotonic() - begin < 20, robot.latest("/joint/2")
+                    time.sleep(0.05)
+                with Robot(address, keys["view"], role="view", name="viewer") as viewer:
+                    refused("role", lambda: viewer.command("Disarm"))
+                    viewer.stop()
+                robot.until(lambda state: state["emergency_stop"])
+                robot.command("RecordStop")
+            robot.until(lambda state: state["control"] is None)
+            assert any(event["code"] == "hold" for event in robot.events()), "no event of the stop"
+            # A connection that is cut: nobody beats any more.
+            cut = Robot(address, keys["control"], name="cut")
+            cut.state()
+            cut.command("TakeControl")
+            cut.close()
+            robot.until(lambda state: state["control"] is None, 5)
+        done = subprocess.run([program, "replay", str(recordings / "0001")], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    print("every channel read; armed, moved, stopped, recorded and repeated from Python")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,74 @@
+"""Makes pages of logs with `wheeleg view`, and opens them in a browser from the disk.
+
+    python3 check_view.py WHEELEG LOG SCREENSHOTS AXE
+
+A whole log, one that breaks off, and two that are compared. At three sizes, light and dark: nothing is wider
+than the window, nothing is asked for from elsewhere, the console is empty, axe-core finds nothing. The robot
+plays, the cursor is one over all plots, and an event can be gone to.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import check_report
+from check_report import cursors, expect, opened, problems
+from playwright.sync_api import sync_playwright
+
+
+def made(program, page, *arguments):
+    done = subprocess.run([program, "view", "--out", str(page), *map(str, arguments)], capture_output=True, text=True)
+    expect(done.returncode == 0, f"{page.name}: {done.stderr}")
+    return done
+
+
+def journey(browser, report):
+    page = opened(browser, report, 1280, 720, "light")
+    expect(page.locator("#motion-view .view").is_visible(), "the robot is not shown")
+    expect(page.locator(".plot-area").count() >= 20, f"{page.locator('.plot-area').count()} plots")
+    before = cursors(page)[0]
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(600)
+    page.get_by_role("button", name="Pause").click()
+    times = cursors(page)
+    expect(len(set(times)) == 1 and times[0] > before + 0.2, f"played for 0.6 s, {before} s became {set(times)}")
+    seek = page.locator("#event-table .seek").last
+    wanted = float(seek.get_attribute("data-seek"))
+    seek.click()
+    expect(abs(cursors(page)[0] - wanted) < 0.011, f"gone to {wanted} s, the cursor is at {cursors(page)[0]}")
+    page.fill("input[data-filter]", "no such event")
+    expect(page.locator("#event-table tbody:visible").count() == 0, "the filter filters nothing")
+    page.context.close()
+
+
+def main(program, log, folder, axe):
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    whole = folder / "whole.html"
+    made(program, whole, log)
+    size = whole.stat().st_size
+    expect(size <= check_report.LARGEST_BYTES, f"the page has {size} bytes")
+    text = Path(log).read_bytes()
+    broken = folder / "broken.mcap"
+    broken.write_bytes(text[: len(text) * 2 // 3])
+    cut = folder / "cut.html"
+    expect("breaks off" in made(program, cut, broken).stderr, "a log that breaks off is not told")
+    both = folder / "both.html"
+    done = made(program, both, log, broken)
+    expect("equal up to" in done.stdout, f"a log and its first part differ: {done.stdout}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=check_report.shutil.which("chromium"), args=check_report.FLAGS)
+        for report in [whole, cut, both]:
+            shots = folder / report.stem
+            shots.mkdir(exist_ok=True)
+            check_report.looks(browser, report.resolve(), shots, axe)
+        journey(browser, whole.resolve())
+        page = opened(browser, cut.resolve(), 1280, 720, "light")
+        expect("breaks off" in page.inner_text(".note"), "the page does not say that its log breaks off")
+        browser.close()
+    if problems:
+        sys.exit("\n".join(problems))
+    print(f"{whole.name}: {size} bytes, sound at {len(check_report.SIZES)} sizes; pictures in {folder.name}/")
+
+
+main(*sys.argv[1:])

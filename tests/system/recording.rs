@@ -1,0 +1,157 @@
+//! The program records a live robot: whatever ends it, what was recorded can be repeated.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::program;
+
+/// Longest time that anything here may take.
+const HUNG: Duration = Duration::from_secs(60);
+
+/// `wheeleg serve` in a home of its own; `limits` are commands of the shell before it.
+struct Served {
+    child: Child,
+    address: String,
+    home: TempDir,
+}
+
+impl Served {
+    fn new(limits: &str) -> Self {
+        let home = tempfile::tempdir().expect("a folder");
+        let mut child = Command::new("sh")
+            .arg("-c")
+            .arg(format!("{limits} exec \"$@\""))
+            .arg("sh")
+            .arg(program::path())
+            .args(["serve", "stand", "--listen", "127.0.0.1:0", "--record"])
+            .arg("--recordings")
+            .arg(home.path().join("recordings"))
+            .env("XDG_STATE_HOME", home.path())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("start");
+        let mut first = String::new();
+        let out = child.stdout.as_mut().expect("piped");
+        BufReader::new(out).read_line(&mut first).expect("a line");
+        let address = first.split_whitespace().nth(1).expect("an address");
+        Self {
+            child,
+            address: address.to_owned(),
+            home,
+        }
+    }
+
+    fn ctl(&self, arguments: &[&str]) -> Output {
+        Command::new(program::path())
+            .args(["ctl", "--url", &self.address])
+            .args(arguments)
+            .env("XDG_STATE_HOME", self.home.path())
+            .output()
+            .expect("run")
+    }
+
+    fn state(&self) -> Value {
+        let output = self.ctl(&["--json", "status"]);
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    }
+
+    /// Waits until the state is as wanted.
+    fn until(&self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+        let begin = Instant::now();
+        loop {
+            let state = self.state();
+            if wanted(&state) {
+                return state;
+            }
+            assert!(begin.elapsed() < HUNG, "never {what}: {state}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Ends the program with a signal; its exit code, and the home.
+    fn end(mut self, signal: &str) -> (Option<i32>, TempDir) {
+        let pid = self.child.id().to_string();
+        let sent = Command::new("kill")
+            .args([&format!("-{signal}"), &pid])
+            .status();
+        assert!(sent.expect("kill").success());
+        let code = self.child.wait().expect("ended").code();
+        (code, self.home)
+    }
+}
+
+fn replay(folder: &Path) -> (Option<i32>, Value) {
+    let output = Command::new(program::path())
+        .args(["replay", "--json"])
+        .arg(folder)
+        .output()
+        .expect("run");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{told}"));
+    (output.status.code(), value)
+}
+
+#[test]
+fn a_recording_repeats_after_term_and_after_a_kill() {
+    for (signal, code) in [("TERM", Some(143)), ("KILL", None)] {
+        let served = Served::new("");
+        served.until("ready", |state| state["ready"] == true);
+        let armed = served.ctl(&["take", "--", "Arm"]);
+        assert!(armed.status.success(), "{armed:?}");
+        served.until("two seconds old", |s| {
+            s["master_us"].as_u64() > Some(2_300_000)
+        });
+        let (ended, home) = served.end(signal);
+        assert_eq!(ended, code, "{signal}");
+        let folder = home.path().join("recordings/0001");
+        let (code, told) = replay(&folder);
+        assert_eq!(code, Some(0), "{signal}: {told}");
+        assert_eq!(told["same"], true, "{signal}: {told}");
+        assert!(told["hashes_compared"].as_u64() >= Some(2), "{told}");
+        assert!(told["inputs"].as_u64() >= Some(3), "{told}");
+        let recorded = &told["recording"]["hash"];
+        match signal {
+            "TERM" => assert_eq!(recorded, &told["hash"]),
+            _ => assert_eq!(recorded, &Value::Null),
+        }
+        let log = folder.join("log.mcap");
+        let recovered = Command::new(program::path())
+            .args(["log", "recover"])
+            .arg(&log)
+            .output()
+            .expect("run");
+        assert!(recovered.status.success(), "{recovered:?}");
+        let text = String::from_utf8_lossy(&recovered.stdout).into_owned();
+        assert_eq!(text.contains("whole already"), signal == "TERM", "{text}");
+    }
+}
+
+/// A file that may not grow stands for a disk that is full.
+#[test]
+fn a_full_disk_ends_the_recording_is_told_and_the_robot_goes_on() {
+    let served = Served::new("trap '' XFSZ; ulimit -f 1200;");
+    let state = served.until("failed", |state| state["recording"]["failure"].is_string());
+    let failure = state["recording"]["failure"].as_str().expect("a text");
+    assert!(failure.contains("File too large"), "{failure}");
+    let at_us = state["master_us"].as_u64();
+    served.until("going on", |s| {
+        s["master_us"].as_u64() > at_us.map(|us| us + 200_000) && s["alive"] == true
+    });
+    let told = served.ctl(&["status"]);
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.contains("recording 0001 ended early"), "{told}");
+    let (code, home) = served.end("TERM");
+    assert_eq!(code, Some(143));
+    let folder = home.path().join("recordings/0001");
+    let summary = fs::read_to_string(folder.join("recording.json")).expect("written");
+    assert!(summary.contains("File too large"), "{summary}");
+    let (code, told) = replay(&folder);
+    assert_eq!(code, Some(0), "{told}");
+    assert_eq!(told["same"], true, "{told}");
+}
