@@ -13,7 +13,7 @@ mod circles;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 27] = [
+const ARROWS: [(&str, &[&str]); 28] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -94,6 +94,18 @@ const ARROWS: [(&str, &[&str]); 27] = [
     ("wheeleg-sim", &SIM),
     ("wheeleg-report", &[]),
     (
+        "wheeleg-campaign",
+        &[
+            "wheeleg-config",
+            "wheeleg-identity",
+            "wheeleg-remote-host",
+            "wheeleg-report",
+            "wheeleg-sim",
+            "wheeleg-studies",
+            "wheeleg-telemetry",
+        ],
+    ),
+    (
         "wheeleg-console",
         &[
             "wheeleg-config",
@@ -162,7 +174,8 @@ const STUDIES: [&str; 13] = [
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 11] = [
+const PROGRAM: [&str; 12] = [
+    "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-console",
     "wheeleg-interface",

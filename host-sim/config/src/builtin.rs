@@ -26,12 +26,15 @@ pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
 );
 
+/// Plans of campaigns: name, file name for messages, text.
+pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns": "three-step-spread");
+
 /// A robot by built-in name, or by path to a TOML file.
 ///
 /// # Errors
 /// [`ConfigError`] if there is no such robot or file, or if it is wrong.
 pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
-    let (file, text) = find("robot", name_or_path, ROBOTS)?;
+    let (file, text) = robot_text(name_or_path)?;
     RobotConfig::parse(&file, &text)
 }
 
@@ -41,17 +44,37 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
 /// # Errors
 /// As [`robot`].
 pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig, ConfigError> {
+    robot(&robot_place(robot_name_or_path, scenario))
+}
+
+/// Built-in name or path of the robot that a scenario names.
+pub(crate) fn robot_place(robot_name_or_path: &str, scenario: &str) -> String {
     let built_in = |list: &[(&str, &str, &str)], name: &str| list.iter().any(|(n, ..)| *n == name);
     if built_in(ROBOTS, robot_name_or_path)
         || built_in(SCENARIOS, scenario)
         || !is_path(robot_name_or_path)
     {
-        return robot(robot_name_or_path);
+        return robot_name_or_path.to_owned();
     }
     let beside = Path::new(scenario)
         .with_file_name("")
         .join(robot_name_or_path);
-    robot(&beside.to_string_lossy())
+    beside.to_string_lossy().into_owned()
+}
+
+/// File name for messages and text of a robot.
+pub(crate) fn robot_text(name_or_path: &str) -> Result<(String, String), ConfigError> {
+    find("robot", name_or_path, ROBOTS)
+}
+
+/// File name for messages and text of a plan.
+pub(crate) fn plan_text(name_or_path: &str) -> Result<(String, String), ConfigError> {
+    find("plan", name_or_path, PLANS)
+}
+
+/// File name for messages and text of a scenario.
+pub(crate) fn scenario_text(name_or_path: &str) -> Result<(String, String), ConfigError> {
+    find("scenario", name_or_path, SCENARIOS)
 }
 
 /// A scenario by built-in name, or by path to a TOML file.
@@ -59,12 +82,12 @@ pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig,
 /// # Errors
 /// [`ConfigError`] if there is no such scenario or file, or if it is wrong.
 pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
-    let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
+    let (file, text) = scenario_text(name_or_path)?;
     Scenario::parse(&file, &text)
 }
 
 /// Whether a name is that of a file.
-fn is_path(name_or_path: &str) -> bool {
+pub(crate) fn is_path(name_or_path: &str) -> bool {
     name_or_path.contains(['/', '\\'])
         || Path::new(name_or_path)
             .extension()

@@ -5,7 +5,7 @@ use wheeleg_master::command::Command;
 
 use super::command;
 use super::error::ConfigError;
-use super::params::FieldSpec;
+use super::params::{FieldSpec, ParameterInfo};
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
 use crate::faults::FaultSpec;
@@ -180,10 +180,18 @@ impl Scenario {
     /// # Errors
     /// [`ConfigError`] with every problem found.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_listed(file, text).map(|(scenario, _)| scenario)
+    }
+
+    /// The same, with its quantities as written.
+    pub(crate) fn parse_listed(
+        file: &str,
+        text: &str,
+    ) -> Result<(Self, Vec<ParameterInfo>), ConfigError> {
         let what = format!("the scenario file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
         let scenario = read(&mut r);
-        r.finish(&what, scenario).map(|(scenario, _)| scenario)
+        r.finish(&what, scenario)
     }
 }
 

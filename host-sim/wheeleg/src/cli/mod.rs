@@ -1,5 +1,6 @@
 //! The command line: one file per command.
 
+mod campaign;
 mod channels;
 mod check;
 mod commands;
@@ -72,6 +73,8 @@ enum Command {
     Serve(serve::ServeArgs),
     /// See and drive the robot that `wheeleg serve` runs.
     Ctl(ctl::CtlArgs),
+    /// Run a scenario many times: factors, shards, one table, replay.
+    Campaign(campaign::CampaignArgs),
     /// List the built-in scenarios and robots.
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
@@ -113,6 +116,7 @@ pub(crate) fn main() -> ExitCode {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
         Some(Command::Serve(args)) => serve::command(&args),
+        Some(Command::Campaign(args)) => campaign::command(&args),
         Some(Command::Ctl(args)) => ctl::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),
         Some(Command::List(args)) => list::command(&args),
