@@ -438,6 +438,25 @@ fn digests_of_images_are_of_all_crates_that_they_are_made_of_and_no_others() {
     }
 }
 
+/// Parts of two programs are told apart by the sources that rows depend on: a crate that the list
+/// lacks could change them unseen.
+#[test]
+fn the_digest_of_campaigns_is_of_all_crates_that_they_are_made_of() {
+    let (packages, root) = (packages(), root().canonicalize().expect("the root"));
+    let script = fs::read_to_string(root.join("host-sim/campaign/build.rs")).expect("there");
+    let mut made_of = BTreeSet::new();
+    built_from("wheeleg-campaign", &packages, &mut made_of);
+    assert!(made_of.len() > 10, "{made_of:?}");
+    for name in made_of {
+        let manifest = PathBuf::from(text(&packages[&name]["manifest_path"]));
+        let folder = manifest.parent().expect("a folder");
+        let folder = folder.canonicalize().expect("a folder");
+        let below = folder.strip_prefix(&root).expect("below the root");
+        let listed = format!("\"{}\",", below.to_string_lossy().replace('\\', "/"));
+        assert!(script.contains(&listed), "{listed}");
+    }
+}
+
 #[test]
 fn the_plant_never_sees_fixed_point() {
     let plant = dependencies(&packages()["wheeleg-plant"]);

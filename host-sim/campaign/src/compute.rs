@@ -1,8 +1,9 @@
 //! The row of a case, whatever becomes of it.
 
 use crate::cases::{Case, Cases};
+use crate::panics::caught;
 use crate::row::{Figure, Row, Status};
-use crate::simulate::{Outcome, caught};
+use crate::simulate::Outcome;
 
 /// What simulates a case; `None` if it was asked to stop before its end.
 pub type Simulate<'a> = &'a (dyn Fn(&Case) -> Option<Outcome> + Sync);

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use crate::columns::{Columns, FACT};
-use crate::part::{self, NotAPart, PLAN, PROGRAM};
+use crate::part::{PLAN, PROGRAM};
 use crate::store::Store;
 use crate::table::{Data, GROUP_ROWS, Table, TableWriter};
 use crate::{CampaignError, Cases, host};
@@ -62,7 +62,13 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
     let columns = Cases::new(&plan)?.columns().clone();
     let plan_text = serde_json::to_string(first.plan()).expect("texts are JSON");
     let temporary = out.with_extension(format!("{}.tmp", host::unique()));
-    let result = write(&temporary, &parts, first, &columns, &plan_text).and_then(|merged| {
+    let result = write(
+        &temporary,
+        &parts,
+        &columns,
+        [&plan_text, &first.plan().program],
+    )
+    .and_then(|merged| {
         let renamed = std::fs::rename(&temporary, out);
         renamed.map_err(|e| CampaignError::output("write", out, e))?;
         Ok(merged)
@@ -73,23 +79,19 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
     result
 }
 
-/// A part of each block, in order.
-fn complete(stores: &[Store], folders: &[PathBuf]) -> Result<Vec<PathBuf>, CampaignError> {
+/// Which of the folders has the part of each block.
+fn complete<'s>(stores: &'s [Store], folders: &[PathBuf]) -> Result<Vec<&'s Store>, CampaignError> {
     let (mut parts, mut holes, mut bad) = (Vec::new(), Vec::new(), Vec::new());
     for block in 0..stores[0].blocks() {
-        let mut whole = None;
-        for store in stores {
-            match store.state(block) {
-                Ok(true) => {
-                    whole = Some(store.part(block));
-                    break;
-                }
-                Ok(false) => {}
-                Err(why) => bad.push(format!("`{}`: {why}", store.part(block).display())),
+        let whole = stores.iter().find(|store| match store.table(block) {
+            Ok(table) => table.is_some(),
+            Err(why) => {
+                bad.push(format!("`{}`: {why}", store.part(block).display()));
+                false
             }
-        }
+        });
         match whole {
-            Some(part) => parts.push(part),
+            Some(store) => parts.push(store),
             None => holes.push(block),
         }
     }
@@ -121,10 +123,9 @@ fn complete(stores: &[Store], folders: &[PathBuf]) -> Result<Vec<PathBuf>, Campa
 
 fn write(
     to: &Path,
-    parts: &[PathBuf],
-    store: &Store,
+    parts: &[&Store],
     columns: &Columns,
-    plan_text: &str,
+    [plan_text, program]: [&str; 2],
 ) -> Result<Merged, CampaignError> {
     let failed = |e: std::io::Error| CampaignError::output("write", to, e);
     let full = |e: parquet::errors::ParquetError| {
@@ -132,29 +133,18 @@ fn write(
     };
     let file = File::create(to).map_err(failed)?;
     let text = serde_json::to_string(&columns.all).expect("columns are JSON");
-    let facts = [
-        (FACT, text.as_str()),
-        (PLAN, plan_text),
-        (PROGRAM, &store.plan().program),
-    ];
+    let facts = [(FACT, text.as_str()), (PLAN, plan_text), (PROGRAM, program)];
     let file = std::io::BufWriter::new(file);
     let mut writer = TableWriter::new(file, &columns.all, &facts).map_err(full)?;
     let mut hasher = blake3::Hasher::new();
     let mut group = Table::empty(columns.all.clone());
     let mut rows = 0_u64;
-    for (block, path) in (0_u64..).zip(parts) {
-        let table = part::read_table(path, &store.plan().hash).map_err(|e| e.error(path))?;
-        if table.columns != columns.all {
-            let other = NotAPart::Torn("other columns than the plan's".to_owned());
-            return Err(other.error(path));
-        }
-        let expected = store.cases_of(block).map(|index| i64::try_from(index).ok());
-        if !table.wholes("index").iter().copied().eq(expected) {
-            return Err(CampaignError::refused(
-                format!("`{}` has not each case of its block once", path.display()),
-                "remove it, and run the campaign again",
-            ));
-        }
+    for (block, store) in (0_u64..).zip(parts) {
+        let path = store.part(block);
+        let table = store.table(block);
+        let table = table.map_err(|why| CampaignError::unreadable(&path, why))?;
+        let table = table.filter(|table| table.columns == columns.all);
+        let table = table.ok_or_else(|| CampaignError::unreadable(&path, "other columns"))?;
         hash(&mut hasher, &table, columns);
         rows += table.rows() as u64;
         group.append(table);

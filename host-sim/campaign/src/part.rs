@@ -4,13 +4,16 @@ use std::fs::File;
 use std::path::Path;
 
 use crate::columns::{Column, Columns, FACT, Kind};
+use crate::panics::caught;
 use crate::row::{self, Row};
 use crate::table::{Data, Table, TableReader, TableWriter};
-use crate::{CampaignError, host, program};
+use crate::{host, program};
 
 /// Keys of what a part says of itself, beside its columns.
 pub(crate) const PLAN: &str = "wheeleg.plan";
 pub(crate) const PROGRAM: &str = "wheeleg.program";
+/// Key of the hash of the values: bytes that were damaged are found, wherever they are.
+const ROWS: &str = "wheeleg.rows";
 
 /// What it took to compute a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,8 +66,13 @@ pub(crate) fn run_bytes(plan: &str, efforts: &[Effort]) -> Vec<u8> {
 
 fn encode(table: &Table, plan: &str) -> Vec<u8> {
     let columns = serde_json::to_string(&table.columns).expect("columns are JSON");
-    let program = program();
-    let facts = [(FACT, columns.as_str()), (PLAN, plan), (PROGRAM, &program)];
+    let (program, rows) = (program(), table.digest());
+    let facts = [
+        (FACT, columns.as_str()),
+        (PLAN, plan),
+        (PROGRAM, &program),
+        (ROWS, &rows),
+    ];
     let write = || {
         let mut writer = TableWriter::new(Vec::new(), &table.columns, &facts)?;
         writer.write(table)?;
@@ -95,23 +103,18 @@ pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), N
 /// Table of a part, if it is one of this plan and program.
 pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
     let file = open(path)?;
-    let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
-    let reader = TableReader::new(file).map_err(torn)?;
-    of(&reader, plan)?;
     // Damaged bytes must not end the program, whatever the library does with them.
-    let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.read()));
-    match read {
-        Ok(table) => table.map_err(torn),
-        Err(_) => Err(NotAPart::Torn("its bytes are damaged".to_owned())),
-    }
-}
-
-/// Whether the footer of a part reads, and is of this plan and program; how many rows it has.
-pub(crate) fn footer(path: &Path, plan: &str) -> Result<i64, NotAPart> {
-    let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
-    let reader = TableReader::new(open(path)?).map_err(torn)?;
-    of(&reader, plan)?;
-    Ok(reader.rows())
+    let read = caught(|| {
+        let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
+        let reader = TableReader::new(file).map_err(torn)?;
+        of(&reader, plan)?;
+        let table = reader.read().map_err(torn)?;
+        if reader.fact(ROWS) != Some(table.digest().as_str()) {
+            return Err(NotAPart::Torn("its values were changed".to_owned()));
+        }
+        Ok(table)
+    });
+    read.unwrap_or_else(|_| Err(NotAPart::Torn("its bytes are damaged".to_owned())))
 }
 
 fn open(path: &Path) -> Result<File, NotAPart> {
@@ -131,16 +134,4 @@ fn of(reader: &TableReader<File>, plan: &str) -> Result<(), NotAPart> {
         }
     }
     Ok(())
-}
-
-impl NotAPart {
-    /// As an error of a file that must be one.
-    pub(crate) fn error(self, path: &Path) -> CampaignError {
-        let reason = match self {
-            Self::Missing => "there is no such file".to_owned(),
-            Self::Torn(why) => format!("torn: {why}"),
-            Self::Foreign(why) => why,
-        };
-        CampaignError::unreadable(path, reason)
-    }
 }

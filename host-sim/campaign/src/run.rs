@@ -86,13 +86,6 @@ pub fn run(
         progress.begin("cases", of);
     }
     let aside = Mutex::new(Vec::new());
-    // Blocks that are done are counted without being read.
-    let counted = blocks.inspect(|block| {
-        if store.state(*block) == Ok(true) {
-            let cases = store.cases_of(*block);
-            live.found(cases.end.min(first) - cases.start);
-        }
-    });
     let work = Work {
         store,
         cases,
@@ -100,11 +93,8 @@ pub fn run(
         stop: &options.stop,
         first,
         program: options.program.as_deref(),
-        told: &|row, computed| {
-            if !computed {
-                live.found(1);
-                return Ok(());
-            }
+        found: &|cases| live.found(cases),
+        told: &|row| {
             live.computed(row);
             keep_log(store, cases, row, &options.stop)
         },
@@ -113,7 +103,7 @@ pub fn run(
             list.push((path.to_owned(), why.to_owned()));
         },
     };
-    let result = work.run(counted, options.threads);
+    let result = work.run(blocks, options.threads);
     live.tell(true);
     progress.clear();
     result?;

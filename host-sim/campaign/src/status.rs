@@ -44,24 +44,21 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
     for block in (0..store.blocks()).filter(|block| shard.has(*block)) {
         let cases = store.cases_of(block);
         state.cases += cases.end - cases.start;
-        let path = store.part(block);
-        let files = match store.state(block) {
-            Ok(true) => vec![path],
-            Ok(false) => {
+        let tables = match store.table(block) {
+            Ok(Some(table)) => vec![table],
+            unfinished => {
                 state.missing.push(block);
-                store.partials(block)
-            }
-            Err(why) => {
-                state.missing.push(block);
-                state.bad.push((path, why));
-                store.partials(block)
+                if let Err(why) = unfinished {
+                    state.bad.push((store.part(block), why));
+                }
+                let partials = store.partials(block).into_iter();
+                partials
+                    .filter_map(|path| part::read_table(&path, &store.plan().hash).ok())
+                    .collect()
             }
         };
         let mut seen = std::collections::BTreeSet::new();
-        for file in files {
-            let Ok(table) = part::read_table(&file, &store.plan().hash) else {
-                continue;
-            };
+        for table in tables {
             let indices = table.wholes("index").iter();
             let rows = indices
                 .zip(table.texts("status"))

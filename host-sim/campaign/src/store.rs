@@ -21,6 +21,7 @@ use wheeleg_config::plan::{Plan, Sources};
 
 use crate::part::NotAPart;
 use crate::row::Row;
+use crate::table::Table;
 use crate::{CampaignError, host, part, program};
 
 /// Name of the plan in the folder.
@@ -259,16 +260,19 @@ impl Store {
         self.folder.join(format!("attempts/{block:06}.jsonl"))
     }
 
-    /// Whether a block is done; of a part that is torn or foreign, why it does not count.
-    pub(crate) fn state(&self, block: u64) -> Result<bool, String> {
+    /// The rows of a block that is done; of a part that is torn or foreign, why it does not count.
+    pub(crate) fn table(&self, block: u64) -> Result<Option<Table>, String> {
         let expected = self.cases_of(block);
-        let expected = (expected.end - expected.start) as i64;
-        match part::footer(&self.part(block), &self.plan.hash) {
-            Ok(rows) if rows == expected => Ok(true),
-            Ok(rows) => Err(format!("{rows} rows, not {expected}")),
-            Err(NotAPart::Missing) => Ok(false),
-            Err(NotAPart::Torn(why) | NotAPart::Foreign(why)) => Err(why),
+        let table = match part::read_table(&self.part(block), &self.plan.hash) {
+            Ok(table) => table,
+            Err(NotAPart::Missing) => return Ok(None),
+            Err(NotAPart::Torn(why) | NotAPart::Foreign(why)) => return Err(why),
+        };
+        let indices = table.wholes("index").iter().copied();
+        if indices.eq(expected.map(|index| i64::try_from(index).ok())) {
+            return Ok(Some(table));
         }
+        Err("it has not each case of its block once".to_owned())
     }
 
     /// Moves a part that does not count out of the way; where it is now.
@@ -372,7 +376,9 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
     if cfg!(unix)
         && let Some(folder) = path.parent()
     {
-        return File::open(folder)?.sync_all();
+        // Of a bare name it is the folder that the program stands in.
+        let here = folder.as_os_str().is_empty();
+        return File::open(if here { Path::new(".") } else { folder })?.sync_all();
     }
     Ok(())
 }

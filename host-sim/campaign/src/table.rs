@@ -138,6 +138,35 @@ impl Table {
         }
     }
 
+    /// Hash of all columns and values, hexadecimal.
+    pub(crate) fn digest(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let columns = serde_json::to_string(&self.columns).expect("columns are JSON");
+        hasher.update(columns.as_bytes());
+        let mut add = |there: bool, bytes: &[u8]| {
+            hasher.update(&[u8::from(there)]);
+            hasher.update(&(bytes.len() as u64).to_le_bytes());
+            hasher.update(bytes);
+        };
+        for data in &self.data {
+            match data {
+                Data::Whole(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), &v.unwrap_or(0).to_le_bytes())),
+                Data::Number(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), &v.unwrap_or(0.0).to_bits().to_le_bytes())),
+                Data::Flag(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), &[u8::from(*v == Some(true))])),
+                Data::Text(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), v.as_deref().unwrap_or("").as_bytes())),
+            }
+        }
+        hasher.finalize().to_hex()[..32].to_owned()
+    }
+
     /// Appends the rows of a table with the same columns.
     pub(crate) fn append(&mut self, other: Self) {
         for (own, other) in self.data.iter_mut().zip(other.data) {
@@ -272,13 +301,8 @@ impl<R: ChunkReader + 'static> TableReader<R> {
     }
 
     /// Number of row groups.
-    pub(crate) fn groups(&self) -> usize {
+    fn groups(&self) -> usize {
         self.file.num_row_groups()
-    }
-
-    /// Number of rows.
-    pub(crate) fn rows(&self) -> i64 {
-        self.file.metadata().file_metadata().num_rows()
     }
 
     /// All rows.
@@ -291,7 +315,7 @@ impl<R: ChunkReader + 'static> TableReader<R> {
     }
 
     /// One row group.
-    pub(crate) fn read_group(&self, group: usize) -> Result<Table, ParquetError> {
+    fn read_group(&self, group: usize) -> Result<Table, ParquetError> {
         let group = self.file.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows())
             .map_err(|e| ParquetError::General(e.to_string()))?;

@@ -48,8 +48,10 @@ pub(crate) struct Work<'a> {
     pub(crate) first: u64,
     /// Program for cases that may end the process.
     pub(crate) program: Option<&'a Path>,
-    /// Told of every row as it comes, computed or found.
-    pub(crate) told: &'a (dyn Fn(&Row, bool) -> Result<(), CampaignError> + Sync),
+    /// Told of cases that have a row already.
+    pub(crate) found: &'a (dyn Fn(u64) + Sync),
+    /// Told of every row that is computed.
+    pub(crate) told: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
     /// Told of a part that was set aside.
     pub(crate) aside: &'a (dyn Fn(&Path, &str) + Sync),
 }
@@ -147,9 +149,14 @@ impl Work<'_> {
 
     /// A block and its cases without a row; `None` if it is done.
     fn open(&self, number: u64) -> Result<Option<(Block, VecDeque<u64>)>, CampaignError> {
-        match self.store.state(number) {
-            Ok(true) => return Ok(None),
-            Ok(false) => {}
+        match self.store.table(number) {
+            Ok(Some(table)) => {
+                let pilot =
+                    (table.rows() as u64).min(self.first - self.store.cases_of(number).start);
+                (self.found)(pilot);
+                return Ok(None);
+            }
+            Ok(None) => {}
             Err(why) => {
                 let path = self.store.part(number);
                 let to = self.store.set_aside(&path)?;
@@ -160,9 +167,10 @@ impl Work<'_> {
         let wanted: Vec<u64> = wanted.filter(|index| *index < self.first).collect();
         let mut rows = BTreeMap::new();
         for row in self.store.kept_rows(number)? {
-            (self.told)(&row, false)?;
             rows.insert(row.index, row);
         }
+        let found = rows.keys().filter(|index| **index < self.first).count();
+        (self.found)(found as u64);
         let left = wanted.iter().copied();
         let left: VecDeque<u64> = left.filter(|index| !rows.contains_key(index)).collect();
         let block = Block {
@@ -182,7 +190,7 @@ impl Work<'_> {
         let Some(row) = self.attempt(block, index)? else {
             return Ok(false);
         };
-        (self.told)(&row, true)?;
+        (self.told)(&row)?;
         held(&block.efforts).push(Effort {
             index,
             wall_s: begun.elapsed().as_secs_f64(),
@@ -191,7 +199,7 @@ impl Work<'_> {
         let done = {
             let mut rows = held(&block.rows);
             rows.insert(index, row);
-            rows.len() >= block.wanted
+            rows.keys().filter(|index| **index < self.first).count() >= block.wanted
         };
         if done {
             self.finish(block)?;

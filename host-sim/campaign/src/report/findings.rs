@@ -234,10 +234,13 @@ fn excess(value: f64, column: &Column) -> f64 {
     low.max(high)
 }
 
+/// A target with its values and verdicts.
+type Judged<'a> = (&'a Column, &'a [Option<f64>], &'a [Option<bool>]);
+
 fn worst(merged: &Merged) -> Vec<Worst> {
     let table = &merged.table;
     let (statuses, passed) = (table.texts("status"), table.flags("passed"));
-    let targets: Vec<(&Column, &[Option<f64>], &[Option<bool>])> = merged
+    let targets: Vec<Judged<'_>> = merged
         .columns
         .all
         .iter()

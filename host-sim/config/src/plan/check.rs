@@ -168,7 +168,7 @@ fn range(
     let (min, max) = (info.min / to_file, info.max / to_file);
     let allowed = |v: f64| {
         let slack = 4.0 * f64::EPSILON * v.abs();
-        v >= min - slack && v <= max + slack
+        v.is_finite() && v >= min - slack && v <= max + slack
     };
     let scaled = |v: f64| -> Vec<f64> {
         let of = info.value.iter().enumerate();

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
 use wheeleg_campaign::{
-    CampaignError, Cases, Options, PlanFile, Shard, Store, isolated, merge, replay, report, run,
-    simulate, status,
+    CampaignError, Cases, Options, PlanFile, Shard, Store, Submission, isolated, merge, replay,
+    report, run, simulate, status,
 };
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::StudyError;
@@ -38,6 +38,8 @@ SIGTERM or by a hang-up, try again; 130 stopped with Ctrl-C.";
 enum Command {
     /// Run a campaign, or a shard of it. Killed or stopped: run it again.
     Run(RunArgs),
+    /// Give the shards of a campaign to Slurm, or print a job for Kubernetes.
+    Submit(SubmitArgs),
     /// How far a campaign is, from its folder alone.
     Status(StatusArgs),
     /// Make one table of the parts in one or more folders.
@@ -86,6 +88,36 @@ struct RunArgs {
 enum Shown {
     Bar,
     Json,
+}
+
+#[derive(Debug, Args)]
+struct SubmitArgs {
+    /// Built-in plan, or path of a TOML file.
+    plan: String,
+    /// Folder for the parts, on a disk that all computers share.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Tasks.
+    #[arg(long, value_name = "N", value_parser = whole(1_u64, 1_000_000))]
+    shards: u64,
+    /// As a Slurm array, and a job that merges after it.
+    #[arg(long, required_unless_present = "kubernetes")]
+    slurm: bool,
+    /// As an indexed job of Kubernetes, printed for `kubectl apply -f -`.
+    #[arg(long, conflicts_with = "slurm")]
+    kubernetes: bool,
+    /// Print what would be submitted.
+    #[arg(long)]
+    dry_run: bool,
+    /// Further argument of sbatch, such as `--partition=long`; may be given several times.
+    #[arg(long = "slurm-arg", value_name = "ARG", allow_hyphen_values = true)]
+    slurm_args: Vec<String>,
+    /// Image with this program.
+    #[arg(long, value_name = "IMAGE", default_value = "wheeleg")]
+    image: String,
+    /// Claim of a volume that all pods can write, the folder of the campaign.
+    #[arg(long, value_name = "CLAIM", default_value = "wheeleg-campaign")]
+    claim: String,
 }
 
 #[derive(Debug, Args)]
@@ -153,6 +185,7 @@ struct CaseArgs {
 pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
     let result = match &args.command {
         Command::Run(args) => run_command(args),
+        Command::Submit(args) => submit_command(args),
         Command::Status(args) => status_command(args),
         Command::Merge(args) => merge_command(args),
         Command::Report(args) => report_command(args),
@@ -226,6 +259,28 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
         return Ok(ExitCode::from(TARGETS_MISSED));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn submit_command(args: &SubmitArgs) -> Result<ExitCode, CampaignError> {
+    let (plan, file) = plan_of(&args.plan)?;
+    let cases = Cases::new(&plan)?;
+    cases.ensure_possible()?;
+    let store = Store::create(&args.out, file)?;
+    let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("wheeleg"));
+    let duration_s = cases.duration_s();
+    let submission = Submission::new(&store, &plan.name, &program, args.shards, duration_s)?;
+    let text = if args.kubernetes {
+        submission.kubernetes(&args.image, &args.claim)
+    } else if args.dry_run {
+        print::slurm(&submission, &args.slurm_args)
+    } else {
+        let [array, merge] = submission.submit_to_slurm(&args.slurm_args)?;
+        format!(
+            "array   {array}\nmerge   {merge}\nfolder  {}\n",
+            submission.folder
+        )
+    };
+    Ok(print(&text)?)
 }
 
 fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {

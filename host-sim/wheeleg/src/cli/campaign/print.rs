@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use serde_json::json;
 use wheeleg_campaign::report::{Findings, Paired, Pairs};
-use wheeleg_campaign::{Cases, Ran, Replayed, Shard, State, Status, Store};
+use wheeleg_campaign::{Cases, Ran, Replayed, Shard, State, Status, Store, Submission};
 use wheeleg_studies::StudyError;
 
 /// Prints cases: place, identity, seed, and the value of each factor.
@@ -57,6 +57,18 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: bool) -> String
         );
     }
     out
+}
+
+/// What would be given to Slurm.
+pub(super) fn slurm(submission: &Submission, further: &[String]) -> String {
+    let array = submission.slurm_arguments(further).join(" ");
+    let merge = submission.merge_arguments("ARRAY", further);
+    let merge: Vec<String> = merge.iter().map(|word| format!("{word:?}")).collect();
+    format!(
+        "# sbatch {array} of\n{}\n# then, with the number of the array\n# sbatch {}\n",
+        submission.slurm_script(),
+        merge.join(" ")
+    )
 }
 
 /// How far a campaign is.
