@@ -1,10 +1,12 @@
 //! Campaigns: their table in a program that is not ours, and the long check.
 
+mod slurm;
+
 use std::fs;
 
 use anyhow::Context;
 
-use crate::process::{cargo, command, figures, run, target_dir};
+use crate::process::{cargo, command, figures, root, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
@@ -21,10 +23,13 @@ pub(crate) fn steps(report: &mut Report) {
         fs::create_dir_all(&folder)?;
         rust::build(&["--bin", "wheeleg"])?;
         let wheeleg = target_dir().join("release").join("wheeleg");
-        let plan = fs::read_to_string("host-sim/campaigns/three-step-spread.toml")
+        let plan = fs::read_to_string(root().join("host-sim/campaigns/three-step-spread.toml"))
             .context("the shipped plan")?;
         let short = folder.join("plan.toml");
-        fs::write(&short, plan.replace("samples = 100", &format!("samples = {SAMPLES}")))?;
+        fs::write(
+            &short,
+            plan.replace("samples = 100", &format!("samples = {SAMPLES}")),
+        )?;
         let (parts, table) = (folder.join("parts"), folder.join("cases.parquet"));
         run(command(&wheeleg)
             .args(["campaign", "run"])
@@ -45,7 +50,8 @@ pub(crate) fn steps(report: &mut Report) {
     });
 }
 
-/// 200 cases by one thread, two, seven processes, and killed at 20 random times: one hash.
+/// 200 cases by one thread, two, seven processes, and killed at 20 random times: one hash. Then
+/// Slurm.
 pub(crate) fn deep() -> StepResult<String> {
     let found = figures(
         cargo()
@@ -57,5 +63,6 @@ pub(crate) fn deep() -> StepResult<String> {
         |line| line.contains("campaign: "),
     )?;
     let first = found.into_iter().next();
-    Ok(first.context("no line with `campaign: `")?)
+    let shared = first.context("no line with `campaign: `")?;
+    Ok(format!("{shared}; {}", slurm::check()?))
 }

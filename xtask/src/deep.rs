@@ -54,7 +54,7 @@ const CHECKS: [Check; 12] = [
     ),
     Check(
         "campaign",
-        "200 cases shared, killed 20 times and replayed: one hash",
+        "200 cases shared, killed 20 times and replayed; Slurm on two nodes of this computer",
         10,
         campaign::deep,
     ),

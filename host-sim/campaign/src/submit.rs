@@ -10,6 +10,8 @@ use crate::{CampaignError, Store};
 
 /// Shortest work of a task, s: less is mostly start-up, and overwhelms a site.
 const LEAST_TASK_S: f64 = 30.0;
+/// So few tasks overwhelm nobody, however short they are.
+const FEW: u64 = 8;
 /// Simulated seconds in one of work, about.
 const SPEED: f64 = 20.0;
 
@@ -30,8 +32,9 @@ impl Submission {
     /// That of a folder.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if there are more shards than blocks, or so many that a task
-    /// has less than 30 s of work, by the simulated time of a case; with what is allowed.
+    /// [`CampaignError::Refused`] if there are more shards than blocks, or more than a few of
+    /// which each has less than 30 s of work, by the simulated time of a case; with what is
+    /// allowed.
     pub fn new(
         store: &Store,
         name: &str,
@@ -40,7 +43,9 @@ impl Submission {
         duration_s: f64,
     ) -> Result<Self, CampaignError> {
         let work_s = store.plan().cases as f64 * duration_s / SPEED;
-        let most = ((work_s / LEAST_TASK_S) as u64).clamp(1, store.blocks());
+        let most = ((work_s / LEAST_TASK_S) as u64)
+            .max(FEW)
+            .min(store.blocks());
         if shards == 0 || shards > most {
             return Err(CampaignError::refused(
                 format!(
@@ -48,8 +53,8 @@ impl Submission {
                     store.blocks()
                 ),
                 format!(
-                    "give --shards from 1 to {most}: a task has at least one block and about \
-                     {LEAST_TASK_S:.0} s of work"
+                    "give --shards from 1 to {most}: a task has at least one block, and above \
+                     {FEW} tasks about {LEAST_TASK_S:.0} s of work"
                 ),
             ));
         }

@@ -24,12 +24,10 @@ pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
             continue;
         };
         for path in scenario {
-            let bases = resolver.scenarios.values();
-            bases.for_each(|base| field(r, factor, ("scenario.", path), base));
+            field_in_all(r, factor, ("scenario.", path), resolver.scenarios.values());
         }
         for path in robot {
-            let bases = resolver.robots.values();
-            bases.for_each(|base| field(r, factor, ("robot.", path), base));
+            field_in_all(r, factor, ("robot.", path), resolver.robots.values());
         }
     }
     if r.is_clean() {
@@ -71,6 +69,20 @@ fn twice(r: &mut Reader, plan: &Plan, factor: &Factor) {
             );
             r.problem(span, message, "set twice", None);
         }
+    }
+}
+
+/// One field that a factor sets, in all files that have it; what is wrong in one is not told of
+/// the others as well.
+fn field_in_all<'a>(
+    r: &mut Reader,
+    factor: &Factor,
+    path: (&str, &str),
+    mut bases: impl Iterator<Item = &'a Base>,
+) {
+    let before = r.problem_count();
+    while let Some(base) = bases.next().filter(|_| r.problem_count() == before) {
+        field(r, factor, path, base);
     }
 }
 
@@ -261,12 +273,28 @@ fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
         })
         .collect();
     if let Err(error) = resolver.resolve(&middle) {
-        let problems = error.problems().iter().map(|p| p.to_string());
-        let message = format!(
-            "factors in their middle do not fit together: {}",
-            problems.collect::<Vec<_>>().join("; ")
-        );
-        r.problem(None, message, "of this plan", None);
+        // Of a factor that is wrong by itself its place is known.
+        let mut named = false;
+        for (factor, value) in plan.factors.iter().zip(&middle) {
+            if let Err(error) = resolver.resolve_only(&[(factor, value)]) {
+                let span = span_of(r, factor);
+                report(
+                    r,
+                    span,
+                    &format!("`factor.{}` = {value}", factor.name),
+                    &error,
+                );
+                named = true;
+            }
+        }
+        if !named {
+            report(
+                r,
+                None,
+                "factors in their middle do not fit together",
+                &error,
+            );
+        }
         return;
     }
     for (place, factor) in plan.factors.iter().enumerate() {
@@ -283,12 +311,26 @@ fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
                 continue;
             };
             let span = span_of(r, factor);
-            for problem in error.problems() {
-                let message = format!("`factor.{}` = {probe}: {problem}", factor.name);
-                let help = problem.help_text().map(str::to_owned);
-                r.problem(span.clone(), message, "does not fit", help);
-            }
+            report(
+                r,
+                span,
+                &format!("`factor.{}` = {probe}", factor.name),
+                &error,
+            );
         }
+    }
+}
+
+/// What the reader of a file says of a value.
+fn report(r: &mut Reader, span: Option<Range<usize>>, what: &str, error: &ConfigError) {
+    for problem in error.problems() {
+        let help = problem.help_text().map(str::to_owned);
+        r.problem(
+            span.clone(),
+            format!("{what}: {problem}"),
+            "does not fit",
+            help,
+        );
     }
 }
 

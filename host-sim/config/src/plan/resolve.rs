@@ -104,9 +104,17 @@ impl<'a> Resolver<'a> {
     /// # Errors
     /// [`ConfigError`] where the values do not make a scenario or a robot that there can be.
     pub fn resolve(&self, values: &[Value]) -> Result<Resolved, ConfigError> {
-        let factors = || self.plan.factors.iter().zip(values);
+        let all: Vec<_> = self.plan.factors.iter().zip(values).collect();
+        self.resolve_only(&all)
+    }
+
+    /// The same of some factors, the others' fields as the files have them.
+    pub(super) fn resolve_only(
+        &self,
+        factors: &[(&Factor, &Value)],
+    ) -> Result<Resolved, ConfigError> {
         let chosen = |sets: &Sets| {
-            let found = factors().find(|(factor, _)| factor.sets == *sets);
+            let found = factors.iter().find(|(factor, _)| factor.sets == *sets);
             found.map(|(_, value)| value.to_string())
         };
         let base = &self.plan.base;
@@ -120,7 +128,7 @@ impl<'a> Resolver<'a> {
         let robot = known(&self.robots, "robot", &robot_name)?;
         let mut scenario_text = scenario.document.clone();
         let mut robot_text = robot.document.clone();
-        for (factor, value) in factors() {
+        for (factor, value) in factors {
             match &factor.sets {
                 Sets::Scenario | Sets::Robot => {}
                 Sets::Fault(template) => {
