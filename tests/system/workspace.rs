@@ -13,7 +13,7 @@ mod circles;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 27] = [
+const ARROWS: [(&str, &[&str]); 28] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -94,6 +94,18 @@ const ARROWS: [(&str, &[&str]); 27] = [
     ("wheeleg-sim", &SIM),
     ("wheeleg-report", &[]),
     (
+        "wheeleg-campaign",
+        &[
+            "wheeleg-config",
+            "wheeleg-identity",
+            "wheeleg-remote-host",
+            "wheeleg-report",
+            "wheeleg-sim",
+            "wheeleg-studies",
+            "wheeleg-telemetry",
+        ],
+    ),
+    (
         "wheeleg-console",
         &[
             "wheeleg-config",
@@ -162,7 +174,8 @@ const STUDIES: [&str; 13] = [
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 11] = [
+const PROGRAM: [&str; 12] = [
+    "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-console",
     "wheeleg-interface",
@@ -422,6 +435,25 @@ fn digests_of_images_are_of_all_crates_that_they_are_made_of_and_no_others() {
                 assert_eq!(files.contains(&source), in_an_image, "{}", source.display());
             }
         }
+    }
+}
+
+/// Parts of two programs are told apart by the sources that rows depend on: a crate that the list
+/// lacks could change them unseen.
+#[test]
+fn the_digest_of_campaigns_is_of_all_crates_that_they_are_made_of() {
+    let (packages, root) = (packages(), root().canonicalize().expect("the root"));
+    let script = fs::read_to_string(root.join("host-sim/campaign/build.rs")).expect("there");
+    let mut made_of = BTreeSet::new();
+    built_from("wheeleg-campaign", &packages, &mut made_of);
+    assert!(made_of.len() > 10, "{made_of:?}");
+    for name in made_of {
+        let manifest = PathBuf::from(text(&packages[&name]["manifest_path"]));
+        let folder = manifest.parent().expect("a folder");
+        let folder = folder.canonicalize().expect("a folder");
+        let below = folder.strip_prefix(&root).expect("below the root");
+        let listed = format!("\"{}\",", below.to_string_lossy().replace('\\', "/"));
+        assert!(script.contains(&listed), "{listed}");
     }
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::process::{cargo, figures, output};
 use crate::report::{Report, StepResult};
-use crate::{fuzz, mutants, pil, record, rust};
+use crate::{campaign, fuzz, mutants, pil, record, rust};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 11] = [
+const CHECKS: [Check; 12] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -51,6 +51,12 @@ const CHECKS: [Check; 11] = [
         "the predictive law on 240 cylinders drawn at random",
         2,
         cylinders,
+    ),
+    Check(
+        "campaign",
+        "200 cases shared, killed 20 times and replayed; Slurm on two nodes of this computer",
+        10,
+        campaign::deep,
     ),
     Check(
         "long-run",

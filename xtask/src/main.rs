@@ -14,6 +14,7 @@
 
 mod bench;
 mod browser;
+mod campaign;
 mod conformance;
 mod deep;
 mod docs;
@@ -88,6 +89,8 @@ enum Command {
     RigidBody,
     /// Compare the pneumatic plant with an integration by scipy.
     Plant,
+    /// The table of a campaign and its SQL in DuckDB.
+    Campaign,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
     /// Make a book of `docs`, if mdbook is there.
@@ -125,6 +128,7 @@ fn main() -> ExitCode {
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),
         Command::RigidBody => rigid_body::steps(&mut report),
         Command::Plant => plant::steps(&mut report),
+        Command::Campaign => campaign::steps(&mut report),
         Command::Mutants(options) => mutants::steps(&mut report, &options),
         Command::Docs => docs::steps(&mut report),
         Command::Deep(options) => deep::steps(&mut report, &options),
@@ -158,6 +162,7 @@ fn test(report: &mut Report) {
     browser::client(report);
     rigid_body::steps(report);
     plant::steps(report);
+    campaign::steps(report);
 }
 
 fn lints(report: &mut Report) {

@@ -50,6 +50,12 @@ impl Images {
             Self::Qemu => ["firmware/board-qemu", "firmware/board-qemu/mps2-an386.ld"],
         }
     }
+
+    /// All that they are made of.
+    fn sources(self) -> Vec<&'static str> {
+        let common = COMMON.into_iter().chain([LINK]);
+        common.chain(self.own()).collect()
+    }
 }
 
 /// Digest and files of the sources of `images` below the workspace's `root`.
@@ -57,8 +63,16 @@ impl Images {
 /// # Errors
 /// A file, a crate, its manifest or its sources that are missing or cannot be read.
 pub fn digest(root: &Path, images: Images) -> io::Result<(Digest, Vec<PathBuf>)> {
+    digest_of(root, &images.sources())
+}
+
+/// Digest and files of the crates and files with these names below the workspace's `root`.
+///
+/// # Errors
+/// As [`digest`].
+pub fn digest_of(root: &Path, names: &[&str]) -> io::Result<(Digest, Vec<PathBuf>)> {
     let mut files = Vec::new();
-    for name in COMMON.into_iter().chain([LINK]).chain(images.own()) {
+    for name in names {
         let path = root.join(name);
         if path.is_file() {
             files.push(path);
@@ -97,12 +111,20 @@ pub fn digest(root: &Path, images: Images) -> io::Result<(Digest, Vec<PathBuf>)>
 /// # Errors
 /// As [`digest`]; the file cannot be written.
 pub fn emit(root: &Path, images: Images, name: &str) -> io::Result<()> {
-    let (digest, files) = digest(root, images)?;
+    emit_of(root, &images.sources(), name)
+}
+
+/// The same of the crates and files with these names.
+///
+/// # Errors
+/// As [`emit`].
+pub fn emit_of(root: &Path, names: &[&str], name: &str) -> io::Result<()> {
+    let (digest, files) = digest_of(root, names)?;
     for file in files {
         println!("cargo:rerun-if-changed={}", file.display());
     }
     // Files that come anew: a folder's time is that of its newest entry.
-    for name in COMMON.into_iter().chain([LINK]).chain(images.own()) {
+    for name in names {
         let sources = root.join(name).join(SOURCES);
         if sources.is_dir() {
             println!("cargo:rerun-if-changed={}", sources.display());

@@ -28,6 +28,9 @@ pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "walk", "slope-10", "rock-field", "height-map",
 );
 
+/// Plans of campaigns: name, file name for messages, text.
+pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns": "three-step-spread");
+
 /// Data files of scenarios: name, content.
 pub const DATA: &[(&str, &[u8])] = &[(
     "height-map.csv",
@@ -69,12 +72,21 @@ pub fn robot_source_of(robot: &str, scenario: &str) -> Result<Source, ConfigErro
     robot_source(&named_by(robot, scenario))
 }
 
+/// The text of a plan, by built-in name or path.
+///
+/// # Errors
+/// [`ConfigError`] if there is no such plan or file.
+pub fn plan_source(name_or_path: &str) -> Result<Source, ConfigError> {
+    let (file, text) = find("plan", name_or_path, PLANS)?;
+    Ok(Source { file, text })
+}
+
 /// A robot by built-in name, or by path to a TOML file.
 ///
 /// # Errors
 /// [`ConfigError`] if there is no such robot or file, or if it is wrong.
 pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
-    let (file, text) = find("robot", name_or_path, ROBOTS)?;
+    let (file, text) = robot_text(name_or_path)?;
     RobotConfig::parse(&file, &text)
 }
 
@@ -88,7 +100,7 @@ pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig,
 }
 
 /// Name or path of the robot that a scenario names.
-fn named_by(robot: &str, scenario: &str) -> String {
+pub(crate) fn named_by(robot: &str, scenario: &str) -> String {
     let built_in = |list: &[(&str, &str, &str)], name: &str| list.iter().any(|(n, ..)| *n == name);
     if built_in(ROBOTS, robot) || built_in(SCENARIOS, scenario) || !is_path(robot) {
         return robot.to_owned();
@@ -104,13 +116,14 @@ fn named_by(robot: &str, scenario: &str) -> String {
 pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
     if SCENARIOS.iter().any(|(name, ..)| *name == name_or_path) {
-        return Scenario::parse_with(&file, &text, &Files::BuiltIn);
+        let read = Scenario::parse_with(&file, &text, &Files::BuiltIn);
+        return read.map(|(scenario, _)| scenario);
     }
     Scenario::parse(&file, &text)
 }
 
 /// Whether a name is that of a file.
-fn is_path(name_or_path: &str) -> bool {
+pub(crate) fn is_path(name_or_path: &str) -> bool {
     name_or_path.contains(['/', '\\'])
         || Path::new(name_or_path)
             .extension()

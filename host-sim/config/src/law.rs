@@ -39,6 +39,14 @@ impl FromStr for LawChoice {
     }
 }
 
+impl LawChoice {
+    /// Value of the boards' parameter `law`.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.number
+    }
+}
+
 impl RobotConfig {
     /// The same robot with another law in all its joints; everything else stays as its file says.
     pub fn set_law(&mut self, law: LawChoice) {

@@ -8,6 +8,8 @@
 //! * **scenario**: what happens in a run: robot, start pose, events by time, targets, faults
 //! * **terrain**: the ground of a scenario, in parts; each has a kind and a material
 //! * **source**: where a value is from: PAPER, DATASHEET, ASSUMED, IDENTIFIED
+//! * **plan**: a file of a campaign: a scenario, and what differs from case to case
+//! * **factor**: one of these differences: a list of values, or a distribution
 //! * **fingerprint**: hash of names, values and units of a robot; equal files of other layout
 //!   have the same
 
@@ -22,6 +24,7 @@ pub mod faults;
 mod law;
 mod node;
 mod params;
+pub mod plan;
 pub mod plant;
 mod quantity;
 mod reader;

@@ -188,6 +188,8 @@ fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
             min: tidy(f64::from(info.min) / scale),
             max: tidy(f64::from(info.max) / scale),
             source: "default of the board (protocol's parameter table)".to_owned(),
+            dimension: None,
+            whole: scale == 1.0,
             doc: info.text,
         });
     }
@@ -249,6 +251,8 @@ fn one(r: &mut Reader, entry: &Entry, info: &'static ParamInfo) -> Option<i32> {
         min,
         max,
         source,
+        dimension: None,
+        whole: scale == 1.0,
         doc: info.text,
     });
     Some(raw as i32)

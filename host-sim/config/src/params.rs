@@ -96,6 +96,10 @@ pub struct ParameterInfo {
     pub max: f64,
     /// Where the value comes from.
     pub source: String,
+    /// Physical dimension; `None` of a board's parameter, which has one unit.
+    pub dimension: Option<Dimension>,
+    /// Whether only whole numbers are allowed.
+    pub whole: bool,
     /// Meaning.
     pub doc: &'static str,
 }

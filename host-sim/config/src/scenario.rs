@@ -7,7 +7,7 @@ use wheeleg_master::layer1::walk::WalkOrder;
 use super::bars::{self, Bar};
 use super::command;
 use super::error::ConfigError;
-use super::params::FieldSpec;
+use super::params::{FieldSpec, ParameterInfo};
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
 use super::terrain::{self, Files, Ground};
@@ -176,15 +176,27 @@ impl Scenario {
     /// # Errors
     /// [`ConfigError`] with every problem found.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_listed(file, text).map(|(scenario, _)| scenario)
+    }
+
+    /// The same, with its quantities as written.
+    pub(crate) fn parse_listed(
+        file: &str,
+        text: &str,
+    ) -> Result<(Self, Vec<ParameterInfo>), ConfigError> {
         Self::parse_with(file, text, &Files::beside(file))
     }
 
-    /// As [`Self::parse`], with the data files elsewhere.
-    pub(crate) fn parse_with(file: &str, text: &str, files: &Files) -> Result<Self, ConfigError> {
+    /// The same, with the data files elsewhere.
+    pub(crate) fn parse_with(
+        file: &str,
+        text: &str,
+        files: &Files,
+    ) -> Result<(Self, Vec<ParameterInfo>), ConfigError> {
         let what = format!("the scenario file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
         let scenario = read(&mut r, files);
-        r.finish(&what, scenario).map(|(scenario, _)| scenario)
+        r.finish(&what, scenario)
     }
 }
 

@@ -4,6 +4,14 @@
 //! sorted values stand at equal distances from share 0 to share 1, and between two of them it
 //! is interpolated. So the median of an even number of values is the mean of the middle two.
 
+mod binomial;
+mod rank;
+mod resample;
+
+pub use binomial::{ALPHA, at_most, clopper_pearson, mcnemar, quantile_ranks, wilson};
+pub use rank::spearman;
+pub use resample::bootstrap;
+
 /// Quantile of a share from 0 to 1; `None` of no values. Not a number sorts last.
 ///
 /// # Panics
@@ -54,25 +62,13 @@ pub fn failure_bound(failures: u32, trials: u32) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
         let p = 0.5 * (low + high);
-        if at_most(failures, trials, p) > 0.05 {
+        if at_most(failures.into(), trials.into(), p) > 0.05 {
             low = p;
         } else {
             high = p;
         }
     }
     high
-}
-
-/// Probability of at most `failures` in `trials` of probability `p`, from 0 to 1 exclusive.
-fn at_most(failures: u32, trials: u32, p: f64) -> f64 {
-    let odds = p.ln() - (-p).ln_1p();
-    let mut term = f64::from(trials) * (-p).ln_1p();
-    let mut sum = term.exp();
-    for k in 1..=failures {
-        term += (f64::from(trials - k + 1) / f64::from(k)).ln() + odds;
-        sum += term.exp();
-    }
-    sum
 }
 
 #[cfg(test)]

@@ -123,6 +123,11 @@ impl Reader {
         self.problems.is_empty()
     }
 
+    /// Number of problems so far.
+    pub(crate) fn problem_count(&self) -> usize {
+        self.problems.len()
+    }
+
     /// Position of the field at a dotted path.
     fn span_of(&self, path: &str) -> Option<Range<usize>> {
         let (table, key) = path.rsplit_once('.').unwrap_or(("", path));

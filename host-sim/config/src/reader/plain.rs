@@ -134,6 +134,26 @@ impl Reader {
         None
     }
 
+    /// Reads a finite number without unit, such as a share.
+    pub(crate) fn plain_number(&mut self, entry: &Entry, key: &str) -> Option<f64> {
+        let (key_span, item) = entry.get(key)?;
+        let value = super::entry::number(item.as_value());
+        if value.is_none() {
+            let message = format!(
+                "`{}` = {} must be a finite number",
+                entry.field_path(key),
+                item.to_string().trim()
+            );
+            self.problem(
+                item.span().or(Some(key_span)),
+                message,
+                "not a number",
+                None,
+            );
+        }
+        value
+    }
+
     /// Reads a whole number without unit, such as a seed.
     pub(crate) fn whole(
         &mut self,

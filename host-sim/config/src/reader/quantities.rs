@@ -95,6 +95,8 @@ impl Reader {
             min: spec.min / factor,
             max: spec.max / factor,
             source,
+            dimension: Some(spec.dimension),
+            whole: spec.integer,
             doc: spec.doc,
         });
         Some(written.into_iter().map(|v| v * factor).collect())

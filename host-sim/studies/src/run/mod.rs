@@ -6,8 +6,10 @@ mod ground;
 mod html;
 mod motion;
 mod report;
+mod simulate;
 mod summary;
 
+pub use simulate::{Simulated, simulate};
 pub use summary::{RunInfo, Summary};
 
 use std::fs::File;
@@ -18,13 +20,12 @@ use std::time::Instant;
 
 use self::figures::Source;
 use crate::StudyError;
-use crate::analysis::Analyser;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, LawChoice, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
-use wheeleg_sim::{self as sil, Boards, DownTimes, SimError};
+use wheeleg_sim::{Boards, DownTimes, SimError};
 use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
 
 /// What to run.
@@ -143,39 +144,55 @@ fn run_on(
         png: options.png,
         stop: stop.clone(),
     };
-    let job = Job::begin(&scenario.name, &settings)?;
+    run_with((&scenario, &robot, seed), boards, &settings)
+}
+
+/// Runs a scenario on a robot that are read already: all nodes in this program; else as [`run`].
+///
+/// # Errors
+/// As [`run`].
+pub fn run_read(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    settings: &Settings,
+) -> Result<Finished<Run>, StudyError> {
+    faults::check(scenario, robot, &Nodes::default())?;
+    run_with((scenario, robot, seed), Boards::default(), settings)
+}
+
+fn run_with(
+    (scenario, robot, seed): (&Scenario, &RobotConfig, u64),
+    boards: Boards,
+    settings: &Settings,
+) -> Result<Finished<Run>, StudyError> {
+    let job = Job::begin(&scenario.name, settings)?;
     announce(scenario.duration_s);
     let reserve = reserve(job.folder());
-    let mut analyser = Analyser::new(&scenario, &robot);
-    let mut recorder = Recorder::new(keep(&scenario))
+    let recorder = Recorder::new(keep(scenario))
         .with(LogFile::create(&job.folder().join("log.mcap"))?)
-        .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?)
-        .with(&mut analyser);
-    sil::provenance(&mut recorder, &scenario, &robot, seed);
+        .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?);
     let duration_ms = (scenario.duration_s * 1e3).round() as u64;
     job.progress.begin(
         format!("{:.0} s simulated", scenario.duration_s),
         duration_ms,
     );
     let begun = Instant::now();
-    let outcome = sil::run_on(
-        boards,
-        &scenario,
-        &robot,
-        seed,
-        &mut recorder,
-        sil::Observers::new(&mut |t_s| {
-            job.progress.at((t_s * 1e3) as u64);
-            if job.progress.is_stopped() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        }),
-    );
-    let (recording, failed) = recorder.close();
+    let simulated = simulate(boards, scenario, robot, seed, recorder, &mut |t_s| {
+        job.progress.at((t_s * 1e3) as u64);
+        if job.progress.is_stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })?;
     let wall_s = begun.elapsed().as_secs_f64();
-    let outcome = outcome?;
+    let Simulated {
+        outcome,
+        recording,
+        analysis,
+        failed,
+    } = simulated;
     let unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
 
     let info = RunInfo {
@@ -187,8 +204,7 @@ fn run_on(
         complete: !outcome.stopped,
         pil: outcome.pil,
     };
-    let analysis = analyser.finish();
-    let mut summary = Summary::new(&scenario, &robot, &recording, &analysis, info);
+    let mut summary = Summary::new(scenario, robot, &recording, &analysis, info);
     summary.unwritten = unwritten.iter().map(ToString::to_string).collect();
     drop(reserve);
     let recorded_ms = (summary.recorded_s * 1e3).round() as u64;
@@ -197,8 +213,8 @@ fn run_on(
         .stopped(recorded_ms, duration_ms, "ms of the scenario")
         .filter(|_| !summary.complete);
     let source = Source {
-        scenario: &scenario,
-        robot: &robot,
+        scenario,
+        robot,
         recording: &recording,
         analysis: &analysis,
     };

@@ -70,6 +70,11 @@ impl Progress {
         self.bar.set_position(0);
     }
 
+    /// Another message beside the bar.
+    pub fn say(&self, what: String) {
+        self.bar.set_message(what);
+    }
+
     /// So many steps of the phase are done.
     pub fn at(&self, steps: u64) {
         self.bar.set_position(steps);

@@ -1,5 +1,6 @@
 //! The command line: one file per command.
 
+mod campaign;
 mod channels;
 mod check;
 mod commands;
@@ -76,6 +77,8 @@ enum Command {
     Ctl(ctl::CtlArgs),
     /// Repeat a recording of `wheeleg serve`, and compare it with what was recorded.
     Replay(replay::ReplayArgs),
+    /// Run a scenario many times: factors, shards, one table, replay.
+    Campaign(campaign::CampaignArgs),
     /// List the built-in scenarios and robots.
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
@@ -120,6 +123,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Run(args)) => run::command(&args),
         Some(Command::Replay(args)) => replay::command(&args),
         Some(Command::Serve(args)) => serve::command(&args),
+        Some(Command::Campaign(args)) => campaign::command(&args),
         Some(Command::Ctl(args)) => ctl::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),
         Some(Command::List(args)) => list::command(&args),

@@ -1,0 +1,35 @@
+//! Digest of the sources that the rows of a campaign depend on: parts of two programs are told
+//! apart by it.
+
+use std::env;
+use std::path::PathBuf;
+
+use wheeleg_identity::sources;
+
+/// Whatever this crate is built from.
+const NAMES: [&str; 19] = [
+    "Cargo.toml",
+    "Cargo.lock",
+    "protocol",
+    "protocol/remote-link",
+    "firmware/identity",
+    "firmware/units",
+    "firmware/control",
+    "firmware/kinematics",
+    "firmware/node",
+    "firmware/master",
+    "host-sim/config",
+    "host-sim/interface",
+    "host-sim/plant",
+    "host-sim/remote",
+    "host-sim/report",
+    "host-sim/sim",
+    "host-sim/studies",
+    "host-sim/telemetry",
+    "host-sim/campaign",
+];
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../..");
+    Ok(sources::emit_of(&root, &NAMES, "sources")?)
+}

@@ -1,0 +1,151 @@
+//! Which cases a process has begun, so that one that ends the process is known by the next.
+//!
+//! A line for each beginning, each end, and each process of its own that a case ended
+//! (`isolate.rs`). A beginning without an end is a suspicion: the process may have been killed
+//! from outside, and had more than one case at work. So such a case is run once more in a process
+//! of its own; if it ends that, too, its row says so.
+
+use std::collections::BTreeMap;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{CampaignError, host};
+
+/// One line.
+#[derive(Debug, Serialize, Deserialize)]
+struct Line {
+    case: u64,
+    event: Event,
+    host: String,
+    process: u32,
+}
+
+/// What became of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Event {
+    /// A process has begun it.
+    Begun,
+    /// It has a row, or was left when the process was asked to stop.
+    Ended,
+    /// It ended a process of its own.
+    EndedItsProcess,
+}
+
+/// What is known of a case.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Known {
+    /// Beginnings without an end.
+    pub(crate) open: u32,
+    /// Processes of its own that it ended.
+    pub(crate) proven: u32,
+}
+
+impl Known {
+    /// Processes that have ended in it, as far as is known.
+    pub(crate) fn ends(self) -> u32 {
+        self.open + self.proven
+    }
+}
+
+/// The file of a block.
+#[derive(Debug)]
+pub(crate) struct Attempts {
+    path: PathBuf,
+    known: BTreeMap<u64, Known>,
+    /// Lines of threads must not mix.
+    file: Mutex<()>,
+}
+
+impl Attempts {
+    /// Reads what is there; a line that was cut off is none.
+    pub(crate) fn read(path: PathBuf) -> Self {
+        let text = fs::read_to_string(&path).unwrap_or_default();
+        let mut known: BTreeMap<u64, Known> = BTreeMap::new();
+        for line in text.lines() {
+            let Ok(line) = serde_json::from_str::<Line>(line) else {
+                continue;
+            };
+            let of = known.entry(line.case).or_default();
+            match line.event {
+                Event::Begun => of.open += 1,
+                Event::Ended => of.open = of.open.saturating_sub(1),
+                Event::EndedItsProcess => {
+                    of.open = of.open.saturating_sub(1);
+                    of.proven += 1;
+                }
+            }
+        }
+        Self {
+            path,
+            known,
+            file: Mutex::new(()),
+        }
+    }
+
+    /// What was known of a case when the file was read.
+    pub(crate) fn known(&self, case: u64) -> Known {
+        self.known.get(&case).copied().unwrap_or_default()
+    }
+
+    /// Adds a line.
+    pub(crate) fn note(&self, case: u64, event: Event) -> Result<(), CampaignError> {
+        let line = Line {
+            case,
+            event,
+            host: host::name(),
+            process: std::process::id(),
+        };
+        let mut text = serde_json::to_string(&line).expect("plain data is JSON");
+        text.push('\n');
+        let _held = self.file.lock();
+        let write = || {
+            let mut file = OpenOptions::new()
+                .create(true)
+                .append(true)
+                .open(&self.path)?;
+            file.write_all(text.as_bytes())
+        };
+        write().map_err(|e| CampaignError::output("write", &self.path, e))
+    }
+
+    /// The block is done.
+    pub(crate) fn remove(&self) {
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_beginning_without_an_end_is_known_and_a_torn_line_is_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("000001.jsonl");
+        let attempts = Attempts::read(path.clone());
+        assert_eq!(attempts.known(5), Known::default());
+        for (case, event) in [
+            (5, Event::Begun),
+            (6, Event::Begun),
+            (6, Event::Ended),
+            (7, Event::Begun),
+            (7, Event::EndedItsProcess),
+        ] {
+            attempts.note(case, event).expect("written");
+        }
+        let mut text = fs::read_to_string(&path).expect("there");
+        text.push_str("{\"case\":6,\"event\":\"beg");
+        fs::write(&path, text).expect("written");
+        let attempts = Attempts::read(path.clone());
+        let known = [5, 6, 7, 8].map(|case| attempts.known(case));
+        let of = |open, proven| Known { open, proven };
+        assert_eq!(known, [of(1, 0), of(0, 0), of(0, 1), of(0, 0)]);
+        attempts.remove();
+        assert!(!path.exists());
+    }
+}

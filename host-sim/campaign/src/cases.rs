@@ -1,0 +1,159 @@
+//! Any case of a plan from its index.
+
+use wheeleg_config::plan::{Plan, Resolved, Resolver, Value};
+use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_remote_host::Nodes;
+use wheeleg_sim::faults;
+
+use crate::CampaignError;
+use crate::columns::Columns;
+use crate::draw::Draws;
+use crate::identity::{CaseId, identity};
+
+/// Cells that are looked at before the first case.
+const CELLS: u64 = 1000;
+
+/// Where a case stands in its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Index of the case. Replicates count first, then cells, then samples: more samples leave
+    /// the cases before them where they are.
+    pub index: u64,
+    /// Cell of the grid.
+    pub cell: u64,
+    /// Sample.
+    pub sample: u64,
+    /// Replicate.
+    pub replicate: u64,
+}
+
+/// A case.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// Where it stands.
+    pub place: Place,
+    /// Values of the factors.
+    pub values: Vec<Value>,
+    /// Identity.
+    pub id: CaseId,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Scenario and robot, or why there are none.
+    pub setup: Result<(Scenario, RobotConfig), String>,
+}
+
+/// All cases of a plan.
+pub struct Cases<'a> {
+    plan: &'a Plan,
+    resolver: Resolver<'a>,
+    draws: Draws<'a>,
+    columns: Columns,
+}
+
+impl<'a> Cases<'a> {
+    /// Reads scenarios and robots once.
+    ///
+    /// # Errors
+    /// [`CampaignError::Config`] if one of them is wrong, [`CampaignError::Refused`] if the
+    /// sampler cannot draw so many factors.
+    pub fn new(plan: &'a Plan) -> Result<Self, CampaignError> {
+        let resolver = Resolver::new(plan)?;
+        let columns = Columns::of(plan, &resolver)?;
+        Ok(Self {
+            draws: Draws::new(plan)?,
+            plan,
+            resolver,
+            columns,
+        })
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        self.plan
+    }
+
+    /// Columns of the table.
+    #[must_use]
+    pub fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    /// Simulated time of the first case, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        let setup = self.case(0).setup;
+        setup.map_or(1.0, |(scenario, _)| scenario.duration_s)
+    }
+
+    /// Whether a case can be at all: tells why not before any is begun. A case that cannot be
+    /// among others that can has a row that says so.
+    ///
+    /// # Errors
+    /// [`CampaignError::Refused`] if no case of the first sample has a scenario and a robot.
+    pub fn ensure_possible(&self) -> Result<(), CampaignError> {
+        let mut why = String::new();
+        for cell in 0..self.plan.cells().min(CELLS) {
+            match self.case(cell * self.plan.replicates).setup {
+                Ok(_) => return Ok(()),
+                Err(told) => why = told,
+            }
+        }
+        Err(CampaignError::refused(
+            format!("no case of the first sample can be: {why}"),
+            "change the plan: what is wrong is wrong in all of its cases",
+        ))
+    }
+
+    /// Where the case of an index stands.
+    #[must_use]
+    pub fn place(&self, index: u64) -> Place {
+        let (replicates, cells) = (self.plan.replicates, self.plan.cells());
+        Place {
+            index,
+            replicate: index % replicates,
+            cell: index / replicates % cells,
+            sample: index / replicates / cells,
+        }
+    }
+
+    /// Values of the factors of a case.
+    #[must_use]
+    pub fn values(&self, place: Place) -> Vec<Value> {
+        self.draws.values(place.cell, place.sample)
+    }
+
+    /// The case of an index.
+    #[must_use]
+    pub fn case(&self, index: u64) -> Case {
+        let place = self.place(index);
+        let values = self.values(place);
+        let resolved = self.resolver.resolve(&values);
+        let (id, seed) = identity(self.plan, &values, place.replicate, resolved.as_ref().ok());
+        let setup = match resolved {
+            Ok(resolved) => checked(resolved),
+            Err(error) => {
+                let problems = error.problems().iter().map(ToString::to_string);
+                Err(problems.collect::<Vec<_>>().join("; "))
+            }
+        };
+        Case {
+            place,
+            values,
+            id,
+            seed,
+            setup,
+        }
+    }
+}
+
+/// What the simulator, too, asks of the faults.
+fn checked(resolved: Resolved) -> Result<(Scenario, RobotConfig), String> {
+    let Resolved {
+        scenario, robot, ..
+    } = resolved;
+    match faults::check(&scenario, &robot, &Nodes::default()) {
+        Ok(()) => Ok((scenario, robot)),
+        Err(error) => Err(error.to_string()),
+    }
+}

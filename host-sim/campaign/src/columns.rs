@@ -1,0 +1,214 @@
+//! Columns of the table of a campaign: known before the first case, so that every part has the
+//! same.
+
+use serde::{Deserialize, Serialize};
+use wheeleg_config::plan::{Factor, Plan, Resolver, Sets, Value, Values};
+use wheeleg_studies::analysis::Analyser;
+
+use crate::CampaignError;
+
+/// Key of the columns in what a file says of itself.
+pub(crate) const FACT: &str = "wheeleg.columns";
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Whole numbers.
+    Whole,
+    /// Numbers.
+    Number,
+    /// Yes or no.
+    Flag,
+    /// Texts.
+    Text,
+}
+
+/// A column: its name, what it holds, and what that means.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Column {
+    /// Name.
+    pub name: String,
+    /// What it holds.
+    pub kind: Kind,
+    /// Unit of its numbers; empty where they have none.
+    pub unit: String,
+    /// What it means.
+    pub meaning: String,
+    /// Lower limit of a target.
+    pub min: Option<f64>,
+    /// Upper limit of a target.
+    pub max: Option<f64>,
+}
+
+impl Column {
+    pub(crate) fn new(name: &str, kind: Kind, unit: &str, meaning: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            kind,
+            unit: unit.to_owned(),
+            meaning: meaning.to_owned(),
+            min: None,
+            max: None,
+        }
+    }
+}
+
+/// All columns, and which of them are what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// In the order of the table.
+    pub all: Vec<Column>,
+    /// Names of the factors, without the `f.` of their columns.
+    pub factors: Vec<String>,
+    /// Names of the targets; each has a column of its value and one of its verdict.
+    pub targets: Vec<String>,
+}
+
+/// Columns before the factors, and between them and the targets.
+const BEFORE: [(&str, Kind, &str, &str); 6] = [
+    (
+        "case",
+        Kind::Text,
+        "",
+        "identity of the case, by its content",
+    ),
+    ("index", Kind::Whole, "", "place in the plan"),
+    ("block", Kind::Whole, "", "part file that it was in"),
+    ("sample", Kind::Whole, "", "sample of the drawn factors"),
+    (
+        "replicate",
+        Kind::Whole,
+        "",
+        "which of the cases that differ in their noise alone",
+    ),
+    ("seed", Kind::Whole, "", "seed of all noise"),
+];
+const BETWEEN: [(&str, Kind, &str, &str); 5] = [
+    (
+        "status",
+        Kind::Text,
+        "",
+        "ok, error, panic, crashed or limit",
+    ),
+    ("error", Kind::Text, "", "what went wrong"),
+    ("log_hash", Kind::Text, "", "hash of the log"),
+    (
+        "simulated_s",
+        Kind::Number,
+        "s",
+        "simulated time, start-up included",
+    ),
+    (
+        "passed",
+        Kind::Flag,
+        "",
+        "whether all required targets are met",
+    ),
+];
+
+impl Columns {
+    /// Those of a plan. Targets are those of all its scenarios.
+    ///
+    /// # Errors
+    /// [`CampaignError::Config`] if a scenario or robot is wrong.
+    pub fn of(plan: &Plan, resolver: &Resolver<'_>) -> Result<Self, CampaignError> {
+        let plain = |list: &[(&str, Kind, &str, &str)]| -> Vec<Column> {
+            let columns = list.iter();
+            columns
+                .map(|(name, kind, unit, meaning)| Column::new(name, *kind, unit, meaning))
+                .collect()
+        };
+        let mut all = plain(&BEFORE);
+        all.extend(plan.factors.iter().map(factor_column));
+        all.extend(plain(&BETWEEN));
+        let mut targets: Vec<String> = Vec::new();
+        for values in probes(plan) {
+            let case = resolver.resolve(&values)?;
+            for target in Analyser::new(&case.scenario, &case.robot).finish().targets {
+                if targets.contains(&target.id) {
+                    continue;
+                }
+                let verdict = format!("{}.pass", target.id);
+                let meaning = format!("whether {} lies within its limits", target.id);
+                all.push(Column {
+                    min: target.min,
+                    max: target.max,
+                    ..Column::new(&target.id, Kind::Number, target.unit, &target.description)
+                });
+                all.push(Column::new(&verdict, Kind::Flag, "", &meaning));
+                targets.push(target.id);
+            }
+        }
+        let factors = plan.factors.iter().map(|f| f.name.clone()).collect();
+        Ok(Self {
+            all,
+            factors,
+            targets,
+        })
+    }
+
+    /// Those of a file, by their order.
+    #[must_use]
+    pub fn read(all: Vec<Column>) -> Self {
+        let names = || all.iter().map(|c| c.name.as_str());
+        let factors = names().filter_map(|name| name.strip_prefix("f."));
+        let factors = factors.map(str::to_owned).collect();
+        let targets = names().filter_map(|name| name.strip_suffix(".pass"));
+        let targets = targets.map(str::to_owned).collect();
+        Self {
+            all,
+            factors,
+            targets,
+        }
+    }
+}
+
+fn factor_column(factor: &Factor) -> Column {
+    let name = format!("f.{}", factor.name);
+    let kind = match &factor.values {
+        _ if factor.is_text() => Kind::Text,
+        Values::Grid(list) if matches!(list[0], Value::Flag(_)) => Kind::Flag,
+        _ => Kind::Number,
+    };
+    let meaning = match &factor.sets {
+        Sets::Scenario => "scenario".to_owned(),
+        Sets::Robot => "robot".to_owned(),
+        Sets::Fault(template) => format!("fault {template}"),
+        Sets::Fields { scenario, robot } => {
+            let scenario = scenario.iter().map(|path| format!("scenario.{path}"));
+            let robot = robot.iter().map(|path| format!("robot.{path}"));
+            let how = if factor.scale {
+                "times the file's "
+            } else {
+                ""
+            };
+            let paths: Vec<String> = scenario.chain(robot).collect();
+            format!("{how}{}", paths.join(", "))
+        }
+    };
+    Column::new(&name, kind, &factor.unit, &meaning)
+}
+
+/// Values at which each scenario and each robot is seen once, the other factors in their middle.
+fn probes(plan: &Plan) -> Vec<Vec<Value>> {
+    let mut probes = vec![Vec::new()];
+    for factor in &plan.factors {
+        let values = match (&factor.sets, &factor.values) {
+            (Sets::Scenario | Sets::Robot, Values::Grid(list)) => list.clone(),
+            (_, Values::Grid(list)) => vec![list[0].clone()],
+            (_, Values::Drawn(distribution)) => vec![distribution.middle()],
+        };
+        probes = probes
+            .into_iter()
+            .flat_map(|probe: Vec<Value>| {
+                values.iter().map(move |value| {
+                    let mut probe = probe.clone();
+                    probe.push(value.clone());
+                    probe
+                })
+            })
+            .collect();
+    }
+    probes
+}

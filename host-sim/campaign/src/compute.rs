@@ -1,0 +1,58 @@
+//! The row of a case, whatever becomes of it.
+
+use crate::cases::{Case, Cases};
+use crate::panics::caught;
+use crate::row::{Figure, Row, Status};
+use crate::simulate::Outcome;
+
+/// What simulates a case; `None` if it was asked to stop before its end.
+pub type Simulate<'a> = &'a (dyn Fn(&Case) -> Option<Outcome> + Sync);
+
+/// Computes the row of a case; `None` if it was stopped.
+pub(crate) fn row(
+    cases: &Cases<'_>,
+    index: u64,
+    block: u64,
+    simulate: Simulate<'_>,
+) -> Option<Row> {
+    let made = caught(|| {
+        let case = cases.case(index);
+        let outcome = simulate(&case);
+        (case, outcome)
+    });
+    match made {
+        Ok((case, outcome)) => Some(row_of(cases, &case, block, outcome?)),
+        Err(told) => {
+            // The case itself can be made: what panicked is its simulation.
+            let case = caught(|| cases.case(index)).ok()?;
+            let outcome = Outcome::without(Status::Panic, told);
+            Some(row_of(cases, &case, block, outcome))
+        }
+    }
+}
+
+/// The row of a case and its outcome.
+pub(crate) fn row_of(cases: &Cases<'_>, case: &Case, block: u64, outcome: Outcome) -> Row {
+    let figures = cases.columns().targets.iter().map(|id| {
+        let target = outcome.targets.iter().find(|target| target.id == *id);
+        Figure {
+            value: target.and_then(|target| target.value),
+            pass: target.map(|target| target.pass),
+        }
+    });
+    Row {
+        case: case.id,
+        index: case.place.index,
+        block: case.place.index / block,
+        sample: case.place.sample,
+        replicate: case.place.replicate,
+        seed: case.seed,
+        figures: figures.collect(),
+        factors: case.values.clone(),
+        status: outcome.status,
+        error: outcome.error,
+        log_hash: outcome.log_hash,
+        simulated_s: outcome.simulated_s,
+        passed: outcome.passed,
+    }
+}

@@ -1,0 +1,155 @@
+//! Who a case is: its content, and nothing else.
+//!
+//! Neither index nor shard nor order enters. Two programs that run the same content have the same
+//! case, so their results can be compared case by case.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde_json::{Value as Json, json};
+use wheeleg_config::plan::{Plan, Resolved, Sets, Value};
+
+/// Version of what is hashed.
+const FORMAT: u32 = 1;
+/// Purpose of the seed's key.
+const SEED_KEY: &str = "wheeleg campaign seed v1";
+
+/// Identity of a case: 128 bits of a hash of its content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CaseId(u128);
+
+impl fmt::Display for CaseId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:032x}", self.0)
+    }
+}
+
+impl FromStr for CaseId {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let digits = text.len() == 32 && text.bytes().all(|b| b.is_ascii_hexdigit());
+        let number = digits.then(|| u128::from_str_radix(text, 16));
+        match number {
+            Some(Ok(number)) => Ok(Self(number)),
+            _ => Err(format!(
+                "`{text}` is no case: that has 32 hexadecimal digits"
+            )),
+        }
+    }
+}
+
+/// Identity and seed of a case.
+pub(crate) fn identity(
+    plan: &Plan,
+    values: &[Value],
+    replicate: u64,
+    resolved: Option<&Resolved>,
+) -> (CaseId, u64) {
+    let mut content = content(plan, values, replicate, resolved);
+    let hash = blake3::hash(canonical(&content).as_bytes());
+    let (half, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
+    let case = CaseId(u128::from_be_bytes(*half));
+    for (factor, value) in plan.factors.iter().zip(values).filter(|(f, _)| f.paired) {
+        remove(&mut content, &factor.name, &factor.sets, value);
+    }
+    let mut hasher = blake3::Hasher::new_derive_key(SEED_KEY);
+    hasher.update(&plan.root.to_le_bytes());
+    hasher.update(canonical(&content).as_bytes());
+    let hash = hasher.finalize();
+    let (bits, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
+    (case, u64::from_le_bytes(*bits) >> 1)
+}
+
+/// Canonical JSON: keys are sorted, floats have the fewest digits that give them back.
+fn canonical(json: &Json) -> String {
+    match json {
+        Json::Object(fields) => {
+            // Whatever order the map keeps.
+            let mut fields: Vec<_> = fields.iter().collect();
+            fields.sort_by_key(|(key, _)| *key);
+            let fields = fields
+                .into_iter()
+                .map(|(key, value)| format!("{}:{}", Json::from(key.as_str()), canonical(value)));
+            format!("{{{}}}", fields.collect::<Vec<_>>().join(","))
+        }
+        Json::Array(list) => {
+            let list: Vec<String> = list.iter().map(canonical).collect();
+            format!("[{}]", list.join(","))
+        }
+        plain => plain.to_string(),
+    }
+}
+
+fn content(plan: &Plan, values: &[Value], replicate: u64, resolved: Option<&Resolved>) -> Json {
+    let factors = plan.factors.iter().zip(values);
+    let factors: serde_json::Map<String, Json> = factors
+        .map(|(factor, value)| {
+            // Two units of one number are two contents; a plan has one of them.
+            let value = json!({ "value": value, "unit": factor.unit });
+            (factor.name.clone(), value)
+        })
+        .collect();
+    let of = |json: fn(&Resolved) -> &Json| resolved.map(|r| json(r).clone());
+    json!({
+        "format": FORMAT,
+        "scenario": of(|r| &r.scenario_json),
+        "robot": of(|r| &r.robot_json),
+        "factors": factors,
+        "replicate": replicate,
+    })
+}
+
+/// Takes a paired factor and what it sets out of a content.
+fn remove(content: &mut Json, name: &str, sets: &Sets, value: &Value) {
+    if let Some(factors) = content["factors"].as_object_mut() {
+        factors.remove(name);
+    }
+    match sets {
+        Sets::Scenario => content["scenario"] = Json::Null,
+        Sets::Robot => content["robot"] = Json::Null,
+        Sets::Fault(template) => {
+            let fault = template.replace("{}", &value.to_string());
+            if let Some(list) = content["scenario"]["faults"].as_array_mut() {
+                list.retain(|listed| listed.as_str() != Some(&fault));
+            }
+        }
+        Sets::Fields { scenario, robot } => {
+            for path in scenario {
+                remove_field(&mut content["scenario"], path);
+            }
+            for path in robot {
+                let parameters = &mut content["robot"]["parameters"];
+                if let Some(parameters) = parameters.as_object_mut() {
+                    parameters.retain(|listed, _| !is_or_holds(listed, path));
+                }
+            }
+        }
+    }
+}
+
+/// Whether a path names a parameter or a component of it.
+fn is_or_holds(listed: &str, path: &str) -> bool {
+    let rest = path.strip_prefix(listed);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+}
+
+/// Removes the field at a path such as `events[0].at`.
+fn remove_field(json: &mut Json, path: &str) {
+    let (above, last) = path.rsplit_once('.').unwrap_or(("", path));
+    let mut item = json;
+    for part in above.split('.').filter(|part| !part.is_empty()) {
+        let (key, index) = match part.strip_suffix(']').and_then(|p| p.rsplit_once('[')) {
+            Some((key, index)) => (key, index.parse::<usize>().ok()),
+            None => (part, None),
+        };
+        item = &mut item[key];
+        if let Some(index) = index {
+            item = &mut item[index];
+        }
+    }
+    let key = last.split('[').next().unwrap_or(last);
+    if let Some(fields) = item.as_object_mut() {
+        fields.remove(key);
+    }
+}

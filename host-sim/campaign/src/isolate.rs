@@ -1,0 +1,110 @@
+//! A case in a process of its own: one that is suspected to end the process that runs it.
+
+use std::path::Path;
+use std::process::{Command, ExitStatus, Stdio};
+
+use wheeleg_studies::study::Stop;
+
+use crate::cases::Cases;
+use crate::compute::{self, Simulate};
+use crate::row::Row;
+use crate::store::{Store, write_whole};
+
+use crate::{CampaignError, part};
+
+/// Exit code of a process that was asked to stop.
+pub(crate) const STOPPED: i32 = 75;
+
+/// What became of the process.
+pub(crate) enum Isolated {
+    /// It has a row.
+    Row(Box<Row>),
+    /// The case ended it, and how.
+    Ended(String),
+    /// It was asked to stop.
+    Stopped,
+}
+
+/// Runs a case in a process of its own of `program`.
+pub(crate) fn isolate(
+    program: &Path,
+    store: &Store,
+    index: u64,
+    stop: &Stop,
+) -> Result<Isolated, CampaignError> {
+    let block = index / store.plan().block;
+    let file = store.new_partial(block);
+    let child = Command::new(program)
+        .args(["campaign", "case"])
+        .arg(store.folder())
+        .arg(index.to_string())
+        .arg("--row")
+        .arg(&file)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .output();
+    let child = child.map_err(|e| {
+        CampaignError::refused(
+            format!("cannot start `{}`: {e}", program.display()),
+            "the program must be where it was",
+        )
+    })?;
+    let row = part::read(&file, &store.plan().hash);
+    let _ = std::fs::remove_file(&file);
+    if let Ok((rows, _)) = row
+        && let [row] = &rows[..]
+        && child.status.success()
+    {
+        return Ok(Isolated::Row(Box::new(row.clone())));
+    }
+    if stop.is_asked() || child.status.code() == Some(STOPPED) {
+        return Ok(Isolated::Stopped);
+    }
+    if child.status.code() == Some(74) {
+        let told = String::from_utf8_lossy(&child.stderr).trim().to_owned();
+        let reason = std::io::Error::other(told);
+        return Err(CampaignError::output("write", file, reason));
+    }
+    Ok(Isolated::Ended(how(child.status)))
+}
+
+/// How a process ended, the same on every computer.
+fn how(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        return format!("signal {signal}");
+    }
+    match status.code() {
+        Some(code) => format!("exit code {code}"),
+        None => "an unknown end".to_owned(),
+    }
+}
+
+/// The other side: computes one row of a campaign into a file. False if it was asked to stop.
+///
+/// # Errors
+/// As of [`crate::run`].
+pub fn isolated(
+    store: &Store,
+    index: u64,
+    file: &Path,
+    simulate: Simulate<'_>,
+) -> Result<bool, CampaignError> {
+    let plan = store.plan().plan()?;
+    let cases = Cases::new(&plan)?;
+    if index >= store.plan().cases {
+        return Err(CampaignError::refused(
+            format!(
+                "there is no case {index}: the plan has {}",
+                store.plan().cases
+            ),
+            format!("give a number from 0 to {}", store.plan().cases - 1),
+        ));
+    }
+    let Some(row) = compute::row(&cases, index, store.plan().block, simulate) else {
+        return Ok(false);
+    };
+    let bytes = part::bytes(cases.columns(), &store.plan().hash, &[row]);
+    write_whole(file, &bytes)?;
+    Ok(true)
+}

@@ -1,0 +1,64 @@
+//! Campaigns: one scenario many times, on as many computers as there are.
+//!
+//! A plan ([`wheeleg_config::plan`]) says what differs. [`Cases`] makes any case from its index,
+//! [`run`] works off a shard of them into a folder of part files ([`Store`]), [`merge`] makes one
+//! table of them, [`report`] a page, [`replay`] a full run of one case.
+//!
+//! There is no scheduler here. A shard is a process that anybody may start, kill and start again.
+//!
+//! # Glossary
+//!
+//! * **case**: one run: a scenario and a robot with a value of each factor, and a seed
+//! * **sample**: values of the factors that are drawn; the same in every cell of the grid
+//! * **cell**: one combination of values of the factors that have a list
+//! * **replicate**: the same values with other noise
+//! * **block**: cases with successive indices, the contents of one part file
+//! * **shard**: every n-th block, the share of one process
+//! * **part**: the file of a block; written whole or not at all
+//! * **attempt**: a case that a process has begun
+//! * **figure**: the measured value of a target
+
+mod attempts;
+mod cases;
+mod columns;
+mod compute;
+mod draw;
+mod error;
+mod host;
+mod identity;
+mod isolate;
+mod merge;
+mod panics;
+mod part;
+mod program;
+mod replay;
+pub mod report;
+mod row;
+mod run;
+mod shard;
+mod simulate;
+mod status;
+mod store;
+mod submit;
+mod table;
+mod work;
+
+pub use cases::{Case, Cases, Place};
+pub use columns::{Column, Columns, Kind};
+pub use compute::Simulate;
+pub use draw::Draws;
+pub use draw::quantile::quantile;
+pub use error::CampaignError;
+pub use identity::CaseId;
+pub use isolate::isolated;
+pub use merge::{Merged, merge};
+pub use program::program;
+pub use replay::{Replayed, replay};
+pub use row::{Figure, Row, Status};
+pub use run::{Options, Ran, run};
+pub use shard::Shard;
+pub use simulate::{Outcome, simulate};
+pub use status::{State, status};
+pub use store::{PlanFile, Store};
+pub use submit::Submission;
+pub use table::{Data, Table};

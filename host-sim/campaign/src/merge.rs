@@ -1,0 +1,198 @@
+//! One table of all parts.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use crate::columns::{Columns, FACT};
+use crate::part::{PLAN, PROGRAM};
+use crate::store::Store;
+use crate::table::{Data, GROUP_ROWS, Table, TableWriter};
+use crate::{CampaignError, Cases, host};
+
+/// What was merged.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Merged {
+    /// Rows.
+    pub rows: u64,
+    /// BLAKE3 over case, status, log hash and the bits of all figures, in the order of the plan,
+    /// hexadecimal. Programs that compute the same have the same, however the work was shared.
+    pub hash: String,
+}
+
+/// Blocks that a message names; of more there is the number.
+const NAMED: usize = 12;
+
+/// Writes one table of the parts in several folders of one plan; each case once.
+///
+/// # Errors
+/// [`CampaignError::Incomplete`] if blocks are missing, with the command that fills the holes;
+/// [`CampaignError::Refused`] for folders of different plans or programs, or a row twice;
+/// [`CampaignError::Output`] if the table cannot be written.
+pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
+    let stores: Vec<Store> = folders
+        .iter()
+        .map(|folder| Store::open(folder))
+        .collect::<Result<_, _>>()?;
+    let Some(first) = stores.first() else {
+        return Err(CampaignError::refused(
+            "no folder to merge",
+            "give one or more",
+        ));
+    };
+    for store in &stores {
+        if store.plan().hash != first.plan().hash || store.plan().program != first.plan().program {
+            return Err(CampaignError::refused(
+                format!(
+                    "`{}` and `{}` are of different plans, block sizes or programs: {} by `{}`, \
+                     and {} by `{}`",
+                    first.folder().display(),
+                    store.folder().display(),
+                    first.plan().hash,
+                    first.plan().program,
+                    store.plan().hash,
+                    store.plan().program,
+                ),
+                "only parts of one plan and one program make a table; write `block = …` into a \
+                 plan that is run in several folders",
+            ));
+        }
+    }
+    let parts = complete(&stores, folders)?;
+    let plan = first.plan().plan()?;
+    let columns = Cases::new(&plan)?.columns().clone();
+    let plan_text = serde_json::to_string(first.plan()).expect("texts are JSON");
+    let temporary = out.with_extension(format!("{}.tmp", host::unique()));
+    let result = write(
+        &temporary,
+        &parts,
+        &columns,
+        [&plan_text, &first.plan().program],
+    )
+    .and_then(|merged| {
+        let renamed = std::fs::rename(&temporary, out);
+        renamed.map_err(|e| CampaignError::output("write", out, e))?;
+        Ok(merged)
+    });
+    if result.is_err() {
+        let _ = std::fs::remove_file(&temporary);
+    }
+    result
+}
+
+/// Which of the folders has the part of each block.
+fn complete<'s>(stores: &'s [Store], folders: &[PathBuf]) -> Result<Vec<&'s Store>, CampaignError> {
+    let (mut parts, mut holes, mut bad) = (Vec::new(), Vec::new(), Vec::new());
+    for block in 0..stores[0].blocks() {
+        let whole = stores.iter().find(|store| match store.table(block) {
+            Ok(table) => table.is_some(),
+            Err(why) => {
+                bad.push(format!("`{}`: {why}", store.part(block).display()));
+                false
+            }
+        });
+        match whole {
+            Some(store) => parts.push(store),
+            None => holes.push(block),
+        }
+    }
+    if holes.is_empty() {
+        return Ok(parts);
+    }
+    let named = holes.iter().take(NAMED).map(|block| format!("{block:06}"));
+    let mut what = format!(
+        "{} of {} blocks have no part: {}",
+        holes.len(),
+        stores[0].blocks(),
+        named.collect::<Vec<_>>().join(", ")
+    );
+    if holes.len() > NAMED {
+        what.push_str(", …");
+    }
+    for bad in bad.iter().take(NAMED) {
+        what.push_str(&format!("; {bad}"));
+    }
+    let folder = folders[0].display();
+    Err(CampaignError::Incomplete {
+        what,
+        help: format!(
+            "`wheeleg campaign run {}/plan.json --out {folder}` computes them",
+            folder
+        ),
+    })
+}
+
+fn write(
+    to: &Path,
+    parts: &[&Store],
+    columns: &Columns,
+    [plan_text, program]: [&str; 2],
+) -> Result<Merged, CampaignError> {
+    let failed = |e: std::io::Error| CampaignError::output("write", to, e);
+    let full = |e: parquet::errors::ParquetError| {
+        CampaignError::output("write", to, std::io::Error::other(e.to_string()))
+    };
+    let file = File::create(to).map_err(failed)?;
+    let text = serde_json::to_string(&columns.all).expect("columns are JSON");
+    let facts = [(FACT, text.as_str()), (PLAN, plan_text), (PROGRAM, program)];
+    let file = std::io::BufWriter::new(file);
+    let mut writer = TableWriter::new(file, &columns.all, &facts).map_err(full)?;
+    let mut hasher = blake3::Hasher::new();
+    let mut group = Table::empty(columns.all.clone());
+    let mut rows = 0_u64;
+    for (block, store) in (0_u64..).zip(parts) {
+        let path = store.part(block);
+        let table = store.table(block);
+        let table = table.map_err(|why| CampaignError::unreadable(&path, why))?;
+        let table = table.filter(|table| table.columns == columns.all);
+        let table = table.ok_or_else(|| CampaignError::unreadable(&path, "other columns"))?;
+        hash(&mut hasher, &table, columns);
+        rows += table.rows() as u64;
+        group.append(table);
+        if group.rows() >= GROUP_ROWS {
+            writer.write(&group).map_err(full)?;
+            group = Table::empty(columns.all.clone());
+        }
+    }
+    if group.rows() > 0 {
+        writer.write(&group).map_err(full)?;
+    }
+    let file = writer.finish().map_err(full)?;
+    let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
+    file.sync_all().map_err(failed)?;
+    Ok(Merged {
+        rows,
+        hash: hasher.finalize().to_hex().to_string(),
+    })
+}
+
+/// Adds case, status, log hash and the figures' bits of each row.
+fn hash(hasher: &mut blake3::Hasher, table: &Table, columns: &Columns) {
+    let texts = ["case", "status", "log_hash"].map(|name| table.texts(name));
+    let figures: Vec<&Data> = columns
+        .targets
+        .iter()
+        .filter_map(|id| table.column(id))
+        .collect();
+    for row in 0..table.rows() {
+        for column in texts {
+            match column.get(row).and_then(Option::as_deref) {
+                Some(text) => {
+                    hasher.update(&(text.len() as u64).to_le_bytes());
+                    hasher.update(text.as_bytes());
+                }
+                None => {
+                    hasher.update(&u64::MAX.to_le_bytes());
+                }
+            }
+        }
+        for figure in &figures {
+            let value = match figure {
+                Data::Number(v) => v.get(row).copied().flatten(),
+                _ => None,
+            };
+            // No figure has these bits: they are those of a number that is none.
+            let bits = value.map_or(u64::MAX, f64::to_bits);
+            hasher.update(&bits.to_le_bytes());
+        }
+    }
+}

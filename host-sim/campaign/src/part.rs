@@ -1,0 +1,137 @@
+//! Part files: the rows of a block, and beside them who computed them and in what time.
+
+use std::fs::File;
+use std::path::Path;
+
+use crate::columns::{Column, Columns, FACT, Kind};
+use crate::panics::caught;
+use crate::row::{self, Row};
+use crate::table::{Data, Table, TableReader, TableWriter};
+use crate::{host, program};
+
+/// Keys of what a part says of itself, beside its columns.
+pub(crate) const PLAN: &str = "wheeleg.plan";
+pub(crate) const PROGRAM: &str = "wheeleg.program";
+/// Key of the hash of the values: bytes that were damaged are found, wherever they are.
+const ROWS: &str = "wheeleg.rows";
+
+/// What it took to compute a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Effort {
+    /// Place in the plan.
+    pub(crate) index: u64,
+    /// Time that it took, s.
+    pub(crate) wall_s: f64,
+    /// How often a process had begun it before without an end.
+    pub(crate) ends: u32,
+}
+
+/// The bytes of a part: the same from any program of the same sources.
+pub(crate) fn bytes(columns: &Columns, plan: &str, rows: &[Row]) -> Vec<u8> {
+    encode(&row::table(columns, rows), plan)
+}
+
+/// The bytes of what stands beside a part.
+pub(crate) fn run_bytes(plan: &str, efforts: &[Effort]) -> Vec<u8> {
+    let column =
+        |name: &str, kind, unit: &str, meaning: &str| Column::new(name, kind, unit, meaning);
+    let columns = vec![
+        column("index", Kind::Whole, "", "place in the plan"),
+        column("wall_s", Kind::Number, "s", "time that the case took"),
+        column("ends", Kind::Whole, "", "processes that ended in it before"),
+        column("host", Kind::Text, "", "computer"),
+        column("process", Kind::Whole, "", "process"),
+        column(
+            "processor",
+            Kind::Text,
+            "",
+            "what of it mathematics depends on",
+        ),
+    ];
+    let mut table = Table::empty(columns);
+    let (name, processor) = (host::name(), host::processor());
+    for (at, data) in table.data.iter_mut().enumerate() {
+        let each = efforts.iter();
+        *data = match at {
+            0 => Data::Whole(each.map(|e| i64::try_from(e.index).ok()).collect()),
+            1 => Data::Number(each.map(|e| Some(e.wall_s)).collect()),
+            2 => Data::Whole(each.map(|e| Some(i64::from(e.ends))).collect()),
+            3 => Data::Text(each.map(|_| Some(name.clone())).collect()),
+            4 => Data::Whole(each.map(|_| Some(i64::from(std::process::id()))).collect()),
+            _ => Data::Text(each.map(|_| Some(processor.clone())).collect()),
+        };
+    }
+    encode(&table, plan)
+}
+
+fn encode(table: &Table, plan: &str) -> Vec<u8> {
+    let columns = serde_json::to_string(&table.columns).expect("columns are JSON");
+    let (program, rows) = (program(), table.digest());
+    let facts = [
+        (FACT, columns.as_str()),
+        (PLAN, plan),
+        (PROGRAM, &program),
+        (ROWS, &rows),
+    ];
+    let write = || {
+        let mut writer = TableWriter::new(Vec::new(), &table.columns, &facts)?;
+        writer.write(table)?;
+        writer.finish()
+    };
+    write().expect("a table in memory can be written")
+}
+
+/// What a part is not.
+#[derive(Debug)]
+pub(crate) enum NotAPart {
+    /// There is none.
+    Missing,
+    /// It cannot be read: torn, or something else.
+    Torn(String),
+    /// It is one of another plan or program.
+    Foreign(String),
+}
+
+/// Rows of a part, if it is one of this plan and program.
+pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), NotAPart> {
+    let table = read_table(path, plan)?;
+    let rows = row::rows(&table);
+    let rows = rows.ok_or_else(|| NotAPart::Torn("rows that are none".to_owned()))?;
+    Ok((rows, table.columns))
+}
+
+/// Table of a part, if it is one of this plan and program.
+pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
+    let file = open(path)?;
+    // Damaged bytes must not end the program, whatever the library does with them.
+    let read = caught(|| {
+        let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
+        let reader = TableReader::new(file).map_err(torn)?;
+        of(&reader, plan)?;
+        let table = reader.read().map_err(torn)?;
+        if reader.fact(ROWS) != Some(table.digest().as_str()) {
+            return Err(NotAPart::Torn("its values were changed".to_owned()));
+        }
+        Ok(table)
+    });
+    read.unwrap_or_else(|_| Err(NotAPart::Torn("its bytes are damaged".to_owned())))
+}
+
+fn open(path: &Path) -> Result<File, NotAPart> {
+    File::open(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => NotAPart::Missing,
+        _ => NotAPart::Torn(e.to_string()),
+    })
+}
+
+fn of(reader: &TableReader<File>, plan: &str) -> Result<(), NotAPart> {
+    let own = program();
+    for (key, own) in [(PLAN, plan), (PROGRAM, own.as_str())] {
+        let found = reader.fact(key).unwrap_or("nothing");
+        if found != own {
+            let what = format!("its {key} is {found}, not {own}");
+            return Err(NotAPart::Foreign(what));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,175 @@
+//! One case again: its row computed anew, and the whole run with log, figures and report.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use wheeleg_studies::run::Run;
+use wheeleg_studies::study::{Finished, Settings, Stop};
+
+use crate::cases::Cases;
+use crate::identity::CaseId;
+use crate::part::{self, PLAN};
+use crate::row::{self, Row};
+use crate::simulate::simulate;
+use crate::store::{PlanFile, Store};
+use crate::table::TableReader;
+use crate::{CampaignError, compute};
+
+/// A case that was run again.
+#[derive(Debug)]
+pub struct Replayed {
+    /// The row as it is now.
+    pub row: Row,
+    /// The row as it was, if there is one.
+    pub before: Option<Row>,
+    /// Program that computed it.
+    pub program: String,
+    /// The run with its files; none of a case that has no scenario or robot.
+    pub run: Option<Finished<Run>>,
+}
+
+impl Replayed {
+    /// Whether the row is what it was, to the bit; none if there was none.
+    #[must_use]
+    pub fn same_row(&self) -> Option<bool> {
+        let before = self.before.as_ref()?;
+        let bits = |row: &Row| -> Vec<Option<u64>> {
+            let values = row.figures.iter().map(|f| f.value);
+            let values = values.chain([row.simulated_s]);
+            values.map(|v| v.map(f64::to_bits)).collect()
+        };
+        Some(*before == self.row && bits(before) == bits(&self.row))
+    }
+
+    /// Whether the log of the full run has the hash of the row; none of a row without one.
+    #[must_use]
+    pub fn same_log(&self) -> Option<bool> {
+        let run = self
+            .run
+            .as_ref()
+            .filter(|run| run.result.summary.complete)?;
+        let hash = self.row.log_hash.as_ref()?;
+        Some(run.result.summary.hash == *hash)
+    }
+}
+
+/// Where the case is from: a folder of parts, or one table of them.
+enum From {
+    Folder(Store),
+    Table(PathBuf),
+}
+
+/// Runs a case again. `from`: the folder of a campaign, or its merged table; `case`: identity, or
+/// place in the plan.
+///
+/// # Errors
+/// [`CampaignError::Refused`] if there is no such case, else as a run.
+pub fn replay(
+    from: &Path,
+    case: &str,
+    out: Option<&Path>,
+    png: bool,
+    stop: &Stop,
+) -> Result<Option<Replayed>, CampaignError> {
+    let (place, plan_file) = if from.is_dir() {
+        let store = Store::open(from)?;
+        let plan = store.plan().clone();
+        (From::Folder(store), plan)
+    } else {
+        let plan = plan_of_table(from)?;
+        (From::Table(from.to_owned()), plan)
+    };
+    let plan = plan_file.plan()?;
+    let cases = Cases::new(&plan)?;
+    let (index, before) = find(&place, &plan_file, case)?;
+    let limit_s = plan.limit_s;
+    let simulate = |case: &crate::Case| simulate(case, limit_s, stop);
+    let Some(row) = compute::row(&cases, index, plan_file.block, &simulate) else {
+        return Ok(None);
+    };
+    let case = cases.case(index);
+    let run = match &case.setup {
+        Ok((scenario, robot)) => {
+            let folder = out.map_or_else(
+                || Path::new("runs").join(format!("{}-{}", plan.name, case.id)),
+                Path::to_owned,
+            );
+            let settings = Settings {
+                out: folder,
+                png,
+                stop: stop.clone(),
+            };
+            Some(wheeleg_studies::run::run_read(
+                scenario, robot, case.seed, &settings,
+            )?)
+        }
+        Err(_) => None,
+    };
+    Ok(Some(Replayed {
+        row,
+        before,
+        program: plan_file.program,
+        run,
+    }))
+}
+
+/// The plan in a merged table.
+pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
+    let file = File::open(path).map_err(|e| CampaignError::unreadable(path, e))?;
+    let reader = TableReader::new(file).map_err(|e| CampaignError::unreadable(path, e))?;
+    let text = reader.fact(PLAN).unwrap_or_default();
+    serde_json::from_str(text).map_err(|_| CampaignError::Unreadable {
+        path: path.to_owned(),
+        reason: "it has no plan".to_owned(),
+        help: "give the table of `wheeleg campaign merge`, or the folder of a campaign".to_owned(),
+    })
+}
+
+/// Index of a case, and its row.
+fn find(place: &From, plan: &PlanFile, case: &str) -> Result<(u64, Option<Row>), CampaignError> {
+    let missing = || {
+        CampaignError::refused(
+            format!("there is no case `{case}`"),
+            format!(
+                "give one of the column `case`, 32 hexadecimal digits, or a place from 0 to {}",
+                plan.cases - 1
+            ),
+        )
+    };
+    let by_index = case.parse::<u64>().ok().filter(|_| case.len() < 32);
+    if let Some(index) = by_index {
+        if index >= plan.cases {
+            return Err(missing());
+        }
+        let row = rows_at(place, Some(index / plan.block))?;
+        let row = row.into_iter().find(|row| row.index == index);
+        return Ok((index, row));
+    }
+    let id: CaseId = case.parse().map_err(|_| missing())?;
+    let row = rows_at(place, None)?.into_iter().find(|row| row.case == id);
+    let row = row.ok_or_else(missing)?;
+    Ok((row.index, Some(row)))
+}
+
+/// Rows of one block, or of all; of a folder those that there are.
+fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> {
+    match place {
+        From::Folder(store) => {
+            let blocks = block.map_or(0..store.blocks(), |block| block..block + 1);
+            let mut rows = Vec::new();
+            for block in blocks {
+                match part::read(&store.part(block), &store.plan().hash) {
+                    Ok((found, _)) => rows.extend(found),
+                    Err(_) => rows.extend(store.kept_rows(block)?),
+                }
+            }
+            Ok(rows)
+        }
+        From::Table(path) => {
+            let file = File::open(path).map_err(|e| CampaignError::unreadable(path, e))?;
+            let read = TableReader::new(file).and_then(|reader| reader.read());
+            let table = read.map_err(|e| CampaignError::unreadable(path, e))?;
+            row::rows(&table).ok_or_else(|| CampaignError::unreadable(path, "rows that are none"))
+        }
+    }
+}

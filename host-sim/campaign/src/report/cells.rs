@@ -1,0 +1,55 @@
+//! Rows by the cell of the grid that they are in.
+
+use wheeleg_config::plan::{Plan, Value, Values};
+
+use crate::table::{Data, Table};
+
+/// One combination of the values of the factors that have a list.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cell {
+    /// The values in words; empty of a plan without a grid.
+    pub(super) name: String,
+    /// The values, in the order of [`grid`].
+    pub(super) values: Vec<Value>,
+    /// Places of its rows in the table.
+    pub(super) rows: Vec<usize>,
+}
+
+/// Names of the factors that have a list.
+pub(super) fn grid(plan: &Plan) -> Vec<String> {
+    let factors = plan.factors.iter();
+    let listed = factors.filter(|factor| matches!(factor.values, Values::Grid(_)));
+    listed.map(|factor| factor.name.clone()).collect()
+}
+
+/// The value that a row has of a factor.
+pub(super) fn value(table: &Table, factor: &str, row: usize) -> Option<Value> {
+    match table.column(&format!("f.{factor}"))? {
+        Data::Number(v) => v.get(row)?.map(Value::Number),
+        Data::Flag(v) => v.get(row)?.map(Value::Flag),
+        Data::Text(v) => v.get(row)?.clone().map(Value::Text),
+        Data::Whole(_) => None,
+    }
+}
+
+/// All cells, in the order of their first rows.
+pub(super) fn cells(table: &Table, plan: &Plan) -> Vec<Cell> {
+    let grid = grid(plan);
+    let mut cells: Vec<Cell> = Vec::new();
+    for row in 0..table.rows() {
+        let values = grid.iter().filter_map(|factor| value(table, factor, row));
+        let values: Vec<Value> = values.collect();
+        if let Some(cell) = cells.iter_mut().find(|cell| cell.values == values) {
+            cell.rows.push(row);
+            continue;
+        }
+        let named = grid.iter().zip(&values);
+        let named = named.map(|(name, value)| format!("{name} {value}"));
+        cells.push(Cell {
+            name: named.collect::<Vec<_>>().join(", "),
+            values,
+            rows: vec![row],
+        });
+    }
+    cells
+}

@@ -1,0 +1,299 @@
+//! What a table says: rates, quantiles, correlations, the worst cases.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use wheeleg_config::plan::Value;
+use wheeleg_report::stats;
+
+use super::Merged;
+use super::cells::{self, Cell};
+use super::pairs::{self, Paired};
+use crate::CampaignError;
+use crate::columns::Column;
+use crate::row::Status;
+
+/// Cases that are listed as the worst.
+const WORST: usize = 20;
+/// Kinds of errors that are listed.
+const ERRORS: usize = 20;
+/// Quantiles that are told of every target.
+const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
+/// Most values of which a bootstrap interval is drawn; beyond it ranks are as good.
+const BOOTSTRAP: usize = 5_000;
+
+/// How often something held.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rate {
+    /// How often.
+    pub met: u64,
+    /// Of how many.
+    pub of: u64,
+    /// Exact interval, 95 % two-sided.
+    pub exact: [f64; 2],
+    /// Score interval, 95 % two-sided.
+    pub wilson: [f64; 2],
+}
+
+impl Rate {
+    pub(super) fn of(met: u64, of: u64) -> Self {
+        Self {
+            met,
+            of,
+            exact: stats::clopper_pearson(met, of),
+            wilson: stats::wilson(met, of),
+        }
+    }
+}
+
+/// A quantile with its intervals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quantile {
+    /// Share of the values below it.
+    pub share: f64,
+    /// Its value.
+    pub value: f64,
+    /// Interval by ranks, 95 %; an end that so few values do not bound is none.
+    pub ranks: [Option<f64>; 2],
+    /// Interval by drawing from the values; none of too many or too few.
+    pub bootstrap: Option<[f64; 2]>,
+}
+
+/// A target in a cell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InCell {
+    /// The cell, in words.
+    pub cell: String,
+    /// How often it was met, of the cases that ran to their end.
+    pub rate: Rate,
+    /// Quantiles of its value.
+    pub quantiles: Vec<Quantile>,
+    /// Rank correlation with each factor that is drawn.
+    pub spearman: Vec<Option<f64>>,
+}
+
+/// A target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OfTarget {
+    /// Its column: name, unit, meaning, limits.
+    pub column: Column,
+    /// In each cell.
+    pub cells: Vec<InCell>,
+}
+
+/// A case with what was missed in it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Worst {
+    /// Identity.
+    pub case: String,
+    /// How it ended.
+    pub status: String,
+    /// Values of the factors.
+    pub factors: Vec<String>,
+    /// Targets outside of their limits, and by how much of the limit's width or value.
+    pub missed: Vec<String>,
+}
+
+/// What a table says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Findings {
+    /// Rows.
+    pub rows: u64,
+    /// Rows by [`Status::ALL`].
+    pub by_status: Vec<(String, u64)>,
+    /// In each cell, how often all required targets were met, of all cases.
+    pub passed: Vec<(String, Rate)>,
+    /// Names of the factors.
+    pub factors: Vec<String>,
+    /// Names of the factors that are drawn and have numbers.
+    pub drawn: Vec<String>,
+    /// Each target.
+    pub targets: Vec<OfTarget>,
+    /// Errors by kind, the most frequent first.
+    pub errors: Vec<(String, u64)>,
+    /// The worst cases, the worst first.
+    pub worst: Vec<Worst>,
+    /// Values of paired factors against the first value of each.
+    pub paired: Vec<Paired>,
+}
+
+/// Reads a table.
+pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
+    let plan = merged.plan.plan()?;
+    let table = &merged.table;
+    let cells = cells::cells(table, &plan);
+    let statuses = table.texts("status");
+    let by_status = Status::ALL.map(|status| {
+        let name = Some(status.name());
+        let count = statuses.iter().filter(|s| s.as_deref() == name).count();
+        (status.name().to_owned(), count as u64)
+    });
+    let passed = table.flags("passed");
+    let grid = cells::grid(&plan);
+    let drawn: Vec<String> = merged
+        .columns
+        .factors
+        .iter()
+        .filter(|name| !grid.contains(name) && !table.numbers(&format!("f.{name}")).is_empty())
+        .cloned()
+        .collect();
+    let columns = merged.columns.all.iter();
+    let columns = columns.filter(|column| merged.columns.targets.contains(&column.name));
+    let targets = columns.map(|column| of_target(merged, column, &cells, &drawn));
+    Ok(Findings {
+        rows: table.rows() as u64,
+        by_status: by_status.to_vec(),
+        passed: cells
+            .iter()
+            .map(|cell| {
+                let met = cell.rows.iter().filter(|row| passed[**row] == Some(true));
+                let rate = Rate::of(met.count() as u64, cell.rows.len() as u64);
+                (cell.name.clone(), rate)
+            })
+            .collect(),
+        factors: merged.columns.factors.clone(),
+        targets: targets.collect(),
+        drawn,
+        errors: errors(merged),
+        worst: worst(merged),
+        paired: pairs::within(merged, &plan, &cells),
+    })
+}
+
+fn of_target(merged: &Merged, column: &Column, cells: &[Cell], drawn: &[String]) -> OfTarget {
+    let table = &merged.table;
+    let values = table.numbers(&column.name);
+    let verdicts = table.flags(&format!("{}.pass", column.name));
+    let in_cell = |cell: &Cell| {
+        let judged = cell.rows.iter().filter_map(|row| verdicts[*row]);
+        let (met, of) = judged.fold((0, 0), |(met, of), pass| (met + u64::from(pass), of + 1));
+        let there = cell.rows.iter().filter_map(|row| values[*row]);
+        let mut sorted: Vec<f64> = there.collect();
+        sorted.sort_by(f64::total_cmp);
+        let quantiles = SHARES
+            .into_iter()
+            .filter_map(|share| quantile(&sorted, share));
+        let of_rows = |column: &[Option<f64>]| -> Vec<f64> {
+            let rows = cell.rows.iter();
+            rows.map(|row| column[*row].unwrap_or(f64::NAN)).collect()
+        };
+        let y = of_rows(values);
+        let spearman = drawn.iter().map(|factor| {
+            let x = of_rows(table.numbers(&format!("f.{factor}")));
+            stats::spearman(&x, &y)
+        });
+        InCell {
+            cell: cell.name.clone(),
+            rate: Rate::of(met, of),
+            quantiles: quantiles.collect(),
+            spearman: spearman.collect(),
+        }
+    };
+    OfTarget {
+        column: column.clone(),
+        cells: cells.iter().map(in_cell).collect(),
+    }
+}
+
+fn quantile(sorted: &[f64], share: f64) -> Option<Quantile> {
+    let value = stats::quantile(sorted, share)?;
+    let ranks = stats::quantile_ranks(sorted.len() as u64, share);
+    let bootstrap = (sorted.len() <= BOOTSTRAP)
+        .then(|| {
+            let of = |drawn: &[f64]| stats::quantile(drawn, share).unwrap_or(f64::NAN);
+            stats::bootstrap(sorted, 1, of)
+        })
+        .flatten();
+    Some(Quantile {
+        share,
+        value,
+        ranks: ranks.map(|rank| rank.and_then(|rank| sorted.get(rank as usize - 1)).copied()),
+        bootstrap,
+    })
+}
+
+fn errors(merged: &Merged) -> Vec<(String, u64)> {
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+    for error in merged.table.texts("error").iter().flatten() {
+        *counts.entry(error).or_default() += 1;
+    }
+    let mut counts: Vec<(String, u64)> = counts
+        .into_iter()
+        .map(|(error, count)| (error.to_owned(), count))
+        .collect();
+    counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    counts.truncate(ERRORS);
+    counts
+}
+
+/// By how much a value is outside of its limits, as a share of the limit that it missed.
+fn excess(value: f64, column: &Column) -> f64 {
+    let beyond = |limit: f64, by: f64| by.max(0.0) / limit.abs().max(1e-9);
+    let low = column.min.map_or(0.0, |min| beyond(min, min - value));
+    let high = column.max.map_or(0.0, |max| beyond(max, value - max));
+    low.max(high)
+}
+
+/// A target with its values and verdicts.
+type Judged<'a> = (&'a Column, &'a [Option<f64>], &'a [Option<bool>]);
+
+fn worst(merged: &Merged) -> Vec<Worst> {
+    let table = &merged.table;
+    let (statuses, passed) = (table.texts("status"), table.flags("passed"));
+    let targets: Vec<Judged<'_>> = merged
+        .columns
+        .all
+        .iter()
+        .filter(|column| merged.columns.targets.contains(&column.name))
+        .map(|column| {
+            let verdicts = table.flags(&format!("{}.pass", column.name));
+            (column, table.numbers(&column.name), verdicts)
+        })
+        .collect();
+    let missed_in = |row: usize| -> Vec<(&Column, f64)> {
+        let missed = targets.iter().filter(|(.., pass)| pass[row] == Some(false));
+        let missed = missed.map(|(column, values, _)| {
+            // What could not be measured is as bad as can be.
+            let by = values[row].map_or(f64::INFINITY, |value| excess(value, column));
+            (*column, by)
+        });
+        missed.collect()
+    };
+    // Without a result first, then by the largest excess.
+    let score = |row: usize| -> f64 {
+        if statuses[row].as_deref() != Some(Status::Ok.name()) {
+            return f64::INFINITY;
+        }
+        let by = missed_in(row).into_iter().map(|(_, by)| by);
+        by.fold(0.0, f64::max)
+    };
+    let failed = (0..table.rows()).filter(|row| passed[*row] != Some(true));
+    let mut failed: Vec<(usize, f64)> = failed.map(|row| (row, score(row))).collect();
+    failed.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let cases = table.texts("case");
+    failed
+        .into_iter()
+        .take(WORST)
+        .map(|(row, _)| Worst {
+            case: cases[row].clone().unwrap_or_default(),
+            status: statuses[row].clone().unwrap_or_default(),
+            factors: merged
+                .columns
+                .factors
+                .iter()
+                .map(|factor| match cells::value(table, factor, row) {
+                    Some(Value::Number(x)) => wheeleg_report::number::short(x),
+                    Some(other) => other.to_string(),
+                    None => String::new(),
+                })
+                .collect(),
+            missed: missed_in(row)
+                .into_iter()
+                .map(|(column, by)| match by.is_finite() {
+                    true => format!("{} by {:.0} %", column.name, 1e2 * by),
+                    false => format!("{} not measured", column.name),
+                })
+                .collect(),
+        })
+        .collect()
+}

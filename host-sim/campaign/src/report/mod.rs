@@ -1,0 +1,76 @@
+//! The page of a campaign: what its table says, with how sure that is.
+
+mod cells;
+mod findings;
+mod page;
+mod pairs;
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use crate::columns::Columns;
+use crate::part::PROGRAM;
+use crate::store::{PlanFile, write_whole};
+use crate::table::{Table, TableReader};
+use crate::{CampaignError, replay};
+
+pub use findings::Findings;
+pub use pairs::{Paired, Pairs};
+
+/// A merged table with its plan.
+pub struct Merged {
+    /// Its rows.
+    pub table: Table,
+    /// Its columns.
+    pub columns: Columns,
+    /// Its plan.
+    pub plan: PlanFile,
+    /// Program that computed it.
+    pub program: String,
+    /// Its file.
+    pub path: PathBuf,
+}
+
+impl Merged {
+    /// Reads one.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] if it is none.
+    pub fn read(path: &Path) -> Result<Self, CampaignError> {
+        let failed = |e: &dyn std::fmt::Display| CampaignError::unreadable(path, e);
+        let plan = replay::plan_of_table(path)?;
+        let file = File::open(path).map_err(|e| failed(&e))?;
+        let reader = TableReader::new(file).map_err(|e| failed(&e))?;
+        let program = reader.fact(PROGRAM).unwrap_or_default().to_owned();
+        let table = reader.read().map_err(|e| failed(&e))?;
+        Ok(Self {
+            columns: Columns::read(table.columns.clone()),
+            table,
+            plan,
+            program,
+            path: path.to_owned(),
+        })
+    }
+}
+
+/// Writes the page of a table, and of its comparison with another one.
+///
+/// # Errors
+/// [`CampaignError::Unreadable`] if a table is none, [`CampaignError::Output`] if the page cannot
+/// be written.
+pub fn write(
+    path: &Path,
+    against: Option<&Path>,
+    out: &Path,
+) -> Result<(Findings, Option<Pairs>), CampaignError> {
+    let merged = Merged::read(path)?;
+    let findings = findings::find(&merged)?;
+    let other = against.map(Merged::read).transpose()?;
+    let pairs = match &other {
+        Some(other) => Some(pairs::against(&merged, other)?),
+        None => None,
+    };
+    let page = page::render(&merged, &findings, pairs.as_ref())?;
+    write_whole(out, page.as_bytes())?;
+    Ok((findings, pairs))
+}

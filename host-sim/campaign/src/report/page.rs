@@ -1,0 +1,114 @@
+//! The page.
+
+use serde::Serialize;
+use wheeleg_report::plot::{Colour, Content, Figure, Panel, colour, line};
+use wheeleg_report::{page, pictures};
+
+use super::Merged;
+use super::cells;
+use super::findings::Findings;
+use super::pairs::Pairs;
+use crate::CampaignError;
+
+const TEMPLATE: &str = include_str!("page.html");
+/// Colours of the cells' curves.
+const COLOURS: [Colour; 3] = [colour::ROBOT, colour::MODEL, colour::THIRD];
+/// Points of a curve at most.
+const POINTS: usize = 400;
+
+#[derive(Serialize)]
+struct Page<'a> {
+    stopped: Option<String>,
+    name: &'a str,
+    program: &'a str,
+    file: String,
+    cases: u64,
+    findings: &'a Findings,
+    pairs: Option<&'a Pairs>,
+    figures: Vec<wheeleg_report::Picture<'a>>,
+}
+
+pub(super) fn render(
+    merged: &Merged,
+    findings: &Findings,
+    pairs: Option<&Pairs>,
+) -> Result<String, CampaignError> {
+    let plan = merged.plan.plan()?;
+    let figures = distributions(merged, &cells::cells(&merged.table, &plan));
+    let figures: Vec<(Figure, String)> = figures
+        .into_iter()
+        .map(|figure| {
+            let svg = figure.svg();
+            (figure, svg)
+        })
+        .collect();
+    let values = Page {
+        stopped: None,
+        name: &plan.name,
+        program: &merged.program,
+        file: merged.path.display().to_string(),
+        cases: merged.plan.cases,
+        findings,
+        pairs,
+        figures: pictures(&figures),
+    };
+    Ok(page(TEMPLATE, values)?)
+}
+
+/// Of each target the share of cases below a value, a curve for each cell, its limits marked.
+fn distributions(merged: &Merged, cells: &[cells::Cell]) -> Vec<Figure> {
+    let columns = merged.columns.all.iter();
+    let targets = columns.filter(|column| merged.columns.targets.contains(&column.name));
+    let figures = targets.filter_map(|column| {
+        let values = merged.table.numbers(&column.name);
+        let mut series = Vec::new();
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (place, cell) in cells.iter().enumerate().take(COLOURS.len()) {
+            let there = cell.rows.iter().filter_map(|row| values[*row]);
+            let mut sorted: Vec<f64> = there.collect();
+            sorted.sort_by(f64::total_cmp);
+            let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
+                continue;
+            };
+            (low, high) = (low.min(*first), high.max(*last));
+            series.push(line(&cell.name, COLOURS[place], 2, steps(&sorted)));
+        }
+        if series.is_empty() {
+            return None;
+        }
+        let limits: Vec<f64> = [column.min, column.max].into_iter().flatten().collect();
+        // Limits that are near belong on the picture.
+        let span = (high - low).max(1e-9 * high.abs()).max(1e-12);
+        for limit in &limits {
+            if (low - 2.0 * span..=high + 2.0 * span).contains(limit) {
+                (low, high) = (low.min(*limit), high.max(*limit));
+            }
+        }
+        let margin = 0.05 * (high - low).max(1e-12);
+        let unit = format!("{} [{}]", column.name, column.unit);
+        let content = Content::curves(&unit, ("[share of cases below]", (0.0, 1.0)), series);
+        let mut panel = Panel::new("", (low - margin, high + margin), 180, content);
+        panel.marks = limits;
+        Some(Figure {
+            id: format!("distribution-{}", column.name.to_lowercase()),
+            title: format!("{}: {}", column.name, column.meaning),
+            caption: "Vertical lines: limits.".to_owned(),
+            panels: vec![panel],
+        })
+    });
+    figures.collect()
+}
+
+/// Share of values below each of them.
+fn steps(sorted: &[f64]) -> Vec<(f64, f64)> {
+    let n = sorted.len();
+    let every = n.div_ceil(POINTS).max(1);
+    let mut points = vec![(sorted[0], 0.0)];
+    for (i, value) in sorted.iter().enumerate() {
+        if i % every == 0 || i + 1 == n {
+            points.push((*value, i as f64 / n as f64));
+            points.push((*value, (i + 1) as f64 / n as f64));
+        }
+    }
+    points
+}

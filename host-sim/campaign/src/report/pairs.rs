@@ -1,0 +1,211 @@
+//! Cases that differ in one thing alone: in the program, or in the value of a paired factor.
+
+use std::collections::HashMap;
+
+use serde::Serialize;
+use wheeleg_config::plan::Plan;
+use wheeleg_report::stats;
+
+use super::Merged;
+use super::cells::{self, Cell};
+use crate::CampaignError;
+use crate::columns::Column;
+
+/// A yes or no of pairs, before and after.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Split {
+    /// Yes before, no after.
+    pub lost: u64,
+    /// No before, yes after.
+    pub gained: u64,
+    /// The same in both.
+    pub same: u64,
+    /// Probability of as unequal a split if neither way is more likely: exact test of McNemar.
+    pub p: f64,
+}
+
+/// One target of pairs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TargetSplit {
+    /// Its column.
+    pub column: Column,
+    /// Verdicts.
+    pub split: Split,
+    /// Mean of after − before.
+    pub mean: Option<f64>,
+    /// Its interval, 95 %, by drawing pairs.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// Pairs of two values of a paired factor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Paired {
+    /// The two, in words.
+    pub what: String,
+    /// Pairs.
+    pub pairs: u64,
+    /// All required targets met.
+    pub passed: Split,
+    /// Each target.
+    pub targets: Vec<TargetSplit>,
+}
+
+/// Pairs of two tables.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pairs {
+    /// The comparison; before is the other table.
+    pub paired: Paired,
+    /// Cases of this table alone.
+    pub only_here: u64,
+    /// Cases of the other table alone.
+    pub only_there: u64,
+    /// Pairs with the same log.
+    pub same_log: u64,
+    /// The other program.
+    pub program: String,
+}
+
+/// Compares a table with another one, case by case.
+pub(super) fn against(here: &Merged, there: &Merged) -> Result<Pairs, CampaignError> {
+    let places = |of: &Merged| -> HashMap<String, usize> {
+        let cases = of.table.texts("case").iter().enumerate();
+        cases
+            .filter_map(|(row, case)| Some((case.clone()?, row)))
+            .collect()
+    };
+    let (rows_here, rows_there) = (places(here), places(there));
+    let mut both: Vec<(usize, usize)> = rows_here
+        .iter()
+        .filter_map(|(case, row)| Some((*rows_there.get(case)?, *row)))
+        .collect();
+    both.sort_unstable();
+    if both.is_empty() {
+        return Err(CampaignError::refused(
+            format!(
+                "`{}` and `{}` have no case in common",
+                here.path.display(),
+                there.path.display()
+            ),
+            "compare tables of one plan, run by two programs",
+        ));
+    }
+    let logs = |of: &Merged, row: usize| of.table.texts("log_hash")[row].clone();
+    let same_log = both.iter().filter(|(before, after)| {
+        let log = logs(here, *after);
+        log.is_some() && log == logs(there, *before)
+    });
+    let common = both.len();
+    Ok(Pairs {
+        same_log: same_log.count() as u64,
+        paired: paired(
+            "this table against the other".to_owned(),
+            there,
+            here,
+            &both,
+        ),
+        only_here: (rows_here.len() - common) as u64,
+        only_there: (rows_there.len() - common) as u64,
+        program: there.program.clone(),
+    })
+}
+
+/// Each value of a paired factor against its first, where all else is the same.
+pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired> {
+    let table = &merged.table;
+    let grid = cells::grid(plan);
+    let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
+    let mut found = Vec::new();
+    for (place, name) in grid.iter().enumerate() {
+        let factor = plan.factors.iter().find(|factor| factor.name == *name);
+        if !factor.is_some_and(|factor| factor.paired) {
+            continue;
+        }
+        let values: Vec<_> = cells
+            .iter()
+            .map(|cell| cell.values[place].clone())
+            .collect();
+        let Some(first) = values.first() else {
+            continue;
+        };
+        let mut others: Vec<_> = values.iter().filter(|v| *v != first).collect();
+        others.dedup();
+        let mut seen = Vec::new();
+        others.retain(|v| {
+            let new = !seen.contains(v);
+            seen.push(*v);
+            new
+        });
+        for other in others {
+            let mut rows = Vec::new();
+            for after in cells.iter().filter(|cell| cell.values[place] == *other) {
+                let mut values = after.values.clone();
+                values[place] = first.clone();
+                let Some(before) = cells.iter().find(|cell| cell.values == values) else {
+                    continue;
+                };
+                let key = |row: &usize| (samples[*row], replicates[*row]);
+                let known: HashMap<_, usize> =
+                    before.rows.iter().map(|row| (key(row), *row)).collect();
+                let pairs = after.rows.iter();
+                rows.extend(pairs.filter_map(|row| Some((*known.get(&key(row))?, *row))));
+            }
+            let what = format!("{name} {other} against {first}");
+            found.push(paired(what, merged, merged, &rows));
+        }
+    }
+    found
+}
+
+/// Pairs of rows, before and after.
+fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]) -> Paired {
+    let flags = |name: &str| {
+        let (b, a) = (before.table.flags(name), after.table.flags(name));
+        split(rows.iter().map(|(i, j)| {
+            let of = |flags: &[Option<bool>], row: usize| flags.get(row).copied().flatten();
+            (of(b, *i), of(a, *j))
+        }))
+    };
+    let columns = after.columns.all.iter();
+    let targets = columns
+        .filter(|column| after.columns.targets.contains(&column.name))
+        .map(|column| {
+            let numbers = |of: &Merged, row: usize| -> Option<f64> {
+                of.table.numbers(&column.name).get(row).copied().flatten()
+            };
+            let differences: Vec<f64> = rows
+                .iter()
+                .filter_map(|(i, j)| Some(numbers(after, *j)? - numbers(before, *i)?))
+                .collect();
+            let mean = |values: &[f64]| stats::mean(values).unwrap_or(f64::NAN);
+            TargetSplit {
+                split: flags(&format!("{}.pass", column.name)),
+                mean: stats::mean(&differences),
+                interval: stats::bootstrap(&differences, 1, mean),
+                column: column.clone(),
+            }
+        });
+    Paired {
+        what,
+        pairs: rows.len() as u64,
+        targets: targets.collect(),
+        passed: flags("passed"),
+    }
+}
+
+/// What is neither yes nor no counts as no: a case without a result has not passed.
+fn split(pairs: impl Iterator<Item = (Option<bool>, Option<bool>)>) -> Split {
+    let (mut lost, mut gained, mut same) = (0, 0, 0);
+    for (before, after) in pairs {
+        match (before == Some(true), after == Some(true)) {
+            (true, false) => lost += 1,
+            (false, true) => gained += 1,
+            _ => same += 1,
+        }
+    }
+    Split {
+        lost,
+        gained,
+        same,
+        p: stats::mcnemar(lost, gained),
+    }
+}

@@ -1,0 +1,197 @@
+//! One row: what became of a case.
+
+use wheeleg_config::plan::Value;
+
+use crate::columns::Columns;
+use crate::identity::CaseId;
+use crate::table::{Data, Table};
+
+/// How a case ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// It ran to its end.
+    Ok,
+    /// Its files contradict each other, or the simulation failed.
+    Error,
+    /// The program panicked.
+    Panic,
+    /// It ended the process, more than once.
+    Crashed,
+    /// It passed the limit of simulated time.
+    Limit,
+}
+
+impl Status {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Ok,
+        Self::Error,
+        Self::Panic,
+        Self::Crashed,
+        Self::Limit,
+    ];
+
+    /// As the table has it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Error => "error",
+            Self::Panic => "panic",
+            Self::Crashed => "crashed",
+            Self::Limit => "limit",
+        }
+    }
+}
+
+/// A target's value and verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Figure {
+    /// What was measured; none where it could not be.
+    pub value: Option<f64>,
+    /// Whether it lies within its limits.
+    pub pass: Option<bool>,
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Identity.
+    pub case: CaseId,
+    /// Place in the plan.
+    pub index: u64,
+    /// Block.
+    pub block: u64,
+    /// Sample.
+    pub sample: u64,
+    /// Replicate.
+    pub replicate: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Values of the factors.
+    pub factors: Vec<Value>,
+    /// How it ended.
+    pub status: Status,
+    /// What went wrong.
+    pub error: Option<String>,
+    /// Hash of the log.
+    pub log_hash: Option<String>,
+    /// Simulated time, s.
+    pub simulated_s: Option<f64>,
+    /// Whether all required targets are met.
+    pub passed: Option<bool>,
+    /// Values and verdicts, in the order of the columns.
+    pub figures: Vec<Figure>,
+}
+
+impl Row {
+    /// Whether it counts as failed: a required target missed, or no result.
+    #[must_use]
+    pub fn is_failed(&self) -> bool {
+        self.passed != Some(true)
+    }
+}
+
+/// Rows as a table.
+pub(crate) fn table(columns: &Columns, rows: &[Row]) -> Table {
+    let mut table = Table::empty(columns.all.clone());
+    for row in rows {
+        let mut cells = table.data.iter_mut();
+        let mut put = |value: Cell<'_>| {
+            if let Some(data) = cells.next() {
+                value.push(data);
+            }
+        };
+        put(Cell::Text(Some(&row.case.to_string())));
+        for number in [row.index, row.block, row.sample, row.replicate, row.seed] {
+            put(Cell::Whole(number));
+        }
+        for value in &row.factors {
+            put(match value {
+                Value::Flag(flag) => Cell::Flag(Some(*flag)),
+                Value::Number(number) => Cell::Number(Some(*number)),
+                Value::Text(text) => Cell::Text(Some(text)),
+            });
+        }
+        put(Cell::Text(Some(row.status.name())));
+        put(Cell::Text(row.error.as_deref()));
+        put(Cell::Text(row.log_hash.as_deref()));
+        put(Cell::Number(row.simulated_s));
+        put(Cell::Flag(row.passed));
+        for figure in &row.figures {
+            put(Cell::Number(figure.value));
+            put(Cell::Flag(figure.pass));
+        }
+    }
+    table
+}
+
+enum Cell<'a> {
+    Whole(u64),
+    Number(Option<f64>),
+    Flag(Option<bool>),
+    Text(Option<&'a str>),
+}
+
+impl Cell<'_> {
+    fn push(self, to: &mut Data) {
+        match (to, self) {
+            // Indices and seeds have 63 bits at most.
+            (Data::Whole(v), Cell::Whole(n)) => v.push(i64::try_from(n).ok()),
+            (Data::Number(v), Cell::Number(n)) => v.push(n),
+            (Data::Flag(v), Cell::Flag(f)) => v.push(f),
+            (Data::Text(v), Cell::Text(t)) => v.push(t.map(str::to_owned)),
+            _ => unreachable!("a column has the kind of its values"),
+        }
+    }
+}
+
+/// Rows of a table; `None` if it is not one of [`table`]'s.
+pub(crate) fn rows(table: &Table) -> Option<Vec<Row>> {
+    let columns = Columns::read(table.columns.clone());
+    let whole = |name: &str, at: usize| -> Option<u64> {
+        let value = table.wholes(name).get(at)?;
+        u64::try_from((*value)?).ok()
+    };
+    let text = |name: &str, at: usize| -> Option<String> { table.texts(name).get(at)?.clone() };
+    let factor = |name: &String, at: usize| -> Option<Value> {
+        let name = format!("f.{name}");
+        match table.column(&name)? {
+            Data::Number(v) => v.get(at)?.map(Value::Number),
+            Data::Flag(v) => v.get(at)?.map(Value::Flag),
+            Data::Text(v) => v.get(at)?.clone().map(Value::Text),
+            Data::Whole(_) => None,
+        }
+    };
+    let row = |at: usize| -> Option<Row> {
+        let status = text("status", at)?;
+        let figures = columns.targets.iter().map(|id| Figure {
+            value: table.numbers(id).get(at).copied().flatten(),
+            pass: table
+                .flags(&format!("{id}.pass"))
+                .get(at)
+                .copied()
+                .flatten(),
+        });
+        Some(Row {
+            case: text("case", at)?.parse().ok()?,
+            index: whole("index", at)?,
+            block: whole("block", at)?,
+            sample: whole("sample", at)?,
+            replicate: whole("replicate", at)?,
+            seed: whole("seed", at)?,
+            factors: columns
+                .factors
+                .iter()
+                .map(|name| factor(name, at))
+                .collect::<Option<_>>()?,
+            status: Status::ALL.into_iter().find(|s| s.name() == status)?,
+            error: text("error", at),
+            log_hash: text("log_hash", at),
+            simulated_s: table.numbers("simulated_s").get(at).copied().flatten(),
+            passed: table.flags("passed").get(at).copied().flatten(),
+            figures: figures.collect(),
+        })
+    };
+    (0..table.rows()).map(row).collect()
+}

@@ -1,0 +1,198 @@
+//! Runs a shard of a campaign.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use wheeleg_config::plan::KeepLogs;
+use wheeleg_studies::study::{Progress, Signal, Stop};
+
+use crate::CampaignError;
+use crate::cases::Cases;
+use crate::compute::Simulate;
+use crate::row::Row;
+use crate::shard::Shard;
+use crate::simulate::log;
+use crate::store::Store;
+use crate::work::Work;
+
+/// How to run.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Which share.
+    pub shard: Shard,
+    /// Threads.
+    pub threads: usize,
+    /// Only so many cases, as a pilot.
+    pub first: Option<u64>,
+    /// Asks to stop.
+    pub stop: Stop,
+    /// This program, for cases that may end the process; none: they are run in this one.
+    pub program: Option<PathBuf>,
+    /// Progress as lines of JSON on standard error.
+    pub json: bool,
+}
+
+/// What a process did.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ran {
+    /// Cases that it was to do and that had a row before.
+    pub found: u64,
+    /// Cases that it computed.
+    pub computed: u64,
+    /// Of those, how many missed a required target or have no result.
+    pub failed: u64,
+    /// Cases of its share.
+    pub of: u64,
+    /// What stopped it.
+    pub stopped: Option<Signal>,
+    /// Parts that were set aside, and why.
+    pub aside: Vec<(PathBuf, String)>,
+}
+
+/// Works off a shard. Whatever a process before has finished is not done again.
+///
+/// # Errors
+/// A file that cannot be written, with its path. Cases that go wrong are rows, not errors.
+pub fn run(
+    store: &Store,
+    cases: &Cases<'_>,
+    options: &Options,
+    simulate: Simulate<'_>,
+) -> Result<Ran, CampaignError> {
+    let first = options.first.unwrap_or(u64::MAX);
+    let blocks = (0..store.blocks()).filter(|block| options.shard.has(*block));
+    let blocks = blocks.filter(|block| store.cases_of(*block).start < first);
+    let of = blocks.clone().map(|block| {
+        let cases = store.cases_of(block);
+        cases.end.min(first) - cases.start
+    });
+    let of: u64 = of.sum();
+    let progress = Progress::new(&cases.plan().name, options.stop.clone());
+    let live = Live {
+        progress: &progress,
+        json: options.json,
+        of,
+        begun: Instant::now(),
+        computed: AtomicU64::new(0),
+        failed: AtomicU64::new(0),
+        last: Mutex::new(None),
+        found: AtomicU64::new(0),
+    };
+    if !options.json {
+        progress.begin("cases", of);
+    }
+    let aside = Mutex::new(Vec::new());
+    let work = Work {
+        store,
+        cases,
+        simulate,
+        stop: &options.stop,
+        first,
+        program: options.program.as_deref(),
+        found: &|cases| live.found(cases),
+        told: &|row| {
+            live.computed(row);
+            keep_log(store, cases, row, &options.stop)
+        },
+        aside: &|path: &Path, why: &str| {
+            let mut list = aside.lock().expect("nobody panics with it");
+            list.push((path.to_owned(), why.to_owned()));
+        },
+    };
+    let result = work.run(blocks, options.threads);
+    live.tell(true);
+    progress.clear();
+    result?;
+    let (found, computed) = (
+        live.found.load(Ordering::Relaxed),
+        live.computed.load(Ordering::Relaxed),
+    );
+    Ok(Ran {
+        found,
+        computed,
+        failed: live.failed.load(Ordering::Relaxed),
+        of,
+        stopped: options.stop.signal().filter(|_| found + computed < of),
+        aside: aside.into_inner().unwrap_or_default(),
+    })
+}
+
+/// Writes the log of a case that the plan wants to be kept: it is simulated once more for it.
+fn keep_log(store: &Store, cases: &Cases<'_>, row: &Row, stop: &Stop) -> Result<(), CampaignError> {
+    let wanted = match cases.plan().keep {
+        KeepLogs::None => false,
+        KeepLogs::Failed => row.is_failed(),
+        KeepLogs::All => true,
+    };
+    if !wanted || row.log_hash.is_none() {
+        return Ok(());
+    }
+    let folder = store.folder().join("logs");
+    std::fs::create_dir_all(&folder)
+        .map_err(|e| CampaignError::output("create the folder", &folder, e))?;
+    let path = folder.join(format!("{}.mcap", row.case));
+    if !path.exists() {
+        log(&cases.case(row.index), &path, cases.plan().limit_s, stop)?;
+    }
+    Ok(())
+}
+
+/// How far it is.
+struct Live<'a> {
+    progress: &'a Progress,
+    json: bool,
+    of: u64,
+    begun: Instant,
+    found: AtomicU64,
+    computed: AtomicU64,
+    failed: AtomicU64,
+    last: Mutex<Option<Instant>>,
+}
+
+/// Time between two lines of progress.
+const BETWEEN: Duration = Duration::from_secs(1);
+
+impl Live<'_> {
+    fn found(&self, cases: u64) {
+        self.found.fetch_add(cases, Ordering::Relaxed);
+        self.tell(false);
+    }
+
+    fn computed(&self, row: &Row) {
+        self.computed.fetch_add(1, Ordering::Relaxed);
+        self.failed
+            .fetch_add(u64::from(row.is_failed()), Ordering::Relaxed);
+        self.tell(false);
+    }
+
+    fn tell(&self, at_once: bool) {
+        let Ok(mut last) = self.last.try_lock() else {
+            return;
+        };
+        if !at_once && last.is_some_and(|last| last.elapsed() < BETWEEN) {
+            return;
+        }
+        *last = Some(Instant::now());
+        let computed = self.computed.load(Ordering::Relaxed);
+        let done = computed + self.found.load(Ordering::Relaxed);
+        let failed = self.failed.load(Ordering::Relaxed);
+        let rate = computed as f64 / self.begun.elapsed().as_secs_f64().max(1e-3);
+        let left_s = (computed > 0).then(|| (self.of.saturating_sub(done)) as f64 / rate);
+        if self.json {
+            let line = json!({
+                "done": done, "failed": failed, "of": self.of,
+                "cases_per_s": rate, "left_s": left_s,
+            });
+            let _ = writeln!(std::io::stderr(), "{line}");
+            return;
+        }
+        let left = left_s.map_or(String::new(), |s| format!(", {s:.0} s left"));
+        self.progress.at(done);
+        self.progress
+            .say(format!("{failed} failed, {rate:.1} cases/s{left}"));
+    }
+}

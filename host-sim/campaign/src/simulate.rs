@@ -1,0 +1,127 @@
+//! One case in memory: no file is written unless its log is asked for.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use wheeleg_sim::Boards;
+use wheeleg_studies::analysis::Target;
+use wheeleg_studies::run::{self, Simulated};
+use wheeleg_studies::study::Stop;
+use wheeleg_telemetry::{Keep, LogFile, Recorder};
+
+use crate::CampaignError;
+use crate::cases::Case;
+use crate::row::Status;
+
+/// What came of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// How it ended.
+    pub status: Status,
+    /// What went wrong.
+    pub error: Option<String>,
+    /// Hash of the log, as far as it went.
+    pub log_hash: Option<String>,
+    /// Simulated time, start-up included, s.
+    pub simulated_s: Option<f64>,
+    /// Whether all required targets are met; none unless it ran to its end.
+    pub passed: Option<bool>,
+    /// Targets; none unless it ran to its end.
+    pub targets: Vec<Target>,
+}
+
+impl Outcome {
+    /// One without a result.
+    pub(crate) fn without(status: Status, error: String) -> Self {
+        Self {
+            status,
+            error: Some(error),
+            log_hash: None,
+            simulated_s: None,
+            passed: None,
+            targets: Vec::new(),
+        }
+    }
+}
+
+/// Simulates a case and judges it; `None` if `stop` was asked for before its end. A simulated
+/// time above `limit_s`, of the scenario, gives it up.
+#[must_use]
+pub fn simulate(case: &Case, limit_s: Option<f64>, stop: &Stop) -> Option<Outcome> {
+    recorded(case, Recorder::new(Keep::nothing()), limit_s, stop)
+}
+
+/// The same with a log at `path`, under that name once it is whole.
+pub(crate) fn log(
+    case: &Case,
+    path: &Path,
+    limit_s: Option<f64>,
+    stop: &Stop,
+) -> Result<Option<Outcome>, CampaignError> {
+    let failed = |e: std::io::Error| CampaignError::output("write", path, e);
+    let temporary = path.with_extension(format!("{}.tmp", crate::host::unique()));
+    let made = || {
+        let file = LogFile::create(&temporary).map_err(wheeleg_studies::StudyError::from)?;
+        let recorder = Recorder::new(Keep::nothing()).with(file);
+        let outcome = recorded(case, recorder, limit_s, stop);
+        if outcome.is_some() {
+            std::fs::rename(&temporary, path).map_err(failed)?;
+        }
+        Ok(outcome)
+    };
+    let result = made();
+    let _ = std::fs::remove_file(&temporary);
+    result
+}
+
+fn recorded(
+    case: &Case,
+    recorder: Recorder<'_>,
+    limit_s: Option<f64>,
+    stop: &Stop,
+) -> Option<Outcome> {
+    let (scenario, robot) = match &case.setup {
+        Ok(setup) => setup,
+        Err(why) => return Some(Outcome::without(Status::Error, why.clone())),
+    };
+    let mut over = false;
+    let simulated = run::simulate(
+        Boards::default(),
+        scenario,
+        robot,
+        case.seed,
+        recorder,
+        &mut |t_s| {
+            over = limit_s.is_some_and(|limit_s| t_s > limit_s);
+            if over || stop.is_asked() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        },
+    );
+    let Simulated {
+        outcome,
+        recording,
+        analysis,
+        ..
+    } = match simulated {
+        Ok(simulated) => simulated,
+        Err(error) => return Some(Outcome::without(Status::Error, error.to_string())),
+    };
+    let (status, error) = match (&outcome.failure, limit_s.filter(|_| over)) {
+        (Some(failure), _) => (Status::Error, Some(failure.to_string())),
+        (None, Some(limit_s)) => (Status::Limit, Some(format!("more than {limit_s} s"))),
+        (None, None) if outcome.stopped => return None,
+        (None, None) => (Status::Ok, None),
+    };
+    let whole = status == Status::Ok;
+    Some(Outcome {
+        status,
+        error,
+        log_hash: Some(recording.hash),
+        simulated_s: Some(outcome.simulated_s),
+        passed: whole.then(|| analysis.passed()),
+        targets: if whole { analysis.targets } else { Vec::new() },
+    })
+}

@@ -1,0 +1,384 @@
+//! The folder of a campaign.
+//!
+//! | name | what |
+//! |---|---|
+//! | `plan.json` | plan with all texts that it stands on, its hash, block size, program |
+//! | `parts/000123.parquet` | rows of block 123; equal bytes from any executor |
+//! | `parts/000123.run.parquet` | who computed them, and in what time |
+//! | `parts/000123.NAME.partial.parquet` | rows of a process that was stopped |
+//! | `attempts/000123.jsonl` | cases that were begun and ended |
+//! | `aside/` | parts that could not be read or are foreign |
+//! | `logs/CASE.mcap` | logs that the plan keeps |
+//!
+//! A file appears under its name when it is whole: it is written under another one and renamed.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use wheeleg_config::plan::{Plan, Sources};
+
+use crate::part::NotAPart;
+use crate::row::Row;
+use crate::table::Table;
+use crate::{CampaignError, host, part, program};
+
+/// Name of the plan in the folder.
+pub(crate) const PLAN_FILE: &str = "plan.json";
+/// Version of the form of `plan.json`.
+const FORMAT: u32 = 1;
+
+/// `plan.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlanFile {
+    /// Version of this form.
+    pub format: u32,
+    /// Program that made it.
+    pub program: String,
+    /// Hash of the texts and the block size.
+    pub hash: String,
+    /// Number of cases.
+    pub cases: u64,
+    /// Cases of a block.
+    pub block: u64,
+    /// Texts that the plan stands on.
+    pub sources: Sources,
+}
+
+/// Work of one block, s, where the plan does not say how many cases it has.
+const BLOCK_S: f64 = 60.0;
+/// Simulated seconds in one of work, about.
+const SPEED: f64 = 20.0;
+
+impl PlanFile {
+    /// That of a plan, for this program. `duration_s`: simulated time of a case.
+    #[must_use]
+    pub fn of(plan: &Plan, duration_s: f64) -> Self {
+        let least = (BLOCK_S * SPEED / duration_s.max(0.1)).clamp(1.0, 4096.0) as u64;
+        let block = plan.block.unwrap_or_else(|| least.next_power_of_two());
+        Self {
+            format: FORMAT,
+            program: program(),
+            hash: hash(&plan.sources, block),
+            cases: plan.cases(),
+            block,
+            sources: plan.sources.clone(),
+        }
+    }
+
+    /// The same plan for this program.
+    #[must_use]
+    pub fn for_this_program(self) -> Self {
+        Self {
+            program: program(),
+            ..self
+        }
+    }
+
+    /// Reads one.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] if it is none.
+    pub fn read(path: &Path) -> Result<Self, CampaignError> {
+        let text = fs::read_to_string(path).map_err(|e| CampaignError::unreadable(path, e))?;
+        Self::parse(path, &text)
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<Self, CampaignError> {
+        let file: Self =
+            serde_json::from_str(text).map_err(|e| CampaignError::unreadable(path, e))?;
+        if file.format != FORMAT {
+            let reason = format!("form {}, not {FORMAT}", file.format);
+            return Err(CampaignError::unreadable(path, reason));
+        }
+        if file.hash != hash(&file.sources, file.block) {
+            let reason = "its texts are not those of its hash".to_owned();
+            return Err(CampaignError::unreadable(path, reason));
+        }
+        Ok(file)
+    }
+
+    /// The plan in it.
+    ///
+    /// # Errors
+    /// [`CampaignError::Config`] if this program refuses it.
+    pub fn plan(&self) -> Result<Plan, CampaignError> {
+        Ok(Plan::of(self.sources.clone())?)
+    }
+
+    /// In what another one differs, for a message.
+    fn difference(&self, other: &Self) -> Option<String> {
+        let texts = |of: &Self| {
+            let Sources {
+                plan,
+                scenarios,
+                robots,
+                ..
+            } = of.sources.clone();
+            let named = scenarios
+                .into_iter()
+                .map(|(n, t)| (format!("scenario {n}"), t));
+            let robots = robots.into_iter().map(|(n, t)| (format!("robot {n}"), t));
+            let plan = [("plan".to_owned(), plan)];
+            plan.into_iter()
+                .chain(named)
+                .chain(robots)
+                .collect::<Vec<_>>()
+        };
+        if self.program != other.program {
+            return Some(format!(
+                "made by `{}`, and this is `{}`",
+                self.program, other.program
+            ));
+        }
+        if self.hash == other.hash {
+            return None;
+        }
+        if self.block != other.block {
+            return Some(format!("block {}, not {}", self.block, other.block));
+        }
+        let (own, others) = (texts(self), texts(other));
+        for (name, text) in &own {
+            let same = others.iter().find(|(other, _)| other == name);
+            let Some((_, found)) = same else {
+                return Some(format!("it has a {name}"));
+            };
+            let mut lines = text.text.lines().zip(found.text.lines());
+            if text.text != found.text {
+                let number = lines.position(|(a, b)| a != b).map_or(0, |n| n + 1);
+                return Some(format!("the {name} differs, first in line {number}"));
+            }
+        }
+        Some("it lacks a scenario or a robot".to_owned())
+    }
+}
+
+/// Names of files do not count, their texts do.
+fn hash(sources: &Sources, block: u64) -> String {
+    let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign plan v1");
+    let mut add = |text: &str| {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    };
+    add(&block.to_string());
+    add(&sources.plan.text);
+    for (kind, files) in [("scenario", &sources.scenarios), ("robot", &sources.robots)] {
+        for (name, source) in files {
+            add(kind);
+            add(name);
+            add(&source.text);
+        }
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// A folder of parts of one plan.
+#[derive(Debug, Clone)]
+pub struct Store {
+    folder: PathBuf,
+    plan: PlanFile,
+}
+
+impl Store {
+    /// Creates the folder, or goes on with one of the same plan and program.
+    ///
+    /// # Errors
+    /// [`CampaignError::Refused`] if it is one of another plan or program, which is named;
+    /// [`CampaignError::Output`] if it cannot be written.
+    pub fn create(folder: &Path, plan: PlanFile) -> Result<Self, CampaignError> {
+        for name in ["parts", "attempts"] {
+            let path = folder.join(name);
+            fs::create_dir_all(&path)
+                .map_err(|e| CampaignError::output("create the folder", &path, e))?;
+        }
+        let path = folder.join(PLAN_FILE);
+        let mut text = serde_json::to_string_pretty(&plan).expect("texts are JSON");
+        text.push('\n');
+        if !path.exists() {
+            create_new(&path, text.as_bytes())?;
+        }
+        let found = PlanFile::read(&path)?;
+        if let Some(difference) = found.difference(&plan) {
+            return Err(CampaignError::refused(
+                format!(
+                    "the folder `{}` is of another campaign: {difference}",
+                    folder.display()
+                ),
+                "give another folder with --out DIR",
+            ));
+        }
+        Ok(Self {
+            folder: folder.to_owned(),
+            plan: found,
+        })
+    }
+
+    /// Opens a folder that there is.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] if it is none.
+    pub fn open(folder: &Path) -> Result<Self, CampaignError> {
+        Ok(Self {
+            plan: PlanFile::read(&folder.join(PLAN_FILE))?,
+            folder: folder.to_owned(),
+        })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Its plan.
+    #[must_use]
+    pub fn plan(&self) -> &PlanFile {
+        &self.plan
+    }
+
+    /// Number of blocks.
+    #[must_use]
+    pub fn blocks(&self) -> u64 {
+        self.plan.cases.div_ceil(self.plan.block)
+    }
+
+    /// Indices of the cases of a block.
+    #[must_use]
+    pub fn cases_of(&self, block: u64) -> std::ops::Range<u64> {
+        let from = block * self.plan.block;
+        from..(from + self.plan.block).min(self.plan.cases)
+    }
+
+    /// The part file of a block.
+    #[must_use]
+    pub fn part(&self, block: u64) -> PathBuf {
+        self.folder.join(format!("parts/{block:06}.parquet"))
+    }
+
+    pub(crate) fn attempts(&self, block: u64) -> PathBuf {
+        self.folder.join(format!("attempts/{block:06}.jsonl"))
+    }
+
+    /// The rows of a block that is done; of a part that is torn or foreign, why it does not count.
+    pub(crate) fn table(&self, block: u64) -> Result<Option<Table>, String> {
+        let expected = self.cases_of(block);
+        let table = match part::read_table(&self.part(block), &self.plan.hash) {
+            Ok(table) => table,
+            Err(NotAPart::Missing) => return Ok(None),
+            Err(NotAPart::Torn(why) | NotAPart::Foreign(why)) => return Err(why),
+        };
+        let indices = table.wholes("index").iter().copied();
+        if indices.eq(expected.map(|index| i64::try_from(index).ok())) {
+            return Ok(Some(table));
+        }
+        Err("it has not each case of its block once".to_owned())
+    }
+
+    /// Moves a part that does not count out of the way; where it is now.
+    pub(crate) fn set_aside(&self, path: &Path) -> Result<PathBuf, CampaignError> {
+        let folder = self.folder.join("aside");
+        let failed = |e| CampaignError::output("set aside", path, e);
+        fs::create_dir_all(&folder).map_err(failed)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let to = folder.join(format!("{name}.{}", host::unique()));
+        fs::rename(path, &to).map_err(failed)?;
+        Ok(to)
+    }
+
+    /// Files with rows of a block that was not finished.
+    pub(crate) fn partials(&self, block: u64) -> Vec<PathBuf> {
+        let begin = format!("{block:06}.");
+        let entries = fs::read_dir(self.folder.join("parts"));
+        let entries = entries.into_iter().flatten().flatten();
+        let mut found: Vec<PathBuf> = entries
+            .filter(|entry| {
+                let name = entry.file_name();
+                let name = name.to_string_lossy();
+                name.starts_with(&begin) && name.ends_with(".partial.parquet")
+            })
+            .map(|entry| entry.path())
+            .collect();
+        found.sort();
+        found
+    }
+
+    /// A name for such a file that no other process has.
+    pub(crate) fn new_partial(&self, block: u64) -> PathBuf {
+        let name = format!("parts/{block:06}.{}.partial.parquet", host::unique());
+        self.folder.join(name)
+    }
+
+    /// Rows of the files of a block that was not finished; those that cannot be read are set
+    /// aside.
+    pub(crate) fn kept_rows(&self, block: u64) -> Result<Vec<Row>, CampaignError> {
+        let mut rows = Vec::new();
+        for path in self.partials(block) {
+            match part::read(&path, &self.plan.hash) {
+                Ok((found, _)) => rows.extend(found),
+                Err(NotAPart::Missing) => {}
+                Err(NotAPart::Torn(_) | NotAPart::Foreign(_)) => {
+                    self.set_aside(&path)?;
+                }
+            }
+        }
+        let cases = self.cases_of(block);
+        rows.retain(|row| cases.contains(&row.index));
+        Ok(rows)
+    }
+}
+
+/// Writes a file whole: under another name, synced, renamed, and the folder synced.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
+    let temporary = temporary(path);
+    let result = fill(&temporary, bytes).and_then(|()| {
+        fs::rename(&temporary, path)
+            .and_then(|()| sync_folder(path))
+            .map_err(|e| CampaignError::output("write", path, e))
+    });
+    if result.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    result
+}
+
+/// Creates a file whole, unless it is there by now.
+fn create_new(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
+    let temporary = temporary(path);
+    let result = fill(&temporary, bytes).and_then(|()| match fs::hard_link(&temporary, path) {
+        Ok(()) => sync_folder(path).map_err(|e| CampaignError::output("write", path, e)),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(()),
+        // A file system without links: whoever comes second writes the same.
+        Err(_) => fs::rename(&temporary, path).map_err(|e| CampaignError::output("write", path, e)),
+    });
+    let _ = fs::remove_file(&temporary);
+    result
+}
+
+fn temporary(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{}.tmp", host::unique()))
+}
+
+fn fill(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
+    let write = || -> std::io::Result<()> {
+        let mut file = File::create(path)?;
+        file.write_all(bytes)?;
+        file.sync_all()
+    };
+    write().map_err(|e| {
+        let _ = fs::remove_file(path);
+        CampaignError::output("write", path, e)
+    })
+}
+
+fn sync_folder(path: &Path) -> std::io::Result<()> {
+    if cfg!(unix)
+        && let Some(folder) = path.parent()
+    {
+        // Of a bare name it is the folder that the program stands in.
+        let here = folder.as_os_str().is_empty();
+        return File::open(if here { Path::new(".") } else { folder })?.sync_all();
+    }
+    Ok(())
+}

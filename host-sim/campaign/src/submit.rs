@@ -1,0 +1,288 @@
+//! A campaign for a cluster: the script of a Slurm array, the manifest of a Kubernetes job.
+//!
+//! There is no scheduler here: both start the shards of [`crate::run`], which know from their
+//! environment which they are.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::{CampaignError, Store};
+
+/// Shortest work of a task, s: less is mostly start-up, and overwhelms a site.
+const LEAST_TASK_S: f64 = 30.0;
+/// So few tasks overwhelm nobody, however short they are.
+const FEW: u64 = 8;
+/// Simulated seconds in one of work, about.
+const SPEED: f64 = 20.0;
+
+/// What a cluster is to do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Submission {
+    /// Name of the plan.
+    pub name: String,
+    /// This program, as the cluster's computers find it.
+    pub program: String,
+    /// Folder of the campaign, as they find it.
+    pub folder: String,
+    /// Shards.
+    pub shards: u64,
+}
+
+impl Submission {
+    /// That of a folder.
+    ///
+    /// # Errors
+    /// [`CampaignError::Refused`] if there are more shards than blocks, or more than a few of
+    /// which each has less than 30 s of work, by the simulated time of a case; with what is
+    /// allowed.
+    pub fn new(
+        store: &Store,
+        name: &str,
+        program: &Path,
+        shards: u64,
+        duration_s: f64,
+    ) -> Result<Self, CampaignError> {
+        let work_s = store.plan().cases as f64 * duration_s / SPEED;
+        let most = ((work_s / LEAST_TASK_S) as u64)
+            .max(FEW)
+            .min(store.blocks());
+        if shards == 0 || shards > most {
+            return Err(CampaignError::refused(
+                format!(
+                    "{shards} shards of {} blocks, about {work_s:.0} s of work",
+                    store.blocks()
+                ),
+                format!(
+                    "give --shards from 1 to {most}: a task has at least one block, and above \
+                     {FEW} tasks about {LEAST_TASK_S:.0} s of work"
+                ),
+            ));
+        }
+        let absolute = |path: &Path| {
+            let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+            path.to_string_lossy().into_owned()
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            program: absolute(program),
+            folder: absolute(store.folder()),
+            shards,
+        })
+    }
+
+    /// Script of a Slurm array.
+    #[must_use]
+    pub fn slurm_script(&self) -> String {
+        let (program, folder) = (shell(&self.program), shell(&self.folder));
+        format!(
+            "#!/bin/bash\n\
+             #SBATCH --job-name=wheeleg-{} --cpus-per-task=1 --requeue --open-mode=append\n\
+             #SBATCH --signal=B:TERM@30 --output={}\n\
+             exec {program} campaign run {folder}/plan.json --out {folder} \\\n    \
+             --shard \"$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT\" \\\n    \
+             --threads \"${{SLURM_CPUS_PER_TASK:-1}}\"\n",
+            self.name,
+            shell(&format!("{}/slurm/%A_%a.out", self.folder)),
+        )
+    }
+
+    /// Arguments of `sbatch` for the script.
+    #[must_use]
+    pub fn slurm_arguments(&self, further: &[String]) -> Vec<String> {
+        let own = [
+            "--parsable".to_owned(),
+            format!("--array=0-{}", self.shards - 1),
+        ];
+        own.into_iter().chain(further.iter().cloned()).collect()
+    }
+
+    /// Arguments of `sbatch` for the job that merges, after all tasks of `job` have ended.
+    #[must_use]
+    pub fn merge_arguments(&self, job: &str, further: &[String]) -> Vec<String> {
+        let (program, folder) = (shell(&self.program), shell(&self.folder));
+        let own = [
+            "--parsable".to_owned(),
+            format!("--dependency=afterany:{job}"),
+            format!("--job-name=wheeleg-{}-merge", self.name),
+            format!("--output={}/slurm/merge.out", self.folder),
+        ];
+        let wrap = format!("{program} campaign merge {folder} --out {folder}/cases.parquet");
+        own.into_iter()
+            .chain(further.iter().cloned())
+            .chain(["--wrap".to_owned(), wrap])
+            .collect()
+    }
+
+    /// Gives the array and the merging job to Slurm; their numbers.
+    ///
+    /// # Errors
+    /// [`CampaignError::Refused`] if Slurm is not there, allows fewer tasks, or refuses;
+    /// [`CampaignError::Output`] if the script cannot be written.
+    pub fn submit_to_slurm(&self, further: &[String]) -> Result<[String; 2], CampaignError> {
+        let config = told("scontrol", &["show".to_owned(), "config".to_owned()])?;
+        if let Some(most) = max_array_size(&config)
+            && self.shards > most
+        {
+            return Err(CampaignError::refused(
+                format!(
+                    "{} shards: this Slurm allows arrays of {most} tasks",
+                    self.shards
+                ),
+                format!("give --shards from 1 to {most}"),
+            ));
+        }
+        let folder = Path::new(&self.folder).join("slurm");
+        std::fs::create_dir_all(&folder)
+            .map_err(|e| CampaignError::output("create the folder", &folder, e))?;
+        let script = folder.join("array.sh");
+        crate::store::write_whole(&script, self.slurm_script().as_bytes())?;
+        let mut arguments = self.slurm_arguments(further);
+        arguments.push(script.to_string_lossy().into_owned());
+        let job = number(&told("sbatch", &arguments)?);
+        let merge = number(&told("sbatch", &self.merge_arguments(&job, further))?);
+        Ok([job, merge])
+    }
+
+    /// Manifest of an indexed job (`batch/v1`), for `kubectl apply -f -`. The folder is a volume
+    /// that all pods can write.
+    #[must_use]
+    pub fn kubernetes(&self, image: &str, claim: &str) -> String {
+        let plain = |c: char| {
+            if c.is_ascii_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '-'
+            }
+        };
+        let name: String = self.name.chars().map(plain).take(40).collect();
+        let name = name.trim_matches('-');
+        let shards = self.shards;
+        let (image, claim) = (quoted(image), quoted(claim));
+        format!(
+            "apiVersion: batch/v1\n\
+             kind: Job\n\
+             metadata:\n  name: wheeleg-{name}\n\
+             spec:\n  completionMode: Indexed\n  completions: {shards}\n  parallelism: {shards}\n  \
+             backoffLimitPerIndex: 3\n  podFailurePolicy:\n    rules:\n      \
+             - action: FailIndex\n        onExitCodes:\n          operator: In\n          \
+             values: [2, 74]\n      - action: Ignore\n        onPodConditions:\n          \
+             - type: DisruptionTarget\n            status: \"True\"\n  template:\n    spec:\n      \
+             restartPolicy: Never\n      containers:\n        - name: wheeleg\n          \
+             image: {image}\n          command: [wheeleg, campaign, run, /campaign/plan.json, --out, \
+             /campaign, --shards, \"{shards}\", --threads, \"1\"]\n          volumeMounts:\n            \
+             - name: campaign\n              mountPath: /campaign\n      volumes:\n        \
+             - name: campaign\n          persistentVolumeClaim:\n            claimName: {claim}\n"
+        )
+    }
+}
+
+/// A word for a shell.
+fn shell(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-%+:=@,".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+/// A text in YAML.
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+/// What a program prints.
+fn told(program: &str, arguments: &[String]) -> Result<String, CampaignError> {
+    let output = Command::new(program)
+        .args(arguments)
+        .output()
+        .map_err(|e| {
+            CampaignError::refused(
+                format!("cannot start `{program}`: {e}"),
+                "submit where Slurm is, or print with --dry-run what would be submitted",
+            )
+        })?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
+    }
+    Err(CampaignError::refused(
+        format!(
+            "`{program}` ended with {}: {}",
+            output.status,
+            String::from_utf8_lossy(&output.stderr).trim()
+        ),
+        "mend what it says, with --slurm-arg for partition, account or time",
+    ))
+}
+
+/// Job number in what `sbatch --parsable` prints: the cluster's name may follow.
+fn number(printed: &str) -> String {
+    let line = printed.trim();
+    line.split(';').next().unwrap_or(line).to_owned()
+}
+
+/// Tasks that an array may have, by `scontrol show config`: indices stay below this number.
+fn max_array_size(config: &str) -> Option<u64> {
+    let lines = config.lines();
+    let mut values = lines.filter_map(|line| line.split_once('='));
+    let (_, value) = values.find(|(key, _)| key.trim() == "MaxArraySize")?;
+    value.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn submission() -> Submission {
+        Submission {
+            name: "Three.Step_spread".to_owned(),
+            program: "/opt/our tools/wheeleg".to_owned(),
+            folder: "/scratch/it's".to_owned(),
+            shards: 8,
+        }
+    }
+
+    #[test]
+    fn a_slurm_script_is_one_that_a_shell_reads_as_meant() {
+        let script = submission().slurm_script();
+        assert!(script.starts_with("#!/bin/bash\n#SBATCH --job-name=wheeleg-Three.Step_spread "));
+        let run = "exec '/opt/our tools/wheeleg' campaign run '/scratch/it'\\''s'/plan.json";
+        assert!(script.contains(run), "{script}");
+        assert!(script.contains("\"$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT\""));
+        let further = ["--partition=long".to_owned()];
+        let arguments = submission().slurm_arguments(&further);
+        assert_eq!(arguments, ["--parsable", "--array=0-7", "--partition=long"]);
+        let merge = submission().merge_arguments("12", &[]);
+        assert!(
+            merge.contains(&"--dependency=afterany:12".to_owned()),
+            "{merge:?}"
+        );
+        assert_eq!(number("4711;cluster\n"), "4711");
+    }
+
+    #[test]
+    fn the_limit_of_slurm_is_read() {
+        let config = "MailProg = /bin/mail\nMaxArraySize            = 1001\nMaxJobCount = 10000\n";
+        assert_eq!(max_array_size(config), Some(1001));
+        assert_eq!(max_array_size("nothing"), None);
+    }
+
+    #[test]
+    fn a_kubernetes_job_is_indexed_and_gives_up_what_no_second_try_mends() {
+        let yaml = submission().kubernetes("registry/wheeleg:1", "scratch");
+        for line in [
+            "  name: wheeleg-three-step-spread",
+            "  completionMode: Indexed",
+            "  completions: 8",
+            "  backoffLimitPerIndex: 3",
+            "      - action: FailIndex",
+            "          values: [2, 74]",
+            "          - type: DisruptionTarget",
+            "      restartPolicy: Never",
+            "          image: \"registry/wheeleg:1\"",
+            "            claimName: \"scratch\"",
+        ] {
+            assert!(yaml.lines().any(|l| l == line), "{line} in\n{yaml}");
+        }
+        assert!(yaml.contains("--shards, \"8\""));
+    }
+}

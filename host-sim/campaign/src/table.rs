@@ -1,0 +1,374 @@
+//! A table in memory, a column at a time, and as Parquet.
+
+use std::sync::Arc;
+
+use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use parquet::column::reader::ColumnReader;
+use parquet::column::writer::ColumnWriter;
+use parquet::data_type::ByteArray;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{ChunkReader, FileReader as _};
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+
+use crate::columns::{Column, Kind};
+
+/// Rows of a row group in a table of many parts.
+pub(crate) const GROUP_ROWS: usize = 65_536;
+
+/// Values of one column; `None` is null.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Data {
+    /// Whole numbers.
+    Whole(Vec<Option<i64>>),
+    /// Numbers.
+    Number(Vec<Option<f64>>),
+    /// Yes or no.
+    Flag(Vec<Option<bool>>),
+    /// Texts.
+    Text(Vec<Option<String>>),
+}
+
+impl Data {
+    /// No values of a kind.
+    #[must_use]
+    pub fn empty(kind: Kind) -> Self {
+        match kind {
+            Kind::Whole => Self::Whole(Vec::new()),
+            Kind::Number => Self::Number(Vec::new()),
+            Kind::Flag => Self::Flag(Vec::new()),
+            Kind::Text => Self::Text(Vec::new()),
+        }
+    }
+
+    /// Number of values.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Whole(v) => v.len(),
+            Self::Number(v) => v.len(),
+            Self::Flag(v) => v.len(),
+            Self::Text(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn append(&mut self, other: Self) {
+        match (self, other) {
+            (Self::Whole(a), Self::Whole(b)) => a.extend(b),
+            (Self::Number(a), Self::Number(b)) => a.extend(b),
+            (Self::Flag(a), Self::Flag(b)) => a.extend(b),
+            (Self::Text(a), Self::Text(b)) => a.extend(b),
+            _ => unreachable!("columns of one table have their kind"),
+        }
+    }
+}
+
+/// A table: its columns, and what else its file says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Names and kinds.
+    pub columns: Vec<Column>,
+    /// Values, one list for each column.
+    pub data: Vec<Data>,
+}
+
+impl Table {
+    /// A table without rows.
+    #[must_use]
+    pub fn empty(columns: Vec<Column>) -> Self {
+        let data = columns.iter().map(|c| Data::empty(c.kind)).collect();
+        Self { columns, data }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.data.first().map_or(0, Data::len)
+    }
+
+    /// The column of a name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&Data> {
+        let at = self.columns.iter().position(|c| c.name == name)?;
+        self.data.get(at)
+    }
+
+    /// Whole numbers of a column; none if there is no such column.
+    #[must_use]
+    pub fn wholes(&self, name: &str) -> &[Option<i64>] {
+        match self.column(name) {
+            Some(Data::Whole(v)) => v,
+            _ => &[],
+        }
+    }
+
+    /// Numbers of a column; none if there is no such column.
+    #[must_use]
+    pub fn numbers(&self, name: &str) -> &[Option<f64>] {
+        match self.column(name) {
+            Some(Data::Number(v)) => v,
+            _ => &[],
+        }
+    }
+
+    /// Flags of a column; none if there is no such column.
+    #[must_use]
+    pub fn flags(&self, name: &str) -> &[Option<bool>] {
+        match self.column(name) {
+            Some(Data::Flag(v)) => v,
+            _ => &[],
+        }
+    }
+
+    /// Texts of a column; none if there is no such column.
+    #[must_use]
+    pub fn texts(&self, name: &str) -> &[Option<String>] {
+        match self.column(name) {
+            Some(Data::Text(v)) => v,
+            _ => &[],
+        }
+    }
+
+    /// Hash of all columns and values, hexadecimal.
+    pub(crate) fn digest(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let columns = serde_json::to_string(&self.columns).expect("columns are JSON");
+        hasher.update(columns.as_bytes());
+        let mut add = |there: bool, bytes: &[u8]| {
+            hasher.update(&[u8::from(there)]);
+            hasher.update(&(bytes.len() as u64).to_le_bytes());
+            hasher.update(bytes);
+        };
+        for data in &self.data {
+            match data {
+                Data::Whole(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), &v.unwrap_or(0).to_le_bytes())),
+                Data::Number(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), &v.unwrap_or(0.0).to_bits().to_le_bytes())),
+                Data::Flag(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), &[u8::from(*v == Some(true))])),
+                Data::Text(list) => list
+                    .iter()
+                    .for_each(|v| add(v.is_some(), v.as_deref().unwrap_or("").as_bytes())),
+            }
+        }
+        hasher.finalize().to_hex()[..32].to_owned()
+    }
+
+    /// Appends the rows of a table with the same columns.
+    pub(crate) fn append(&mut self, other: Self) {
+        for (own, other) in self.data.iter_mut().zip(other.data) {
+            own.append(other);
+        }
+    }
+}
+
+/// Writes one table, a row group after the other.
+pub(crate) struct TableWriter<W: std::io::Write + Send> {
+    file: SerializedFileWriter<W>,
+}
+
+impl<W: std::io::Write + Send> TableWriter<W> {
+    /// A file of these columns that says `facts` of itself.
+    pub(crate) fn new(
+        to: W,
+        columns: &[Column],
+        facts: &[(&str, &str)],
+    ) -> Result<Self, ParquetError> {
+        let facts = facts.iter().map(|(key, value)| KeyValue {
+            key: (*key).to_owned(),
+            value: Some((*value).to_owned()),
+        });
+        let properties = WriterProperties::builder()
+            // Equal rows give equal bytes, whatever version of the library another program has.
+            .set_created_by("wheeleg".to_owned())
+            .set_compression(Compression::SNAPPY)
+            .set_key_value_metadata(Some(facts.collect()))
+            .build();
+        let file = SerializedFileWriter::new(to, schema(columns)?, Arc::new(properties))?;
+        Ok(Self { file })
+    }
+
+    /// Writes rows as one group.
+    pub(crate) fn write(&mut self, table: &Table) -> Result<(), ParquetError> {
+        let mut group = self.file.next_row_group()?;
+        for data in &table.data {
+            let Some(mut column) = group.next_column()? else {
+                break;
+            };
+            match (column.untyped(), data) {
+                (ColumnWriter::Int64ColumnWriter(w), Data::Whole(v)) => {
+                    let (values, levels) = split(v, |v| *v);
+                    w.write_batch(&values, Some(&levels), None)?;
+                }
+                (ColumnWriter::DoubleColumnWriter(w), Data::Number(v)) => {
+                    let (values, levels) = split(v, |v| *v);
+                    w.write_batch(&values, Some(&levels), None)?;
+                }
+                (ColumnWriter::BoolColumnWriter(w), Data::Flag(v)) => {
+                    let (values, levels) = split(v, |v| *v);
+                    w.write_batch(&values, Some(&levels), None)?;
+                }
+                (ColumnWriter::ByteArrayColumnWriter(w), Data::Text(v)) => {
+                    let (values, levels) = split(v, |v| ByteArray::from(v.as_str()));
+                    w.write_batch(&values, Some(&levels), None)?;
+                }
+                _ => return Err(ParquetError::General("column of another kind".to_owned())),
+            }
+            column.close()?;
+        }
+        group.close()?;
+        Ok(())
+    }
+
+    /// Writes the footer and gives back what was written to.
+    pub(crate) fn finish(self) -> Result<W, ParquetError> {
+        self.file.into_inner()
+    }
+}
+
+/// Values that there are, and for each row whether it has one.
+fn split<T, U>(values: &[Option<T>], of: impl Fn(&T) -> U) -> (Vec<U>, Vec<i16>) {
+    let there = values.iter().flatten().map(of).collect();
+    let levels = values.iter().map(|v| i16::from(v.is_some())).collect();
+    (there, levels)
+}
+
+fn schema(columns: &[Column]) -> Result<Arc<Type>, ParquetError> {
+    let mut fields = Vec::new();
+    for column in columns {
+        let (physical, logical) = match column.kind {
+            Kind::Whole => (Physical::INT64, None),
+            Kind::Number => (Physical::DOUBLE, None),
+            Kind::Flag => (Physical::BOOLEAN, None),
+            Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        };
+        let field = Type::primitive_type_builder(&column.name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()?;
+        fields.push(Arc::new(field));
+    }
+    let schema = Type::group_type_builder("case")
+        .with_fields(fields)
+        .build()?;
+    Ok(Arc::new(schema))
+}
+
+/// Reads tables that [`TableWriter`] has written.
+pub(crate) struct TableReader<R: ChunkReader + 'static> {
+    file: SerializedFileReader<R>,
+    columns: Vec<Column>,
+}
+
+impl<R: ChunkReader + 'static> TableReader<R> {
+    /// Reads the footer, and from it the columns.
+    pub(crate) fn new(from: R) -> Result<Self, ParquetError> {
+        let file = SerializedFileReader::new(from)?;
+        let mut reader = Self {
+            file,
+            columns: Vec::new(),
+        };
+        let columns = reader.fact(crate::columns::FACT).unwrap_or_default();
+        reader.columns = serde_json::from_str(columns)
+            .map_err(|e| ParquetError::General(format!("no columns: {e}")))?;
+        let schema = reader.file.metadata().file_metadata().schema_descr();
+        let names = schema.columns().iter().map(|column| column.name());
+        if !names.eq(reader.columns.iter().map(|column| column.name.as_str())) {
+            let other = "its columns are not those that it says".to_owned();
+            return Err(ParquetError::General(other));
+        }
+        Ok(reader)
+    }
+
+    /// What the file says of itself.
+    pub(crate) fn fact(&self, key: &str) -> Option<&str> {
+        let facts = self.file.metadata().file_metadata().key_value_metadata()?;
+        let fact = facts.iter().find(|fact| fact.key == key)?;
+        fact.value.as_deref()
+    }
+
+    /// Number of row groups.
+    fn groups(&self) -> usize {
+        self.file.num_row_groups()
+    }
+
+    /// All rows.
+    pub(crate) fn read(&self) -> Result<Table, ParquetError> {
+        let mut table = Table::empty(self.columns.clone());
+        for group in 0..self.groups() {
+            table.append(self.read_group(group)?);
+        }
+        Ok(table)
+    }
+
+    /// One row group.
+    fn read_group(&self, group: usize) -> Result<Table, ParquetError> {
+        let group = self.file.get_row_group(group)?;
+        let rows = usize::try_from(group.metadata().num_rows())
+            .map_err(|e| ParquetError::General(e.to_string()))?;
+        let mut table = Table::empty(self.columns.clone());
+        for (at, column) in self.columns.iter().enumerate() {
+            let data = match (group.get_column_reader(at)?, column.kind) {
+                (ColumnReader::Int64ColumnReader(mut r), Kind::Whole) => {
+                    Data::Whole(read_column(rows, |d, v| {
+                        r.read_records(rows, Some(d), None, v)
+                    })?)
+                }
+                (ColumnReader::DoubleColumnReader(mut r), Kind::Number) => {
+                    Data::Number(read_column(rows, |d, v| {
+                        r.read_records(rows, Some(d), None, v)
+                    })?)
+                }
+                (ColumnReader::BoolColumnReader(mut r), Kind::Flag) => {
+                    Data::Flag(read_column(rows, |d, v| {
+                        r.read_records(rows, Some(d), None, v)
+                    })?)
+                }
+                (ColumnReader::ByteArrayColumnReader(mut r), Kind::Text) => {
+                    let bytes: Vec<Option<ByteArray>> =
+                        read_column(rows, |d, v| r.read_records(rows, Some(d), None, v))?;
+                    let texts = bytes.into_iter().map(|b| match b {
+                        Some(b) => String::from_utf8(b.data().to_vec()).map(Some),
+                        None => Ok(None),
+                    });
+                    let texts = texts.collect::<Result<_, _>>();
+                    Data::Text(texts.map_err(|e| ParquetError::General(e.to_string()))?)
+                }
+                _ => return Err(ParquetError::General(format!("column {}", column.name))),
+            };
+            table.data[at] = data;
+        }
+        Ok(table)
+    }
+}
+
+/// Reads a column whole: values and levels to values or null.
+fn read_column<T>(
+    rows: usize,
+    read: impl FnOnce(&mut Vec<i16>, &mut Vec<T>) -> Result<(usize, usize, usize), ParquetError>,
+) -> Result<Vec<Option<T>>, ParquetError> {
+    let (mut levels, mut values) = (Vec::new(), Vec::new());
+    read(&mut levels, &mut values)?;
+    if levels.len() != rows {
+        return Err(ParquetError::General("rows are missing".to_owned()));
+    }
+    let mut values = values.into_iter();
+    let present = levels.into_iter().map(|level| match level {
+        0 => None,
+        _ => values.next(),
+    });
+    Ok(present.collect())
+}

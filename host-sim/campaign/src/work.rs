@@ -1,0 +1,292 @@
+//! Works off the blocks of a shard: a queue of cases, and a part as soon as its block is done.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use wheeleg_studies::study::Stop;
+
+use crate::CampaignError;
+use crate::attempts::{Attempts, Event};
+use crate::cases::Cases;
+use crate::compute::{Simulate, row, row_of};
+use crate::isolate::{Isolated, isolate};
+use crate::part::{self, Effort};
+use crate::row::{Row, Status};
+use crate::simulate::Outcome;
+use crate::store::{Store, write_whole};
+
+/// Processes of its own that a case must have ended before it is given up.
+const ENDS: u32 = 2;
+
+/// A block at work.
+struct Block {
+    number: u64,
+    /// Cases that it has, or of a pilot those that it is to have.
+    wanted: usize,
+    rows: Mutex<BTreeMap<u64, Row>>,
+    efforts: Mutex<Vec<Effort>>,
+    attempts: Attempts,
+}
+
+/// What is to be done, and what was.
+struct Queue<'a> {
+    blocks: Box<dyn Iterator<Item = u64> + Send + 'a>,
+    block: Option<(Arc<Block>, VecDeque<u64>)>,
+    open: Vec<Arc<Block>>,
+    error: Option<CampaignError>,
+}
+
+/// A shard at work.
+pub(crate) struct Work<'a> {
+    pub(crate) store: &'a Store,
+    pub(crate) cases: &'a Cases<'a>,
+    pub(crate) simulate: Simulate<'a>,
+    pub(crate) stop: &'a Stop,
+    /// Only cases below this index.
+    pub(crate) first: u64,
+    /// Program for cases that may end the process.
+    pub(crate) program: Option<&'a Path>,
+    /// Told of cases that have a row already.
+    pub(crate) found: &'a (dyn Fn(u64) + Sync),
+    /// Told of every row that is computed.
+    pub(crate) told: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
+    /// Told of a part that was set aside.
+    pub(crate) aside: &'a (dyn Fn(&Path, &str) + Sync),
+}
+
+impl Work<'_> {
+    /// Works on the blocks with so many threads.
+    ///
+    /// # Errors
+    /// The first file that cannot be written. What was computed until then is kept, as far as
+    /// that can be written.
+    pub(crate) fn run(
+        &self,
+        blocks: impl Iterator<Item = u64> + Send,
+        threads: usize,
+    ) -> Result<(), CampaignError> {
+        let queue = Mutex::new(Queue {
+            blocks: Box::new(blocks),
+            block: None,
+            open: Vec::new(),
+            error: None,
+        });
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                // The simulator's frames are larger in builds for tests.
+                let thread = std::thread::Builder::new().stack_size(8 << 20);
+                let started = thread.spawn_scoped(scope, || self.thread(&queue));
+                if let Err(e) = started {
+                    let what = format!("cannot start a thread: {e}");
+                    let error = CampaignError::refused(what, "give fewer --threads");
+                    held(&queue).error.get_or_insert(error);
+                    break;
+                }
+            }
+        });
+        let queue = queue.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut error = queue.error;
+        for block in queue.open {
+            if let Err(e) = self.leave(&block) {
+                error.get_or_insert(e);
+            }
+        }
+        error.map_or(Ok(()), Err)
+    }
+
+    fn thread(&self, queue: &Mutex<Queue<'_>>) {
+        loop {
+            let next = {
+                let mut queue = held(queue);
+                if self.stop.is_asked() || queue.error.is_some() {
+                    return;
+                }
+                match self.next(&mut queue) {
+                    Ok(next) => next,
+                    Err(e) => {
+                        queue.error.get_or_insert(e);
+                        return;
+                    }
+                }
+            };
+            let Some((block, index)) = next else { return };
+            match self.work_on(&block, index) {
+                Ok(true) => held(queue).open.retain(|open| open.number != block.number),
+                Ok(false) => {}
+                Err(e) => {
+                    held(queue).error.get_or_insert(e);
+                    return;
+                }
+            }
+        }
+    }
+
+    /// The next case, from the next block if this one has none left.
+    fn next(&self, queue: &mut Queue<'_>) -> Result<Option<(Arc<Block>, u64)>, CampaignError> {
+        loop {
+            if let Some((block, left)) = &mut queue.block
+                && let Some(index) = left.pop_front()
+            {
+                return Ok(Some((Arc::clone(block), index)));
+            }
+            let Some(number) = queue.blocks.next() else {
+                return Ok(None);
+            };
+            let Some((block, left)) = self.open(number)? else {
+                continue;
+            };
+            let block = Arc::new(block);
+            if left.is_empty() {
+                self.finish(&block)?;
+                continue;
+            }
+            queue.open.push(Arc::clone(&block));
+            queue.block = Some((block, left));
+        }
+    }
+
+    /// A block and its cases without a row; `None` if it is done.
+    fn open(&self, number: u64) -> Result<Option<(Block, VecDeque<u64>)>, CampaignError> {
+        match self.store.table(number) {
+            Ok(Some(table)) => {
+                let pilot =
+                    (table.rows() as u64).min(self.first - self.store.cases_of(number).start);
+                (self.found)(pilot);
+                return Ok(None);
+            }
+            Ok(None) => {}
+            Err(why) => {
+                let path = self.store.part(number);
+                let to = self.store.set_aside(&path)?;
+                (self.aside)(&to, &why);
+            }
+        }
+        let wanted = self.store.cases_of(number);
+        let wanted: Vec<u64> = wanted.filter(|index| *index < self.first).collect();
+        let mut rows = BTreeMap::new();
+        for row in self.store.kept_rows(number)? {
+            rows.insert(row.index, row);
+        }
+        let found = rows.keys().filter(|index| **index < self.first).count();
+        (self.found)(found as u64);
+        let left = wanted.iter().copied();
+        let left: VecDeque<u64> = left.filter(|index| !rows.contains_key(index)).collect();
+        let block = Block {
+            number,
+            wanted: wanted.len(),
+            rows: Mutex::new(rows),
+            efforts: Mutex::new(Vec::new()),
+            attempts: Attempts::read(self.store.attempts(number)),
+        };
+        Ok(Some((block, left)))
+    }
+
+    /// Computes one case of a block; true if the block is finished with it.
+    fn work_on(&self, block: &Block, index: u64) -> Result<bool, CampaignError> {
+        let begun = Instant::now();
+        let ends = block.attempts.known(index).ends();
+        let Some(row) = self.attempt(block, index)? else {
+            return Ok(false);
+        };
+        (self.told)(&row)?;
+        held(&block.efforts).push(Effort {
+            index,
+            wall_s: begun.elapsed().as_secs_f64(),
+            ends,
+        });
+        let done = {
+            let mut rows = held(&block.rows);
+            rows.insert(index, row);
+            rows.keys().filter(|index| **index < self.first).count() >= block.wanted
+        };
+        if done {
+            self.finish(block)?;
+        }
+        Ok(done)
+    }
+
+    fn attempt(&self, block: &Block, index: u64) -> Result<Option<Row>, CampaignError> {
+        let attempts = &block.attempts;
+        let mut known = attempts.known(index);
+        let Some(program) = self.program.filter(|_| known.ends() > 0) else {
+            attempts.note(index, Event::Begun)?;
+            let row = row(self.cases, index, self.store.plan().block, self.simulate);
+            attempts.note(index, Event::Ended)?;
+            return Ok(row);
+        };
+        let mut last = "an earlier process".to_owned();
+        loop {
+            if known.proven >= ENDS {
+                let case = self.cases.case(index);
+                let told = format!("ended its process {ENDS} times: {last}");
+                let outcome = Outcome::without(Status::Crashed, told);
+                let size = self.store.plan().block;
+                return Ok(Some(row_of(self.cases, &case, size, outcome)));
+            }
+            attempts.note(index, Event::Begun)?;
+            match isolate(program, self.store, index, self.stop)? {
+                Isolated::Row(row) => {
+                    attempts.note(index, Event::Ended)?;
+                    return Ok(Some(*row));
+                }
+                Isolated::Stopped => {
+                    attempts.note(index, Event::Ended)?;
+                    return Ok(None);
+                }
+                Isolated::Ended(how) => {
+                    attempts.note(index, Event::EndedItsProcess)?;
+                    known.proven += 1;
+                    last = how;
+                }
+            }
+        }
+    }
+
+    /// Writes the part of a block that has all its rows; of a pilot, what there is.
+    fn finish(&self, block: &Block) -> Result<(), CampaignError> {
+        let cases = self.store.cases_of(block.number);
+        let rows = held(&block.rows);
+        if (rows.len() as u64) < cases.end - cases.start {
+            drop(rows);
+            return self.leave(block);
+        }
+        let rows: Vec<Row> = rows.values().cloned().collect();
+        let partials = self.store.partials(block.number);
+        let hash = &self.store.plan().hash;
+        let part = self.store.part(block.number);
+        let mut efforts = held(&block.efforts).clone();
+        efforts.sort_by_key(|effort| effort.index);
+        write_whole(
+            &part.with_extension("run.parquet"),
+            &part::run_bytes(hash, &efforts),
+        )?;
+        write_whole(&part, &part::bytes(self.cases.columns(), hash, &rows))?;
+        for path in partials {
+            let _ = std::fs::remove_file(path);
+        }
+        block.attempts.remove();
+        Ok(())
+    }
+
+    /// Keeps the rows of a block that is not finished.
+    fn leave(&self, block: &Block) -> Result<(), CampaignError> {
+        let rows: Vec<Row> = held(&block.rows).values().cloned().collect();
+        if rows.is_empty() || held(&block.efforts).is_empty() {
+            return Ok(());
+        }
+        let before = self.store.partials(block.number);
+        let bytes = part::bytes(self.cases.columns(), &self.store.plan().hash, &rows);
+        write_whole(&self.store.new_partial(block.number), &bytes)?;
+        for path in before {
+            let _ = std::fs::remove_file(path);
+        }
+        Ok(())
+    }
+}
+
+/// What a thread that panicked has left is whole: nothing is half done under a lock.
+fn held<T>(lock: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
+}

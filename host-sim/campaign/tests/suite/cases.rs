@@ -1,0 +1,184 @@
+//! Any case from its index: who it is, its seed, its values.
+
+use std::collections::BTreeSet;
+
+use wheeleg_campaign::{Case, Cases};
+use wheeleg_config::plan::Value;
+
+use crate::common::{BASE, HEAD, SPREAD, plan_of, spread};
+
+fn number(case: &Case, factor: usize) -> f64 {
+    match case.values[factor] {
+        Value::Number(x) => x,
+        ref other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn paired_cells_share_their_seed_and_nothing_else_does() {
+    let plan = spread(8);
+    let cases = Cases::new(&plan).expect("a plan");
+    let all: Vec<Case> = (0..16).map(|i| cases.case(i)).collect();
+    for pair in all.chunks(2) {
+        assert_eq!(pair[0].seed, pair[1].seed);
+        assert_ne!(pair[0].id, pair[1].id);
+        assert_eq!(pair[0].values[..2], pair[1].values[..2]);
+        assert!(pair[0].seed <= i64::MAX as u64);
+    }
+    let seeds: BTreeSet<u64> = all.iter().map(|c| c.seed).collect();
+    let ids: BTreeSet<String> = all.iter().map(|c| c.id.to_string()).collect();
+    assert_eq!((seeds.len(), ids.len()), (8, 16));
+    // Not paired, they meet other noise.
+    let text = format!("samples = 8\n{HEAD}{BASE}{SPREAD}").replace("paired = true\n", "");
+    let plan = plan_of(&text);
+    let cases = Cases::new(&plan).expect("a plan");
+    assert_ne!(cases.case(0).seed, cases.case(1).seed);
+    assert_eq!(cases.case(0).id, all[0].id, "pairing is no content");
+}
+
+#[test]
+fn more_samples_and_another_order_of_work_leave_a_case_as_it_is() {
+    for sampler in ["random", "sobol", "latin-hypercube"] {
+        let of = |samples: u64| {
+            plan_of(&format!(
+                "samples = {samples}\nreplicates = 2\nsampler = \"{sampler}\"\n{HEAD}{BASE}{SPREAD}"
+            ))
+        };
+        let (few, many) = (of(5), of(50));
+        let (few, many) = (
+            Cases::new(&few).expect("a plan"),
+            Cases::new(&many).expect("a plan"),
+        );
+        for index in (0..20).rev() {
+            let (a, b) = (few.case(index), many.case(index));
+            // A Latin hypercube of another size is another one.
+            assert_eq!(
+                a.id == b.id,
+                sampler != "latin-hypercube",
+                "{sampler} {index}"
+            );
+            assert_eq!(few.case(index).id, a.id);
+        }
+        let (one, two) = (few.case(0), few.case(1));
+        assert_eq!((one.place.replicate, two.place.replicate), (0, 1));
+        assert_eq!(one.values, two.values);
+        assert_ne!(one.seed, two.seed);
+    }
+}
+
+/// The content decides, not the unit that the plan's author likes for the file: names of files
+/// and comments do not enter either.
+#[test]
+fn comments_and_texts_about_a_plan_do_not_enter_a_case() {
+    let text = format!("samples = 2\n{HEAD}{BASE}{SPREAD}");
+    let plain = plan_of(&text);
+    let told = plan_of(&format!(
+        "# told\n{}",
+        text.replace("name = \"test\"", "name = \"told\"")
+    ));
+    let other = plan_of(&text.replace("root = 7", "root = 8"));
+    let ids = [&plain, &told, &other].map(|plan| {
+        let cases = Cases::new(plan).expect("a plan");
+        (cases.case(0).id, cases.case(0).seed)
+    });
+    assert_eq!(ids[0], ids[1]);
+    assert_ne!(ids[0].1, ids[2].1, "the root enters the seed");
+}
+
+/// Golden: an identity that changes by accident would make all tables of before incomparable.
+#[test]
+fn identities_are_those_of_format_1() {
+    let plan = plan_of(&format!(
+        "{HEAD}{BASE}[factor.x]\nparameter = \"scenario.duration\"\ngrid = [2.0]\nunit = \"s\"\n"
+    ));
+    let cases = Cases::new(&plan).expect("a plan");
+    let case = cases.case(0);
+    assert_eq!(case.id.to_string().len(), 32);
+    let again: wheeleg_campaign::CaseId = case.id.to_string().parse().expect("an identity");
+    assert_eq!(again, case.id);
+    for wrong in ["", "12", "zz", &"g".repeat(32)] {
+        assert!(wrong.parse::<wheeleg_campaign::CaseId>().is_err());
+    }
+}
+
+#[test]
+fn draws_follow_their_distribution() {
+    for sampler in ["random", "latin-hypercube", "sobol"] {
+        let plan = plan_of(&format!(
+            "samples = 512\nsampler = \"{sampler}\"\n{HEAD}{BASE}\
+             [factor.droop]\nparameter = \"robot.supply.droop\"\n\
+             uniform = {{ min = 0.2, max = 0.4, unit = \"bar\" }}\n\
+             [factor.friction]\n\
+             parameter = [\"robot.friction.coulomb\", \"robot.friction.static\"]\nscale = true\n\
+             lognormal = {{ median = 1.0, sigma = 0.3, max = 9.0 }}\n"
+        ));
+        let draws = wheeleg_campaign::Draws::new(&plan).expect("a sampler");
+        let values: Vec<Vec<f64>> = (0..512)
+            .map(|sample| {
+                let values = draws.values(0, sample);
+                let numbers = values.iter().map(|v| match v {
+                    Value::Number(x) => *x,
+                    other => panic!("{other}"),
+                });
+                numbers.collect()
+            })
+            .collect();
+        let uniform: Vec<f64> = values.iter().map(|v| (v[0] - 0.2) / 0.2).collect();
+        let z: Vec<f64> = values.iter().map(|v| v[1].ln() / 0.3).collect();
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        // Four standard errors of random draws; the others are far within.
+        assert!(
+            (mean(&uniform) - 0.5).abs() < 4.0 * 0.289 / 512_f64.sqrt(),
+            "{sampler}"
+        );
+        assert!(mean(&z).abs() < 4.0 / 512_f64.sqrt(), "{sampler}");
+        let variance = mean(&z.iter().map(|z| z * z).collect::<Vec<_>>());
+        assert!((0.7..1.3).contains(&variance), "{sampler}: {variance}");
+        let both = mean(
+            &uniform
+                .iter()
+                .zip(&z)
+                .map(|(u, z)| (u - 0.5) * z)
+                .collect::<Vec<_>>(),
+        );
+        assert!(
+            (both / 0.289).abs() < 4.0 / 512_f64.sqrt(),
+            "{sampler}: {both}"
+        );
+        let mut cells: Vec<usize> = uniform.iter().map(|u| (u * 512.0) as usize).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        // One in each of as many equal parts, but for draws that know nothing of each other.
+        assert_eq!(
+            cells.len() == 512,
+            sampler != "random",
+            "{sampler}: {}",
+            cells.len()
+        );
+    }
+}
+
+/// Values that contradict each other are a row, not the end: each end of a factor is sound beside
+/// the middle of the other, but the friction at rest is below that of sliding in one of eight.
+#[test]
+fn a_case_that_cannot_be_says_why() {
+    let plan = plan_of(&format!(
+        "samples = 32\n{HEAD}{BASE}[factor.a]\nparameter = \"robot.friction.coulomb\"\n\
+         uniform = {{ min = 4.0, max = 5.0, unit = \"N\" }}\n\
+         [factor.b]\nparameter = \"robot.friction.static\"\n\
+         uniform = {{ min = 4.5, max = 5.5, unit = \"N\" }}\n"
+    ));
+    let cases = Cases::new(&plan).expect("a plan");
+    cases.ensure_possible().expect("some can be");
+    let mut wrong = 0;
+    for index in 0..32 {
+        let case = cases.case(index);
+        let fits = number(&case, 0) <= number(&case, 1);
+        assert_eq!(case.setup.is_ok(), fits, "{:?}", case.values);
+        if let Err(why) = case.setup {
+            assert!(why.contains("friction.static"), "{why}");
+            wrong += 1;
+        }
+    }
+    assert!(wrong > 0);
+}

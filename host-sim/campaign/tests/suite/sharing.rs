@@ -1,0 +1,158 @@
+//! However the work is shared and wherever it stops, the table is the same.
+
+use std::fs;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use wheeleg_campaign::{CampaignError, Merged, PlanFile, Shard, Store, merge, status};
+use wheeleg_config::plan::Plan;
+use wheeleg_studies::study::Signal;
+
+use crate::common::{computed, options, parts, run_in, spread};
+
+const SAMPLES: u64 = 100;
+
+fn whole(plan: &Plan) -> (tempfile::TempDir, Merged) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (ran, count) = run_in(folder.path(), plan, &options(1), &|case| {
+        Some(computed(case))
+    });
+    let ran = ran.expect("it runs");
+    assert_eq!((ran.computed, count as u64), (plan.cases(), plan.cases()));
+    let merged = merged(folder.path());
+    (folder, merged)
+}
+
+fn merged(folder: &std::path::Path) -> Merged {
+    merge(&[folder.to_owned()], &folder.join("cases.parquet")).expect("merged")
+}
+
+#[test]
+fn threads_and_shards_give_the_same_bytes() {
+    let plan = spread(SAMPLES);
+    let (one, expected) = whole(&plan);
+    assert_eq!(expected.rows, 2 * SAMPLES);
+    assert_eq!(expected.hash.len(), 64);
+    let two = tempfile::tempdir().expect("a folder");
+    run_in(two.path(), &plan, &options(4), &|case| Some(computed(case)))
+        .0
+        .expect("it runs");
+    assert_eq!(merged(two.path()), expected);
+    assert!(parts(two.path()) == parts(one.path()));
+    // Seven shards into three folders, one of them twice.
+    let folders: Vec<_> = (0..3)
+        .map(|_| tempfile::tempdir().expect("a folder"))
+        .collect();
+    for i in [0, 1, 2, 3, 4, 5, 6, 2] {
+        let options = wheeleg_campaign::Options {
+            shard: Shard { i, n: 7 },
+            ..options(2)
+        };
+        let folder = folders[i as usize % 3].path();
+        let ran = run_in(folder, &plan, &options, &|case| Some(computed(case)));
+        ran.0.expect("it runs");
+    }
+    let paths: Vec<_> = folders.iter().map(|f| f.path().to_owned()).collect();
+    let together = merge(&paths, &paths[0].join("cases.parquet")).expect("merged");
+    assert_eq!(together, expected);
+    let tables = [one.path(), folders[0].path()].map(|f| fs::read(f.join("cases.parquet")));
+    let [a, b] = tables.map(|table| table.expect("read"));
+    assert!(a == b, "the merged tables differ");
+}
+
+#[test]
+fn what_is_stopped_goes_on_where_it_was() {
+    let plan = spread(SAMPLES);
+    let (_one, expected) = whole(&plan);
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut all = 0;
+    for round in 0.. {
+        let options = options(3);
+        let (stop, count) = (options.stop.clone(), AtomicUsize::new(0));
+        let (ran, simulated) = run_in(folder.path(), &plan, &options, &|case| {
+            // What is under way then is left.
+            if count.fetch_add(1, Ordering::Relaxed) >= 23 {
+                stop.ask(Signal::Terminate);
+                return None;
+            }
+            Some(computed(case))
+        });
+        let ran = ran.expect("it runs");
+        all += ran.computed;
+        assert!(simulated < 30 && ran.found + ran.computed <= ran.of);
+        let state = status(&Store::open(folder.path()).expect("a folder"), Shard::ALL);
+        let state = state.expect("readable");
+        assert_eq!(
+            (state.rows, state.cases),
+            (all, 2 * SAMPLES),
+            "round {round}"
+        );
+        if ran.stopped.is_none() {
+            break;
+        }
+        assert!(round < 20);
+    }
+    assert_eq!(all, 2 * SAMPLES, "no case is done twice");
+    assert_eq!(merged(folder.path()), expected);
+    let left = fs::read_dir(folder.path().join("attempts"))
+        .expect("there")
+        .count();
+    assert_eq!(left, 0);
+    let partial = fs::read_dir(folder.path().join("parts")).expect("there");
+    let partial = partial.filter(|e| {
+        let name = e.as_ref().expect("entry").file_name();
+        name.to_string_lossy().contains("partial")
+    });
+    assert_eq!(partial.count(), 0);
+}
+
+#[test]
+fn a_pilot_is_taken_up() {
+    let plan = spread(SAMPLES);
+    let folder = tempfile::tempdir().expect("a folder");
+    let pilot = wheeleg_campaign::Options {
+        first: Some(10),
+        ..options(2)
+    };
+    let (ran, _) = run_in(folder.path(), &plan, &pilot, &|case| Some(computed(case)));
+    let ran = ran.expect("it runs");
+    assert_eq!((ran.computed, ran.of, ran.found), (10, 10, 0));
+    let (again, count) = run_in(folder.path(), &plan, &pilot, &|case| Some(computed(case)));
+    assert_eq!((again.expect("it runs").found, count), (10, 0));
+    let (ran, count) = run_in(folder.path(), &plan, &options(2), &|case| {
+        Some(computed(case))
+    });
+    let ran = ran.expect("it runs");
+    assert_eq!((ran.found, ran.computed, count), (10, 190, 190));
+    assert_eq!(merged(folder.path()), whole(&plan).1);
+}
+
+#[test]
+fn another_plan_is_refused_and_the_difference_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = spread(4);
+    let file = PlanFile::of(&plan, 1.0);
+    Store::create(folder.path(), file.clone()).expect("a folder");
+    Store::create(folder.path(), file.clone()).expect("the same again");
+    let refused = |file: PlanFile| {
+        let error = Store::create(folder.path(), file).expect_err("another campaign");
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    };
+    let told = refused(PlanFile::of(&spread(5), 1.0));
+    assert!(told.contains("the plan differs, first in line 1"), "{told}");
+    let told = refused(PlanFile {
+        program: "wheeleg 9".to_owned(),
+        ..file.clone()
+    });
+    assert!(
+        told.contains("wheeleg 9") && told.contains(&file.program),
+        "{told}"
+    );
+    let path = folder.path().join("plan.json");
+    let text = fs::read_to_string(&path).expect("there");
+    fs::write(&path, text.replace("root = 7", "root = 8")).expect("written");
+    let error = Store::open(folder.path()).expect_err("changed by hand");
+    assert!(error.to_string().contains("hash"), "{error}");
+    let error = Store::open(&folder.path().join("none")).expect_err("no folder");
+    assert!(matches!(error, CampaignError::Unreadable { .. }) && error.exit_code() == 2);
+}

@@ -1,0 +1,346 @@
+//! Every value that a factor can have, against the ranges of the files: all that is wrong is
+//! told at once, before the first case.
+
+use std::ops::Range;
+
+use super::distribution::Distribution;
+use super::factor::{Factor, Sets, Values};
+use super::resolve::{Base, Resolver, factor_between};
+use super::value::Value;
+use super::{Plan, distribution};
+use crate::error::ConfigError;
+use crate::params::ParameterInfo;
+use crate::quantity::{pretty, suffix};
+use crate::reader::Reader;
+use crate::suggest::closest;
+
+/// Reports every factor that does not fit the files, and every end of a factor at which the files
+/// contradict themselves.
+pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
+    let resolver = Resolver::new(plan)?;
+    for factor in &plan.factors {
+        twice(r, plan, factor);
+        let Sets::Fields { scenario, robot } = &factor.sets else {
+            continue;
+        };
+        for path in scenario {
+            field_in_all(r, factor, ("scenario.", path), resolver.scenarios.values());
+        }
+        for path in robot {
+            field_in_all(r, factor, ("robot.", path), resolver.robots.values());
+        }
+    }
+    if r.is_clean() {
+        ends(r, plan, &resolver);
+    }
+    Ok(())
+}
+
+/// Where the values of a factor stand in the plan.
+fn span_of(r: &Reader, factor: &Factor) -> Option<Range<usize>> {
+    let entry = r.table(&format!("factor.{}", factor.name))?;
+    let keys = distribution::NAMES.iter().chain(&["grid"]);
+    let found = keys.filter_map(|key| entry.get(key)).next();
+    let span = found.map(|(key, item)| item.span().unwrap_or(key));
+    span.or(Some(entry.span))
+}
+
+/// Two factors that set one field: the later would win, unseen.
+fn twice(r: &mut Reader, plan: &Plan, factor: &Factor) {
+    let fields = |factor: &Factor| match &factor.sets {
+        Sets::Scenario => vec!["scenario".to_owned()],
+        Sets::Robot => vec!["robot".to_owned()],
+        Sets::Fault(_) => Vec::new(),
+        Sets::Fields { scenario, robot } => {
+            let scenario = scenario.iter().map(|path| format!("scenario.{path}"));
+            let robot = robot.iter().map(|path| format!("robot.{path}"));
+            scenario.chain(robot).collect()
+        }
+    };
+    let own = fields(factor);
+    let earlier = plan.factors.iter().take_while(|f| f.name != factor.name);
+    for other in earlier {
+        let shared = fields(other).into_iter().find(|path| own.contains(path));
+        if let Some(path) = shared {
+            let span = span_of(r, factor);
+            let message = format!(
+                "`factor.{}` and `factor.{}` both set `{path}`",
+                other.name, factor.name
+            );
+            r.problem(span, message, "set twice", None);
+        }
+    }
+}
+
+/// One field that a factor sets, in all files that have it; what is wrong in one is not told of
+/// the others as well.
+fn field_in_all<'a>(
+    r: &mut Reader,
+    factor: &Factor,
+    path: (&str, &str),
+    mut bases: impl Iterator<Item = &'a Base>,
+) {
+    let before = r.problem_count();
+    while let Some(base) = bases.next().filter(|_| r.problem_count() == before) {
+        field(r, factor, path, base);
+    }
+}
+
+/// One field that a factor sets, in one file.
+fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &Base) {
+    let span = span_of(r, factor);
+    let named = format!("`factor.{}.parameter` = \"{prefix}{path}\"", factor.name);
+    if factor.is_text() {
+        if !base.has_text(path) {
+            let message = format!("{named}: {} has no name there", base.file);
+            r.problem(span, message, "no such name", nearest(base, prefix, path));
+        }
+        return;
+    }
+    let Some((info, component)) = base.listed(path) else {
+        let message = format!("{named}: {} has no such parameter", base.file);
+        r.problem(span, message, "not known", nearest(base, prefix, path));
+        return;
+    };
+    if info.value.len() > 1 && component.is_none() && !factor.scale {
+        let message = format!(
+            "{named} is a list of {} numbers: scale it, or set one of them, `{path}[0]`",
+            info.value.len()
+        );
+        r.problem(span, message, "a list", None);
+        return;
+    }
+    if !unit_fits(r, factor, info, span.clone()) {
+        return;
+    }
+    range(
+        r,
+        factor,
+        (info, component),
+        &format!("{prefix}{path}"),
+        span,
+    );
+}
+
+fn nearest(base: &Base, prefix: &str, path: &str) -> Option<String> {
+    let paths = base.listing.iter().map(|p| p.path.as_str());
+    let near = closest(path, paths).map(|word| format!("did you mean \"{prefix}{word}\"?"));
+    near.or_else(|| Some("`wheeleg params` lists a robot's parameters".into()))
+}
+
+fn unit_fits(
+    r: &mut Reader,
+    factor: &Factor,
+    info: &ParameterInfo,
+    span: Option<Range<usize>>,
+) -> bool {
+    let unit = factor.unit.as_str();
+    let plain = suffix(&info.unit).is_empty() || info.unit == "flag";
+    let fits = match (unit, info.dimension) {
+        _ if factor.scale => true,
+        ("", _) => plain,
+        (unit, Some(dimension)) => dimension.factor(unit).is_some(),
+        (unit, None) => unit == info.unit,
+    };
+    if fits {
+        return true;
+    }
+    let accepted = match info.dimension {
+        Some(dimension) => dimension.unit_names(),
+        None => format!("\"{}\"", info.unit),
+    };
+    let found = match unit {
+        "" => "has no unit".to_owned(),
+        unit => format!("is in \"{unit}\""),
+    };
+    r.problem(
+        span,
+        format!("`factor.{}` {found}; accepted: {accepted}", factor.name),
+        "wrong unit",
+        Some(format!("{}: {}", info.path, info.doc)),
+    );
+    false
+}
+
+/// Whether all values lie within the range of the file's field.
+fn range(
+    r: &mut Reader,
+    factor: &Factor,
+    (info, component): (&ParameterInfo, Option<usize>),
+    name: &str,
+    span: Option<Range<usize>>,
+) {
+    let unit = if factor.unit.is_empty() {
+        info.unit.clone()
+    } else {
+        factor.unit.clone()
+    };
+    // Of the file's unit in one of the factor's.
+    let to_file = factor_between(info, &unit);
+    let (min, max) = (info.min / to_file, info.max / to_file);
+    let allowed = |v: f64| {
+        let slack = 4.0 * f64::EPSILON * v.abs();
+        v.is_finite() && v >= min - slack && v <= max + slack
+    };
+    let scaled = |v: f64| -> Vec<f64> {
+        let of = info.value.iter().enumerate();
+        let of = of.filter(|(i, _)| component.is_none_or(|c| c == *i));
+        of.map(|(_, file)| file * v).collect()
+    };
+    let values = extremes(factor);
+    let mut wrong = None;
+    for v in values {
+        let made = if factor.scale { scaled(v) } else { vec![v] };
+        if let Some(made) = made.into_iter().find(|made| !allowed(*made)) {
+            wrong = Some((v, made));
+            break;
+        }
+    }
+    let range = format!("{} to {}{}", pretty(min), pretty(max), suffix(&unit));
+    if let Some((v, made)) = wrong {
+        let how = match factor.scale {
+            true => format!(
+                "{} times the file's value is {}{}",
+                shown(v),
+                shown(made),
+                suffix(&unit)
+            ),
+            false => format!("{}{} is out of range", shown(v), suffix(&unit)),
+        };
+        let help = match v.is_infinite() {
+            true => "cut the distribution with `min` and `max`".to_owned(),
+            false => format!("{name}: {}", info.doc),
+        };
+        let message = format!("`factor.{}`: {how}: allowed {range}", factor.name);
+        r.problem(span, message, "leaves the range", Some(help));
+        return;
+    }
+    let continuous = matches!(&factor.values, Values::Drawn(d) if d.ends().is_some());
+    if info.whole && continuous {
+        let message = format!(
+            "`factor.{}`: {name} must be a whole number from {range}: use `grid` or `choice`",
+            factor.name
+        );
+        r.problem(span, message, "not whole", None);
+    }
+}
+
+fn shown(v: f64) -> String {
+    match v {
+        f64::INFINITY => "without an upper end, it".to_owned(),
+        f64::NEG_INFINITY => "without a lower end, it".to_owned(),
+        v => pretty(v),
+    }
+}
+
+/// The numbers between which all values of a factor lie.
+fn extremes(factor: &Factor) -> Vec<f64> {
+    let number = |v: &Value| match v {
+        Value::Number(n) => Some(*n),
+        Value::Flag(flag) => Some(f64::from(u8::from(*flag))),
+        Value::Text(_) => None,
+    };
+    match &factor.values {
+        Values::Grid(list) => list.iter().filter_map(number).collect(),
+        Values::Drawn(Distribution::Choice(list)) => {
+            list.iter().filter_map(|c| number(&c.value)).collect()
+        }
+        Values::Drawn(d) => d.ends().map_or(Vec::new(), Vec::from),
+    }
+}
+
+/// The values of a factor at which something is most likely to be wrong: all of a list, the ends
+/// of a distribution.
+fn probes(factor: &Factor) -> Vec<Value> {
+    match &factor.values {
+        Values::Grid(list) => list.clone(),
+        Values::Drawn(Distribution::Choice(list)) => list.iter().map(|c| c.value.clone()).collect(),
+        Values::Drawn(d) => {
+            let ends = d.ends().map_or(Vec::new(), Vec::from);
+            ends.into_iter().map(Value::Number).collect()
+        }
+    }
+}
+
+/// Runs the files' own readers at the ends of each factor, the others at a value in their middle.
+fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
+    let middle: Vec<Value> = plan
+        .factors
+        .iter()
+        .map(|factor| match &factor.values {
+            Values::Grid(list) => list[0].clone(),
+            Values::Drawn(d) => d.middle(),
+        })
+        .collect();
+    if let Err(error) = resolver.resolve(&middle) {
+        // Of a factor that is wrong by itself its place is known.
+        let mut named = false;
+        for (factor, value) in plan.factors.iter().zip(&middle) {
+            if let Err(error) = resolver.resolve_only(&[(factor, value)]) {
+                let span = span_of(r, factor);
+                report(
+                    r,
+                    span,
+                    &format!("`factor.{}` = {value}", factor.name),
+                    &error,
+                );
+                named = true;
+            }
+        }
+        if !named {
+            report(
+                r,
+                None,
+                "factors in their middle do not fit together",
+                &error,
+            );
+        }
+        return;
+    }
+    for (place, factor) in plan.factors.iter().enumerate() {
+        for probe in probes(factor) {
+            if let Value::Number(n) = probe
+                && n.is_infinite()
+            {
+                infinite_fault(r, factor);
+                continue;
+            }
+            let mut values = middle.clone();
+            values[place] = probe.clone();
+            let Err(error) = resolver.resolve(&values) else {
+                continue;
+            };
+            let span = span_of(r, factor);
+            report(
+                r,
+                span,
+                &format!("`factor.{}` = {probe}", factor.name),
+                &error,
+            );
+        }
+    }
+}
+
+/// What the reader of a file says of a value.
+fn report(r: &mut Reader, span: Option<Range<usize>>, what: &str, error: &ConfigError) {
+    for problem in error.problems() {
+        let help = problem.help_text().map(str::to_owned);
+        r.problem(
+            span.clone(),
+            format!("{what}: {problem}"),
+            "does not fit",
+            help,
+        );
+    }
+}
+
+/// A distribution of a fault's number without an end.
+fn infinite_fault(r: &mut Reader, factor: &Factor) {
+    let span = span_of(r, factor);
+    let message = format!(
+        "`factor.{}`: a distribution without an end can leave the range of any fault",
+        factor.name
+    );
+    let help = "cut the distribution with `min` and `max`".to_owned();
+    r.problem(span, message, "leaves the range", Some(help));
+}

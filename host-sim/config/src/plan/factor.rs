@@ -1,0 +1,254 @@
+//! One factor of a plan: what it sets, and its values.
+
+use super::distribution::{self, Distribution};
+use super::value::{Value, list};
+use crate::reader::{Entry, Reader};
+
+/// What a factor sets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sets {
+    /// Which scenario is run.
+    Scenario,
+    /// Which robot.
+    Robot,
+    /// Fields of the scenario, without the `scenario.` of the plan, and of the robot, without
+    /// its `robot.`.
+    Fields {
+        /// Of the scenario.
+        scenario: Vec<String>,
+        /// Of the robot.
+        robot: Vec<String>,
+    },
+    /// A fault, the value in place of its `{}`.
+    Fault(String),
+}
+
+/// Where the values come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Each of a list, with all samples.
+    Grid(Vec<Value>),
+    /// One for each sample.
+    Drawn(Distribution),
+}
+
+/// A factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factor {
+    /// Name: column `f.NAME` of the table.
+    pub name: String,
+    /// What it sets.
+    pub sets: Sets,
+    /// Its values.
+    pub values: Values,
+    /// Unit of the values; empty where they have none.
+    pub unit: String,
+    /// Whether the value is one that the file's is multiplied by.
+    pub scale: bool,
+    /// Whether it leaves the seed as it is, so that its values meet the same noise.
+    pub paired: bool,
+}
+
+impl Factor {
+    /// Number of values of its list; 1 of one that is drawn.
+    #[must_use]
+    pub fn grid_len(&self) -> u64 {
+        match &self.values {
+            Values::Grid(list) => list.len() as u64,
+            Values::Drawn(_) => 1,
+        }
+    }
+
+    /// Whether its values are names.
+    #[must_use]
+    pub fn is_text(&self) -> bool {
+        match &self.values {
+            Values::Grid(list) => list.iter().any(|v| matches!(v, Value::Text(_))),
+            Values::Drawn(Distribution::Choice(list)) => {
+                list.iter().any(|c| matches!(c.value, Value::Text(_)))
+            }
+            Values::Drawn(_) => false,
+        }
+    }
+}
+
+const OWN: [&str; 6] = ["parameter", "fault", "scale", "paired", "grid", "unit"];
+
+/// Reads all of `[factor.NAME]`.
+pub(super) fn read_all(r: &mut Reader) -> Option<Vec<Factor>> {
+    let Some(top) = r.optional_table("factor", &["a section for each factor"]) else {
+        return Some(Vec::new());
+    };
+    let names: Vec<_> = top.keys().map(|(k, span)| (k.to_owned(), span)).collect();
+    let mut factors = Vec::new();
+    let mut ok = true;
+    for (name, span) in names {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        if name.is_empty() || !name.chars().all(plain) {
+            r.problem(
+                Some(span),
+                format!(
+                    "`factor.{name}` is not a name: allowed are the characters A-Z, a-z, 0-9, \
+                     `_` and `-`"
+                ),
+                "not a name",
+                Some("a column of the table is named after it".into()),
+            );
+            ok = false;
+            continue;
+        }
+        match read(r, &name) {
+            Some(factor) => factors.push(factor),
+            None => ok = false,
+        }
+    }
+    ok.then_some(factors)
+}
+
+fn read(r: &mut Reader, name: &str) -> Option<Factor> {
+    let path = format!("factor.{name}");
+    let known = [&OWN[..], &distribution::NAMES].concat();
+    let entry = r.optional_table(&path, &known)?;
+    r.reject_unknown(&entry, &known);
+    let mut flag = |key: &str| match entry.get(key) {
+        None => Some(false),
+        Some((span, item)) => {
+            let flag = item.as_bool();
+            if flag.is_none() {
+                let message = format!(
+                    "`{path}.{key}` = {} must be true or false",
+                    item.to_string().trim()
+                );
+                r.problem(item.span().or(Some(span)), message, "wrong type", None);
+            }
+            flag
+        }
+    };
+    let (scale, paired) = (flag("scale"), flag("paired"));
+    let sets = sets(r, &entry);
+    let (values, unit) = values(r, &entry)?;
+    let factor = Factor {
+        name: name.to_owned(),
+        sets: sets?,
+        values,
+        unit,
+        scale: scale?,
+        paired: paired?,
+    };
+    fits(r, &entry, &factor).then_some(factor)
+}
+
+/// Whether what it sets, `scale` and the kind of its values go together.
+fn fits(r: &mut Reader, entry: &Entry, factor: &Factor) -> bool {
+    let path = &entry.path;
+    let why = match &factor.sets {
+        Sets::Scenario | Sets::Robot if !matches!(factor.values, Values::Grid(_)) => {
+            "scenarios and robots are given as `grid = [\"NAME\", …]`"
+        }
+        Sets::Scenario | Sets::Robot if !factor.is_text() => "its values must be names",
+        Sets::Fields { .. } if factor.scale && factor.is_text() => {
+            "a name scales nothing: `scale` needs numbers"
+        }
+        Sets::Fields { .. } if factor.scale && !factor.unit.is_empty() => {
+            "a factor that scales has no unit"
+        }
+        Sets::Scenario | Sets::Robot | Sets::Fault(_) if factor.scale => {
+            "`scale` is for parameters"
+        }
+        Sets::Fault(template) if template.matches("{}").count() != 1 => {
+            "a fault has `{}` once, where its value goes, as in \"pot-open:joint3@{}s\""
+        }
+        _ => return true,
+    };
+    r.problem(
+        Some(entry.span.clone()),
+        format!("`{path}`: {why}"),
+        "does not go together",
+        None,
+    );
+    false
+}
+
+fn sets(r: &mut Reader, entry: &Entry) -> Option<Sets> {
+    let path = &entry.path;
+    match (entry.get("parameter"), entry.get("fault")) {
+        (None, Some(_)) => r.text(entry, "fault").map(Sets::Fault),
+        (Some((span, item)), None) => {
+            let listed = item.as_array().is_some();
+            let texts = if listed {
+                r.texts(entry, "parameter", |text| Ok(text.to_owned()))
+            } else {
+                vec![r.text(entry, "parameter")?]
+            };
+            match texts.as_slice() {
+                [one] if one == "scenario" => return Some(Sets::Scenario),
+                [one] if one == "robot" => return Some(Sets::Robot),
+                _ => {}
+            }
+            let (mut scenario, mut robot) = (Vec::new(), Vec::new());
+            let mut ok = !texts.is_empty();
+            for text in texts {
+                if let Some(field) = text.strip_prefix("scenario.") {
+                    scenario.push(field.to_owned());
+                } else if let Some(field) = text.strip_prefix("robot.") {
+                    robot.push(field.to_owned());
+                } else {
+                    ok = false;
+                    r.problem(
+                        item.span().or(Some(span.clone())),
+                        format!(
+                            "`{path}.parameter` = \"{text}\" must begin with `robot.` or \
+                             `scenario.`, or be one of them alone"
+                        ),
+                        "not a path",
+                        Some("for example \"robot.supply.set_pressure\"".into()),
+                    );
+                }
+            }
+            ok.then_some(Sets::Fields { scenario, robot })
+        }
+        (found, _) => {
+            let how = if found.is_some() { "both" } else { "neither" };
+            r.problem(
+                Some(entry.span.clone()),
+                format!("`{path}` has {how} of `parameter` and `fault`: it needs one"),
+                "sets what?",
+                Some("write `parameter = \"robot.supply.set_pressure\"`".into()),
+            );
+            None
+        }
+    }
+}
+
+fn values(r: &mut Reader, entry: &Entry) -> Option<(Values, String)> {
+    let path = &entry.path;
+    let mut given: Vec<&str> = distribution::NAMES.to_vec();
+    given.push("grid");
+    given.retain(|key| entry.get(key).is_some());
+    let [key] = given[..] else {
+        r.problem(
+            Some(entry.span.clone()),
+            format!(
+                "`{path}` has {} of {} and grid: it needs one",
+                given.len(),
+                distribution::NAMES.join(", ")
+            ),
+            "which values?",
+            Some("write `uniform = { min = …, max = …, unit = \"…\" }` or `grid = […]`".into()),
+        );
+        return None;
+    };
+    if key != "grid" {
+        if let Some((span, _)) = entry.get("unit") {
+            let message = format!("`{path}.unit` belongs into `{path}.{key}`");
+            r.problem(Some(span), message, "not here", None);
+        }
+        let (distribution, unit) = distribution::read(r, entry, key)?;
+        return Some((Values::Drawn(distribution), unit));
+    }
+    let unit = match entry.get("unit") {
+        Some(_) => r.text(entry, "unit")?,
+        None => String::new(),
+    };
+    Some((Values::Grid(list(r, entry, "grid")?), unit))
+}

@@ -1,0 +1,255 @@
+//! A plan of a campaign: one scenario, many times, with what differs from case to case.
+//!
+//! | file | what |
+//! |---|---|
+//! | `sources.rs` | the texts that a plan stands on: its own, of scenarios, of robots |
+//! | `factor.rs` | one factor: what it sets, and its values |
+//! | `value.rs` | one value: a number, a name, yes or no |
+//! | `distribution.rs` | distributions, and where they end |
+//! | `overlay.rs` | another value in the text of a file |
+//! | `resolve.rs` | values of all factors to a scenario and a robot |
+//! | `check.rs` | every value that a factor can have, against the files' own ranges |
+
+mod check;
+mod distribution;
+mod factor;
+mod overlay;
+mod resolve;
+mod sources;
+mod value;
+
+pub use distribution::{Choice, Distribution};
+pub use factor::{Factor, Sets, Values};
+pub use resolve::{Resolved, Resolver};
+pub use sources::{Sources, Text};
+pub use value::Value;
+
+use crate::error::ConfigError;
+use crate::params::FieldSpec;
+use crate::quantity::Dimension;
+use crate::reader::Reader;
+
+/// How the values of factors that are not on a grid are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sampler {
+    /// Each on its own, uniform.
+    Random,
+    /// One in each of as many equal parts as there are samples.
+    LatinHypercube,
+    /// The sequence of Sobol with the direction numbers of Joe and Kuo, shifted.
+    Sobol,
+}
+
+/// Samplers by name.
+pub const SAMPLERS: [(&str, Sampler); 3] = [
+    ("random", Sampler::Random),
+    ("latin-hypercube", Sampler::LatinHypercube),
+    ("sobol", Sampler::Sobol),
+];
+
+/// Which cases keep their log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeepLogs {
+    /// None.
+    None,
+    /// Those that missed a required target, or have no result.
+    Failed,
+    /// All.
+    All,
+}
+
+const KEEP: [(&str, KeepLogs); 3] = [
+    ("none", KeepLogs::None),
+    ("failed", KeepLogs::Failed),
+    ("all", KeepLogs::All),
+];
+
+/// What every case begins with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Base {
+    /// Scenario, by built-in name or path.
+    pub scenario: String,
+    /// Robot instead of the scenario's.
+    pub robot: Option<String>,
+}
+
+/// A plan, checked.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Name, as in reports.
+    pub name: String,
+    /// Root of all randomness.
+    pub root: u64,
+    /// Samples of each cell of the grid.
+    pub samples: u64,
+    /// Cases of each sample, which differ in their noise alone.
+    pub replicates: u64,
+    /// How samples are drawn.
+    pub sampler: Sampler,
+    /// Cases of a part file; `None`: as many as are 30 to 120 s of work.
+    pub block: Option<u64>,
+    /// Which logs are kept.
+    pub keep: KeepLogs,
+    /// Simulated time after which a case is given up, s.
+    pub limit_s: Option<f64>,
+    /// What every case begins with.
+    pub base: Base,
+    /// What differs, in the order of the file.
+    pub factors: Vec<Factor>,
+    /// The texts that it stands on.
+    pub sources: Sources,
+}
+
+const TOP: [&str; 10] = [
+    "name",
+    "root",
+    "samples",
+    "replicates",
+    "sampler",
+    "block",
+    "keep",
+    "limit",
+    "base",
+    "factor",
+];
+
+/// Most samples, replicates and cases of a plan: indices stay exact in tables of floats, too.
+const MOST: u64 = 1 << 40;
+/// Most cases of a part file.
+const MOST_IN_BLOCK: u64 = 1 << 16;
+
+impl Plan {
+    /// A plan by built-in name, or from a TOML file.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with every problem of the plan, or those of a scenario or robot that it
+    /// names.
+    pub fn load(name_or_path: &str) -> Result<Self, ConfigError> {
+        Self::of(Sources::load(name_or_path)?)
+    }
+
+    /// A plan from its texts.
+    ///
+    /// # Errors
+    /// As [`Plan::load`].
+    pub fn of(sources: Sources) -> Result<Self, ConfigError> {
+        let Text { file, text } = &sources.plan;
+        let what = format!("the plan {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, false)?;
+        let plan = read(&mut r, &sources);
+        if let Some(plan) = plan.as_ref().filter(|_| r.is_clean()) {
+            check::check(&mut r, plan)?;
+        }
+        r.finish(&what, plan).map(|(plan, _)| plan)
+    }
+
+    /// Cells of the grid: one for each combination of values of the factors that have a list.
+    #[must_use]
+    pub fn cells(&self) -> u64 {
+        self.factors.iter().map(Factor::grid_len).product()
+    }
+
+    /// Number of cases.
+    #[must_use]
+    pub fn cases(&self) -> u64 {
+        self.cells() * self.samples * self.replicates
+    }
+}
+
+fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
+    let top = r.table("")?;
+    r.reject_unknown(&top, &TOP);
+    let name = r.name(&top, "name");
+    let mut count = |key: &str, most: u64| match top.get(key) {
+        Some(_) => r.whole(&top, key, 1..=most),
+        None => Some(1),
+    };
+    let samples = count("samples", MOST);
+    let replicates = count("replicates", MOST);
+    let block = match top.get("block") {
+        Some(_) => r.whole(&top, "block", 1..=MOST_IN_BLOCK).map(Some),
+        None => Some(None),
+    };
+    let root = match top.get("root") {
+        Some(_) => r.whole(&top, "root", 0..=i64::MAX as u64),
+        None => {
+            r.problem(
+                None,
+                "`root` is missing".into(),
+                "expected at the top of the file",
+                Some("write `root = 1`: all randomness comes from it".into()),
+            );
+            None
+        }
+    };
+    let sampler = match top.get("sampler") {
+        Some(_) => r.choice(&top, "sampler", &SAMPLERS),
+        None => Some(Sampler::Random),
+    };
+    let keep = match top.get("keep") {
+        Some(_) => r.choice(&top, "keep", &KEEP),
+        None => Some(KeepLogs::None),
+    };
+    let limit = FieldSpec {
+        key: "limit",
+        dimension: Dimension::Time,
+        min: 0.01,
+        max: 9.0e6,
+        components: 1,
+        integer: false,
+        doc: "simulated time after which a case is given up",
+    };
+    let limit_s = match top.get("limit") {
+        Some(_) => r.quantity(&top, &limit).map(|s| s.first().copied()),
+        None => Some(None),
+    };
+    let base = base(r);
+    let factors = factor::read_all(r);
+    let plan = Plan {
+        name: name?,
+        root: root?,
+        samples: samples?,
+        replicates: replicates?,
+        sampler: sampler?,
+        block: block?,
+        keep: keep?,
+        limit_s: limit_s?,
+        base: base?,
+        factors: factors?,
+        sources: sources.clone(),
+    };
+    let cells = plan.factors.iter().map(Factor::grid_len);
+    let numbers = cells.chain([plan.samples, plan.replicates]);
+    let cases = numbers.fold(1_u128, |n, m| n.saturating_mul(u128::from(m)));
+    if cases > u128::from(MOST) {
+        r.problem(
+            top.get("samples").map(|(key, _)| key),
+            format!("the plan has {cases} cases: allowed are 1 to {MOST}"),
+            "too many",
+            Some("cases = grid cells × samples × replicates".into()),
+        );
+    }
+    Some(plan)
+}
+
+fn base(r: &mut Reader) -> Option<Base> {
+    let Some(entry) = r.table("base") else {
+        r.problem(
+            None,
+            "section [base] is missing".into(),
+            "expected in this file",
+            Some("write `[base]` and below it `scenario = \"three-step\"`".into()),
+        );
+        return None;
+    };
+    r.reject_misplaced(&entry, &["scenario", "robot"], &TOP);
+    let scenario = r.text(&entry, "scenario");
+    let robot = match entry.get("robot") {
+        Some(_) => r.text(&entry, "robot").map(Some),
+        None => Some(None),
+    };
+    Some(Base {
+        scenario: scenario?,
+        robot: robot?,
+    })
+}

@@ -1,0 +1,115 @@
+//! Another value in the text of a file: the file's own reader checks it then.
+
+use toml_edit::{DocumentMut, InlineTable, Item, Table, Value};
+
+use crate::params::ParameterInfo;
+use crate::quantity::Dimension;
+
+/// One part of a path: a key, and a place in the list that stands there.
+fn parts(path: &str) -> Vec<(&str, Option<usize>)> {
+    path.split('.')
+        .map(|part| match split_index(part) {
+            Some((key, index)) => (key, Some(index)),
+            None => (part, None),
+        })
+        .collect()
+}
+
+/// `events[0]` as `events` and 0.
+pub(super) fn split_index(part: &str) -> Option<(&str, usize)> {
+    let (key, index) = part.strip_suffix(']')?.rsplit_once('[')?;
+    Some((key, index.parse().ok()?))
+}
+
+/// The table that holds the last part of a path, made where there is none.
+fn holder<'a>(document: &'a mut DocumentMut, path: &str) -> Option<&'a mut Item> {
+    let mut item = document.as_item_mut();
+    let parts = parts(path);
+    let (_, above) = parts.split_last()?;
+    for (key, index) in above {
+        let table = item.as_table_like_mut()?;
+        if !table.contains_key(key) {
+            table.insert(key, Item::Table(Table::new()));
+        }
+        item = table.get_mut(key)?;
+        if let Some(index) = index {
+            item = match item {
+                Item::ArrayOfTables(list) => {
+                    // An item of its own kind is needed below.
+                    let _ = list.get(*index)?;
+                    item.get_mut(*index)?
+                }
+                _ => item.get_mut(*index)?,
+            };
+        }
+    }
+    Some(item)
+}
+
+fn last(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+/// Writes a quantity; false where the path leads nowhere.
+pub(super) fn set_quantity(
+    document: &mut DocumentMut,
+    info: &ParameterInfo,
+    values: &[f64],
+    unit: &str,
+    source: &str,
+) -> bool {
+    let flag = info.dimension == Some(Dimension::Flag);
+    let number = |v: f64| -> Value {
+        if flag {
+            (v != 0.0).into()
+        } else if info.whole && v.fract() == 0.0 && v.abs() < 9e15 {
+            (v as i64).into()
+        } else {
+            v.into()
+        }
+    };
+    let value = match values {
+        [one] => number(*one),
+        many => Value::Array(many.iter().map(|v| number(*v)).collect()),
+    };
+    let mut table = InlineTable::new();
+    table.insert("value", value);
+    if !flag {
+        table.insert("unit", unit.into());
+    }
+    table.insert("source", source.into());
+    set(document, &info.path, Value::InlineTable(table))
+}
+
+/// Writes a plain value; false where the path leads nowhere.
+pub(super) fn set(document: &mut DocumentMut, path: &str, value: Value) -> bool {
+    let Some(table) = holder(document, path).and_then(Item::as_table_like_mut) else {
+        return false;
+    };
+    table.insert(last(path), Item::Value(value));
+    true
+}
+
+/// The text that a file has at a path, if it has one.
+pub(super) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str> {
+    let mut item = document.as_item();
+    for (key, index) in parts(path) {
+        item = item.get(key)?;
+        if let Some(index) = index {
+            item = item.get(index)?;
+        }
+    }
+    item.as_str()
+}
+
+/// Adds a fault to a scenario.
+pub(super) fn add_fault(document: &mut DocumentMut, fault: &str) {
+    let table = document.as_table_mut();
+    match table.get_mut("faults").and_then(Item::as_array_mut) {
+        Some(list) => list.push(fault),
+        None => {
+            let list: toml_edit::Array = [fault].into_iter().collect();
+            table.insert("faults", Item::Value(Value::Array(list)));
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The texts that a plan stands on, so that a folder of results needs no other file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use toml_edit::Document;
+
+use crate::builtin::{self, Source};
+use crate::error::ConfigError;
+
+/// A file: its name for messages, and what is in it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Text {
+    /// Name for messages.
+    pub file: String,
+    /// Contents.
+    pub text: String,
+}
+
+/// A plan's own text and those of every scenario and robot that it names.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sources {
+    /// The plan.
+    pub plan: Text,
+    /// Scenarios by the name that the plan has for them.
+    pub scenarios: BTreeMap<String, Text>,
+    /// Robots by the name that plan or scenario has for them.
+    pub robots: BTreeMap<String, Text>,
+    /// Robot of each scenario, by their names.
+    pub robot_of: BTreeMap<String, String>,
+}
+
+impl Sources {
+    /// Reads a plan, built in or from a file, and what it names. A relative path counts from the
+    /// folder of the plan, the robot's of a scenario from that of the scenario.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if one of the files cannot be read.
+    pub fn load(name_or_path: &str) -> Result<Self, ConfigError> {
+        let Source { file, text } = builtin::plan_source(name_or_path)?;
+        let path = Path::new(name_or_path);
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut sources = Self {
+            plan: Text { file, text },
+            scenarios: BTreeMap::new(),
+            robots: BTreeMap::new(),
+            robot_of: BTreeMap::new(),
+        };
+        // A plan that is no TOML, or names nothing, is told of when it is read.
+        let Ok(document) = Document::parse(sources.plan.text.clone()) else {
+            return Ok(sources);
+        };
+        let named = |key: &str| -> Vec<String> {
+            let base = document
+                .get("base")
+                .and_then(|base| base.get(key)?.as_str());
+            let factors = document.get("factor").and_then(|f| f.as_table_like());
+            let factors = factors.into_iter().flat_map(|table| table.iter());
+            let grids =
+                factors.filter(|(_, f)| f.get("parameter").and_then(|p| p.as_str()) == Some(key));
+            let grids = grids.filter_map(|(_, factor)| factor.get("grid")?.as_array());
+            let grids = grids.flat_map(|grid| grid.iter().filter_map(|v| v.as_str()));
+            base.into_iter().chain(grids).map(str::to_owned).collect()
+        };
+        for name in named("scenario") {
+            sources.add_scenario(folder, &name)?;
+        }
+        for name in named("robot") {
+            let place = placed(folder, &name);
+            let Source { file, text } = builtin::robot_source(&place)?;
+            sources.robots.insert(name, Text { file, text });
+        }
+        Ok(sources)
+    }
+
+    fn add_scenario(&mut self, folder: &Path, name: &str) -> Result<(), ConfigError> {
+        let place = placed(folder, name);
+        let Source { file, text } = builtin::scenario_source(&place)?;
+        let robot = Document::parse(text.as_str()).ok();
+        let robot = robot.as_ref().and_then(|d| d.get("robot")?.as_str());
+        if let Some(robot) = robot {
+            let place = builtin::named_by(robot, &place);
+            let Source { file, text } = builtin::robot_source(&place)?;
+            self.robots.insert(place.clone(), Text { file, text });
+            self.robot_of.insert(name.to_owned(), place);
+        }
+        self.scenarios.insert(name.to_owned(), Text { file, text });
+        Ok(())
+    }
+}
+
+/// A name as it is, a relative path from the folder.
+fn placed(folder: &Path, name: &str) -> String {
+    if builtin::is_path(name) && !Path::new(name).is_absolute() {
+        return folder.join(name).to_string_lossy().into_owned();
+    }
+    name.to_owned()
+}

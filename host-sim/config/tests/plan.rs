@@ -1,0 +1,291 @@
+//! Plans of campaigns: what is read of them, and what is told of wrong ones.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use wheeleg_config::builtin::PLANS;
+use wheeleg_config::plan::{Plan, Resolver, Sources, Text, Value};
+
+const HEAD: &str = "name = \"test\"\nroot = 1\nsamples = 10\n[base]\nscenario = \"three-step\"\n";
+
+/// The built-in texts that a plan on `three-step` stands on.
+fn sources(plan: &str) -> Sources {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.toml");
+    fs::write(&path, plan).expect("written");
+    let mut sources = Sources::load(&path.to_string_lossy()).expect("read");
+    sources.plan.file = "plan.toml".to_owned();
+    sources
+}
+
+fn plan(factors: &str) -> Result<Plan, Vec<String>> {
+    let plan = Plan::of(sources(&format!("{HEAD}{factors}")));
+    plan.map_err(|e| e.problems().iter().map(|p| p.summary()).collect())
+}
+
+fn usable(factors: &str) -> Plan {
+    plan(factors).unwrap_or_else(|told| panic!("{factors}: {told:#?}"))
+}
+
+fn refused(factors: &str) -> Vec<String> {
+    plan(factors).expect_err(factors)
+}
+
+#[test]
+fn the_built_in_plans_are_usable() {
+    for (name, ..) in PLANS {
+        let plan = Plan::load(name).unwrap_or_else(|e| panic!("{name}: {:?}", e.problems()));
+        assert_eq!(plan.name, *name);
+        assert!(plan.cases() >= 100, "{name}");
+    }
+}
+
+#[test]
+fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
+    let plan = usable(
+        "[factor.supply]\nparameter = \"robot.supply.droop\"\n\
+         uniform = { min = 20.0, max = 40.0, unit = \"kPa\" }\n\
+         [factor.friction]\nparameter = [\"robot.friction.coulomb\", \"robot.friction.static\"]\n\
+         scale = true\ngrid = [0.5, 2.0]\n\
+         [factor.spread]\nparameter = \"robot.cylinder.timing_spread[2]\"\ngrid = [1.5]\n\
+         [factor.law]\nparameter = \"robot.node.joint.law\"\ngrid = [\"fuzzy\", \"predictive\"]\n\
+         [factor.length]\nparameter = \"scenario.duration\"\ngrid = [3.0, 4.0]\nunit = \"s\"\n\
+         [factor.leg]\nparameter = \"scenario.motion.leg\"\ngrid = [\"left\", \"right\"]\n\
+         [factor.fault]\nfault = \"pot-open:joint3@{}s\"\nuniform = { min = 1.0, max = 2.0 }\n",
+    );
+    assert_eq!((plan.cells(), plan.cases()), (16, 160));
+    let resolver = Resolver::new(&plan).expect("usable");
+    let number = Value::Number;
+    let text = |text: &str| Value::Text(text.to_owned());
+    let values = [
+        number(25.0),
+        number(2.0),
+        number(1.5),
+        text("predictive"),
+        number(4.0),
+        text("right"),
+        number(1.5),
+    ];
+    let case = resolver.resolve(&values).expect("it can be");
+    let plain = wheeleg_config::builtin::robot("wheeleg-2003").expect("built in");
+    let changed: BTreeMap<&str, &[f64]> = (case.robot.parameters.iter())
+        .zip(&plain.parameters)
+        .filter(|(a, b)| (&a.path, &a.value, &a.unit) != (&b.path, &b.value, &b.unit))
+        .map(|(a, _)| (a.path.as_str(), a.value.as_slice()))
+        .collect();
+    let of = |path: &str| {
+        let listed = plain.parameters.iter().find(|p| p.path == path);
+        listed.expect(path).value.clone()
+    };
+    let doubled = ["friction.coulomb", "friction.static"].map(|path| vec![2.0 * of(path)[0]]);
+    let mut spread = of("cylinder.timing_spread");
+    spread[2] = 1.5;
+    // A parameter that the file leaves at its default moves in the listing; it is looked up.
+    let found = |path: &str| {
+        let listed = case.robot.parameters.iter().find(|p| p.path == path);
+        listed.expect(path).value.clone()
+    };
+    assert_eq!(found("supply.droop"), [25.0]);
+    assert_eq!(found("friction.coulomb"), doubled[0]);
+    assert_eq!(found("friction.static"), doubled[1]);
+    assert_eq!(found("cylinder.timing_spread"), spread);
+    assert_eq!(found("node.joint.law"), [5.0]);
+    assert!(changed.contains_key("supply.droop"));
+    assert!((case.robot.plant.supply.droop_pa - 25e3).abs() < 1e-9);
+    assert!(case.robot.is_predictive());
+    for parameter in &plain.parameters {
+        let set = ["supply.droop", "friction.coulomb", "friction.static"];
+        let set = [&set[..], &["cylinder.timing_spread", "node.joint.law"]].concat();
+        if !set.contains(&parameter.path.as_str()) {
+            assert_eq!(
+                found(&parameter.path),
+                parameter.value,
+                "{}",
+                parameter.path
+            );
+        }
+    }
+    assert_eq!(case.scenario.duration_s, 4.0);
+    assert_eq!(case.scenario.faults[0].to_string(), "pot-open:joint3@1.5s");
+    assert_eq!(case.scenario_json["motion"]["leg"], "right");
+    assert!(case.scenario_json.get("seed").is_none());
+}
+
+/// Each with a word of the field, of the value and of what is allowed.
+#[test]
+fn what_is_wrong_is_told_with_field_value_and_range() {
+    let on = |parameter: &str, values: &str| {
+        format!("[factor.x]\nparameter = \"robot.{parameter}\"\n{values}\n")
+    };
+    for (factors, told) in [
+        (
+            on(
+                "supply.droop",
+                "uniform = { min = 1.0, max = 70.0, unit = \"bar\" }",
+            ),
+            vec!["factor.x", "70 bar", "0.001 to 10 bar"],
+        ),
+        (
+            on(
+                "supply.droop",
+                "normal = { mean = 0.3, sd = 0.1, unit = \"bar\" }",
+            ),
+            vec!["factor.x", "without a lower end", "0.001 to 10 bar"],
+        ),
+        (
+            on(
+                "friction.coulomb",
+                "scale = true\nlognormal = { median = 1.0, sigma = 0.3 }",
+            ),
+            vec!["factor.x", "without an upper end", "0 to 500 N"],
+        ),
+        (
+            on("supply.droop", "grid = [1.0]\nunit = \"mm\""),
+            vec!["factor.x", "\"mm\"", "\"Pa\""],
+        ),
+        (
+            on("supply.droop", "grid = [1.0]"),
+            vec!["factor.x", "no unit", "\"bar\""],
+        ),
+        (
+            on("supply.drop", "grid = [1.0]\nunit = \"bar\""),
+            vec!["robot.supply.drop", "no such parameter"],
+        ),
+        (
+            on("adc.bits", "uniform = { min = 10, max = 12 }"),
+            vec!["robot.adc.bits"],
+        ),
+        (
+            on(
+                "sensor.adc.bits",
+                "uniform = { min = 10, max = 12, unit = \"bit\" }",
+            ),
+            vec!["robot.sensor.adc.bits", "whole number", "grid"],
+        ),
+        (
+            on("node.joint.law", "grid = [\"fuzzi\"]"),
+            vec!["factor.x", "fuzzi", "did you mean `fuzzy`"],
+        ),
+        (
+            on("friction.coulomb", "scale = true\ngrid = [1.0, 3.0]"),
+            vec!["factor.x", "= 3", "friction.static", "friction.coulomb"],
+        ),
+        (
+            on(
+                "supply.droop",
+                "uniform = { min = 2.0, max = 1.0, unit = \"bar\" }",
+            ),
+            vec!["factor.x.uniform", "min = 2", "max = 1"],
+        ),
+        (
+            on(
+                "supply.droop",
+                "normal = { mean = 1.0, sd = 0.0, unit = \"bar\" }",
+            ),
+            vec!["factor.x.normal", "sd = 0", "above 0"],
+        ),
+        (
+            on(
+                "supply.droop",
+                "choice = { values = [1.0, 2.0], weights = [1.0], unit = \"bar\" }",
+            ),
+            vec!["factor.x.choice.weights", "2 numbers above 0"],
+        ),
+        (
+            on("supply.droop", "grid = [1.0, 1.0]\nunit = \"bar\""),
+            vec!["factor.x.grid", "none of them twice"],
+        ),
+        (on("supply.droop", ""), vec!["factor.x", "0 of", "uniform"]),
+        (
+            "[factor.x]\nfault = \"pot-open:joint9@{}s\"\ngrid = [1.0]\n".to_owned(),
+            vec!["factor.x", "joint9", "joint1"],
+        ),
+        (
+            "[factor.x]\nfault = \"pot-open:joint3@{}s\"\nuniform = { min = 1.0, max = 90.0 }\n"
+                .to_owned(),
+            vec!["factor.x", "90", "ends at 10 s"],
+        ),
+        (
+            "[factor.x]\nfault = \"pot-open:joint3@1s\"\ngrid = [1.0]\n".to_owned(),
+            vec!["factor.x", "`{}`"],
+        ),
+        (
+            "[factor.x]\nparameter = \"plant.mass\"\ngrid = [1.0]\n".to_owned(),
+            vec!["plant.mass", "`robot.`", "`scenario.`"],
+        ),
+    ] {
+        let found = refused(&factors);
+        let all = found.join("\n");
+        for word in told {
+            assert!(all.contains(word), "{word} in\n{all}\nof\n{factors}");
+        }
+        // Where it stands: the section begins in line 6.
+        let line = found.iter().filter_map(|p| p.strip_prefix("plan.toml:"));
+        let line = line.filter_map(|p| p.split(':').next()?.parse::<usize>().ok());
+        assert!(line.into_iter().all(|line| line >= 6), "{all}");
+    }
+}
+
+#[test]
+fn all_bad_factors_are_told_at_once() {
+    let found = refused(
+        "[factor.a]\nparameter = \"robot.supply.droop\"\n\
+         uniform = { min = 1.0, max = 70.0, unit = \"bar\" }\n\
+         [factor.b]\nparameter = \"robot.supply.nothing\"\ngrid = [1.0]\n\
+         [factor.c]\nparameter = \"scenario.duration\"\ngrid = [1.0]\nunit = \"kg\"\n",
+    );
+    assert_eq!(found.len(), 3, "{found:#?}");
+    for name in ["`factor.a`", "`factor.b", "`factor.c`"] {
+        assert!(found.iter().any(|p| p.contains(name)), "{name}: {found:#?}");
+    }
+    let twice = refused(
+        "[factor.a]\nparameter = \"robot.supply.droop\"\ngrid = [0.2]\nunit = \"bar\"\n\
+         [factor.b]\nparameter = \"robot.supply.droop\"\ngrid = [0.3]\nunit = \"bar\"\n",
+    );
+    assert!(
+        twice[0].contains("both set `robot.supply.droop`"),
+        "{twice:?}"
+    );
+}
+
+#[test]
+fn a_plan_needs_its_head() {
+    for (text, told) in [
+        (
+            "name = \"x\"\n[base]\nscenario = \"stand\"\n",
+            "`root` is missing",
+        ),
+        ("name = \"x\"\nroot = 1\n", "section [base] is missing"),
+        (
+            "name = \"x/y\"\nroot = 1\n[base]\nscenario = \"stand\"\n",
+            "is not a name",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nsamples = 0\n[base]\nscenario = \"stand\"\n",
+            "`samples` = 0 must be a whole number from 1",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nsampler = \"sobbol\"\n[base]\nscenario = \"stand\"\n",
+            "`sampler` = \"sobbol\" is not known",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nsamples = 1099511627776\nreplicates = 2\n\
+             [base]\nscenario = \"stand\"\n",
+            "2199023255552 cases",
+        ),
+        ("name = ", "not valid TOML"),
+    ] {
+        let error = Plan::of(sources(text)).expect_err(text);
+        let all: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
+        assert!(all.iter().any(|p| p.contains(told)), "{told}: {all:?}");
+    }
+    let missing = Sources {
+        plan: Text {
+            file: "plan.toml".to_owned(),
+            text: HEAD.replace("three-step", "three-steps"),
+        },
+        ..sources("")
+    };
+    let error = Plan::of(missing).expect_err("no such scenario");
+    assert!(format!("{:?}", error.problems()).contains("three-steps"));
+}

@@ -1,0 +1,375 @@
+//! `wheeleg campaign`: one scenario many times, on as many computers as there are.
+
+mod print;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Subcommand, ValueEnum};
+use wheeleg_campaign::{
+    CampaignError, Cases, Options, PlanFile, Shard, Store, Submission, isolated, merge, replay,
+    report, run, simulate, status,
+};
+use wheeleg_config::plan::Plan;
+use wheeleg_studies::StudyError;
+use wheeleg_studies::study::Signal;
+
+use super::{TARGETS_MISSED, print, stop_on_signals, tell, whole};
+
+/// Exit code where cases have no row yet.
+const INCOMPLETE: u8 = 3;
+/// Exit code of a process that was asked to stop, and is to be started again.
+const TRY_AGAIN: u8 = 75;
+
+/// Arguments of `wheeleg campaign`.
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_CODES)]
+pub(super) struct CampaignArgs {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 every case (of this shard) has a row; 1 a required target \
+is missed (--strict only); 2 error; 3 incomplete; 74 a file cannot be written; 75 stopped with \
+SIGTERM or by a hang-up, try again; 130 stopped with Ctrl-C.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a campaign, or a shard of it. Killed or stopped: run it again.
+    Run(RunArgs),
+    /// Give the shards of a campaign to Slurm, or print a job for Kubernetes.
+    Submit(SubmitArgs),
+    /// How far a campaign is, from its folder alone.
+    Status(StatusArgs),
+    /// Make one table of the parts in one or more folders.
+    Merge(MergeArgs),
+    /// Make a page of a table: rates with intervals, distributions, correlations, worst cases.
+    Report(ReportArgs),
+    /// Run one case again: its row, and log, figures and report.
+    Replay(ReplayArgs),
+    /// Run one case into a file: what `run` does with one that may end the process.
+    #[command(hide = true)]
+    Case(CaseArgs),
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// Built-in plan, path of a TOML file, or `plan.json` of a folder.
+    plan: String,
+    /// Folder for the parts [default: runs/<plan>].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Only every N-th block, beginning with the I-th, from 0. Without it, that of a Slurm
+    /// array or of an indexed Kubernetes job.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Completions of an indexed Kubernetes job.
+    #[arg(long, value_name = "N", value_parser = whole(1_u64, 1_000_000))]
+    shards: Option<u64>,
+    /// Threads [default: all cores].
+    #[arg(long, value_name = "N", value_parser = whole(1_u64, 4096))]
+    threads: Option<u64>,
+    /// Only the first cases, as a pilot; going on takes them up.
+    #[arg(long, value_name = "N", value_parser = whole(1_u64, u64::MAX))]
+    first: Option<u64>,
+    /// Print the cases instead of running them.
+    #[arg(long)]
+    list: bool,
+    /// Exit with code 1 if a case of this shard misses a required target or has no result.
+    #[arg(long)]
+    strict: bool,
+    /// How progress is shown: a bar, if standard error is a terminal, or lines of JSON.
+    #[arg(long, value_enum, default_value = "bar")]
+    progress: Shown,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Shown {
+    Bar,
+    Json,
+}
+
+#[derive(Debug, Args)]
+struct SubmitArgs {
+    /// Built-in plan, or path of a TOML file.
+    plan: String,
+    /// Folder for the parts, on a disk that all computers share.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Tasks.
+    #[arg(long, value_name = "N", value_parser = whole(1_u64, 1_000_000))]
+    shards: u64,
+    /// As a Slurm array, and a job that merges after it.
+    #[arg(long, required_unless_present = "kubernetes")]
+    slurm: bool,
+    /// As an indexed job of Kubernetes, printed for `kubectl apply -f -`.
+    #[arg(long, conflicts_with = "slurm")]
+    kubernetes: bool,
+    /// Print what would be submitted.
+    #[arg(long)]
+    dry_run: bool,
+    /// Further argument of sbatch, such as `--partition=long`; may be given several times.
+    #[arg(long = "slurm-arg", value_name = "ARG", allow_hyphen_values = true)]
+    slurm_args: Vec<String>,
+    /// Image with this program.
+    #[arg(long, value_name = "IMAGE", default_value = "wheeleg")]
+    image: String,
+    /// Claim of a volume that all pods can write, the folder of the campaign.
+    #[arg(long, value_name = "CLAIM", default_value = "wheeleg-campaign")]
+    claim: String,
+}
+
+#[derive(Debug, Args)]
+struct StatusArgs {
+    /// Folder of a campaign.
+    dir: PathBuf,
+    /// Only one shard.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Print it every two seconds until all cases have a row.
+    #[arg(long)]
+    watch: bool,
+    /// Print it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct MergeArgs {
+    /// Folders of one campaign.
+    #[arg(required = true)]
+    dirs: Vec<PathBuf>,
+    /// The table.
+    #[arg(long, value_name = "FILE", default_value = "cases.parquet")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct ReportArgs {
+    /// Table of `wheeleg campaign merge`.
+    table: PathBuf,
+    /// Another table, of another program, that it is compared with case by case.
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// The page [default: beside the table].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print the findings as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct ReplayArgs {
+    /// Folder of a campaign, or its merged table.
+    from: PathBuf,
+    /// The case: its identity, 32 hexadecimal digits, or its place in the plan.
+    case: String,
+    /// Folder for log, figures and report [default: runs/<plan>-<case>].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    drawing: super::Drawing,
+}
+
+#[derive(Debug, Args)]
+struct CaseArgs {
+    dir: PathBuf,
+    index: u64,
+    #[arg(long)]
+    row: PathBuf,
+}
+
+/// Does what the command line says. Errors have exit codes of their own.
+pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
+    let result = match &args.command {
+        Command::Run(args) => run_command(args),
+        Command::Submit(args) => submit_command(args),
+        Command::Status(args) => status_command(args),
+        Command::Merge(args) => merge_command(args),
+        Command::Report(args) => report_command(args),
+        Command::Replay(args) => replay_command(args),
+        Command::Case(args) => case_command(args),
+    };
+    Ok(result.unwrap_or_else(|error| {
+        let code = error.exit_code();
+        tell(&format!("{:?}", miette::Report::new(error)));
+        ExitCode::from(code)
+    }))
+}
+
+/// A plan, and what `plan.json` says of it.
+fn plan_of(name_or_path: &str) -> Result<(Plan, PlanFile), CampaignError> {
+    let is_json = Path::new(name_or_path)
+        .extension()
+        .is_some_and(|e| e == "json");
+    if is_json {
+        let file = PlanFile::read(Path::new(name_or_path))?.for_this_program();
+        return Ok((file.plan()?, file));
+    }
+    let plan = Plan::load(name_or_path)?;
+    let duration_s = Cases::new(&plan)?.duration_s();
+    let file = PlanFile::of(&plan, duration_s);
+    Ok((plan, file))
+}
+
+fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
+    let (plan, file) = plan_of(&args.plan)?;
+    let cases = Cases::new(&plan)?;
+    if args.list {
+        return Ok(print::list(&cases, args.first.unwrap_or(u64::MAX))?);
+    }
+    let variable = |name: &str| std::env::var(name).ok();
+    let shard = Shard::choose(args.shard, args.shards, &variable)?;
+    cases.ensure_possible()?;
+    let out = args.out.clone();
+    let out = out.unwrap_or_else(|| Path::new("runs").join(&plan.name));
+    let store = Store::create(&out, file)?;
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let stop = stop_on_signals()?;
+    let options = Options {
+        shard,
+        threads: args.threads.map_or(cores, |n| n as usize),
+        first: args.first,
+        stop: stop.clone(),
+        program: std::env::current_exe().ok(),
+        json: args.progress == Shown::Json,
+    };
+    let simulate = |case: &_| simulate(case, plan.limit_s, &stop);
+    let ran = run(&store, &cases, &options, &simulate)?;
+    for (path, why) in &ran.aside {
+        tell(&format!("set aside: {}: {why}", path.display()));
+    }
+    let text = print::ran(&ran, &store, shard, args.first.is_some());
+    print(&text)?;
+    if let Some(signal) = ran.stopped {
+        tell(&format!(
+            "{} with {} of {} cases done; run the same command again to go on",
+            signal.label(),
+            ran.found + ran.computed,
+            ran.of
+        ));
+        return Ok(match signal {
+            Signal::Interrupt => ExitCode::from(signal.exit_code()),
+            Signal::Terminate | Signal::HangUp => ExitCode::from(TRY_AGAIN),
+        });
+    }
+    if args.strict && status(&store, shard)?.failed > 0 {
+        return Ok(ExitCode::from(TARGETS_MISSED));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn submit_command(args: &SubmitArgs) -> Result<ExitCode, CampaignError> {
+    let (plan, file) = plan_of(&args.plan)?;
+    let cases = Cases::new(&plan)?;
+    cases.ensure_possible()?;
+    let store = Store::create(&args.out, file)?;
+    let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("wheeleg"));
+    let duration_s = cases.duration_s();
+    let submission = Submission::new(&store, &plan.name, &program, args.shards, duration_s)?;
+    let text = if args.kubernetes {
+        submission.kubernetes(&args.image, &args.claim)
+    } else if args.dry_run {
+        print::slurm(&submission, &args.slurm_args)
+    } else {
+        let [array, merge] = submission.submit_to_slurm(&args.slurm_args)?;
+        format!(
+            "array   {array}\nmerge   {merge}\nfolder  {}\n",
+            submission.folder
+        )
+    };
+    Ok(print(&text)?)
+}
+
+fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
+    let store = Store::open(&args.dir)?;
+    let shard = args.shard.unwrap_or(Shard::ALL);
+    let stop = stop_on_signals()?;
+    loop {
+        let state = status(&store, shard)?;
+        let text = if args.json {
+            print::state_json(&state)
+        } else {
+            print::state(&state, &store)
+        };
+        print(&text)?;
+        let complete = state.missing.is_empty();
+        if complete || !args.watch {
+            return Ok(if complete {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::from(INCOMPLETE)
+            });
+        }
+        for _ in 0..20 {
+            if let Some(signal) = stop.signal() {
+                return Ok(ExitCode::from(signal.exit_code()));
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+}
+
+fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
+    let merged = merge(&args.dirs, &args.out)?;
+    let text = format!(
+        "rows    {}\nhash    {}\ntable   {}\n",
+        merged.rows,
+        merged.hash,
+        args.out.display()
+    );
+    Ok(print(&text)?)
+}
+
+fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
+    let out = args.out.clone();
+    let out = out.unwrap_or_else(|| args.table.with_extension("html"));
+    let (findings, pairs) = report::write(&args.table, args.against.as_deref(), &out)?;
+    let text = if args.json {
+        print::findings_json(&findings, pairs.as_ref())
+    } else {
+        print::findings(&findings, pairs.as_ref(), &out)
+    };
+    Ok(print(&text)?)
+}
+
+fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
+    let stop = stop_on_signals()?;
+    let out = args.out.as_deref();
+    let replayed = replay(&args.from, &args.case, out, args.drawing.png, &stop)?;
+    let stopped = || stop.signal().map_or(2, Signal::exit_code);
+    let Some(replayed) = replayed else {
+        return Ok(ExitCode::from(stopped()));
+    };
+    print(&print::replayed(&replayed))?;
+    if replayed
+        .run
+        .as_ref()
+        .is_some_and(|run| run.stopped.is_some())
+    {
+        return Ok(ExitCode::from(stopped()));
+    }
+    let same = replayed.same_row() != Some(false) && replayed.same_log() != Some(false);
+    if same {
+        return Ok(ExitCode::SUCCESS);
+    }
+    Err(StudyError::refused(
+        "the case is not what it was",
+        "another program gives other rows; the same one must not: please report this",
+    )
+    .into())
+}
+
+fn case_command(args: &CaseArgs) -> Result<ExitCode, CampaignError> {
+    let store = Store::open(&args.dir)?;
+    let limit_s = store.plan().plan()?.limit_s;
+    let stop = stop_on_signals()?;
+    let simulate = |case: &_| simulate(case, limit_s, &stop);
+    Ok(if isolated(&store, args.index, &args.row, &simulate)? {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(TRY_AGAIN)
+    })
+}

@@ -1,0 +1,195 @@
+//! What `wheeleg campaign` prints.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+use serde_json::json;
+use wheeleg_campaign::report::{Findings, Paired, Pairs};
+use wheeleg_campaign::{Cases, Ran, Replayed, Shard, State, Status, Store, Submission};
+use wheeleg_studies::StudyError;
+
+/// Prints cases: place, identity, seed, and the value of each factor.
+pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError> {
+    let plan = cases.plan();
+    let names = plan
+        .factors
+        .iter()
+        .map(|factor| match factor.unit.as_str() {
+            "" => factor.name.clone(),
+            unit => format!("{} ({unit})", factor.name),
+        });
+    let mut head = vec!["index".to_owned(), "case".to_owned(), "seed".to_owned()];
+    head.extend(names);
+    super::super::print(&format!("{}\n", head.join("\t")))?;
+    for index in 0..plan.cases().min(most) {
+        let case = cases.case(index);
+        let mut line = format!("{index}\t{}\t{}", case.id, case.seed);
+        for value in &case.values {
+            let _ = write!(line, "\t{value}");
+        }
+        line.push('\n');
+        super::super::print(&line)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What a process did, and what comes next.
+pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: bool) -> String {
+    let mut out = format!("cases   {} of {}", ran.found + ran.computed, ran.of);
+    if shard != Shard::ALL {
+        let _ = write!(out, " in shard {shard}");
+    }
+    if ran.found > 0 {
+        let _ = write!(out, ", {} of them found", ran.found);
+    }
+    let _ = writeln!(
+        out,
+        "\nfailed  {} of the {} computed now missed a required target or have no result",
+        ran.failed, ran.computed
+    );
+    let folder = store.folder().display();
+    let _ = writeln!(out, "folder  {folder}");
+    if shard == Shard::ALL && !pilot && ran.stopped.is_none() {
+        let _ = writeln!(
+            out,
+            "next    wheeleg campaign merge {folder} --out {folder}/cases.parquet"
+        );
+    }
+    out
+}
+
+/// What would be given to Slurm.
+pub(super) fn slurm(submission: &Submission, further: &[String]) -> String {
+    let array = submission.slurm_arguments(further).join(" ");
+    let merge = submission.merge_arguments("ARRAY", further);
+    let merge: Vec<String> = merge.iter().map(|word| format!("{word:?}")).collect();
+    format!(
+        "# sbatch {array} of\n{}\n# then, with the number of the array\n# sbatch {}\n",
+        submission.slurm_script(),
+        merge.join(" ")
+    )
+}
+
+/// How far a campaign is.
+pub(super) fn state(state: &State, store: &Store) -> String {
+    let mut out = format!(
+        "cases   {} of {}, {} of them in blocks that are not finished\n",
+        state.rows, state.cases, state.partial
+    );
+    let counts = Status::ALL.iter().zip(state.by_status);
+    let counts = counts.filter(|(_, n)| *n > 0);
+    let counts: Vec<String> = counts.map(|(s, n)| format!("{n} {}", s.name())).collect();
+    if !counts.is_empty() {
+        let _ = writeln!(out, "status  {}", counts.join(", "));
+    }
+    let _ = writeln!(
+        out,
+        "failed  {} missed a required target or have no result",
+        state.failed
+    );
+    let _ = writeln!(
+        out,
+        "blocks  {} of {} without a part",
+        state.missing.len(),
+        store.blocks()
+    );
+    for (path, why) in &state.bad {
+        let _ = writeln!(out, "bad     {}: {why}", path.display());
+    }
+    out
+}
+
+/// The same as a line of JSON.
+pub(super) fn state_json(state: &State) -> String {
+    let counts = Status::ALL.iter().zip(state.by_status);
+    let counts: serde_json::Map<String, serde_json::Value> = counts
+        .map(|(s, n)| (s.name().to_owned(), json!(n)))
+        .collect();
+    let bad = state
+        .bad
+        .iter()
+        .map(|(path, why)| json!({ "part": path, "why": why }));
+    let line = json!({
+        "cases": state.cases,
+        "rows": state.rows,
+        "partial": state.partial,
+        "failed": state.failed,
+        "status": counts,
+        "missing_blocks": state.missing,
+        "bad_parts": bad.collect::<Vec<_>>(),
+    });
+    format!("{line}\n")
+}
+
+/// A case that was run again.
+pub(super) fn replayed(replayed: &Replayed) -> String {
+    let row = &replayed.row;
+    let mut out = format!("case    {}, place {}\n", row.case, row.index);
+    let _ = writeln!(out, "status  {}", row.status.name());
+    if let Some(error) = &row.error {
+        let _ = writeln!(out, "error   {error}");
+    }
+    let _ = writeln!(
+        out,
+        "row     {}",
+        match replayed.same_row() {
+            Some(true) => "the same to the bit".to_owned(),
+            Some(false) => format!("DIFFERS from that of `{}`", replayed.program),
+            None => "none before".to_owned(),
+        }
+    );
+    if let Some(hash) = &row.log_hash {
+        let _ = writeln!(out, "hash    {hash}");
+    }
+    if let Some(run) = &replayed.run {
+        let log = match replayed.same_log() {
+            Some(true) => "the same to the bit",
+            Some(false) => "DIFFERS",
+            None => "not compared",
+        };
+        let _ = writeln!(out, "log     {log}");
+        let _ = writeln!(out, "report  {}", run.report.display());
+    }
+    out
+}
+
+/// What a table says, in a few lines.
+pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: &Path) -> String {
+    let mut out = format!("rows    {}\n", findings.rows);
+    for (cell, rate) in &findings.passed {
+        let cell = if cell.is_empty() { "all cases" } else { cell };
+        let [low, high] = rate.exact.map(|share| 1e2 * share);
+        let _ = writeln!(
+            out,
+            "passed  {} of {} ({low:.2} to {high:.2} %): {cell}",
+            rate.met, rate.of
+        );
+    }
+    let paired = findings.paired.iter();
+    for p in paired.chain(pairs.map(|pairs| &pairs.paired)) {
+        out.push_str(&pair(p));
+    }
+    if let Some(pairs) = pairs {
+        let _ = writeln!(
+            out,
+            "logs    {} of {} the same to the bit",
+            pairs.same_log, pairs.paired.pairs
+        );
+    }
+    let _ = writeln!(out, "report  {}", page.display());
+    out
+}
+
+fn pair(p: &Paired) -> String {
+    format!(
+        "paired  {}: {} lost, {} gained, {} the same (p = {:.3})\n",
+        p.what, p.passed.lost, p.passed.gained, p.passed.same, p.passed.p
+    )
+}
+
+/// The same as JSON.
+pub(super) fn findings_json(findings: &Findings, pairs: Option<&Pairs>) -> String {
+    let text = json!({ "findings": findings, "against": pairs });
+    format!("{text:#}\n")
+}

@@ -1,0 +1,343 @@
+//! Campaigns as a user meets them: shared, killed, stopped, replayed, and refused.
+//!
+//! A few cases here; `cargo xtask deep campaign` runs as many as the table of the specification
+//! asks for.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// Samples of the plan, and how often a run is killed.
+const SAMPLES_VARIABLE: &str = "WHEELEG_CAMPAIGN_SAMPLES";
+const KILLS_VARIABLE: &str = "WHEELEG_CAMPAIGN_KILLS";
+/// Longest time that a program may take.
+const HUNG: Duration = Duration::from_secs(600);
+
+fn number(variable: &str, default: u64) -> u64 {
+    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
+}
+
+fn wheeleg() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_wheeleg"));
+    for variable in [
+        "SLURM_ARRAY_TASK_ID",
+        "SLURM_ARRAY_TASK_COUNT",
+        "JOB_COMPLETION_INDEX",
+    ] {
+        command.env_remove(variable);
+    }
+    command.env("NO_COLOR", "1").stdin(Stdio::null());
+    command.args(["campaign"]);
+    command
+}
+
+/// Two laws on robots whose seals and supply differ; short, because their start-up is not.
+fn plan(folder: &Path, samples: u64) -> PathBuf {
+    let text = format!(
+        "name = \"short\"\nroot = 3\nsamples = {samples}\nblock = 4\nsampler = \"sobol\"\n\
+         [base]\nscenario = \"stand\"\n\
+         [factor.length]\nparameter = \"scenario.duration\"\ngrid = [0.3]\nunit = \"s\"\n\
+         [factor.friction]\nscale = true\n\
+         parameter = [\"robot.friction.coulomb\", \"robot.friction.static\"]\n\
+         lognormal = {{ median = 1.0, sigma = 0.2, min = 0.5, max = 2.0 }}\n\
+         [factor.robot]\nparameter = \"robot\"\ngrid = [\"wheeleg-2003\", \"wheeleg\"]\n\
+         paired = true\n"
+    );
+    let path = folder.join("plan.toml");
+    fs::write(&path, text).expect("written");
+    path
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+fn output(command: &mut Command) -> Output {
+    command.output().expect("started")
+}
+
+/// What was said, its wrapped lines joined.
+fn text(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    text.replace("\n  │ ", " ")
+}
+
+fn succeeded(command: &mut Command) -> String {
+    let output = output(command);
+    assert!(
+        output.status.success(),
+        "{}: {}{}",
+        output.status,
+        text(&output.stdout),
+        text(&output.stderr)
+    );
+    text(&output.stdout)
+}
+
+/// The hash of all rows.
+fn merged(folders: &[&Path], out: &Path) -> String {
+    let told = succeeded(wheeleg().arg("merge").args(folders).arg("--out").arg(out));
+    let line = told.lines().find_map(|line| line.strip_prefix("hash    "));
+    line.expect("a hash").to_owned()
+}
+
+fn parts(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(folder.join("parts")).expect("parts").flatten();
+    let files = entries.map(|entry| {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        (name, fs::read(entry.path()).expect("read"))
+    });
+    let mut files: Vec<_> = files.filter(|(name, _)| !name.contains("run")).collect();
+    files.sort();
+    files
+}
+
+/// One hash, and equal bytes of parts: one thread, two, seven processes, killed again and again;
+/// and what is replayed is what it was.
+#[test]
+fn however_it_is_run_the_table_is_the_same() {
+    let samples = number(SAMPLES_VARIABLE, 7);
+    let home = folder();
+    let plan = plan(home.path(), samples);
+    let at = |name: &str| home.path().join(name);
+    let run = |to: &Path| {
+        let mut command = wheeleg();
+        command.arg("run").arg(&plan).arg("--out").arg(to);
+        command
+    };
+    let (one, two, seven, killed) = (at("one"), at("two"), at("seven"), at("killed"));
+    let begun = Instant::now();
+    let told = succeeded(run(&one).args(["--threads", "1"]));
+    let one_s = begun.elapsed().as_secs_f64();
+    assert!(
+        told.contains(&format!("cases   {0} of {0}", 2 * samples)),
+        "{told}"
+    );
+    let begun = Instant::now();
+    succeeded(run(&two).args(["--threads", "2"]));
+    let two_s = begun.elapsed().as_secs_f64();
+    let children: Vec<_> = (0..7)
+        .map(|i| {
+            run(&seven)
+                .args(["--threads", "1", "--shard", &format!("{i}/7")])
+                .stdout(Stdio::null())
+                .spawn()
+                .expect("started")
+        })
+        .collect();
+    for mut child in children {
+        assert!(child.wait().expect("ended").success());
+    }
+    let kills = number(KILLS_VARIABLE, 4);
+    let mut random = 88_172_645_463_325_252_u64;
+    for _ in 0..kills {
+        let mut child = run(&killed)
+            .args(["--threads", "2"])
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("started");
+        // Xorshift (Marsaglia 2003).
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        let wait = one_s / (kills + 2) as f64 * (random % 1000) as f64 * 2e-3;
+        std::thread::sleep(Duration::from_secs_f64(wait));
+        let _ = child.kill();
+        let _ = child.wait();
+    }
+    succeeded(run(&killed).args(["--threads", "2"]));
+    let table = at("cases.parquet");
+    let hash = merged(&[&one], &table);
+    for other in [&two, &seven, &killed] {
+        let name = other.display();
+        assert_eq!(merged(&[other], &at("other.parquet")), hash, "{name}");
+        assert!(parts(other) == parts(&one), "{name}");
+    }
+    // From the folder by place, from the table by identity.
+    let list = succeeded(wheeleg().arg("run").arg(&plan).arg("--list"));
+    let cases: Vec<&str> = list
+        .lines()
+        .skip(1)
+        .filter_map(|line| line.split('\t').nth(1))
+        .collect();
+    assert_eq!(cases.len() as u64, 2 * samples);
+    let replays = (2 * samples).min(50);
+    let every = (2 * samples / replays).max(1) as usize;
+    let replays: Vec<usize> = match samples {
+        0..20 => vec![1, 2 * samples as usize - 2],
+        _ => (0..2 * samples as usize).step_by(every).collect(),
+    };
+    for place in &replays {
+        let (from, case) = match place % 2 {
+            0 => (&one, place.to_string()),
+            _ => (&table, cases[*place].to_owned()),
+        };
+        let out = at(&format!("replay-{place}"));
+        let told = succeeded(
+            wheeleg()
+                .arg("replay")
+                .args([from, Path::new(&case)])
+                .arg("--out")
+                .arg(&out),
+        );
+        assert!(told.contains("row     the same to the bit"), "{told}");
+        assert!(told.contains("log     the same to the bit"), "{told}");
+        assert!(out.join("log.mcap").exists() && out.join("report.html").exists());
+        fs::remove_dir_all(&out).expect("there");
+    }
+    let told = succeeded(wheeleg().arg("report").arg(&table));
+    assert!(
+        at("cases.html").exists() && told.contains("paired  robot wheeleg against"),
+        "{told}"
+    );
+    println!(
+        "campaign: {} cases, 1 and 2 threads, 7 processes, {kills} kills: one hash; {} replays \
+         equal; 2 threads are {:.2} times as fast",
+        2 * samples,
+        replays.len(),
+        one_s / two_s
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_leaves_what_was_done_and_a_full_disk_is_named() {
+    let home = folder();
+    let plan = plan(home.path(), 40);
+    let out = home.path().join("out");
+    for (signal, code) in [("TERM", 75), ("INT", 130)] {
+        let child = wheeleg()
+            .arg("run")
+            .arg(&plan)
+            .arg("--out")
+            .arg(&out)
+            .args(["--threads", "2", "--progress", "json"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("started");
+        let before = finished(&out);
+        let begun = Instant::now();
+        while finished(&out) == before {
+            assert!(begun.elapsed() < HUNG, "no block is finished");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let sent = Command::new("kill")
+            .args([&format!("-{signal}"), &child.id().to_string()])
+            .status();
+        assert!(sent.expect("kill").success());
+        let output = child.wait_with_output().expect("ended");
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        assert!(stderr.contains("run the same command again"), "{stderr}");
+        let line = stderr
+            .lines()
+            .find(|line| line.starts_with('{'))
+            .expect("progress");
+        let line: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!(line["of"], 80);
+    }
+    let state = output(wheeleg().arg("status").arg(&out).arg("--json"));
+    assert_eq!(state.status.code(), Some(3), "incomplete");
+    let state: serde_json::Value = serde_json::from_slice(&state.stdout).expect("JSON");
+    let rows = state["rows"].as_u64().expect("a number");
+    assert!((4..80).contains(&rows), "{state}");
+    assert_eq!(state["bad_parts"], serde_json::json!([]));
+    // No file above 4 kB can be written: a part is larger.
+    let full = Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
+        .arg(env!("CARGO_BIN_EXE_wheeleg"))
+        .args(["campaign", "run"])
+        .arg(&plan)
+        .arg("--out")
+        .arg(&out)
+        .env("NO_COLOR", "1")
+        .output()
+        .expect("started");
+    let stderr = text(&full.stderr);
+    assert_eq!(full.status.code(), Some(74), "{stderr}");
+    assert!(
+        stderr.contains("parts") && stderr.contains("File too large"),
+        "{stderr}"
+    );
+    let state = output(wheeleg().arg("status").arg(&out).arg("--json"));
+    let state: serde_json::Value = serde_json::from_slice(&state.stdout).expect("JSON");
+    assert!(
+        state["rows"].as_u64() >= Some(rows),
+        "finished rows are intact: {state}"
+    );
+}
+
+/// Files of blocks that are finished.
+#[cfg(unix)]
+fn finished(out: &Path) -> usize {
+    let entries = fs::read_dir(out.join("parts"))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.ends_with(".run.parquet")).count()
+}
+
+#[test]
+fn bad_input_is_told_before_the_first_case() {
+    let home = folder();
+    let plan = plan(home.path(), 2);
+    let out = home.path().join("out");
+    let bad = home.path().join("bad.toml");
+    let good = fs::read_to_string(&plan).expect("there");
+    let text_of = good.replace("max = 2.0 }", "max = 2000.0 }").replace(
+        "\"robot\"\ngrid = [\"wheeleg-2003\"",
+        "\"robot\"\ngrid = [\"wheeleg-2004\"",
+    );
+    fs::write(&bad, text_of).expect("written");
+    let refused = output(wheeleg().arg("run").arg(&bad).arg("--out").arg(&out));
+    assert_eq!(refused.status.code(), Some(2));
+    let told = text(&refused.stderr);
+    assert!(told.contains("wheeleg-2004") && !out.exists(), "{told}");
+    fs::write(&bad, good.replace("max = 2.0 }", "max = 2000.0 }")).expect("written");
+    let refused = output(wheeleg().arg("run").arg(&bad).arg("--out").arg(&out));
+    let told = text(&refused.stderr);
+    assert!(
+        told.contains("factor.friction") && told.contains("0 to 500 N"),
+        "{told}"
+    );
+    assert!(!out.exists(), "nothing is begun");
+    for (arguments, code, words) in [
+        (vec!["run", "no-such-plan"], 2, "no-such-plan"),
+        (vec!["status", "no-such-folder"], 2, "plan.json"),
+        (vec!["merge", "no-such-folder"], 2, "plan.json"),
+        (vec!["report", "no-such-table"], 2, "no-such-table"),
+        (vec!["replay", "no-such-table", "0"], 2, "no-such-table"),
+        (
+            vec!["run", "three-step-spread", "--shard", "4/4"],
+            2,
+            "0 to N - 1",
+        ),
+        (
+            vec!["run", "three-step-spread", "--shards", "4"],
+            2,
+            "--shards 4",
+        ),
+    ] {
+        let refused = output(wheeleg().args(&arguments).current_dir(home.path()));
+        let told = text(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(code), "{arguments:?}: {told}");
+        assert!(told.contains(words), "{words}: {told}");
+    }
+    let refused = output(
+        wheeleg()
+            .arg("run")
+            .arg(&plan)
+            .arg("--out")
+            .arg(&out)
+            .args(["--shard", "0/2"])
+            .env("SLURM_ARRAY_TASK_ID", "1")
+            .env("SLURM_ARRAY_TASK_COUNT", "2"),
+    );
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("the Slurm array says 1/2"));
+}
