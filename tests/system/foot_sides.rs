@@ -47,7 +47,9 @@ fn beside(side: &str) -> Scenario {
             return line.to_owned();
         };
         let (range, rest) = range.split_once(']').expect("a range");
-        let ends = range.split(", ").map(|y| y.parse::<f64>().expect("a number") - 0.40);
+        let ends = range
+            .split(", ")
+            .map(|y| y.parse::<f64>().expect("a number") - 0.40);
         let ends: Vec<String> = ends.map(|y| format!("{y:.3}")).collect();
         format!("y = {{ value = [{}]{rest}", ends.join(", "))
     });

@@ -19,7 +19,8 @@ pub const DEFAULT_SCENARIO: &str = "three-step";
 pub const DEFAULT_ROBOT: &str = "wheeleg-2003";
 
 /// Robots: name, file name for messages, text.
-pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg", "wheeleg-2003");
+pub const ROBOTS: &[(&str, &str, &str)] =
+    embedded!("robots": "wheeleg", "wheeleg-2003", "wheeleg-field");
 
 /// Scenarios: name, file name for messages, text.
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
@@ -86,7 +87,7 @@ pub fn plan_source(name_or_path: &str) -> Result<Source, ConfigError> {
 /// # Errors
 /// [`ConfigError`] if there is no such robot or file, or if it is wrong.
 pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
-    let (file, text) = robot_text(name_or_path)?;
+    let (file, text) = find("robot", name_or_path, ROBOTS)?;
     RobotConfig::parse(&file, &text)
 }
 

@@ -19,4 +19,7 @@ mod rk4;
 mod robot;
 mod rocks;
 mod slope;
+mod soil;
+mod soil_robot;
+mod soil_rolling;
 mod terrain;

@@ -22,7 +22,7 @@ use self::figures::Source;
 use crate::StudyError;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_config::{EventAction, LawChoice, Scenario, builtin};
+use wheeleg_config::{EventAction, LawChoice, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
 use wheeleg_sim::{Boards, DownTimes, SimError};
