@@ -73,7 +73,8 @@ pub struct Touching {
     wheel_radius_m: f64,
     terrain: Terrain,
     index: Index,
-    top_m: f64,
+    /// No point of the chassis is farther from its origin.
+    chassis_reach_m: f64,
     /// How far the ground has gone down under the feet alone \[m\].
     sunk_under_feet_m: f64,
 }
@@ -220,10 +221,10 @@ impl Touching {
                 params.wheel.law.shared_by(DISCS),
                 params.chassis.law,
             ],
+            chassis_reach_m: points_m.iter().map(|p| p.norm()).fold(0.0, f64::max),
             points_m,
             wheel_radius_m,
             index: Index::new(&terrain.parts),
-            top_m: terrain.top_m(),
             terrain: terrain.clone(),
             sunk_under_feet_m: 0.0,
             params: *params,
@@ -261,6 +262,12 @@ impl Touching {
     /// Lets the ground go down by `depth_m` under the feet alone; 0 brings it back.
     pub fn sink_under_feet(&mut self, depth_m: f64) {
         self.sunk_under_feet_m = depth_m;
+    }
+
+    /// No ground within this distance of a place along X and Y is higher \[m\].
+    #[inline]
+    fn top_near_m(&self, place: &Vector3<f64>, reach_m: f64) -> f64 {
+        self.index.top_near_m(&self.terrain.parts, place, reach_m)
     }
 
     /// One sphere or point against the ground; gives its deepest penetration \[m\].
@@ -379,7 +386,8 @@ impl Touching {
         let (grips, switches) = (&mut states.feet[leg], &mut states.switches[leg]);
         let mut reference = *sole;
         reference.z += self.sunk_under_feet_m;
-        if reference.z - foot.sole_radius_m - foot.sphere_radius_m > self.top_m {
+        let reach = foot.sole_radius_m + foot.sphere_radius_m;
+        if reference.z - reach > self.top_near_m(&reference, reach) {
             release(grips);
             if moving.step_s > 0.0 {
                 *switches = [false; 4];
@@ -422,7 +430,8 @@ impl Touching {
         let rotation = moving.kin.rotation();
         let axis = rotation.column(1).into_owned();
         let mut sum = moving.sum(body, *centre);
-        if centre.z - r - wheel.width_m > self.top_m {
+        let reach = r + wheel.width_m;
+        if centre.z - reach > self.top_near_m(centre, reach) {
             release(grips);
         } else {
             let discs = grips.iter_mut().zip(rims).zip([1.0, 0.0, -1.0]);
@@ -462,7 +471,8 @@ impl Touching {
         let rotation = moving.kin.rotation();
         let (from, to) = (&self.params.chassis.from_m, &self.params.chassis.to_m);
         let deepest = |i: usize| (rotation[(2, i)] * from[i]).min(rotation[(2, i)] * to[i]);
-        if origin.z + deepest(0) + deepest(1) + deepest(2) > self.top_m {
+        let reach = self.chassis_reach_m;
+        if origin.z + deepest(0) + deepest(1) + deepest(2) > self.top_near_m(origin, reach) {
             release(&mut states.chassis);
             return Wrench::ZERO;
         }
