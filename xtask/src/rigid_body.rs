@@ -1,4 +1,5 @@
-//! The robot's dynamics against a rigid-body library that is not ours.
+//! The robot's dynamics against a rigid-body library that is not ours, and the robot on rigid ground
+//! against another physics engine.
 
 use std::fs;
 use std::path::Path;
@@ -36,6 +37,18 @@ pub(crate) fn steps(report: &mut Report) {
             compare(&["--seeded-errors"])
         });
     }
+    report.step("rigid body: MuJoCo on the same ground", || {
+        let results = folder.join("terrain.json");
+        let example = target_dir().join("release/examples/rigid_terrain");
+        fs::create_dir_all(&folder).map_err(anyhow::Error::from)?;
+        rust::build(&["--example", "rigid_terrain"])?;
+        fs::write(&results, output(&mut command(example))?).map_err(anyhow::Error::from)?;
+        let python = tools::python()?;
+        run(command(python)
+            .arg("tests/python/check_terrain.py")
+            .arg(&results))?;
+        Ok(())
+    });
 }
 
 fn export(folder: &Path, urdf: &Path, states: &Path) -> Result<()> {

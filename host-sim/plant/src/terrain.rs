@@ -28,7 +28,7 @@ pub use plane::Plane;
 pub use rim::{Rim, RimTouch};
 pub use rocks::{MOST_ROCKS, RockError, RockField};
 pub use solid::Solid;
-pub use surface::{Ball, Disc, Near, Surface};
+pub use surface::{Bounds, Disc, Near, Surface};
 
 /// A kind of surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -84,8 +84,12 @@ impl Surface for Shape {
         self.surface().height_m(x_m, y_m)
     }
 
-    fn ball(&self) -> Option<Ball> {
-        self.surface().ball()
+    fn top_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
+        self.surface().top_near_m(x_m, y_m, reach_m)
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        self.surface().bounds()
     }
 
     fn feed(&self, hasher: &mut StateHasher) {

@@ -118,8 +118,9 @@ export function sideView(picture, g, terrain) {
   picture.classList.add("robot");
   const title = svg("title", {}, picture);
   const { ticks, shadows } = terrain ? terrainSide(picture, g, terrain) : groundSide(picture);
+  // The axle stays where it is in the picture; what is on it pitches about its middle.
+  const farWheel = wheelSide(picture, g, g.track_mm / 2);
   const root = svg("g", {}, picture);
-  const farWheel = wheelSide(root, g, g.track_mm / 2);
   chassisSide(root);
   const yaws = SIDES.map(() => ({ barrel: bar(root, "r-barrel-l", 22), rod: bar(root, "r-rod-l", 8) }));
   const legs = SIDES.map((side) => {
@@ -138,7 +139,7 @@ export function sideView(picture, g, terrain) {
     say(tag, side.name);
     return { crank, barrel, rod, commanded, setCommanded, sensed, setSensed, load, tag };
   });
-  const nearWheel = wheelSide(root, g, -g.track_mm / 2);
+  const nearWheel = wheelSide(picture, g, -g.track_mm / 2);
 
   return {
     /** @param {Pose} pose */

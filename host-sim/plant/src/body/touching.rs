@@ -83,7 +83,8 @@ pub struct Touching {
     terrain: Terrain,
     index: Index,
     soft: Soft,
-    top_m: f64,
+    /// No point of the chassis is farther from its origin.
+    chassis_reach_m: f64,
     /// How far the ground has gone down under the feet alone \[m\].
     sunk_under_feet_m: f64,
 }
@@ -143,11 +144,11 @@ impl Touching {
                 params.wheel.law.shared_by(DISCS),
                 params.chassis.law,
             ],
+            chassis_reach_m: points_m.iter().map(|p| p.norm()).fold(0.0, f64::max),
             points_m,
             wheel_radius_m,
             index: Index::new(&terrain.parts),
             soft: Soft::new(params, wheel_radius_m, terrain),
-            top_m: terrain.top_m(),
             terrain: terrain.clone(),
             sunk_under_feet_m: 0.0,
             params: *params,
@@ -185,6 +186,12 @@ impl Touching {
     /// Lets the ground go down by `depth_m` under the feet alone; 0 brings it back.
     pub fn sink_under_feet(&mut self, depth_m: f64) {
         self.sunk_under_feet_m = depth_m;
+    }
+
+    /// No ground within this distance of a place along X and Y is higher \[m\].
+    #[inline]
+    fn top_near_m(&self, place: &Vector3<f64>, reach_m: f64) -> f64 {
+        self.index.top_near_m(&self.terrain.parts, place, reach_m)
     }
 
     /// One sphere or point against the ground, of which what is farther than `reach_m` from it is no
@@ -322,8 +329,9 @@ impl Touching {
         let steps = &mut states.steps[leg];
         let mut reference = *sole;
         reference.z += self.sunk_under_feet_m;
-        let reach = self.soft.reach_m();
-        if reference.z - foot.sole_radius_m - foot.sphere_radius_m - reach > self.top_m {
+        let nails = self.soft.reach_m();
+        let reach = foot.sole_radius_m + foot.sphere_radius_m + nails;
+        if reference.z - reach > self.top_near_m(&reference, reach) {
             release(grips);
             lift(steps.as_flattened_mut());
             if moving.step_s > 0.0 {
@@ -344,7 +352,7 @@ impl Touching {
                 self.soft
                     .sole(sum, &mut steps[k], &mut touched, at, &mut soil_n)
             };
-            let depth = self.press_point(pressing, &centre, radius_m + reach, soft);
+            let depth = self.press_point(pressing, &centre, radius_m + nails, soft);
             let left = steps[k].iter_mut().zip(touched).filter(|(_, t)| !t);
             left.for_each(|(step, _)| lift(std::slice::from_mut(step)));
             if k > 0 {
@@ -381,7 +389,8 @@ impl Touching {
         let axis = rotation.column(1).into_owned();
         let mut sum = moving.sum(body, *centre);
         let mut patches = Patches::default();
-        if centre.z - r - wheel.width_m > self.top_m {
+        let reach = r + wheel.width_m;
+        if centre.z - reach > self.top_near_m(centre, reach) {
             release(grips);
         } else {
             let discs = grips.iter_mut().zip(rims).zip([1.0, 0.0, -1.0]);
@@ -427,7 +436,8 @@ impl Touching {
         let rotation = moving.kin.rotation();
         let (from, to) = (&self.params.chassis.from_m, &self.params.chassis.to_m);
         let deepest = |i: usize| (rotation[(2, i)] * from[i]).min(rotation[(2, i)] * to[i]);
-        if origin.z + deepest(0) + deepest(1) + deepest(2) > self.top_m {
+        let reach = self.chassis_reach_m;
+        if origin.z + deepest(0) + deepest(1) + deepest(2) > self.top_near_m(origin, reach) {
             release(&mut states.chassis);
             return Wrench::ZERO;
         }

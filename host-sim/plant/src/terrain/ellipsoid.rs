@@ -17,7 +17,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::surface::{Ball, Disc, Near, Surface};
+use super::surface::{Bounds, Disc, Near, Surface};
 use crate::hash::StateHasher;
 
 /// Relative accuracy of the roots.
@@ -266,10 +266,14 @@ impl Surface for Ellipsoid {
         (left >= 0.0).then(|| self.centre_m.z + self.radii_m.z * left.sqrt())
     }
 
-    fn ball(&self) -> Option<Ball> {
-        Some(Ball {
-            centre_m: self.centre_m,
-            radius_m: self.radii_m.max(),
+    fn bounds(&self) -> Option<Bounds> {
+        let (a, b) = (self.radii_m.x, self.radii_m.y);
+        let wide = libm::hypot(a * self.cos, b * self.sin);
+        let long = libm::hypot(a * self.sin, b * self.cos);
+        let (c, half) = (&self.centre_m, [wide, long, self.radii_m.z]);
+        Some(Bounds {
+            low_m: std::array::from_fn(|i| c[i] - half[i]),
+            high_m: std::array::from_fn(|i| c[i] + half[i]),
         })
     }
 

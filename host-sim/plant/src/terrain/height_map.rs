@@ -63,6 +63,29 @@ pub struct HeightMap {
     cell_m: f64,
     origin_m: [f64; 2],
     top_m: f64,
+    /// Nothing in a square of `TILE` cells is higher; row after row, as the heights \[m\].
+    tops_m: Vec<f64>,
+    /// Tiles in a row.
+    tiles: usize,
+}
+
+/// Cells along a side of a tile.
+const TILE: usize = 8;
+
+/// Highest in each tile of cells, the values around it with it, and over them.
+fn tops(heights_m: &[f64], columns: usize, over_m: f64) -> (Vec<f64>, usize) {
+    let rows = heights_m.len() / columns;
+    let (across, up) = ((columns - 1).div_ceil(TILE), (rows - 1).div_ceil(TILE));
+    let around = |tile: usize, count: usize| {
+        let from = (tile * TILE).saturating_sub(1);
+        from..(tile * TILE + TILE + 2).min(count)
+    };
+    let top = |k: usize| {
+        let (i, j) = (k % across, k / across);
+        let lines = around(j, rows).map(|row| &heights_m[row * columns..][around(i, columns)]);
+        lines.flatten().copied().fold(f64::NEG_INFINITY, f64::max) + over_m
+    };
+    ((0..across * up).map(top).collect(), across)
 }
 
 /// Height and slopes at a place.
@@ -152,14 +175,18 @@ impl HeightMap {
         let from_below = heights_m.chunks_exact(columns).rev();
         let heights_m: Vec<f64> = from_below.flatten().copied().collect();
         let highest = heights_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // The cubics rise over the values by less than this (weights below 0 sum to 0.28).
+        let over_m = 0.28 * 6.0 * steepest_m;
+        let (tops_m, tiles) = tops(&heights_m, columns, over_m);
         Ok(Self {
+            tops_m,
+            tiles,
             heights_m,
             columns,
             rows,
             cell_m,
             origin_m,
-            // The cubics rise over the values by less than this (weights below 0 sum to 0.28).
-            top_m: highest + 0.28 * 6.0 * steepest_m,
+            top_m: highest + over_m,
         })
     }
 
@@ -260,6 +287,19 @@ impl Surface for HeightMap {
 
     fn top_m(&self) -> f64 {
         self.top_m
+    }
+
+    fn top_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
+        let cell = |at_m: f64, axis: usize, count: usize| {
+            self.locate(at_m, self.origin_m[axis], count).0 / TILE
+        };
+        let mut top = f64::NEG_INFINITY;
+        for j in cell(y_m - reach_m, 1, self.rows)..=cell(y_m + reach_m, 1, self.rows) {
+            for i in cell(x_m - reach_m, 0, self.columns)..=cell(x_m + reach_m, 0, self.columns) {
+                top = top.max(self.tops_m[j * self.tiles + i]);
+            }
+        }
+        top
     }
 
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {

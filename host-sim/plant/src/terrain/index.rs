@@ -1,14 +1,14 @@
 //! Which parts of the terrain may touch a body: a grid of square cells over all parts of limited
 //! size.
 //!
-//! Each part is in every cell that its ball covers. A query looks at the cells below the body and
-//! at the balls in them, so its cost depends on how many parts are near, not on how many there
+//! Each part is in every cell that its box covers. A query looks at the cells below the body and
+//! at the boxes in them, so its cost depends on how many parts are near, not on how many there
 //! are. Nothing is allocated.
 
 use nalgebra::Vector3;
 
 use super::Part;
-use super::surface::{Ball, Surface};
+use super::surface::{Bounds, Surface};
 
 /// Parts that would cover more cells are looked at always.
 const CELLS: u64 = 64;
@@ -19,7 +19,7 @@ struct Item {
     part: u32,
     /// First cell that it covers, X and Y.
     first: [u32; 2],
-    ball: Ball,
+    bounds: Bounds,
 }
 
 /// The grid, built once.
@@ -33,6 +33,8 @@ pub struct Index {
     /// Where the items of a cell begin; one more at the end.
     begins: Vec<u32>,
     items: Vec<Item>,
+    /// No part in the grid is higher \[m\].
+    top_m: f64,
 }
 
 /// Cells that a square covers: first and last, X and Y.
@@ -42,11 +44,14 @@ impl Index {
     /// Sorts the parts into cells.
     #[must_use]
     pub fn new(parts: &[Part]) -> Self {
-        let mut index = Self::default();
+        let mut index = Self {
+            top_m: f64::NEG_INFINITY,
+            ..Self::default()
+        };
         let mut limited = Vec::new();
         for (number, part) in (0..).zip(parts) {
-            match part.shape.ball() {
-                Some(ball) => limited.push((number, ball)),
+            match part.shape.bounds() {
+                Some(bounds) => limited.push((number, bounds)),
                 None => index.everywhere.push(number),
             }
         }
@@ -54,11 +59,13 @@ impl Index {
             return index;
         };
         // Cells of the size of the parts, but not many more cells than parts.
-        let mut sizes: Vec<f64> = limited.iter().map(|(_, b)| 2.0 * b.radius_m).collect();
+        let wide = |b: &Bounds, i: usize| b.high_m[i] - b.low_m[i];
+        let mean = |b: &Bounds| (wide(b, 0) * wide(b, 1)).sqrt();
+        let mut sizes: Vec<f64> = limited.iter().map(|(_, b)| mean(b)).collect();
         sizes.sort_by(f64::total_cmp);
         let typical = sizes[middle];
-        limited.retain(|(number, ball)| {
-            let small = 2.0 * ball.radius_m < 8.0 * typical;
+        limited.retain(|(number, bounds)| {
+            let small = mean(bounds) < 8.0 * typical;
             if !small {
                 index.everywhere.push(*number);
             }
@@ -66,10 +73,11 @@ impl Index {
         });
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
-        for (_, ball) in &limited {
+        for (_, bounds) in &limited {
+            index.top_m = index.top_m.max(bounds.high_m[2]);
             for i in 0..2 {
-                low[i] = low[i].min(ball.centre_m[i] - ball.radius_m);
-                high[i] = high[i].max(ball.centre_m[i] + ball.radius_m);
+                low[i] = low[i].min(bounds.low_m[i]);
+                high[i] = high[i].max(bounds.high_m[i]);
             }
         }
         let span = [0, 1].map(|i| high[i] - low[i]);
@@ -81,12 +89,13 @@ impl Index {
         index
     }
 
-    fn fill(&mut self, limited: &[(u32, Ball)]) {
+    fn fill(&mut self, limited: &[(u32, Bounds)]) {
         let cells = (u64::from(self.size[0]) * u64::from(self.size[1])) as usize;
         let mut counts = vec![0_u32; cells + 1];
         let mut placed = Vec::new();
-        for (part, ball) in limited {
-            let Some(covered) = self.covered(&ball.centre_m, ball.radius_m) else {
+        for (part, bounds) in limited {
+            let (low, high) = (&bounds.low_m, &bounds.high_m);
+            let Some(covered) = self.covered([low[0], low[1]], [high[0], high[1]]) else {
                 continue;
             };
             let [wide, high] = [0, 1].map(|i| u64::from(covered[1][i] - covered[0][i]) + 1);
@@ -95,28 +104,28 @@ impl Index {
                 continue;
             }
             self.each(covered, |cell| counts[cell + 1] += 1);
-            placed.push((*part, *ball, covered));
+            placed.push((*part, *bounds, covered));
         }
         self.everywhere.sort_unstable();
         for i in 0..cells {
             counts[i + 1] += counts[i];
         }
         self.begins = counts.clone();
-        let Some((first, ball, covered)) = placed.first().copied() else {
+        let Some((first, bounds, covered)) = placed.first().copied() else {
             return;
         };
         let blank = Item {
             part: first,
             first: covered[0],
-            ball,
+            bounds,
         };
         self.items = vec![blank; counts[cells] as usize];
         let mut items = std::mem::take(&mut self.items);
-        for (part, ball, covered) in placed {
+        for (part, bounds, covered) in placed {
             let item = Item {
                 part,
                 first: covered[0],
-                ball,
+                bounds,
             };
             self.each(covered, |cell| {
                 items[counts[cell] as usize] = item;
@@ -126,13 +135,12 @@ impl Index {
         self.items = items;
     }
 
-    /// Cells below a body; `None`: it is beside the grid.
+    /// Cells below a rectangle; `None`: it is beside the grid.
     #[inline]
-    fn covered(&self, centre_m: &Vector3<f64>, reach_m: f64) -> Option<Covered> {
+    fn covered(&self, low_m: [f64; 2], high_m: [f64; 2]) -> Option<Covered> {
         let mut covered = [[0; 2]; 2];
         for i in 0..2 {
-            let at = centre_m[i] - self.origin_m[i];
-            let (low, high) = (at - reach_m, at + reach_m);
+            let (low, high) = (low_m[i] - self.origin_m[i], high_m[i] - self.origin_m[i]);
             if high < 0.0 || low >= f64::from(self.size[i]) * self.cell_m {
                 return None;
             }
@@ -161,7 +169,9 @@ impl Index {
         if self.items.is_empty() {
             return;
         }
-        let Some(covered) = self.covered(centre_m, reach_m) else {
+        let low: [f64; 3] = std::array::from_fn(|i| centre_m[i] - reach_m);
+        let high: [f64; 3] = std::array::from_fn(|i| centre_m[i] + reach_m);
+        let Some(covered) = self.covered([low[0], low[1]], [high[0], high[1]]) else {
             return;
         };
         let [from, to] = covered;
@@ -172,13 +182,23 @@ impl Index {
                 for item in &self.items[items] {
                     // A part in several of these cells is given in the first of them.
                     let first = [item.first[0].max(from[0]), item.first[1].max(from[1])];
-                    let reach = item.ball.radius_m + reach_m;
-                    let apart = (centre_m - item.ball.centre_m).norm_squared();
-                    if first == [x, y] && apart <= reach * reach {
+                    let meets = |i: usize| {
+                        item.bounds.low_m[i] <= high[i] && item.bounds.high_m[i] >= low[i]
+                    };
+                    if first == [x, y] && meets(0) && meets(1) && meets(2) {
                         f(item.part);
                     }
                 }
             }
         }
+    }
+
+    /// No part within this distance of a place along X and Y is higher \[m\].
+    #[must_use]
+    pub fn top_near_m(&self, parts: &[Part], place_m: &Vector3<f64>, reach_m: f64) -> f64 {
+        let [x, y] = [place_m.x, place_m.y];
+        let of = |part: &u32| parts[*part as usize].shape.top_near_m(x, y, reach_m);
+        let everywhere = self.everywhere.iter().map(of);
+        everywhere.fold(self.top_m, f64::max)
     }
 }

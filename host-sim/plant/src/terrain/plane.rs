@@ -84,6 +84,12 @@ impl Surface for Plane {
         }
     }
 
+    fn top_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
+        let n = &self.normal;
+        let rise = (n.x.abs() + n.y.abs()) * reach_m;
+        (self.offset_m - n.x * x_m - n.y * y_m + rise) / n.z
+    }
+
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
         let n = &self.normal;
         Some((self.offset_m - n.x * x_m - n.y * y_m) / n.z)

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::height_map::HeightMap;
-use super::surface::{Disc, Near};
+use super::surface::{Disc, Near, Surface};
 use crate::hash::StateHasher;
 
 /// Angles at which the rim is looked at.
@@ -75,23 +75,51 @@ impl Axes {
     }
 }
 
-/// One step of Newton's method towards the peak of h − z along the rim.
+/// The ground at one angle of a rim, and where Newton's method would go from there.
+struct Look {
+    /// Slopes of the ground along X and Y, and how they change along the rim \[1/rad\].
+    slope: [f64; 2],
+    bend: [f64; 2],
+    /// h − z \[m\], and its first and second derivative along the rim.
+    over: [f64; 3],
+    step: f64,
+}
+
+/// Looks at h − z along the rim.
 #[inline]
-fn climb(map: &HeightMap, disc: &Disc, axes: &Axes, angle: f64) -> f64 {
+fn look(map: &HeightMap, disc: &Disc, axes: &Axes, angle: f64) -> Look {
     let [out, along] = axes.at(angle);
-    let point = disc.centre_m + disc.radius_m * out;
+    let r = disc.radius_m;
+    let point = disc.centre_m + r * out;
     let place = map.place::<true>(point.x, point.y);
     let ([sx, sy], [xx, xy, yy]) = (place.slope, place.bend);
+    let bend = [xx * along.x + xy * along.y, xy * along.x + yy * along.y];
     let rise = sx * along.x + sy * along.y - along.z;
-    let bend = xx * along.x * along.x + 2.0 * xy * along.x * along.y + yy * along.y * along.y;
-    let fall = disc.radius_m * bend - (sx * out.x + sy * out.y - out.z);
+    let curve = bend[0] * along.x + bend[1] * along.y;
+    let fall = r * curve - (sx * out.x + sy * out.y - out.z);
     // Where it is not a peak yet, uphill.
     let step = if fall < -1e-6 {
         -rise / fall
     } else {
         STEP.copysign(rise)
     };
-    angle + step.clamp(-STEP, STEP)
+    Look {
+        slope: [sx, sy],
+        bend: bend.map(|b| r * b),
+        over: [place.z - point.z, r * rise, r * fall],
+        step: step.clamp(-STEP, STEP),
+    }
+}
+
+/// The closest place as from the tangent plane.
+#[inline]
+fn tangent(over_m: f64, [x, y]: [f64; 2], point_m: Vector3<f64>) -> Near {
+    let up = 1.0 / (1.0 + x * x + y * y).sqrt();
+    Near {
+        distance_m: -over_m * up,
+        normal: Vector3::new(-x * up, -y * up, up),
+        point_m,
+    }
 }
 
 impl Rim {
@@ -100,8 +128,8 @@ impl Rim {
         let before = *self;
         self.there = [false; 2];
         self.due_s = AGAIN_S;
-        let lowest = disc.centre_m.z - disc.radius_m;
-        if lowest > map_top(map) + NEAR_M {
+        let (c, r) = (&disc.centre_m, disc.radius_m);
+        if c.z - r > map.top_near_m(c.x, c.y, r) + NEAR_M {
             return;
         }
         let Some(axes) = Axes::of(disc) else { return };
@@ -126,7 +154,8 @@ impl Rim {
             }
         }
         for (_, start) in best.into_iter().flatten() {
-            let peak = (0..FIRST).fold(start, |a, _| climb(map, disc, &axes, a));
+            let climb = |a: f64, _| a + look(map, disc, &axes, a).step;
+            let peak = (0..FIRST).fold(start, climb);
             let same = |k: &usize| before.there[*k] && (before.angle_rad[*k] - peak).abs() < SAME;
             let place = (0..2).find(same);
             self.put(place.unwrap_or(usize::from(before.there[0])), peak);
@@ -152,14 +181,33 @@ impl Rim {
         // Half a nanosecond, for rounding: plant steps are whole nanoseconds.
         if self.due_s <= 5e-10 {
             self.seed(map, disc);
-        } else if let Some(axes) = Axes::of(disc) {
+            return touches(map, disc, self);
+        }
+        let mut nears = [None; 2];
+        if let Some(axes) = Axes::of(disc) {
             let before = *self;
             self.there = [false; 2];
             for place in (0..2).filter(|place| before.there[*place]) {
-                self.put(place, climb(map, disc, &axes, before.angle_rad[place]));
+                let looked = look(map, disc, &axes, before.angle_rad[place]);
+                let angle = before.angle_rad[place] + looked.step;
+                self.put(place, angle);
+                if self.there[place] {
+                    nears[place] = Some(at_peak(map, disc, &axes, &looked, angle));
+                }
             }
         }
-        touches(map, disc, self)
+        let share = self.share();
+        nears.map(|near| near.map(|near| RimTouch { near, share }))
+    }
+
+    /// Share of a whole contact that each peak bears.
+    fn share(&self) -> f64 {
+        if self.there != [true; 2] {
+            return 1.0;
+        }
+        let apart = (self.angle_rad[0] - self.angle_rad[1]).abs();
+        let u = (apart / SHARING).min(1.0);
+        0.5 + 0.5 * u * u * (3.0 - 2.0 * u)
     }
 
     /// Adds the state to a hash; a rim that has never been near a map adds nothing.
@@ -172,11 +220,22 @@ impl Rim {
     }
 }
 
-/// No part of a map is higher \[m\].
+/// Steps of Newton's method up to this are small enough for a parabola \[rad\].
+const SMALL: f64 = 1e-3;
+
+/// The ground at the end of a step of Newton's method.
 #[inline]
-fn map_top(map: &HeightMap) -> f64 {
-    use super::surface::Surface;
-    map.top_m()
+fn at_peak(map: &HeightMap, disc: &Disc, axes: &Axes, looked: &Look, angle: f64) -> Near {
+    let [out, _] = axes.at(angle);
+    let point = disc.centre_m + disc.radius_m * out;
+    let d = looked.step;
+    if d.abs() > SMALL {
+        return map.near(&point);
+    }
+    let ([x, y], [bx, by]) = (looked.slope, looked.bend);
+    let [over, first, second] = looked.over;
+    let over = over + d * (first + 0.5 * d * second);
+    tangent(over, [x + d * bx, y + d * by], point)
 }
 
 /// The ground at the peaks.
@@ -186,13 +245,7 @@ pub(super) fn touches(map: &HeightMap, disc: &Disc, rim: &Rim) -> [Option<RimTou
     let Some(axes) = Axes::of(disc) else {
         return touches;
     };
-    let share = if rim.there == [true; 2] {
-        let apart = (rim.angle_rad[0] - rim.angle_rad[1]).abs();
-        let u = (apart / SHARING).min(1.0);
-        0.5 + 0.5 * u * u * (3.0 - 2.0 * u)
-    } else {
-        1.0
-    };
+    let share = rim.share();
     for place in (0..2).filter(|place| rim.there[*place]) {
         let [out, _] = axes.at(rim.angle_rad[place]);
         let near = map.near(&(disc.centre_m + disc.radius_m * out));

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::hash::StateHasher;
 
-use super::surface::{Ball, Disc, Near, Surface};
+use super::surface::{Bounds, Disc, Near, Surface};
 
 /// Most faces of a solid.
 const FACES: usize = 6;
@@ -291,10 +291,17 @@ impl Surface for Solid {
         Some(highest)
     }
 
-    fn ball(&self) -> Option<Ball> {
-        Some(Ball {
-            centre_m: self.centre_m,
-            radius_m: self.radius_m,
+    fn bounds(&self) -> Option<Bounds> {
+        let outline = self.outline_m();
+        let ends = |i: usize| {
+            let along = outline.map(|corner| corner[i]);
+            let least = along.into_iter().fold(f64::INFINITY, f64::min);
+            [least, along.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+        };
+        let ([x0, x1], [y0, y1]) = (ends(0), ends(1));
+        Some(Bounds {
+            low_m: [x0, y0, self.centre_m.z - self.radius_m],
+            high_m: [x1, y1, self.top_m],
         })
     }
 

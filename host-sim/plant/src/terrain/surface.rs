@@ -26,13 +26,13 @@ pub struct Disc {
     pub radius_m: f64,
 }
 
-/// A ball around a body of limited size.
+/// A box around a body of limited size, along the axes of the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ball {
-    /// Centre \[m\].
-    pub centre_m: Vector3<f64>,
-    /// Radius \[m\].
-    pub radius_m: f64,
+pub struct Bounds {
+    /// Its least coordinates \[m\].
+    pub low_m: [f64; 3],
+    /// Its largest coordinates \[m\].
+    pub high_m: [f64; 3],
 }
 
 /// Something that carries robots.
@@ -46,11 +46,16 @@ pub trait Surface {
     /// No part of it is higher \[m\].
     fn top_m(&self) -> f64;
 
+    /// No part of it within this distance along X and Y is higher \[m\].
+    fn top_near_m(&self, _x_m: f64, _y_m: f64, _reach_m: f64) -> f64 {
+        self.top_m()
+    }
+
     /// Height of the surface above a place \[m\]; `None` where it has none.
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64>;
 
-    /// A ball around the body; `None`: it has no limits.
-    fn ball(&self) -> Option<Ball> {
+    /// A box around the body; `None`: it has no limits.
+    fn bounds(&self) -> Option<Bounds> {
         None
     }
 
