@@ -117,6 +117,7 @@ const ARROWS: [(&str, &[&str]); 27] = [
             "wheeleg-remote",
             "wheeleg-remote-link",
             "wheeleg-studies",
+            "wheeleg-telemetry",
             "wheeleg-units",
         ],
     ),
