@@ -262,6 +262,7 @@ def journey(browser, console, folder):
     expect("Board 3" in remedy and "potentiometer" in remedy, f"the fault and its remedy: {remedy!r}")
     expect(waits(page, "State", ["HOLD"]), f"after the fault: {cell(page, 'State')}")
     expect("No reading" in page.locator(".joint").nth(2).inner_text(), "the joint shows a reading all the same")
+    expect("error" not in page.locator(".joint").nth(2).inner_text(), "the joint shows an error of no reading")
     expect(page.locator(".joint.blind").count() == 1, "other joints show no reading, too")
     page.evaluate("scrollTo(0, 0)")
     page.screenshot(path=folder / "fault.png")

@@ -232,7 +232,7 @@ mod tests {
         assert!(told.verdict.contains("up to 3.500 mm"), "{}", told.verdict);
         assert_eq!(told.page, folder.path().join("compared.html"));
         let page = std::fs::read_to_string(&told.page).expect("written");
-        assert!(page.contains("data-seek=\"0.6\""));
+        assert!(page.contains("data-seek=\"0.600\""));
         let same = viewed(&options(&[&one, &one])).expect("a page");
         assert!(same.verdict.contains("are equal"), "{}", same.verdict);
     }
