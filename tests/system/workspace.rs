@@ -129,6 +129,7 @@ const ARROWS: [(&str, &[&str]); 28] = [
             "wheeleg-remote",
             "wheeleg-remote-link",
             "wheeleg-studies",
+            "wheeleg-telemetry",
             "wheeleg-units",
         ],
     ),

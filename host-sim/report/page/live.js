@@ -137,7 +137,7 @@ const joints = JOINTS.map((name, i) => {
       set(chamber.b, { x: at + 7, width: 214 - at - 7, "fill-opacity": shade(s.pressure_b_bar) });
       valves.forEach((v, k) => set(v, { class: (s.valves_open >> k) & 1 ? "v on" : "v" }));
       say(value, blind ? "No reading" : `${fixed(s.sensed_mm)} mm`);
-      say(side, ` asked ${fixed(s.commanded_mm)}, error ${fixed(s.commanded_mm - s.sensed_mm)} mm; A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)`);
+      say(side, ` asked ${fixed(s.commanded_mm)}${blind ? "" : `, error ${fixed(s.commanded_mm - s.sensed_mm)}`} mm; A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)`);
       say(title, `${name}: ${fixed(s.sensed_mm)} mm of ${STROKE_MM} mm, open: ${VALVES.filter((_, k) => (s.valves_open >> k) & 1).join(", ") || "no valve"}`);
     },
   };

@@ -46,7 +46,7 @@ pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use log_file::LogFile;
 pub use memory::{Keep, Memory, Recording, Row};
-pub use read::{Logged, Read, Scalar, read};
+pub use read::{Logged, Read, Scalar, read, read_from};
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, json_schema};

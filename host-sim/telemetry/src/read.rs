@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
-use std::io::{BufReader, Read as _, Seek as _};
+use std::io::{BufReader, Read as _};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -53,15 +53,27 @@ pub fn read(
     path: &Path,
     take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
 ) -> Result<Read, LogError> {
+    let file = File::open(path).map_err(|e| LogError::output("read the log", path, e))?;
+    read_from(BufReader::new(file), path, take)
+}
+
+/// The same of any source; `path` is its name for errors.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(
+    mut source: impl std::io::Read,
+    path: &Path,
+    take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
+) -> Result<Read, LogError> {
     let unreadable = |e| LogError::output("read the log", path, e);
-    let mut file = File::open(path).map_err(unreadable)?;
     let mut magic = Vec::new();
-    let mut begin = file.by_ref().take(MAGIC.len() as u64);
+    let mut begin = source.by_ref().take(MAGIC.len() as u64);
     begin.read_to_end(&mut magic).map_err(unreadable)?;
     if magic != MAGIC {
         return Err(LogError::NotALog { path: path.into() });
     }
-    file.rewind().map_err(unreadable)?;
+    let source = MAGIC.chain(source);
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(MAX_RECORD);
@@ -71,7 +83,7 @@ pub fn read(
         others: 0,
         whole: true,
     };
-    for message in MessageReader::new_with_options(BufReader::new(file), options) {
+    for message in MessageReader::new_with_options(source, options) {
         let message = match message {
             Ok(message) => message,
             Err(McapError::Io(e)) if e.kind() != std::io::ErrorKind::UnexpectedEof => {

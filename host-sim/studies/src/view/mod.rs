@@ -153,3 +153,123 @@ fn beside(logs: &[PathBuf]) -> PathBuf {
         _ => first.with_extension("html"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_telemetry::{
+        BodySample, FootSample, JointSample, MasterSample, Recorder, SupplySample,
+    };
+
+    /// A log of one second, of a robot that its maker calls `robot`.
+    fn log(path: &Path, robot: &str, stroke_mm: f64) {
+        let mut recorder = Recorder::create(path).expect("created");
+        recorder.provenance("robot", robot);
+        for ms in 0..1_000_u64 {
+            let t_ns = ms * 1_000_000;
+            for joint in 0..6 {
+                let sample = JointSample {
+                    commanded_mm: 90.0,
+                    sensed_mm: if ms < 600 { 90.0 } else { stroke_mm },
+                    ..JointSample::default()
+                };
+                recorder.joint(t_ns, joint, sample);
+            }
+            if ms.is_multiple_of(10) {
+                recorder.body(t_ns, BodySample::default());
+                recorder.supply(t_ns, SupplySample::default());
+                recorder.master(t_ns, MasterSample::default());
+            }
+            for foot in 0..2 {
+                recorder.foot(t_ns, foot, FootSample::default());
+            }
+        }
+        drop(recorder.finish().expect("finished"));
+    }
+
+    fn options(logs: &[&Path]) -> Options {
+        Options {
+            logs: logs.iter().map(|path| (*path).to_owned()).collect(),
+            robot: None,
+            from_s: 0.0,
+            to_s: f64::INFINITY,
+            signals: Vec::new(),
+            out: None,
+        }
+    }
+
+    fn viewed(options: &Options) -> Result<Viewed, StudyError> {
+        view(options, &Progress::silent()).map(|viewed| viewed.expect("not stopped"))
+    }
+
+    #[test]
+    fn a_page_stands_beside_its_log_and_nothing_in_the_log_is_markup() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        log(&path, "<script>alert(1)</script>", 90.0);
+        let viewed = viewed(&options(&[&path])).expect("a page");
+        assert_eq!(viewed.page, folder.path().join("log.html"));
+        assert!(viewed.broken_off.is_empty());
+        let page = std::fs::read_to_string(&viewed.page).expect("written");
+        assert!(page.contains("&lt;script&gt;alert(1)") && !page.contains("<script>alert"));
+        for id in [
+            "motion-data",
+            "id=\"strokes\"",
+            "id=\"pressures\"",
+            "id=\"events\"",
+        ] {
+            assert!(page.contains(id), "{id}");
+        }
+    }
+
+    #[test]
+    fn two_logs_differ_where_they_do() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [one, other] = ["one.mcap", "other.mcap"].map(|name| folder.path().join(name));
+        log(&one, "wheeleg-2003", 90.0);
+        log(&other, "wheeleg-2003", 93.5);
+        let told = viewed(&options(&[&one, &other])).expect("a page");
+        assert!(told.verdict.contains("up to 3.500 mm"), "{}", told.verdict);
+        assert_eq!(told.page, folder.path().join("compared.html"));
+        let page = std::fs::read_to_string(&told.page).expect("written");
+        assert!(page.contains("data-seek=\"0.600\""));
+        let same = viewed(&options(&[&one, &one])).expect("a page");
+        assert!(same.verdict.contains("are equal"), "{}", same.verdict);
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_told_and_no_page_is_left() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        log(&path, "wheeleg-2003", 90.0);
+        let part = |from_s, to_s| Options {
+            from_s,
+            to_s,
+            ..options(&[&path])
+        };
+        for (options, word) in [
+            (part(5.0, 6.0), "no sample"),
+            (part(2.0, 1.0), "no part"),
+            (part(f64::NAN, 1.0), "no part"),
+            (
+                Options {
+                    signals: vec!["/joint/3.colour".to_owned()],
+                    ..part(0.0, 1.0)
+                },
+                "colour",
+            ),
+            (options(&[&folder.path().join("none.mcap")]), "none.mcap"),
+            (options(&[folder.path()]), "read the log"),
+        ] {
+            let told = viewed(&options).expect_err("refused").to_string();
+            assert!(told.contains(word), "{told}");
+        }
+        assert!(!folder.path().join("log.html").exists());
+        let bytes = std::fs::read(&path).expect("read");
+        std::fs::write(&path, &bytes[..bytes.len() * 3 / 4]).expect("written");
+        let broken = viewed(&options(&[&path])).expect("a page");
+        assert_eq!(broken.broken_off, [path]);
+        let part = std::fs::read_to_string(broken.page).expect("written");
+        assert!(part.contains("breaks off after"));
+    }
+}
