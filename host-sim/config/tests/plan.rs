@@ -201,9 +201,9 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
             vec!["factor.x", "joint9", "joint1"],
         ),
         (
-            "[factor.x]\nfault = \"pot-open:joint3@{}s\"\nuniform = { min = 1.0, max = 90.0 }\n"
+            "[factor.x]\nfault = \"pot-open:joint3@{}s\"\nuniform = { min = 1.0, max = 12.0 }\n"
                 .to_owned(),
-            vec!["factor.x", "90", "ends at 10 s"],
+            vec!["factor.x", "= 12", "ends at 10 s"],
         ),
         (
             "[factor.x]\nfault = \"pot-open:joint3@1s\"\ngrid = [1.0]\n".to_owned(),
