@@ -32,4 +32,5 @@ mod service;
 mod session;
 #[cfg(unix)]
 mod stop;
+mod walk;
 mod workspace;

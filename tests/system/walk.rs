@@ -1,0 +1,96 @@
+//! The robot walks: wheels and legs together, on the level, in turns, over rocks.
+
+use crate::sil;
+use wheeleg_config::{Bar, Measure, Motion, Scenario, builtin};
+use wheeleg_master::layer1::walk::WalkOrder;
+use wheeleg_studies::analysis::{Target, analyse};
+use wheeleg_units::VelocityMmS;
+
+/// What a seed makes of the scenario's bars.
+fn targets(scenario: &Scenario, seed: u64) -> Vec<Target> {
+    let robot = builtin::robot(&scenario.robot).expect("built in");
+    let recording = sil::run(scenario, &robot, seed);
+    let targets = analyse(scenario, &robot, &recording).targets;
+    for t in &targets {
+        println!(
+            "{} seed {seed}: {} {:?} {}",
+            scenario.name, t.id, t.value, t.unit
+        );
+    }
+    targets
+}
+
+fn met(scenario: &Scenario, seeds: impl IntoIterator<Item = u64>) {
+    for seed in seeds {
+        let targets = targets(scenario, seed);
+        let missed = targets.iter().filter(|t| t.required && !t.pass);
+        let missed: Vec<_> = missed.map(|t| (&t.id, t.value)).collect();
+        assert!(
+            !targets.is_empty() && missed.is_empty(),
+            "seed {seed}: {missed:?}"
+        );
+    }
+}
+
+#[test]
+fn the_walk_on_the_level_meets_its_bars() {
+    met(&builtin::scenario("walk").expect("built in"), 1..=3);
+}
+
+/// A walk of 20 s with this order, and the bars in SI.
+fn walk(order: WalkOrder, bars: &[(Measure, f64, f64)]) -> Scenario {
+    let mut scenario = builtin::scenario("walk").expect("built in");
+    scenario.duration_s = 20.0;
+    scenario.motion = Motion::Walk(order);
+    let bar = |(measure, min, max): &(Measure, f64, f64)| Bar {
+        measure: *measure,
+        min: Some(*min),
+        max: Some(*max),
+        required: true,
+    };
+    scenario.bars = bars.iter().map(bar).collect();
+    scenario
+}
+
+#[test]
+fn a_turn_is_the_one_asked_for() {
+    let order = WalkOrder {
+        speed_mm_s: VelocityMmS::from_int(60),
+        turn_rad_s: "0.05".parse().expect("a number"),
+        ..WalkOrder::default()
+    };
+    // 20 s at 0.05 rad/s, less the start; the radius is speed over rate of turning.
+    let bars = [
+        (Measure::Heading, 0.85, 1.02),
+        (Measure::Radius, 1.08, 1.32),
+        (Measure::ChassisForce, 0.0, 0.0),
+    ];
+    met(&walk(order, &bars), [1]);
+}
+
+#[test]
+fn the_robot_walks_backward_and_turns_on_the_spot() {
+    let back = WalkOrder {
+        speed_mm_s: VelocityMmS::from_int(-80),
+        ..WalkOrder::default()
+    };
+    let bars = [
+        (Measure::Speed, -0.082, -0.076),
+        (Measure::Heading, -0.03, 0.03),
+    ];
+    met(&walk(back, &bars), [1]);
+    let spin = WalkOrder {
+        turn_rad_s: "-0.06".parse().expect("a number"),
+        ..WalkOrder::default()
+    };
+    let bars = [
+        (Measure::Heading, -1.25, -0.95),
+        (Measure::Distance, -0.05, 0.05),
+    ];
+    met(&walk(spin, &bars), [1]);
+}
+
+#[test]
+fn the_robot_walks_over_rocks() {
+    met(&builtin::scenario("rocks-20").expect("built in"), [1]);
+}
