@@ -20,7 +20,7 @@ const ERRORS: usize = 20;
 /// Quantiles that are told of every target.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 /// Most values of which a bootstrap interval is drawn; beyond it ranks are as good.
-const BOOTSTRAP: usize = 5_000;
+const BOOTSTRAP: usize = 500;
 
 /// How often something held.
 #[derive(Debug, Clone, PartialEq, Serialize)]
