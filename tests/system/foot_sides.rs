@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use wheeleg_config::{Scenario, builtin};
 use wheeleg_master::contact::{Sector, Side};
 use wheeleg_master::event::Event as MasterEvent;
+use wheeleg_plant::terrain::{Shape, Solid, Surface, Terrain};
 use wheeleg_sim as sil;
 use wheeleg_telemetry::{Cause, Recorder, Recording};
 
@@ -97,6 +98,21 @@ fn reported_touch(recording: &Recording, foot: Side, from_ns: u64) -> (u64, Opti
         _ => None,
     });
     touches.next().expect("the master reports a touch")
+}
+
+/// The same blocks on the other foot's track, 0.40 m to the right.
+fn beside(terrain: &Terrain) -> Terrain {
+    let mut terrain = terrain.clone();
+    for part in &mut terrain.parts {
+        if let Shape::Solid(block) = &part.shape {
+            let [[x1, y1], _, [x0, y0], _] = block.outline_m();
+            let middle = [0.5 * (x0 + x1), 0.5 * (y0 + y1) - 0.40];
+            let half = [0.5 * (x1 - x0), 0.5 * (y1 - y0)];
+            let upright = [-1.0, block.top_m()];
+            part.shape = Shape::Solid(Solid::block(middle, half, 0.0, upright));
+        }
+    }
+    terrain
 }
 
 /// Holds one run against the side on which its foot must touch.
