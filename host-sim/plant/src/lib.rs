@@ -37,6 +37,7 @@ pub mod noise;
 pub mod reference;
 pub mod robot;
 pub mod sensors;
+pub mod soil;
 pub mod supply;
 pub mod terrain;
 pub mod testing;

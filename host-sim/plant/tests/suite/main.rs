@@ -19,4 +19,6 @@ mod rk4;
 mod robot;
 mod rocks;
 mod slope;
+mod soil;
+mod soil_rolling;
 mod terrain;
