@@ -19,7 +19,8 @@ pub const DEFAULT_SCENARIO: &str = "three-step";
 pub const DEFAULT_ROBOT: &str = "wheeleg-2003";
 
 /// Robots: name, file name for messages, text.
-pub const ROBOTS: &[(&str, &str, &str)] = embedded!("robots": "wheeleg", "wheeleg-2003");
+pub const ROBOTS: &[(&str, &str, &str)] =
+    embedded!("robots": "wheeleg", "wheeleg-2003", "wheeleg-field");
 
 /// Scenarios: name, file name for messages, text.
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":

@@ -10,19 +10,20 @@ use wheeleg_plant::dynamics::{BodyParams, RobotDynamicsParams};
 use wheeleg_plant::motor::MotorParams;
 use wheeleg_plant::robot::SpatialParams as PlantSpatial;
 use wheeleg_plant::sensors::AdcNoise;
+use wheeleg_plant::soil::sole::Nails;
 use wheeleg_plant::terrain::Terrain;
 use wheeleg_plant::{Plant, PlantParams};
 
 use self::pneumatics::{Pneumatics, Sensing};
 use self::sections::{
-    BodySection, ChassisContactSection, ContactSection, LinkSection, MotorSection, SpatialParams,
-    StartSection, WheelContactSection,
+    BodySection, ChassisContactSection, ContactSection, LinkSection, MotorSection,
+    SoftGroundSection, SpatialParams, StartSection, WheelContactSection,
 };
 use super::reader::Reader;
 use super::relations::{self, Moved};
 
 /// Names of the plant's sections besides those of one cylinder.
-pub(super) const SECTIONS: [&str; 8] = [
+pub(super) const SECTIONS: [&str; 9] = [
     "start",
     "motor",
     "body",
@@ -31,7 +32,11 @@ pub(super) const SECTIONS: [&str; 8] = [
     "contact",
     "wheel_contact",
     "chassis_contact",
+    "soft_ground",
 ];
+
+/// Force of soil that closes a switch of a robot that does not say, N.
+const PLAIN_SWITCH_N: f64 = 0.25;
 
 /// The six bodies of a leg, in the order of the chain.
 const LINKS: [&str; 6] = [
@@ -64,6 +69,7 @@ pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
     let contact = r.section::<ContactSection>("contact");
     let wheel_contact = r.section::<WheelContactSection>("wheel_contact");
     let chassis_contact = r.section::<ChassisContactSection>("chassis_contact");
+    let soft_ground = r.optional_section::<SoftGroundSection>("soft_ground");
 
     let starts = [yaw?, horizontal?, vertical?];
     let (pneumatics, sensing) = (pneumatics?, sensing?);
@@ -71,7 +77,17 @@ pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
     let [l1, l2, l3, l4, l5, l6] = links;
     let links = [l1?, l2?, l3?, l4?, l5?, l6?];
     let spatial = spatial?;
-    let contacts = contacts(&contact?, &wheel_contact?, &chassis_contact?, &spatial);
+    let mut contacts = contacts(&contact?, &wheel_contact?, &chassis_contact?, &spatial);
+    if let Some(soft) = soft_ground? {
+        contacts.wheel.lug_m = soft.lugs;
+        contacts.foot.switch_force_n = soft.switch_force;
+        contacts.foot.nails = Nails {
+            count: soft.nails,
+            diameter_m: soft.nail_diameter,
+            length_m: soft.nail_length,
+            shear_m: soft.nail_shear,
+        };
+    }
     let plant = PlantParams {
         gas: pneumatics.gas,
         supply: pneumatics.supply,
@@ -205,6 +221,8 @@ fn contacts(
             sole_radius_m: sole.sole_radius,
             sphere_radius_m: sole.sphere_radius,
             switch_threshold_m: sole.switch_threshold,
+            switch_force_n: PLAIN_SWITCH_N,
+            nails: Nails::NONE,
         },
         wheel: WheelContact {
             law: ContactLaw {
@@ -216,6 +234,7 @@ fn contacts(
                 ..law
             },
             width_m: spatial.wheel_width_m,
+            lug_m: 0.0,
             rolling_resistance: wheel.rolling_resistance,
             rolling_blend_rad_s: wheel.rolling_blend,
         },
@@ -266,11 +285,16 @@ mod tests {
     /// the two must not drift apart.
     #[test]
     fn robot_file_and_plant_tests_use_the_same_robot() {
-        let robot = builtin::robot("wheeleg-2003").expect("built in");
-        let file = serde_json::to_value(&robot.plant).expect("serialises");
-        let copy =
-            serde_json::to_value(wheeleg_plant::testing::wheeleg_2003()).expect("serialises");
-        compare("plant", &file, &copy);
+        use wheeleg_plant::testing::{wheeleg_2003, wheeleg_field};
+        for (name, copy) in [
+            ("wheeleg-2003", wheeleg_2003()),
+            ("wheeleg-field", wheeleg_field()),
+        ] {
+            let robot = builtin::robot(name).expect("built in");
+            let file = serde_json::to_value(&robot.plant).expect("serialises");
+            let copy = serde_json::to_value(copy).expect("serialises");
+            compare(name, &file, &copy);
+        }
     }
 
     /// The reference model's foot load rests on three numbers derived from

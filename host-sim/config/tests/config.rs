@@ -58,6 +58,52 @@ fn every_built_in_file_is_accepted() {
     }
 }
 
+/// The field robot is that of `wheeleg.toml` but for its wheels and feet.
+#[test]
+fn the_field_robot_differs_in_wheels_and_feet_alone() {
+    let values = |name: &str| -> std::collections::BTreeMap<String, (Vec<f64>, String)> {
+        let robot = builtin::robot(name).expect("built in");
+        let all = robot.parameters.into_iter();
+        all.map(|p| (p.path, (p.value, p.unit))).collect()
+    };
+    let (plain, field) = (values("wheeleg"), values("wheeleg-field"));
+    let differ: Vec<&str> = field
+        .iter()
+        .filter(|(path, value)| plain.get(*path) != Some(*value))
+        .map(|(path, _)| path.as_str())
+        .filter(|path| !path.starts_with("soft_ground."))
+        .collect();
+    assert_eq!(
+        differ,
+        [
+            "contact.sole_radius",
+            "spatial.wheel_transverse_inertia",
+            "spatial.wheel_width"
+        ]
+    );
+    assert!(plain.keys().all(|path| field.contains_key(path)));
+    assert_eq!(field.len(), plain.len() + 6);
+}
+
+#[test]
+fn wrong_nails_are_named() {
+    let field = builtin::ROBOTS
+        .iter()
+        .find(|(name, ..)| *name == "wheeleg-field");
+    let text = field.expect("built in").2;
+    let long = text.replace(
+        "nail_length   = { value = 60.0,",
+        "nail_length   = { value = 600.0,",
+    );
+    let rejected = |text: &str, parts: &[&str]| {
+        let error = RobotConfig::parse("my.toml", text).expect_err("must be rejected");
+        assert_all(&report(&error), parts);
+    };
+    rejected(&long, &["`soft_ground.nail_length` = 600 mm", "0 to 500"]);
+    let missing = text.replace("lugs          =", "lug           =");
+    rejected(&missing, &["lug", "lugs"]);
+}
+
 #[test]
 fn every_parameter_is_listed_with_unit_source_and_range() {
     let robot = builtin::robot("wheeleg-2003").expect("built in");

@@ -325,3 +325,19 @@ fn a_wrong_map_is_told_with_row_and_column() {
         &["`terrain[1]`: a terrain has one heightmap at most"],
     );
 }
+
+#[test]
+fn soils_are_materials_with_a_name() {
+    for (name, soil) in wheeleg_plant::soil::Soil::NAMED {
+        let text =
+            format!("[[terrain]]\nkind = \"plane\"\nslope = \"20 deg\"\nmaterial = \"{name}\"\n");
+        let ground = accepted(&text).ground;
+        assert_eq!(ground.terrain.parts[0].material, Material::soft(soil));
+        let hard = accepted(&text.replace(name, "rock")).ground;
+        assert_ne!(ground.fingerprint(), hard.fingerprint());
+    }
+    refused(
+        "[[terrain]]\nkind = \"plane\"\nmaterial = \"volcanic sand\"\n",
+        &["volcanic-sand", "loose-ash", "rock"],
+    );
+}

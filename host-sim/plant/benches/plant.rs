@@ -14,7 +14,11 @@ use wheeleg_plant::dynamics::chain::reference::{
 };
 use wheeleg_plant::dynamics::floating::{Contacts, FloatingParams, FloatingRobot, FloatingState};
 use wheeleg_plant::dynamics::noc::Leg;
-use wheeleg_plant::testing::wheeleg_2003;
+use wheeleg_plant::soil::Soil;
+use wheeleg_plant::soil::rolling::{Motion, Rolled, RollingLaw};
+use wheeleg_plant::soil::wheel::Wheel;
+use wheeleg_plant::terrain::Material;
+use wheeleg_plant::testing::{wheeleg_2003, wheeleg_field};
 use wheeleg_plant::{Inputs, Plant};
 
 const LENGTHS_M: [f64; 3] = [0.40, 0.10, 0.19];
@@ -141,11 +145,71 @@ fn plant_tick(c: &mut Criterion) {
     });
 }
 
+/// A wheel in soil: integrals, table, and the law that a step takes; the field robot on sand.
+fn soil(c: &mut Criterion) {
+    let (wheel, sand) = (
+        Wheel {
+            radius_m: 0.15,
+            width_m: 0.10,
+            lug_m: 0.015,
+        },
+        Soil::VOLCANIC_SAND,
+    );
+    c.bench_function("soil_wheel_integral", |b| {
+        b.iter(|| wheel.forces(black_box(&sand), black_box(0.0167), black_box(0.2)));
+    });
+    let law = RollingLaw::new(&wheel, &sand);
+    let (h, v) = (1e-4, 0.12);
+    for (name, rolled, left) in [
+        ("soil_wheel_rolling", 1.0, 0.0),
+        ("soil_wheel_turning", 1.0, 0.01),
+        ("soil_wheel_at_rest", 0.0, 0.01),
+    ] {
+        let speed = Motion {
+            travel: rolled * v,
+            tread: rolled * v / 0.8,
+            left,
+        };
+        let touch = Rolled {
+            depth_m: 0.0167,
+            closing_m_s: 1e-4,
+            speed,
+            moved: Motion {
+                travel: h * speed.travel,
+                tread: h * speed.tread,
+                left: h * speed.left,
+            },
+        };
+        let mut state = RollingLaw::pressed(0.0167);
+        state.rolled = rolled;
+        c.bench_function(name, |b| {
+            b.iter(|| law.force(black_box(&mut state), black_box(&touch)));
+        });
+    }
+    c.bench_function("soil_table_build", |b| {
+        b.iter(|| RollingLaw::new(black_box(&wheel), black_box(&sand)));
+    });
+    let mut params = wheeleg_field();
+    params.terrain.parts[0].material = Material::soft(sand);
+    let plant = Plant::new(&params).expect("plant");
+    let start = plant.initial_state(1).expect("state");
+    let inputs = Inputs {
+        bridge_duty: [0.3; 2],
+        bridge_enabled: [true; 2],
+        ..Inputs::default()
+    };
+    c.bench_function("plant_tick_1ms_sand", |b| {
+        let mut state = start.clone();
+        b.iter(|| plant.tick(&mut state, black_box(&inputs)));
+    });
+}
+
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     reference_legs(&mut criterion);
     own_leg(&mut criterion);
     robots(&mut criterion);
     plant_tick(&mut criterion);
+    soil(&mut criterion);
     criterion.final_summary();
 }

@@ -6,7 +6,9 @@
 
 mod bound;
 mod contacts;
+mod soft;
 mod stand;
+mod sum;
 mod touching;
 
 use nalgebra::Vector3;
@@ -20,7 +22,8 @@ use crate::error::{PlantError, check_state};
 use crate::hash::StateHasher;
 use crate::motor::{MotorParams, MotorState};
 pub use contacts::{
-    ChassisContact, ContactStates, FootContact, Grip, Grips, RobotContacts, WheelContact,
+    ChassisContact, ContactStates, FootContact, Grip, Grips, RobotContacts, Rut, Ruts, Step, Steps,
+    WheelContact,
 };
 pub use touching::{FootLoad, Loads, Touching, WheelLoad};
 

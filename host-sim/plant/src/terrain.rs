@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
 use crate::hash::StateHasher;
+use crate::soil::Soil;
 pub use ellipsoid::Ellipsoid;
 pub use height_map::{HeightMap, HeightMapError, STEEPEST_DEG};
 pub use index::Index;
@@ -103,6 +104,10 @@ pub struct Material {
     pub mu_static: f64,
     /// Most kinetic friction that it gives, at most the static one.
     pub mu_kinetic: f64,
+    /// Soft soil; steep faces of it, and what of the robot is neither wheel nor foot, have the
+    /// frictions above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub soil: Option<Soil>,
 }
 
 impl Material {
@@ -110,7 +115,18 @@ impl Material {
     pub const ROUGH: Self = Self {
         mu_static: 10.0,
         mu_kinetic: 10.0,
+        soil: None,
     };
+
+    /// Soft soil.
+    #[must_use]
+    pub fn soft(soil: Soil) -> Self {
+        Self {
+            mu_static: soil.friction(),
+            mu_kinetic: soil.friction(),
+            soil: Some(soil),
+        }
+    }
 
     /// Checks the ranges.
     ///
@@ -118,7 +134,8 @@ impl Material {
     /// [`PlantError::Parameter`] names the field.
     pub fn validate(&self) -> Result<(), PlantError> {
         check("terrain.mu_static", self.mu_static, 0.0, 10.0)?;
-        check("terrain.mu_kinetic", self.mu_kinetic, 0.0, self.mu_static)
+        check("terrain.mu_kinetic", self.mu_kinetic, 0.0, self.mu_static)?;
+        self.soil.iter().try_for_each(Soil::validate)
     }
 }
 
@@ -176,6 +193,7 @@ impl Terrain {
             part.shape.feed(&mut hasher);
             hasher.f64(part.material.mu_static);
             hasher.f64(part.material.mu_kinetic);
+            part.material.soil.iter().for_each(|s| s.feed(&mut hasher));
         }
         hasher.finish()
     }

@@ -17,6 +17,7 @@ use crate::friction::FrictionParams;
 use crate::motor::MotorParams;
 use crate::robot::{PlantParams, SpatialParams};
 use crate::sensors::{AdcNoise, AdcParams, PotentiometerParams};
+use crate::soil::sole::Nails;
 use crate::supply::{SupplyParams, SwitchParams};
 use crate::terrain::Terrain;
 use crate::valve::ValveParams;
@@ -209,6 +210,8 @@ pub fn ground_contacts() -> RobotContacts {
             sole_radius_m: 0.03,        // m ASSUMED
             sphere_radius_m: 0.01,      // m ASSUMED: rounding of the sole's rim
             switch_threshold_m: 5.0e-5, // m ASSUMED (1 N on a flat sole)
+            switch_force_n: 0.25,       // N ASSUMED (1.3 N on a flat sole)
+            nails: Nails::NONE,         // ASSUMED: plain soles
         },
         wheel: WheelContact {
             law: ContactLaw {
@@ -218,6 +221,7 @@ pub fn ground_contacts() -> RobotContacts {
                 ..sole                        // damping and friction ASSUMED as the sole's
             },
             width_m: 0.05,            // m ASSUMED
+            lug_m: 0.0,               // m ASSUMED: smooth tyres
             rolling_resistance: 0.02, // - ASSUMED
             rolling_blend_rad_s: 0.1, // rad/s ASSUMED, numerical
         },
@@ -299,4 +303,23 @@ pub fn wheeleg_2003() -> PlantParams {
         adc: adc(),
         step_ns: 100_000, // ns design decision
     }
+}
+
+/// The whole robot for sand: wheels 100 mm wide with lugs, large soles with nails.
+#[must_use]
+pub fn wheeleg_field() -> PlantParams {
+    let mut params = wheeleg_2003();
+    let (foot, wheel) = (&mut params.contacts.foot, &mut params.contacts.wheel);
+    foot.sole_radius_m = 0.06; // m ASSUMED
+    foot.nails = Nails {
+        count: 6,           // - ASSUMED
+        diameter_m: 4.0e-3, // m ASSUMED
+        length_m: 0.060,    // m ASSUMED (PAPER: long nails)
+        shear_m: 5.0e-3,    // m ASSUMED
+    };
+    wheel.width_m = 0.10; // m ASSUMED: the paper's overall width with the track of 0.56 m
+    wheel.lug_m = 0.015; // m ASSUMED
+    // kg m2 DERIVED as the narrow wheel's: half of wheel_inertia, plus m w²/12
+    params.spatial.wheel_transverse_inertia_kg_m2 = 0.0091;
+    params
 }

@@ -323,6 +323,22 @@ params! {
         to: [f64; 3], "to", Length, -10.0, 10.0;
     }
 
+    /// What of the robot acts on soft ground alone; without the section wheels are smooth, soles plain.
+    SoftGroundSection {
+        /// Height of the lugs over the rim of a wheel.
+        lugs: f64, "lugs", Length, 0.0, 0.2;
+        /// Force of soil on a side of the sole that closes its switch; half of it opens it.
+        switch_force: f64, "switch_force", Force, 0.0, 100.0;
+        /// Nails under a sole.
+        nails: u32, "nails", Count, 0.0, 100.0;
+        /// Diameter of a nail.
+        nail_diameter: f64, "nail_diameter", Length, 1e-4, 0.05;
+        /// Length of a nail below the sole.
+        nail_length: f64, "nail_length", Length, 0.0, 0.5;
+        /// Way at which a nail holds 63 % of what it can sideways.
+        nail_shear: f64, "nail_shear", Length, 1e-3, 0.1;
+    }
+
     /// Numerics of the plant.
     NumericsSection {
         /// Length of a full step; steps are cut at every valve edge.

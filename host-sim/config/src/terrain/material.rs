@@ -1,8 +1,8 @@
 //! What a part of the terrain is made of.
 //!
-//! A hard material is known by its friction. Soils belong here, too: names of this table, with
-//! what the plant needs for them.
+//! A hard material is known by its friction, a soil by its name.
 
+use wheeleg_plant::soil::Soil;
 use wheeleg_plant::terrain::Material;
 
 use super::fields::{Fields, number};
@@ -12,13 +12,22 @@ use crate::reader::Reader;
 const ICE: Material = Material {
     mu_static: 0.1,
     mu_kinetic: 0.05,
+    soil: None,
 };
 
-const MATERIALS: [(&str, Material); 3] = [
+/// Hard materials.
+const HARD: [(&str, Material); 3] = [
     ("rock", Material::ROUGH),
     ("floor", Material::ROUGH),
     ("ice", ICE),
 ];
+
+/// All materials that have a name.
+fn named() -> Vec<(&'static str, Material)> {
+    let soils = Soil::NAMED.iter();
+    let soft = soils.map(|(name, soil)| (*name, Material::soft(*soil)));
+    HARD.into_iter().chain(soft).collect()
+}
 
 /// Reads `material`, a name or its frictions; rock if it is left out.
 pub(super) fn read(r: &mut Reader, fields: &mut Fields<'_>) -> Option<Material> {
@@ -27,7 +36,7 @@ pub(super) fn read(r: &mut Reader, fields: &mut Fields<'_>) -> Option<Material> 
     }
     let entry = fields.entry;
     let Some(table) = entry.table("material") else {
-        return r.choice(entry, "material", &MATERIALS);
+        return r.choice(entry, "material", &named());
     };
     let mut own = Fields::new(&table, &[]);
     let most = number("mu_static", [0.0, 10.0], "static friction");
@@ -43,5 +52,6 @@ pub(super) fn read(r: &mut Reader, fields: &mut Fields<'_>) -> Option<Material> 
     Some(Material {
         mu_static: mu_static?,
         mu_kinetic: mu_kinetic?,
+        soil: None,
     })
 }

@@ -70,6 +70,15 @@ impl BodyMechanics {
             let law = &params.wheel.law;
             check_law(law, WHEEL, lightest_kg(2 + leg, tread)?, step_s)?;
         }
+        // A whole sole on soil that rises.
+        let area_m2 = std::f64::consts::PI * params.foot.sole_radius_m * params.foot.sole_radius_m;
+        let mass_kg = lightest_kg(0, Vector3::zeros())?;
+        let stiffest = mass_kg * (TURN / step_s) * (TURN / step_s) / area_m2;
+        let parts = self.touching.terrain().parts.iter();
+        for soil in parts.filter_map(|p| p.material.soil.as_ref()) {
+            let stiffness = soil.stiffness_most_pa_m;
+            check("soil.stiffness_most_pa_m", stiffness, 0.0, stiffest)?;
+        }
         for point in params.chassis.points_m() {
             let law = &params.chassis.law;
             check_law(law, CHASSIS, lightest_kg(4, point)?, step_s)?;

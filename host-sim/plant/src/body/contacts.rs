@@ -15,6 +15,8 @@ use serde::{Deserialize, Serialize};
 use crate::contact::ContactLaw;
 use crate::error::{PlantError, check};
 use crate::hash::StateHasher;
+use crate::soil::rolling::Rolling;
+use crate::soil::sole::{Nails, Print};
 use crate::terrain::Rim;
 
 /// Spheres of a sole: centre, front, left, back, right.
@@ -25,6 +27,9 @@ pub(super) const DISCS: usize = 3;
 pub(super) const POINTS: usize = 12;
 /// Surfaces that one sphere, disc or point can touch at once; further ones do not push.
 pub(super) const SLOTS: usize = 4;
+
+/// Soft parts that one sphere or wheel can touch at once.
+pub(super) const SOFT_SLOTS: usize = 2;
 
 /// Radius of the ring of side spheres over that of the sole.
 pub(super) const RING: f64 = 5.0 / 6.0;
@@ -44,6 +49,10 @@ pub struct FootContact {
     pub sphere_radius_m: f64,
     /// Penetration of a side of the sole that closes its switch \[m\]; half of it opens it.
     pub switch_threshold_m: f64,
+    /// Normal force of soil on a side of the sole that closes its switch \[N\]; half of it opens it.
+    pub switch_force_n: f64,
+    /// Nails under the sole; they act in soil alone.
+    pub nails: Nails,
 }
 
 /// A wheel on the ground.
@@ -53,6 +62,8 @@ pub struct WheelContact {
     pub law: ContactLaw,
     /// Width \[m\].
     pub width_m: f64,
+    /// Height of the lugs over the rim \[m\]; they act in soil alone.
+    pub lug_m: f64,
     /// Rolling resistance: moment over load and radius.
     pub rolling_resistance: f64,
     /// Speed of turning at which that moment is nearly whole \[rad/s\].
@@ -128,7 +139,10 @@ impl RobotContacts {
             0.0,
             0.1,
         )?;
+        check("contact.switch_force_n", foot.switch_force_n, 0.0, 100.0)?;
+        foot.nails.validate()?;
         check("wheel_contact.width_m", wheel.width_m, 1e-3, 1.0)?;
+        check("wheel_contact.lug_m", wheel.lug_m, 0.0, 0.2)?;
         check(
             "wheel_contact.rolling_resistance",
             wheel.rolling_resistance,
@@ -161,6 +175,30 @@ pub struct Grip {
 /// The grips of one sphere, disc or point.
 pub type Grips = [Grip; SLOTS];
 
+/// The print of a sphere of a sole in one soft part.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Number of the part plus one; 0: none.
+    pub part: u32,
+    /// What is left in the soil.
+    pub print: Print,
+}
+
+/// The prints of one sphere.
+pub type Steps = [Step; SOFT_SLOTS];
+
+/// The rut of a wheel in one soft part.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rut {
+    /// Number of the part plus one; 0: none.
+    pub part: u32,
+    /// What is left in the soil.
+    pub rolling: Rolling,
+}
+
+/// The ruts of one wheel.
+pub type Ruts = [Rut; SOFT_SLOTS];
+
 /// What the contacts carry over.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactStates {
@@ -172,6 +210,10 @@ pub struct ContactStates {
     pub rims: [[Rim; DISCS]; 2],
     /// Points of the chassis.
     pub chassis: [Grips; POINTS],
+    /// Spheres of the left and the right sole in soil.
+    pub steps: [[Steps; SPHERES]; 2],
+    /// The left and the right wheel in soil.
+    pub ruts: [Ruts; 2],
     /// Closed switches of the left and the right foot: front, left, back, right.
     pub switches: [[bool; 4]; 2],
 }
@@ -183,7 +225,20 @@ impl ContactStates {
         feet.chain(wheels).chain(&self.chassis).flatten()
     }
 
-    /// Adds the state to a hash.
+    /// Soil as if everything in it had been pressed straight down to where it is, shear as it is.
+    pub(super) fn press_soil_anew(&mut self) {
+        let steps = self.steps.as_flattened_mut().as_flattened_mut();
+        for step in steps.iter_mut().filter(|step| step.part != 0) {
+            step.print.deepest_m = 0.0;
+            // More than any soil bears.
+            step.print.pressed_m = f64::MAX;
+        }
+        for rut in self.ruts.as_flattened_mut() {
+            rut.rolling.deepest_m = 0.0;
+        }
+    }
+
+    /// Adds the state to a hash. Soil adds to it only where something stands in it.
     pub fn feed(&self, hasher: &mut StateHasher) {
         for grip in self.grips() {
             hasher.bytes(&grip.part.to_le_bytes());
@@ -194,6 +249,26 @@ impl ContactStates {
         }
         for switch in self.switches.iter().flatten() {
             hasher.bytes(&[u8::from(*switch)]);
+        }
+        let soles = self.steps.as_flattened().as_flattened();
+        for (place, step) in soles.iter().enumerate().filter(|(_, s)| s.part != 0) {
+            hasher.bytes(b"step");
+            hasher.u64(place as u64);
+            hasher.bytes(&step.part.to_le_bytes());
+            let print = &step.print;
+            let shear = print.rubbed.iter().chain(print.raked.iter());
+            let depths = [print.deepest_m, print.pressed_m];
+            shear.chain(&depths).for_each(|v| hasher.f64(*v));
+        }
+        let ruts = self.ruts.as_flattened();
+        for (place, rut) in ruts.iter().enumerate().filter(|(_, r)| r.part != 0) {
+            hasher.bytes(b"rut");
+            hasher.u64(place as u64);
+            hasher.bytes(&rut.part.to_le_bytes());
+            let r = &rut.rolling;
+            for value in [r.slip, r.drift, r.pile, r.rolled, r.deepest_m] {
+                hasher.f64(value);
+            }
         }
     }
 }

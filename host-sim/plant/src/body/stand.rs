@@ -108,6 +108,9 @@ impl BodyMechanics {
         moved.state.velocity = rest;
         let kin = self.dynamics.prepare(&moved.state, &self.gravity_m_s2)?;
         let mut contacts = motion.contacts;
+        // Soil that had been pressed down once would be stiff upward and soft downward, and
+        // Newton's method would find no slope.
+        contacts.press_soil_anew();
         let loads = self.touching.loads(&kin, &rest, shift, 1.0, &mut contacts);
         let force = kin.contact_force(&loads.contacts) - kin.bias();
         if grips {

@@ -3,11 +3,13 @@
 use nalgebra::Vector3;
 
 use super::contacts::{
-    ContactStates, DISCS, Grip, Grips, POINTS, RING, RobotContacts, SLOTS, SOLE, SPHERES,
+    ContactStates, DISCS, Grip, Grips, POINTS, RING, RobotContacts, SOFT_SLOTS, SOLE, SPHERES, Step,
 };
-use crate::contact::{ContactLaw, Touch};
+use super::soft::{Patches, Soft};
+use super::sum::{Pressing, Sum};
+use crate::contact::ContactLaw;
 use crate::dynamics::floating::{Contacts, FloatingKin, Velocity, Wrench};
-use crate::terrain::{Disc, Index, Material, Near, Rim, Shape, Surface, Terrain};
+use crate::terrain::{Disc, Index, Near, Rim, Shape, Surface, Terrain};
 
 /// Rocks and solids farther than this from a foot are not looked for, where its height over the
 /// ground is asked for \[m\].
@@ -19,7 +21,10 @@ pub struct WheelLoad {
     /// Sum of the normal forces \[N\].
     pub normal_n: f64,
     /// Speed of the tread over the ground \[m/s\]: positive if the wheel turns faster than it travels.
+    /// On soil, of the lugs' tips.
     pub slip_m_s: f64,
+    /// Sinkage of the rim in soil \[m\]; 0 on hard ground.
+    pub sinkage_m: f64,
 }
 
 /// Ground on one foot.
@@ -27,10 +32,12 @@ pub struct WheelLoad {
 pub struct FootLoad {
     /// Force \[N\], world axes.
     pub force_n: Vector3<f64>,
-    /// Sum of the normal forces \[N\].
+    /// Sum of the normal forces \[N\]; negative only while soil holds nails that are pulled out.
     pub normal_n: f64,
-    /// Largest penetration of each side \[m\]: front, left, back, right.
+    /// Largest penetration of each side into hard ground \[m\]: front, left, back, right.
     pub depth_m: [f64; 4],
+    /// Normal force of soil on each side \[N\], in the same order.
+    pub soil_n: [f64; 4],
 }
 
 impl WheelLoad {
@@ -38,6 +45,7 @@ impl WheelLoad {
     pub const UNKNOWN: Self = Self {
         normal_n: f64::NAN,
         slip_m_s: f64::NAN,
+        sinkage_m: f64::NAN,
     };
 }
 
@@ -47,6 +55,7 @@ impl FootLoad {
         force_n: Vector3::new(f64::NAN, f64::NAN, f64::NAN),
         normal_n: f64::NAN,
         depth_m: [f64::NAN; 4],
+        soil_n: [f64::NAN; 4],
     };
 }
 
@@ -73,105 +82,11 @@ pub struct Touching {
     wheel_radius_m: f64,
     terrain: Terrain,
     index: Index,
+    soft: Soft,
     /// No point of the chassis is farther from its origin.
     chassis_reach_m: f64,
     /// How far the ground has gone down under the feet alone \[m\].
     sunk_under_feet_m: f64,
-}
-
-/// The forces of one body's contacts, as they are found.
-struct Sum {
-    /// Point about which the body's twists are \[m\].
-    reference_m: Vector3<f64>,
-    /// Twist now.
-    now: [Vector3<f64>; 2],
-    /// Twist over the step that has just ended.
-    during: [Vector3<f64>; 2],
-    /// Length of that step \[s\]; 0: grips stay as they are.
-    step_s: f64,
-    wrench: Wrench,
-    normal_n: f64,
-    /// Sum of the normal forces as vectors.
-    support_n: Vector3<f64>,
-}
-
-/// Velocity of a point at `arm` from the reference of a twist.
-#[inline]
-fn velocity(twist: &[Vector3<f64>; 2], arm: &Vector3<f64>) -> Vector3<f64> {
-    twist[1] + twist[0].cross(arm)
-}
-
-/// One sphere, disc or point against the parts near it.
-struct Pressing<'a> {
-    sum: &'a mut Sum,
-    law: &'a ContactLaw,
-    grips: &'a mut Grips,
-    radius_m: f64,
-    touched: [bool; SLOTS],
-    /// Deepest penetration \[m\].
-    deepest_m: f64,
-}
-
-impl<'a> Pressing<'a> {
-    #[inline]
-    fn new(sum: &'a mut Sum, law: &'a ContactLaw, grips: &'a mut Grips, radius_m: f64) -> Self {
-        Self {
-            sum,
-            law,
-            grips,
-            radius_m,
-            touched: [false; SLOTS],
-            deepest_m: 0.0,
-        }
-    }
-
-    /// The closest place of one part, by its number from 1.
-    #[inline]
-    fn on(&mut self, number: u32, near: &Near, material: Material) {
-        let law = self.law;
-        self.with(law, number, near, material);
-    }
-
-    #[inline]
-    fn with(&mut self, law: &ContactLaw, number: u32, near: &Near, material: Material) {
-        let depth_m = self.radius_m - near.distance_m;
-        if depth_m <= 0.0 {
-            return;
-        }
-        let grips = &mut *self.grips;
-        let known = grips.iter().position(|g| g.part == number);
-        let slot = known.or_else(|| grips.iter().position(|g| g.part == 0));
-        let Some(slot) = slot else { return };
-        self.touched[slot] = true;
-        grips[slot].part = number;
-        self.deepest_m = self.deepest_m.max(depth_m);
-        let sum = &mut *self.sum;
-        let point = near.point_m - self.radius_m * near.normal;
-        let arm = point - sum.reference_m;
-        let touch = Touch {
-            depth_m,
-            normal: near.normal,
-            velocity_m_s: velocity(&sum.now, &arm),
-            moved_m: sum.step_s * velocity(&sum.during, &arm),
-            material,
-        };
-        let force = law.force(&mut grips[slot].stretch_m, &touch);
-        sum.normal_n += force.normal_n;
-        sum.support_n += force.normal_n * near.normal;
-        sum.wrench.force_n += force.force_n;
-        sum.wrench.moment_n_m += arm.cross(&force.force_n);
-    }
-
-    /// Lets go of what is not touched; gives the deepest penetration \[m\].
-    #[inline]
-    fn end(self) -> f64 {
-        for (grip, touched) in self.grips.iter_mut().zip(self.touched) {
-            if !touched && grip.part != 0 {
-                *grip = Grip::default();
-            }
-        }
-        self.deepest_m
-    }
 }
 
 /// Number of the second contact of a wheel with one part.
@@ -182,6 +97,14 @@ const SECOND: u32 = 1 << 31;
 fn release(all: &mut [Grips]) {
     for grip in all.iter_mut().flatten().filter(|grip| grip.part != 0) {
         *grip = Grip::default();
+    }
+}
+
+/// No print is left.
+#[inline]
+fn lift(steps: &mut [Step]) {
+    for step in steps.iter_mut().filter(|step| step.part != 0) {
+        *step = Step::default();
     }
 }
 
@@ -225,6 +148,7 @@ impl Touching {
             points_m,
             wheel_radius_m,
             index: Index::new(&terrain.parts),
+            soft: Soft::new(params, wheel_radius_m, terrain),
             terrain: terrain.clone(),
             sunk_under_feet_m: 0.0,
             params: *params,
@@ -270,40 +194,58 @@ impl Touching {
         self.index.top_near_m(&self.terrain.parts, place, reach_m)
     }
 
-    /// One sphere or point against the ground; gives its deepest penetration \[m\].
+    /// One sphere or point against the ground, of which what is farther than `reach_m` from it is no
+    /// matter; gives its deepest penetration into hard parts \[m\]. `soft` is asked for each soft
+    /// part, and is false where that part is hard.
     #[inline]
     fn press_point(
         &self,
-        sum: &mut Sum,
-        law: &ContactLaw,
-        grips: &mut Grips,
+        mut pressing: Pressing<'_>,
         centre: &Vector3<f64>,
-        radius_m: f64,
+        reach_m: f64,
+        mut soft: impl FnMut(&mut Sum, u32, &Near) -> bool,
     ) -> f64 {
-        let mut pressing = Pressing::new(sum, law, grips, radius_m);
-        self.index.near(centre, radius_m, |number| {
+        self.index.near(centre, reach_m, |number| {
             let part = &self.terrain.parts[number as usize];
-            pressing.on(number + 1, &part.shape.to_point(centre), part.material);
+            let near = part.shape.to_point(centre);
+            if part.material.soil.is_none() || !soft(pressing.sum, number + 1, &near) {
+                pressing.on(number + 1, &near, part.material);
+            }
         });
         pressing.end()
     }
 
-    /// One disc against the ground.
+    /// One disc against the ground; what soft parts it touches goes to the patches.
     #[inline]
-    fn press_disc(&self, sum: &mut Sum, grips: &mut Grips, rim: &mut Rim, disc: &Disc) {
-        let step_s = sum.step_s;
+    fn press_disc(
+        &self,
+        mut pressing: Pressing<'_>,
+        patches: &mut Patches,
+        rim: &mut Rim,
+        disc: &Disc,
+    ) {
+        let step_s = pressing.sum.step_s;
         let law = &self.laws[1];
-        let mut pressing = Pressing::new(sum, law, grips, 0.0);
         self.index.near(&disc.centre_m, disc.radius_m, |number| {
             let part = &self.terrain.parts[number as usize];
+            let mut is_soft = |near: &Near, share: f64| {
+                part.material.soil.is_some()
+                    && self
+                        .soft
+                        .disc(patches, number + 1, (near, share), &disc.axis)
+            };
             if let Shape::HeightMap(map) = &part.shape {
                 let touches = rim.follow(map, disc, step_s);
                 for (touch, second) in touches.into_iter().zip([0, SECOND]) {
                     let Some(touch) = touch else { continue };
-                    let law = law.scaled(touch.share);
-                    pressing.with(&law, (number + 1) | second, &touch.near, part.material);
+                    if !is_soft(&touch.near, touch.share) {
+                        let law = law.scaled(touch.share);
+                        pressing.with(&law, (number + 1) | second, &touch.near, part.material);
+                    }
                 }
-            } else if let Some(near) = part.shape.to_disc(disc) {
+            } else if let Some(near) = part.shape.to_disc(disc)
+                && !is_soft(&near, 1.0)
+            {
                 pressing.on(number + 1, &near, part.material);
             }
         });
@@ -384,11 +326,14 @@ impl Touching {
     ) -> Wrench {
         let foot = &self.params.foot;
         let (grips, switches) = (&mut states.feet[leg], &mut states.switches[leg]);
+        let steps = &mut states.steps[leg];
         let mut reference = *sole;
         reference.z += self.sunk_under_feet_m;
-        let reach = foot.sole_radius_m + foot.sphere_radius_m;
+        let nails = self.soft.reach_m();
+        let reach = foot.sole_radius_m + foot.sphere_radius_m + nails;
         if reference.z - reach > self.top_near_m(&reference, reach) {
             release(grips);
+            lift(steps.as_flattened_mut());
             if moving.step_s > 0.0 {
                 *switches = [false; 4];
             }
@@ -399,16 +344,28 @@ impl Touching {
         for (k, direction) in SOLE.into_iter().enumerate() {
             let centre = self.sphere_m(sole, &axes, direction);
             let radius_m = foot.sphere_radius_m;
-            let law = &self.laws[0];
-            let depth = self.press_point(&mut sum, law, &mut grips[k], &centre, radius_m);
+            let mut touched = [false; SOFT_SLOTS];
+            let mut soil_n = 0.0;
+            let pressing = Pressing::new(&mut sum, &self.laws[0], &mut grips[k], radius_m);
+            let soft = |sum: &mut Sum, part: u32, near: &Near| {
+                let at = (part, near, radius_m);
+                self.soft
+                    .sole(sum, &mut steps[k], &mut touched, at, &mut soil_n)
+            };
+            let depth = self.press_point(pressing, &centre, radius_m + nails, soft);
+            let left = steps[k].iter_mut().zip(touched).filter(|(_, t)| !t);
+            left.for_each(|(step, _)| lift(std::slice::from_mut(step)));
             if k > 0 {
                 load.depth_m[k - 1] = depth;
+                load.soil_n[k - 1] = soil_n;
             }
         }
         if moving.step_s > 0.0 {
-            for (closed, depth) in switches.iter_mut().zip(load.depth_m) {
-                let threshold = foot.switch_threshold_m;
-                *closed = depth > if *closed { 0.5 * threshold } else { threshold };
+            let sides = load.depth_m.iter().zip(&load.soil_n);
+            for (closed, (depth, soil_n)) in switches.iter_mut().zip(sides) {
+                let share = if *closed { 0.5 } else { 1.0 };
+                *closed = *depth > share * foot.switch_threshold_m
+                    || *soil_n > share * foot.switch_force_n;
             }
         }
         load.force_n = sum.wrench.force_n;
@@ -425,11 +382,13 @@ impl Touching {
         load: &mut WheelLoad,
     ) -> Wrench {
         let (grips, rims) = (&mut states.wheels[wheel], &mut states.rims[wheel]);
+        let ruts = &mut states.ruts[wheel];
         let (wheel, body) = (&self.params.wheel, 2 + wheel);
         let r = self.wheel_radius_m;
         let rotation = moving.kin.rotation();
         let axis = rotation.column(1).into_owned();
         let mut sum = moving.sum(body, *centre);
+        let mut patches = Patches::default();
         let reach = r + wheel.width_m;
         if centre.z - reach > self.top_near_m(centre, reach) {
             release(grips);
@@ -441,9 +400,12 @@ impl Touching {
                     axis,
                     radius_m: r,
                 };
-                self.press_disc(&mut sum, grips, rim, &disc);
+                let pressing = Pressing::new(&mut sum, &self.laws[1], grips, 0.0);
+                self.press_disc(pressing, &mut patches, rim, &disc);
             }
         }
+        let hard_n = sum.normal_n;
+        load.sinkage_m = self.soft.wheel(&mut sum, ruts, &patches, &axis);
         let spin = sum.now[0].dot(&axis);
         let forward = if sum.normal_n > 0.0 {
             let along = axis.cross(&sum.support_n);
@@ -451,12 +413,15 @@ impl Touching {
         } else {
             rotation.column(0).into_owned()
         };
-        load.slip_m_s = r * spin - sum.now[1].dot(&forward);
+        let tread = if load.sinkage_m > 0.0 {
+            self.soft.shear_radius_m()
+        } else {
+            r
+        };
+        load.slip_m_s = tread * spin - sum.now[1].dot(&forward);
         load.normal_n = sum.normal_n;
-        let rolling = wheel.rolling_resistance
-            * sum.normal_n
-            * r
-            * libm::tanh(spin / wheel.rolling_blend_rad_s);
+        let rolling =
+            wheel.rolling_resistance * hard_n * r * libm::tanh(spin / wheel.rolling_blend_rad_s);
         sum.wrench.moment_n_m -= rolling * axis;
         sum.wrench
     }
@@ -479,7 +444,9 @@ impl Touching {
         let mut sum = moving.sum(4, *origin);
         for (grips, point) in states.chassis.iter_mut().zip(&self.points_m) {
             let place = origin + rotation * point;
-            self.press_point(&mut sum, &self.laws[2], grips, &place, 0.0);
+            let pressing = Pressing::new(&mut sum, &self.laws[2], grips, 0.0);
+            // To the chassis every ground is hard.
+            self.press_point(pressing, &place, 0.0, |_, _, _| false);
         }
         *normal_n = sum.normal_n;
         sum.wrench

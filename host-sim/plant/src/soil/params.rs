@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
+use crate::hash::StateHasher;
 
 /// A soft, homogeneous soil of any depth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,14 +46,6 @@ const COMMON: Soil = Soil {
     stiffness_most_pa_m: 2e8,   // Pa/m ASSUMED: presets of Chrono's SCM terrain; bounds the step
     shear_damping_n_s_m: 100.0, // N s/m ASSUMED
 };
-
-/// The soils that have a name.
-const NAMED: [(&str, Soil); 4] = [
-    ("volcanic-sand", Soil::VOLCANIC_SAND),
-    ("dry-sand", Soil::DRY_SAND),
-    ("firm-sand", Soil::FIRM_SAND),
-    ("loose-ash", Soil::LOOSE_ASH),
-];
 
 impl Soil {
     /// Angular basaltic sand. Chosen so that a slope of 20 degrees is near the limit of the robot with
@@ -100,18 +93,19 @@ impl Soil {
         ..COMMON
     };
 
-    /// Names of the soils that have one.
-    pub fn names() -> impl Iterator<Item = &'static str> {
-        NAMED.iter().map(|(name, _)| *name)
-    }
+    /// The soils that have a name.
+    pub const NAMED: [(&'static str, Self); 4] = [
+        ("volcanic-sand", Self::VOLCANIC_SAND),
+        ("dry-sand", Self::DRY_SAND),
+        ("firm-sand", Self::FIRM_SAND),
+        ("loose-ash", Self::LOOSE_ASH),
+    ];
 
     /// The soil of a name; `None` if no soil has it.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        NAMED
-            .iter()
-            .find(|(n, _)| *n == name)
-            .map(|(_, soil)| *soil)
+        let found = Self::NAMED.iter().find(|(n, _)| *n == name);
+        found.map(|(_, soil)| *soil)
     }
 
     /// Checks the ranges.
@@ -137,6 +131,26 @@ impl Soil {
             0.0,
             500.0,
         )
+    }
+
+    /// Adds every parameter to a hash.
+    pub fn feed(&self, hasher: &mut StateHasher) {
+        hasher.bytes(b"soil");
+        for value in [
+            self.kc_n_m,
+            self.kphi_n_m,
+            self.exponent,
+            self.cohesion_pa,
+            self.friction_rad,
+            self.shear_m,
+            self.density_kg_m3,
+            self.damping_pa_s_m,
+            self.rebound,
+            self.stiffness_most_pa_m,
+            self.shear_damping_n_s_m,
+        ] {
+            hasher.f64(value);
+        }
     }
 
     /// tan φ.

@@ -63,6 +63,7 @@ fn of_two_frictions_the_smaller_holds() {
     t.material = Material {
         mu_static: 0.1,
         mu_kinetic: 0.05,
+        soil: None,
     };
     let icy = unstretched(&t);
     assert!((rough.force_n.x + 0.7 * rough.normal_n).abs() < 1e-9);

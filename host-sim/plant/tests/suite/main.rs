@@ -20,5 +20,6 @@ mod robot;
 mod rocks;
 mod slope;
 mod soil;
+mod soil_robot;
 mod soil_rolling;
 mod terrain;

@@ -137,7 +137,7 @@ fn steady(law: &RollingLaw, depth_m: f64, travel: f64, tread: f64, left: f64) ->
 
 #[test]
 fn steady_rolling_is_the_textbook_both_ways_driving_and_braking() {
-    for name in Soil::names() {
+    for (name, _) in Soil::NAMED {
         let soil = Soil::named(name).unwrap();
         let law = law(&soil);
         for s in [-8.0, -1.0, -0.2, 0.0, 0.05, 0.2, 0.5, 0.9] {
@@ -196,7 +196,7 @@ fn a_wheel_that_digs_in_turns_around_within_two_patches() {
 #[test]
 fn pull_along_and_across_stay_within_the_strength() {
     let mut rng = Pcg64Mcg::seed_from_u64(5);
-    for name in Soil::names() {
+    for (name, _) in Soil::NAMED {
         let soil = Soil::named(name).unwrap();
         let law = law(&soil);
         let (mut across, mut rims) = (0.0_f64, 0.0_f64);
@@ -244,7 +244,7 @@ fn pull_along_and_across_stay_within_the_strength() {
 
 #[test]
 fn a_wheel_at_rest_stands_without_pull_and_a_load_moves_it_once() {
-    for name in Soil::names() {
+    for (name, _) in Soil::NAMED {
         let law = law(&Soil::named(name).unwrap());
         let mut cart = Cart::set_down(&law);
         for _ in 0..20_000 {
@@ -274,7 +274,7 @@ fn a_wheel_at_rest_stands_without_pull_and_a_load_moves_it_once() {
 
 #[test]
 fn a_wheel_left_alone_comes_to_rest_and_its_energy_is_the_grounds() {
-    for name in Soil::names() {
+    for (name, _) in Soil::NAMED {
         let law = law(&Soil::named(name).unwrap());
         let mut cart = Cart::set_down(&law);
         (cart.v, cart.rate) = (0.5, 0.5 / FIELD.shear_radius_m());

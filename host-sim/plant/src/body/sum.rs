@@ -1,0 +1,122 @@
+//! The forces of one body's contacts, as they are found.
+
+use nalgebra::Vector3;
+
+use super::contacts::{Grip, Grips, SLOTS};
+use crate::contact::{ContactLaw, Touch};
+use crate::dynamics::floating::Wrench;
+use crate::terrain::{Material, Near};
+
+/// The forces of one body's contacts, as they are found.
+pub(super) struct Sum {
+    /// Point about which the body's twists are \[m\].
+    pub(super) reference_m: Vector3<f64>,
+    /// Twist now.
+    pub(super) now: [Vector3<f64>; 2],
+    /// Twist over the step that has just ended.
+    pub(super) during: [Vector3<f64>; 2],
+    /// Length of that step \[s\]; 0: grips stay as they are.
+    pub(super) step_s: f64,
+    pub(super) wrench: Wrench,
+    pub(super) normal_n: f64,
+    /// Sum of the normal forces as vectors.
+    pub(super) support_n: Vector3<f64>,
+}
+
+/// Velocity of a point at `arm` from the reference of a twist.
+#[inline]
+pub(super) fn velocity(twist: &[Vector3<f64>; 2], arm: &Vector3<f64>) -> Vector3<f64> {
+    twist[1] + twist[0].cross(arm)
+}
+
+impl Sum {
+    /// Adds a force that acts at `arm` from the reference.
+    #[inline]
+    pub(super) fn add(
+        &mut self,
+        normal_n: f64,
+        normal: &Vector3<f64>,
+        force_n: &Vector3<f64>,
+        arm: &Vector3<f64>,
+    ) {
+        self.normal_n += normal_n;
+        self.support_n += normal_n * normal;
+        self.wrench.force_n += force_n;
+        self.wrench.moment_n_m += arm.cross(force_n);
+    }
+}
+
+/// One sphere, disc or point against the hard parts near it.
+pub(super) struct Pressing<'a> {
+    pub(super) sum: &'a mut Sum,
+    law: &'a ContactLaw,
+    grips: &'a mut Grips,
+    radius_m: f64,
+    touched: [bool; SLOTS],
+    /// Deepest penetration \[m\].
+    deepest_m: f64,
+}
+
+impl<'a> Pressing<'a> {
+    #[inline]
+    pub(super) fn new(
+        sum: &'a mut Sum,
+        law: &'a ContactLaw,
+        grips: &'a mut Grips,
+        radius_m: f64,
+    ) -> Self {
+        Self {
+            sum,
+            law,
+            grips,
+            radius_m,
+            touched: [false; SLOTS],
+            deepest_m: 0.0,
+        }
+    }
+
+    /// The closest place of one part, by its number from 1.
+    #[inline]
+    pub(super) fn on(&mut self, number: u32, near: &Near, material: Material) {
+        let law = self.law;
+        self.with(law, number, near, material);
+    }
+
+    #[inline]
+    pub(super) fn with(&mut self, law: &ContactLaw, number: u32, near: &Near, material: Material) {
+        let depth_m = self.radius_m - near.distance_m;
+        if depth_m <= 0.0 {
+            return;
+        }
+        let grips = &mut *self.grips;
+        let known = grips.iter().position(|g| g.part == number);
+        let slot = known.or_else(|| grips.iter().position(|g| g.part == 0));
+        let Some(slot) = slot else { return };
+        self.touched[slot] = true;
+        grips[slot].part = number;
+        self.deepest_m = self.deepest_m.max(depth_m);
+        let sum = &mut *self.sum;
+        let point = near.point_m - self.radius_m * near.normal;
+        let arm = point - sum.reference_m;
+        let touch = Touch {
+            depth_m,
+            normal: near.normal,
+            velocity_m_s: velocity(&sum.now, &arm),
+            moved_m: sum.step_s * velocity(&sum.during, &arm),
+            material,
+        };
+        let force = law.force(&mut grips[slot].stretch_m, &touch);
+        sum.add(force.normal_n, &near.normal, &force.force_n, &arm);
+    }
+
+    /// Lets go of what is not touched; gives the deepest penetration \[m\].
+    #[inline]
+    pub(super) fn end(self) -> f64 {
+        for (grip, touched) in self.grips.iter_mut().zip(self.touched) {
+            if !touched && grip.part != 0 {
+                *grip = Grip::default();
+            }
+        }
+        self.deepest_m
+    }
+}

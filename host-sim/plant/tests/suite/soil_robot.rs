@@ -1,0 +1,122 @@
+//! The whole robot on soil.
+
+use nalgebra::Vector3;
+use wheeleg_plant::soil::Soil;
+use wheeleg_plant::soil::wheel::Wheel;
+use wheeleg_plant::terrain::{Material, Part, Plane, Shape};
+use wheeleg_plant::testing::{wheeleg_2003, wheeleg_field};
+use wheeleg_plant::{Inputs, Plant, PlantParams, PlantState};
+
+/// A robot with its legs at mid stroke on a slope of soil.
+fn on(soil: Soil, degrees: f64, mut params: PlantParams) -> (Plant, PlantState) {
+    params.initial_stroke_m = [0.09, 0.09, 0.18, 0.09, 0.09, 0.18];
+    params.terrain.parts = vec![Part {
+        shape: Shape::Plane(Plane::sloping(degrees.to_radians(), 0.0)),
+        material: Material::soft(soil),
+    }];
+    let plant = Plant::new(&params).unwrap();
+    let state = plant.initial_state(1).unwrap();
+    (plant, state)
+}
+
+fn wheel(params: &PlantParams) -> Wheel {
+    Wheel {
+        radius_m: params.body.wheel_radius_m,
+        width_m: params.contacts.wheel.width_m,
+        lug_m: params.contacts.wheel.lug_m,
+    }
+}
+
+#[test]
+fn the_start_is_an_equilibrium_and_sinkages_are_those_of_the_loads() {
+    for (name, _) in Soil::NAMED {
+        for params in [wheeleg_2003(), wheeleg_field()] {
+            for degrees in [0.0, 10.0] {
+                let soil = Soil::named(name).unwrap();
+                let (plant, state) = on(soil, degrees, params.clone());
+                let scene = plant.assembly.mechanics.scene(&state.core.motion).unwrap();
+                let weight = params.body.total_mass_kg() * 9.81;
+                let contacts = &scene.loads.contacts;
+                let total: Vector3<f64> = contacts.all().iter().map(|w| w.force_n).sum();
+                let error = (total - weight * Vector3::z()).norm();
+                let loads = &scene.loads;
+                println!("{name} {degrees}: {loads:?} off by {error}");
+                assert!(error < 1e-6 * weight, "{name} {degrees}: {error}");
+                for (side, load) in scene.loads.wheels.iter().enumerate() {
+                    let own = wheel(&params);
+                    let alone = own.forces(&soil, load.sinkage_m, 0.0).normal_n;
+                    if degrees == 0.0 {
+                        let pull = contacts.wheels[side].force_n.x;
+                        assert!(pull.abs() < 1e-6, "{name}: {pull}");
+                        assert!((load.normal_n / alone - 1.0).abs() < 0.002, "{name}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn at_rest_it_neither_moves_nor_chatters() {
+    let (plant, mut state) = on(Soil::VOLCANIC_SAND, 0.0, wheeleg_field());
+    let start = plant.outputs(&state);
+    let (mut fastest, mut turns) = (0.0_f64, 0);
+    let mut last = 0.0;
+    for k in 0..3000 {
+        plant.tick(&mut state, &Inputs::default()).unwrap();
+        let o = plant.outputs(&state);
+        if k > 1000 {
+            fastest = fastest.max(Vector3::from(o.velocity_m_s).norm());
+            let force = plant.assembly.mechanics.scene(&state.core.motion).unwrap();
+            let pull = force.loads.contacts.wheels[0].force_n.x;
+            turns += usize::from(pull * last < 0.0 && pull.abs() > 0.01);
+            last = pull;
+        }
+    }
+    let end = plant.outputs(&state);
+    let gone = (Vector3::from(end.position_m) - Vector3::from(start.position_m)).norm();
+    println!("{gone} m, {fastest} m/s, {turns} turns, {last} N");
+    assert!(gone < 5e-4 && fastest < 1e-3 && turns < 5 && last.abs() < 0.5);
+    assert!(end.foot_switches.iter().flatten().all(|s| *s));
+}
+
+/// Driven by the wheels for ten seconds: travel, slip, pull on each wheel.
+fn driven(soil: Soil, params: &PlantParams, step_ns: u64) -> [f64; 4] {
+    let mut params = params.clone();
+    params.step_ns = step_ns;
+    let (plant, mut state) = on(soil, 0.0, params);
+    let inputs = Inputs {
+        bridge_duty: [0.4; 2],
+        bridge_enabled: [true; 2],
+        ..Inputs::default()
+    };
+    for _ in 0..6000 {
+        plant.tick(&mut state, &inputs).unwrap();
+    }
+    let o = plant.outputs(&state);
+    let scene = plant.assembly.mechanics.scene(&state.core.motion).unwrap();
+    let pull = scene.loads.contacts.wheels[0].force_n.x;
+    let tread = wheel(plant.params()).shear_radius_m() * o.wheel_rate_rad_s[0];
+    [
+        o.position_m[0],
+        o.wheel_slip_m_s[0] / tread,
+        pull,
+        scene.loads.wheels[0].sinkage_m,
+    ]
+}
+
+#[test]
+fn it_drives_with_the_slip_of_its_pull_and_half_the_step_says_the_same() {
+    // Plain soles drag; nails would hold.
+    let mut params = wheeleg_field();
+    params.contacts.foot = wheeleg_2003().contacts.foot;
+    let [coarse, fine] = [100_000, 50_000].map(|h| driven(Soil::VOLCANIC_SAND, &params, h));
+    println!("{coarse:?} {fine:?}");
+    let [x, slip, pull, sinkage] = coarse;
+    assert!(x > 0.3 && slip > 0.02 && slip < 0.5, "{x} {slip}");
+    let exact = wheel(&params).forces(&Soil::VOLCANIC_SAND, sinkage, slip);
+    assert!((pull - exact.drawbar_n()).abs() < 1.0, "{pull} {exact:?}");
+    for (a, b) in coarse.iter().zip(fine) {
+        assert!((a / b - 1.0).abs() < 0.01, "{coarse:?} {fine:?}");
+    }
+}
