@@ -110,6 +110,7 @@ impl Soft {
 
     /// A sphere of a sole near a soft part; its normal force is added to `normal_n`. False: the
     /// surface is hard there.
+    #[inline]
     pub(super) fn sole(
         &self,
         sum: &mut Sum,

@@ -56,9 +56,11 @@ impl Grid {
         let bits = x.to_bits() >> SHIFT;
         let cell = bits.saturating_sub(self.first) as usize;
         let cell = cell.min(self.cells - 1);
-        let (low, high) = (self.node(cell), self.node(cell + 1));
-        let width = high - low;
-        let share = ((x - low) / width).clamp(0.0, 1.0);
+        let low = self.node(cell);
+        let width = self.node(cell + 1) - low;
+        // A power of two, whose inverse is known from its exponent.
+        let inverse = f64::from_bits((2046 << 52) - width.to_bits());
+        let share = ((x - low) * inverse).clamp(0.0, 1.0);
         Place {
             cell,
             weights: hermite(share, width),

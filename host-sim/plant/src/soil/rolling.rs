@@ -97,6 +97,8 @@ pub struct RollingForce {
 pub struct RollingLaw {
     table: WheelTable,
     friction: f64,
+    /// Shear displacement j/K over slip and length of the patch \[1/m\].
+    per_shear: f64,
 }
 
 impl Motion {
@@ -128,6 +130,7 @@ impl RollingLaw {
         Self {
             table: WheelTable::new(wheel, soil),
             friction: soil.friction(),
+            per_shear: SHEARED / soil.shear_m,
         }
     }
 
@@ -154,39 +157,49 @@ impl RollingLaw {
         let radius = wheel.shear_radius_m();
         let patch = wheel.entry_rad(state.deepest_m.max(touch.depth_m));
         let length = radius * patch;
+        // Ways and speeds in lengths of the patch.
+        let per_length = 1.0 / length;
         let moved = &touch.moved;
+        let rolled_on = per_length * moved.travel;
 
-        let above = (state.deepest_m - touch.depth_m).max(0.0);
-        let leaves = soil.rebound * length;
-        state.deepest_m = touch.depth_m + above / (1.0 + moved.travel.abs() / leaves);
-        let keep = 1.0 / (1.0 + moved.fastest() / length);
-        state.slip = keep * (state.slip + moved.slip() / length);
-        state.drift = keep * (state.drift - moved.left / length);
-        let (pile, turn) = (PILE * length, ROLLED * length);
-        state.pile = (state.pile + moved.travel / pile).clamp(-1.0, 1.0);
-        state.rolled = (state.rolled + moved.travel / turn).clamp(-1.0, 1.0);
+        let above = state.deepest_m - touch.depth_m;
+        state.deepest_m = touch.depth_m;
+        if above > 0.0 {
+            state.deepest_m += above / (1.0 + rolled_on.abs() / soil.rebound);
+        }
+        let keep = 1.0 / (1.0 + per_length * moved.fastest());
+        state.slip = keep * (state.slip + per_length * moved.slip());
+        state.drift = keep * (state.drift - per_length * moved.left);
+        let clamped = |x: f64| x.clamp(-1.0, 1.0);
+        state.pile = clamped(state.pile + rolled_on / PILE);
+        state.rolled = clamped(state.rolled + rolled_on / ROLLED);
 
         let speed = &touch.speed;
         let rolled = self.both_ways(state);
-        let piled = (state.pile + PILE_DAMPING_S * speed.travel / pile).clamp(-1.0, 1.0);
+        let ahead = PILE_DAMPING_S / PILE * per_length * speed.travel;
+        let piled = clamped(state.pile + ahead);
         let area = wheel.radius_m * wheel.width_m * patch;
-        let steepest = rolled.normal_n / (area * soil.stiffness_most_pa_m);
-        let band = steepest.max(soil.rebound * state.deepest_m);
-        let share = 1.0 - (state.deepest_m - touch.depth_m) / band;
-        if share <= 0.0 {
-            return RollingForce::default();
+        let mut share = 1.0;
+        let above = state.deepest_m - touch.depth_m;
+        if above > 0.0 {
+            let steepest = rolled.normal_n / (area * soil.stiffness_most_pa_m);
+            let band = steepest.max(soil.rebound * state.deepest_m);
+            share -= above / band;
+            if share <= 0.0 {
+                return RollingForce::default();
+            }
         }
         let damping = soil.damping_pa_s_m * area * touch.closing_m_s.max(0.0);
         let normal_n = share * (rolled.normal_n + damping);
 
         // The resultant displacement mobilises the strength.
-        let per = SHEARED * length / soil.shear_m;
+        let per = self.per_shear * length;
         let across = per * state.drift;
         let (whole, turned) = if across.abs() < 1e-9 {
             (1.0, 1.0)
         } else {
             let along = (per * state.slip).abs();
-            let whole = mobilised(libm::sqrt(along * along + across * across));
+            let whole = mobilised((along * along + across * across).sqrt());
             (whole, whole / mobilised(along))
         };
         let strength = share * soil.cohesion_pa * area + self.friction * normal_n;
@@ -195,9 +208,9 @@ impl RollingLaw {
         let lag = lagging * (speed.slip() - state.slip * fastest);
         let thrust = share * turned * rolled.thrust_n + lag;
         let left = strength * whole * across - lagging * (speed.left + state.drift * fastest);
-        let pull = libm::sqrt(thrust * thrust + left * left);
-        let within = if pull > strength {
-            strength / pull
+        let pull_squared = thrust * thrust + left * left;
+        let within = if pull_squared > strength * strength {
+            strength / pull_squared.sqrt()
         } else {
             1.0
         };

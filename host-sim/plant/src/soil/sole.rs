@@ -107,11 +107,13 @@ pub struct SoleLaw {
     /// Pressure of the pad \[Pa\] over sinkage.
     pressure: Curve,
     area_m2: f64,
-    /// Diameter of the sole \[m\]: a pad that slides so far is out of its print.
-    across_m: f64,
+    /// Way over which a pad that slides leaves its print behind \[m\].
+    leaves_m: f64,
+    /// Inverse of the most stiffness \[m/Pa\].
+    softest_m_pa: f64,
     nails: Nails,
-    /// ξ π d²/4 times the number of nails \[N/m\].
-    tips_n_m: f64,
+    /// Of all tips, pressed soil below them \[N/m\].
+    tip_stiffness_n_m: f64,
     /// ξ d times the number of nails \[N/m²\].
     shafts_n_m2: f64,
     shear_damping_n_s_m: f64,
@@ -136,9 +138,10 @@ impl SoleLaw {
             friction: soil.friction(),
             pressure,
             area_m2: share * std::f64::consts::PI * radius_m * radius_m,
-            across_m: 2.0 * radius_m,
+            leaves_m: soil.rebound * 2.0 * radius_m,
+            softest_m_pa: 1.0 / soil.stiffness_most_pa_m,
             nails: *nails,
-            tips_n_m: scale * quarter_pi * d * d,
+            tip_stiffness_n_m: PUSHED * scale * quarter_pi * d * d / soil.rebound,
             shafts_n_m2: scale * d,
             shear_damping_n_s_m: share * soil.shear_damping_n_s_m,
         }
@@ -166,6 +169,7 @@ impl SoleLaw {
 
     /// Follows the motion of the step that has just ended, and gives the force.
     #[must_use]
+    #[inline]
     pub fn force(&self, print: &mut Print, touch: &Stepped) -> SoleForce {
         let n = &touch.normal;
         let closing = -n.dot(&touch.velocity_m_s);
@@ -176,26 +180,25 @@ impl SoleLaw {
 
         let pad_n = self.pad_n(print, touch.depth_m, closing, way);
         let (tips_n, shafts_n) = self.nails_n(print, touch.depth_m, pressed);
-        let follow = |state: &Vector3<f64>, shear_m: f64| {
-            let laid = state - n.dot(state) * n;
-            (laid + slid / shear_m) / (1.0 + way / shear_m)
-        };
-        print.rubbed = follow(&print.rubbed, self.soil.shear_m);
-        print.raked = follow(&print.raked, self.nails.shear_m);
-
         let rubbing = self.friction * pad_n;
-        let (most, held) = (
-            rubbing + shafts_n,
-            rubbing * print.rubbed + shafts_n * print.raked,
-        );
+        let most = rubbing + shafts_n;
         let mut shear = Vector3::zeros();
         if most > 0.0 {
-            let mobilised = held / most;
-            let lag = slide - slide.norm() * mobilised;
-            shear = -held - self.shear_damping_n_s_m * lag;
-            let size = shear.norm();
-            if size > most {
-                shear *= most / size;
+            let follow = |state: &Vector3<f64>, shear_m: f64| {
+                let laid = state - n.dot(state) * n;
+                (shear_m * laid + slid) * (1.0 / (shear_m + way))
+            };
+            print.rubbed = follow(&print.rubbed, self.soil.shear_m);
+            print.raked = if shafts_n > 0.0 {
+                follow(&print.raked, self.nails.shear_m)
+            } else {
+                Vector3::zeros()
+            };
+            let held = rubbing * print.rubbed + shafts_n * print.raked;
+            shear = -held - self.shear_damping_n_s_m * slide;
+            let squared = shear.norm_squared();
+            if squared > most * most {
+                shear *= most / squared.sqrt();
             }
         }
         let normal_n = pad_n + tips_n;
@@ -206,24 +209,32 @@ impl SoleLaw {
     }
 
     /// Pressure on the pad \[N\].
+    #[inline]
     fn pad_n(&self, print: &mut Print, depth_m: f64, closing_m_s: f64, way_m: f64) -> f64 {
         if depth_m <= 0.0 {
             print.deepest_m = 0.0;
             return 0.0;
         }
-        let above = (print.deepest_m - depth_m).max(0.0);
-        let leaves = self.soil.rebound * self.across_m;
-        print.deepest_m = depth_m + above / (1.0 + way_m / leaves);
-        let pressure = self.pressure.value(print.deepest_m);
-        let band =
-            (pressure / self.soil.stiffness_most_pa_m).max(self.soil.rebound * print.deepest_m);
-        let share = (1.0 - (print.deepest_m - depth_m) / band).max(0.0);
+        let mut above = print.deepest_m - depth_m;
+        let mut share = 1.0;
+        let pressure;
+        if above > 0.0 {
+            above *= self.leaves_m / (self.leaves_m + way_m);
+            print.deepest_m = depth_m + above;
+            pressure = self.pressure.value(print.deepest_m);
+            let band = (self.softest_m_pa * pressure).max(self.soil.rebound * print.deepest_m);
+            share = (1.0 - above / band).max(0.0);
+        } else {
+            print.deepest_m = depth_m;
+            pressure = self.pressure.value(depth_m);
+        }
         // No more than the pressure itself, so that nothing jumps at touch-down.
         let damping = (self.soil.damping_pa_s_m * closing_m_s.max(0.0)).min(pressure);
         share * self.area_m2 * (pressure + damping)
     }
 
     /// Force at the tips and most force on the shafts \[N\].
+    #[inline]
     fn nails_n(&self, print: &mut Print, depth_m: f64, pressed_m: f64) -> (f64, f64) {
         let tip = depth_m + self.reach_m();
         if self.nails.count == 0 || tip <= 0.0 {
@@ -231,7 +242,7 @@ impl SoleLaw {
         }
         let most = self.soil.rebound * tip;
         print.pressed_m = (print.pressed_m + pressed_m).clamp(-PULLED / PUSHED * most, most);
-        let tips = PUSHED * self.tips_n_m / self.soil.rebound * print.pressed_m;
+        let tips = self.tip_stiffness_n_m * print.pressed_m;
         let top = depth_m.max(0.0);
         let shafts = 0.5 * SIDEWAYS * self.shafts_n_m2 * (tip * tip - top * top);
         (tips, shafts)

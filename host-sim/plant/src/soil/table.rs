@@ -33,6 +33,8 @@ type Node = [[f64; 4]; 4];
 pub struct WheelTable {
     wheel: Wheel,
     soil: Soil,
+    /// Inverse of the radius \[1/m\].
+    per_radius: f64,
     grid: Grid,
     nodes: Vec<Node>,
 }
@@ -58,6 +60,7 @@ impl WheelTable {
         Self {
             wheel: *wheel,
             soil: *soil,
+            per_radius: 1.0 / wheel.radius_m,
             grid,
             nodes,
         }
@@ -80,7 +83,7 @@ impl WheelTable {
     #[must_use]
     #[inline]
     pub fn forces(&self, sinkage_m: f64, x: f64) -> WheelForces {
-        let deep = sinkage_m / self.wheel.radius_m;
+        let deep = self.per_radius * sinkage_m;
         let (low, high) = (self.grid.node(0), self.grid.node(SINKAGE_CELLS));
         let scale = if deep < low {
             (deep / low).max(0.0)
@@ -90,22 +93,29 @@ impl WheelTable {
             1.0
         };
         let place = self.grid.place(deep);
-        let along = ((x - BRAKED) / SLIP_CELL).clamp(0.0, SLIP_CELLS as f64);
+        let along = ((x - BRAKED) * (1.0 / SLIP_CELL)).clamp(0.0, SLIP_CELLS as f64);
         let column = (along as usize).min(SLIP_CELLS - 1);
         let across = hermite(along - column as f64, SLIP_CELL);
         let row = place.cell * (SLIP_CELLS + 1) + column;
-        let mut sum = [0.0; 4];
-        for (end, z) in place.weights.chunks_exact(2).enumerate() {
-            for (side, s) in across.chunks_exact(2).enumerate() {
-                let node = &self.nodes[row + end * (SLIP_CELLS + 1) + side];
-                let weights = [z[0] * s[0], z[1] * s[0], z[0] * s[1], z[1] * s[1]];
-                for (weight, values) in weights.iter().zip(node) {
-                    for (sum, value) in sum.iter_mut().zip(values) {
-                        *sum += weight * value;
-                    }
-                }
-            }
-        }
+        // Sums of few terms each, which a processor can form side by side.
+        let [z0, d0, z1, d1] = place.weights;
+        let [s0, e0, s1, e1] = across;
+        let corner = |node: &Node, [z, d]: [f64; 2], [s, e]: [f64; 2]| -> [f64; 4] {
+            let (a, b, c, f) = (z * s, d * s, z * e, d * e);
+            std::array::from_fn(|i| {
+                (a * node[0][i] + b * node[1][i]) + (c * node[2][i] + f * node[3][i])
+            })
+        };
+        let below = &self.nodes[row..row + 2];
+        let above = &self.nodes[row + SLIP_CELLS + 1..row + SLIP_CELLS + 3];
+        let corners = [
+            corner(&below[0], [z0, d0], [s0, e0]),
+            corner(&below[1], [z0, d0], [s1, e1]),
+            corner(&above[0], [z1, d1], [s0, e0]),
+            corner(&above[1], [z1, d1], [s1, e1]),
+        ];
+        let [p, q, r, t] = corners;
+        let sum: [f64; 4] = std::array::from_fn(|i| (p[i] + q[i]) + (r[i] + t[i]));
         let [normal_n, compaction_n, thrust_n, torque_n_m] = sum.map(|s| scale * s);
         WheelForces {
             normal_n,
