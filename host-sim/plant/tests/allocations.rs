@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use wheeleg_plant::soil::Soil;
 use wheeleg_plant::terrain::{
     Ellipsoid, HeightMap, Material, Part, Plane, RockField, Shape, Solid,
 };
-use wheeleg_plant::testing::wheeleg_2003;
+use wheeleg_plant::testing::{wheeleg_2003, wheeleg_field};
 use wheeleg_plant::{Inputs, Plant};
 
 fn waves() -> HeightMap {
@@ -43,13 +44,16 @@ fn a_step_allocates_nothing() {
         ("rocks", [vec![level], rocks()].concat()),
         ("map", vec![Shape::HeightMap(Arc::new(waves()))]),
     ];
-    for (name, shapes) in kinds {
-        let mut params = wheeleg_2003();
-        let part = |shape| Part {
-            shape,
-            material: Material::ROUGH,
+    let sand = Material::soft(Soil::VOLCANIC_SAND);
+    let hard = kinds.iter().map(|kind| (kind, Material::ROUGH));
+    let soft = kinds.iter().map(|kind| (kind, sand));
+    for ((name, shapes), material) in hard.chain(soft) {
+        let mut params = match material.soil {
+            None => wheeleg_2003(),
+            Some(_) => wheeleg_field(),
         };
-        params.terrain.parts = shapes.into_iter().map(part).collect();
+        let part = |shape: Shape| Part { shape, material };
+        params.terrain.parts = shapes.iter().cloned().map(part).collect();
         let plant = Plant::new(&params).unwrap();
         let mut state = plant.initial_state(1).unwrap();
         let mut inputs = Inputs {

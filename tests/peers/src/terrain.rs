@@ -5,11 +5,14 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use wheeleg_plant::soil::Soil;
+use wheeleg_plant::soil::rolling::{Motion, Rolled, RollingLaw};
+use wheeleg_plant::soil::wheel::Wheel;
 use wheeleg_plant::terrain::{
     Ellipsoid, HeightMap, Material, Part, Plane, RockField, Shape, Solid, Surface,
 };
-use wheeleg_plant::testing::wheeleg_2003;
-use wheeleg_plant::{Inputs, Plant};
+use wheeleg_plant::testing::{wheeleg_2003, wheeleg_field};
+use wheeleg_plant::{Inputs, Plant, PlantParams};
 
 use crate::measure::{put_ns, put_realtime, repetitions, scale, timed};
 
@@ -23,6 +26,7 @@ pub(crate) fn run() {
     plant("plant_flat", on(level(), Vec::new()));
     let slope = Shape::Plane(Plane::sloping(0.1, 0.0));
     plant("plant_slope", on(slope, Vec::new()));
+    sand();
     plant("plant_stairs", on(level(), stairs()));
     plant("plant_rocks", on(level(), rocks([0.25, 30.0], 2.0)));
     plant("plant_rocks_100k", on(level(), rocks([0.25, 150.0], 40.0)));
@@ -32,6 +36,7 @@ pub(crate) fn run() {
         vec![Shape::HeightMap(Arc::new(map(4096)))],
     );
     height_query();
+    soil_wheel();
 }
 
 fn plant(case: &str, shapes: Vec<Shape>) {
@@ -41,7 +46,21 @@ fn plant(case: &str, shapes: Vec<Shape>) {
         material: Material::ROUGH,
     };
     params.terrain.parts = shapes.into_iter().map(part).collect();
-    let built = Plant::new(&params);
+    step(case, &params);
+}
+
+/// The field robot on level sand.
+fn sand() {
+    let mut params = wheeleg_field();
+    params.terrain.parts = vec![Part {
+        shape: Shape::Plane(Plane::level(0.0)),
+        material: Material::soft(Soil::VOLCANIC_SAND),
+    }];
+    step("plant_sand", &params);
+}
+
+fn step(case: &str, params: &PlantParams) {
+    let built = Plant::new(params);
     let Ok((plant, mut state)) = built.and_then(|p| p.initial_state(1).map(|s| (p, s))) else {
         return;
     };
@@ -121,5 +140,44 @@ fn height_query() {
         took,
         repetitions,
         &format!("sum={sum:.3}"),
+    );
+}
+
+/// The law of a wheel that rolls on sand with a slip, turning a little, in one step.
+fn soil_wheel() {
+    let wheel = Wheel {
+        radius_m: 0.15,
+        width_m: 0.10,
+        lug_m: 0.015,
+    };
+    let law = RollingLaw::new(&wheel, &Soil::VOLCANIC_SAND);
+    let speed = Motion {
+        travel: 0.12,
+        tread: 0.15,
+        left: 0.01,
+    };
+    let touch = Rolled {
+        depth_m: 0.0167,
+        closing_m_s: 0.0,
+        speed,
+        moved: Motion {
+            travel: 1.2e-5,
+            tread: 1.5e-5,
+            left: 1e-6,
+        },
+    };
+    let mut state = RollingLaw::pressed(0.0167);
+    let (mut pull, repetitions) = (0.0, repetitions(1_000_000.0));
+    let took = timed(|| {
+        for _ in 0..repetitions {
+            pull = law.force(&mut state, black_box(&touch)).forward_n;
+        }
+    });
+    put_ns(
+        "soil_wheel",
+        "",
+        took,
+        repetitions,
+        &format!("DP={pull:.2} N"),
     );
 }
