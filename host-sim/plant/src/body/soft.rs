@@ -4,6 +4,7 @@
 //! back. A wheel is one contact, not three: its patch is as wide as it is. The sinkages δ of its
 //! three discs give a mean Σδ²/Σδ and a share of the width, (Σδ)²/(3 Σδ²). Both are continuous
 //! where a disc leaves the soil, and the point between the discs gives the moment about the roll axis.
+//! A disc that is deep in a height map at two places counts twice.
 
 use std::sync::Arc;
 

@@ -120,3 +120,48 @@ fn it_drives_with_the_slip_of_its_pull_and_half_the_step_says_the_same() {
         assert!((a / b - 1.0).abs() < 0.01, "{coarse:?} {fine:?}");
     }
 }
+
+/// The front side of each sole bears 1.34 N at rest, the others more than 2.5 N.
+#[test]
+fn a_switch_closes_at_its_force_and_opens_at_half_of_it() {
+    let front = |force_n: f64, closed: bool| {
+        let mut params = wheeleg_field();
+        params.contacts.foot.switch_force_n = force_n;
+        let (plant, mut state) = on(Soil::VOLCANIC_SAND, 0.0, params);
+        state.core.motion.contacts.switches = [[closed; 4]; 2];
+        plant.tick(&mut state, &Inputs::default()).unwrap();
+        let switches = plant.outputs(&state).foot_switches[0];
+        assert!(switches[1..].iter().all(|s| *s), "{switches:?}");
+        switches[0]
+    };
+    assert!(front(1.3, false));
+    assert!(!front(1.4, false));
+    assert!(front(1.4, true));
+    assert!(!front(2.5, false) && front(2.5, true));
+}
+
+/// A sole that is lifted leaves its print; nails hold it down on the way.
+#[test]
+fn soil_carries_no_state_of_a_foot_in_the_air() {
+    let (plant, mut state) = on(Soil::VOLCANIC_SAND, 0.0, wheeleg_field());
+    let hash = plant.state_hash(&state);
+    let inputs = Inputs {
+        // Up: chamber A of the left vertical cylinder vented, B filled.
+        valve_on_us: [[0; 4], [0; 4], [0, 1000, 1000, 0], [0; 4], [0; 4], [0; 4]],
+        ..Inputs::default()
+    };
+    let mut least = 0.0_f64;
+    for _ in 0..1500 {
+        plant.tick(&mut state, &inputs).unwrap();
+        least = least.min(plant.outputs(&state).foot_normal_n[0]);
+    }
+    let o = plant.outputs(&state);
+    println!("{least} N, {} m", o.foot_clearance_m[0]);
+    assert!(o.foot_clearance_m[0] > 0.06, "{:?}", o.foot_clearance_m);
+    // Six nails at 60 mm: 6.8 N in, half of it out.
+    assert!(least < -1.0 && least > -4.0, "{least}");
+    assert!(o.foot_normal_n[0] == 0.0 && !o.foot_switches[0].contains(&true));
+    let contacts = &state.core.motion.contacts;
+    assert!(contacts.steps[0].iter().flatten().all(|s| s.part == 0));
+    assert_ne!(plant.state_hash(&state), hash);
+}
