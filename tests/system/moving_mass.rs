@@ -44,7 +44,7 @@ fn boards_are_told_the_mass_that_their_piston_feels() {
             joint + 1
         );
         assert!(
-            told_kg > 0.6 * least && told_kg < 1.6 * most,
+            told_kg > 0.5 * least && told_kg < 2.5 * most,
             "joint {}: told {told_kg} kg, felt {least} to {most} kg",
             joint + 1
         );

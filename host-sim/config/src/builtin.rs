@@ -117,7 +117,7 @@ pub(crate) fn named_by(robot: &str, scenario: &str) -> String {
 pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
     if SCENARIOS.iter().any(|(name, ..)| *name == name_or_path) {
-        let read = Scenario::parse_with(&file, &text, &Files::BuiltIn);
+        let read = Scenario::parse_with(&file, &text, &Files::BuiltIn(DATA));
         return read.map(|(scenario, _)| scenario);
     }
     Scenario::parse(&file, &text)

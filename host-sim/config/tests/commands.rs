@@ -45,7 +45,8 @@ fn assert_told(event: &str, parts: &[&str]) {
 fn usual(argument: &Argument) -> String {
     let instants = [
         ("period", "3.333333 s"),
-        ("lift", "100 ms"),
+        ("nose", "-20 mm"),
+        ("turn", "0.05 rad/s"),
         ("reach", "0.5 s"),
         ("lower", "1 s"),
         ("push", "2 s"),
@@ -56,6 +57,7 @@ fn usual(argument: &Argument) -> String {
         return format!("\"{text}\"");
     }
     match argument.kind {
+        ArgumentKind::Time(_) => "\"100 ms\"".to_owned(),
         ArgumentKind::Whole(_) => "3".to_owned(),
         ArgumentKind::Choice(words) => format!("\"{}\"", words[0]),
         ArgumentKind::Flag => "true".to_owned(),
@@ -178,7 +180,7 @@ fn a_missing_an_unknown_and_a_foreign_argument_are_told() {
         &[
             "my.toml:9: `events[0]`: ",
             "needs `stroke`",
-            "add `stroke` to the event: `stroke = \"… mm\"`, 0 to 180 mm",
+            "add `stroke` to it: `stroke = \"… mm\"`, 0 to 180 mm",
         ],
     );
     assert_told(

@@ -81,7 +81,8 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
             counts_per_revolution: counts.round() as u32,
             circumference_um: circumference_um.round() as u32,
         },
-        wheel_drive: if robot.gait.stream_wheels {
+        // A walk has no end that a profile of the boards could lead to.
+        wheel_drive: if robot.gait.stream_wheels || matches!(scenario.motion, Motion::Walk(_)) {
             WheelDrive::Stream
         } else {
             WheelDrive::Profile

@@ -6,8 +6,8 @@
 //! * **Stuck closed.** In a swing, clear of where the foot stood, nothing should close it. Seen in
 //!   two swings without its having opened in between, it is stuck.
 //! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as
-//!   the ground does where it is even. Three times in a row the other three closed, and it did
-//!   not: uneven ground would have closed it once.
+//!   the ground does where it is even. Twice in a row the other three closed, and it did not:
+//!   uneven ground would have closed it once.
 //!
 //! It takes some steps to know; the gait does not wait for it.
 
@@ -29,7 +29,7 @@ const LEVEL_MM: i16 = 175;
 /// Swings in which a switch must stay closed.
 const SWINGS: u8 = 2;
 /// Stances in which a switch must stay open.
-const STANCES: u8 = 3;
+const STANCES: u8 = 2;
 
 /// One switch against the other three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

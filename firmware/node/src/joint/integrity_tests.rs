@@ -266,7 +266,9 @@ fn damaged_parameters_settings_and_gains_are_seen_within_a_round() {
     for id in [first, JointParam::FollowingTime.id(), last] {
         found_in_turn(|node| {
             let raw = node.parameters.by_id(id).unwrap();
-            node.parameters = node.parameters.with(id, raw + 1, true).unwrap();
+            let other = [raw + 1, raw - 1].into_iter();
+            let mut other = other.filter_map(|raw| node.parameters.with(id, raw, true).ok());
+            node.parameters = other.next().unwrap();
         });
     }
     found_in_turn(|node| node.settings.sensor.step_max = PositionMm::ZERO);

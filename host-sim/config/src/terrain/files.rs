@@ -4,8 +4,6 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use crate::builtin;
-
 /// Largest data file, bytes.
 const LARGEST: u64 = 512 << 20;
 
@@ -13,8 +11,8 @@ const LARGEST: u64 = 512 << 20;
 pub(crate) enum Files {
     /// Paths count from this folder.
     Below(PathBuf),
-    /// They are part of the program.
-    BuiltIn,
+    /// They are part of the program: names and contents.
+    BuiltIn(&'static [(&'static str, &'static [u8])]),
 }
 
 impl Files {
@@ -29,8 +27,8 @@ impl Files {
     /// In words: there is none, it is no file, it is too large, it cannot be read.
     pub(super) fn read(&self, name: &str) -> Result<Vec<u8>, String> {
         let folder = match self {
-            Self::BuiltIn => {
-                let data = builtin::DATA.iter().find(|(n, _)| *n == name);
+            Self::BuiltIn(all) => {
+                let data = all.iter().find(|(n, _)| *n == name);
                 let found = data.map(|(_, bytes)| bytes.to_vec());
                 return found.ok_or_else(|| "no such file is built in".to_owned());
             }

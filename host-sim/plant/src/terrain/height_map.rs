@@ -10,8 +10,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::rim::{self, Rim};
-use super::surface::{Disc, Near, Surface};
+use super::surface::Near;
 use crate::hash::StateHasher;
 
 /// Steepest slope between two neighbours, degrees.
@@ -271,25 +270,15 @@ impl HeightMap {
     }
 }
 
-impl Surface for HeightMap {
-    #[inline]
-    fn to_point(&self, point_m: &Vector3<f64>) -> Near {
-        self.near(point_m)
-    }
-
-    fn to_disc(&self, disc: &Disc) -> Option<Near> {
-        let mut rim = Rim::default();
-        rim.seed(self, disc);
-        let touches = rim::touches(self, disc, &rim);
-        let all = touches.into_iter().flatten().map(|touch| touch.near);
-        all.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
-    }
-
-    fn top_m(&self) -> f64 {
+impl HeightMap {
+    /// No place of it is higher \[m\].
+    pub(super) fn highest_m(&self) -> f64 {
         self.top_m
     }
 
-    fn top_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
+    /// No place of it within `reach_m` of this one is higher \[m\].
+    #[inline]
+    pub(super) fn highest_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
         let cell = |at_m: f64, axis: usize, count: usize| {
             self.locate(at_m, self.origin_m[axis], count).0 / TILE
         };
@@ -302,11 +291,13 @@ impl Surface for HeightMap {
         top
     }
 
-    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
-        Some(self.place::<false>(x_m, y_m).z)
+    /// Height of a place \[m\].
+    pub(super) fn height_at_m(&self, x_m: f64, y_m: f64) -> f64 {
+        self.place::<false>(x_m, y_m).z
     }
 
-    fn feed(&self, hasher: &mut StateHasher) {
+    /// Adds its heights to a hash.
+    pub(super) fn add_to(&self, hasher: &mut StateHasher) {
         hasher.bytes(b"height map");
         hasher.u64(self.columns as u64);
         let sizes = [&self.cell_m, &self.origin_m[0], &self.origin_m[1]];

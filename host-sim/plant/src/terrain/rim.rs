@@ -35,6 +35,37 @@ const STEP: f64 = 0.05;
 /// Steps on a peak that has just been found.
 const FIRST: usize = 8;
 
+impl Surface for HeightMap {
+    #[inline]
+    fn to_point(&self, point_m: &Vector3<f64>) -> Near {
+        self.near(point_m)
+    }
+
+    fn to_disc(&self, disc: &Disc) -> Option<Near> {
+        let mut rim = Rim::default();
+        rim.seed(self, disc);
+        let touches = touches(self, disc, &rim);
+        let all = touches.into_iter().flatten().map(|touch| touch.near);
+        all.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+    }
+
+    fn top_m(&self) -> f64 {
+        self.highest_m()
+    }
+
+    fn top_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
+        self.highest_near_m(x_m, y_m, reach_m)
+    }
+
+    fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
+        Some(self.height_at_m(x_m, y_m))
+    }
+
+    fn feed(&self, hasher: &mut StateHasher) {
+        self.add_to(hasher);
+    }
+}
+
 /// Peaks of one disc, carried over from step to step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rim {

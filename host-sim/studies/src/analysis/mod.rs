@@ -342,6 +342,9 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
         }
         analyser.body(body.t_s(), &body.v);
     }
+    for (foot, rows) in feet.into_iter().enumerate() {
+        rows.for_each(|r| analyser.foot(foot, r.t_ns, &r.v));
+    }
     if let Meter::SafeState(meter) = &mut analyser.meter {
         recording.supply.iter().for_each(|r| meter.supply(r));
     }

@@ -158,14 +158,14 @@ pub const ROWS: &[Row] = &[
         stop_moving(2), &[LatchedOneOf(2, STUCK)]).lasting(3.5),
     // Foot switches.
     row("foot-switch-on", &[at("foot-switch-on:left.front", FOR_GOOD)], Phase::Flight,
-        goes_on(0.001), &[LEFT_FRONT_CLOSED]),
+        goes_on(0.001), &[LEFT_FRONT_CLOSED]).lasting(9.0),
     row("foot-switch-off", &[at("foot-switch-off:left.back", FOR_GOOD)], Phase::Flight,
-        goes_on(0.001), &[LEFT_REAR_OPEN]),
+        goes_on(0.001), &[LEFT_REAR_OPEN]).lasting(9.0),
     row("foot-switch-on/reflex", &[at("foot-switch-on:left.front", FOR_GOOD)], Phase::Flight,
-        goes_on(10.0), &[LEFT_FRONT_CLOSED]).of(Variant::Reflex)
+        goes_on(10.0), &[LEFT_FRONT_CLOSED]).of(Variant::Reflex).lasting(9.0)
         .noted("the reflex stops the lowering where it believes the ground: the foot stays higher than it should"),
     row("foot-switch-off/reflex", &[at("foot-switch-off:left.back", FOR_GOOD)], Phase::Flight,
-        goes_on(0.001), &[LEFT_REAR_OPEN]).of(Variant::Reflex),
+        goes_on(0.001), &[LEFT_REAR_OPEN]).of(Variant::Reflex).lasting(9.0),
     // Encoder.
     row("encoder-lost", &[at("encoder-lost:wheel7", LONG_S)], Phase::Push,
         stop_axis(7, [0.0, 100.0], 103.0, 140.0), &[LatchedBy(7, Fault::EncoderFault)]),

@@ -73,7 +73,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
         Refusal::Parameter(ref error) => error.to_string(),
         Refusal::WheelsNotStreamed => {
             "the wheels of this robot make profiles of their own, but a walk leads them in every \
-             cycle: set `stream_wheels` in the [gait] of the robot file"
+             cycle: begin with a scenario that walks, or set `stream_wheels` in the [gait] of the robot file"
                 .to_owned()
         }
         Refusal::Busy => "other requests are still under way: wait for their answers".to_owned(),

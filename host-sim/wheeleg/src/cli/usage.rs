@@ -80,7 +80,7 @@ mod tests {
             assert!(!said.contains("as a value"), "{said}");
         }
         let said = said(&["wheeleg", "faults", "rows", "--row", "pot-open"]);
-        assert!(said.contains("option of `wheeleg faults run`"), "{said}");
+        assert!(said.contains("`wheeleg faults run`"), "{said}");
     }
 
     #[test]

@@ -1,0 +1,164 @@
+//! Fields that contradict each other are answered like single fields.
+
+use wheeleg_config::{AxisConfig, ConfigError, RobotConfig};
+
+const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
+
+/// One line per problem, with its help.
+fn report(error: &ConfigError) -> String {
+    let lines: Vec<String> = error
+        .problems()
+        .iter()
+        .map(|p| format!("{} | {}", p.summary(), p.help_text().unwrap_or("")))
+        .collect();
+    lines.join("\n")
+}
+
+fn assert_all(report: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(report.contains(part), "`{part}` is not in:\n{report}");
+    }
+}
+
+/// Fields that are within their ranges and cannot be together: each relation of the table is
+/// broken once, and the answer has every field with its line, and what would do.
+#[test]
+fn relations_between_fields_are_answered_like_single_fields() {
+    const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
+    // Changes are by section and key.
+    let replaced = |text: &str, changes: &[(&str, &str)]| {
+        let mut text = text.to_owned();
+        for (path, value) in changes {
+            let (section, key) = path.rsplit_once('.').expect("a section and a key");
+            let begin = text.find(&format!("[{section}]\n")).expect("the section");
+            let line = text[begin..].lines().find(|line| {
+                let (name, _) = line.split_once('=').unwrap_or_default();
+                name.trim() == key
+            });
+            let line = line
+                .unwrap_or_else(|| panic!("{path} in the file"))
+                .to_owned();
+            let at = begin + text[begin..].find(&line).expect("it stands there");
+            text.replace_range(at..at + line.len(), &format!("{key} = {value}"));
+        }
+        text
+    };
+    let axis = |changes: &[(&str, &str)]| {
+        let text = replaced(AXIS, changes);
+        report(&AxisConfig::parse("my.toml", &text).expect_err("must be rejected"))
+    };
+    let quantity = |value: &str, unit: &str| {
+        format!("{{ value = {value}, unit = \"{unit}\", source = \"ASSUMED\" }}")
+    };
+
+    let text = axis(&[("moving.mass", &quantity("0.03", "kg"))]);
+    let fields = [
+        "`friction.bristle_damping` = ",
+        "`numerics.step` = 100 us",
+        "`moving.mass` = 0.03 kg",
+    ];
+    assert_all(
+        &text,
+        &[&fields[..], &["my.toml:", "(line ", "a step of at most"]].concat(),
+    );
+
+    let text = axis(&[
+        ("moving.mass", &quantity("0.15", "kg")),
+        ("end_stop.cushion_damping", &quantity("2000", "N s/m")),
+    ]);
+    assert_all(
+        &text,
+        &[
+            "`end_stop.cushion_damping` = 2000",
+            "`numerics.step`",
+            "a mass of at least",
+        ],
+    );
+
+    let text = axis(&[
+        ("cylinder.dead_volume_a", &quantity("0.01", "cm3")),
+        ("line.volume", &quantity("0.0", "cm3")),
+    ]);
+    assert_all(
+        &text,
+        &[
+            "`cylinder.dead_volume_a` = 0.01 cm3",
+            "`cylinder.bore`",
+            "`end_stop.stiffness`",
+            "a dead volume of at least",
+        ],
+    );
+
+    let wide = quantity("100.0", "dm3/(s bar)");
+    let text = axis(&[
+        ("fill_valve.conductance", &wide),
+        ("line.conductance", &wide),
+    ]);
+    assert_all(
+        &text,
+        &[
+            "`fill_valve.conductance` = 100 dm3/(s bar)",
+            "`cylinder.dead_volume_a`",
+            "`numerics.step`",
+            "a step of at most",
+        ],
+    );
+    let text = axis(&[
+        ("regulator.conductance", &quantity("900.0", "dm3/(s bar)")),
+        ("supply.reservoir", &quantity("1.0", "cm3")),
+    ]);
+    assert_all(
+        &text,
+        &[
+            "`regulator.conductance` = 900",
+            "`supply.reservoir` = 1 cm3",
+            "`supply.droop`",
+            "a reservoir of at least",
+        ],
+    );
+
+    let text = axis(&[("friction.static", &quantity("0.015", "N"))]);
+    assert_all(
+        &text,
+        &[
+            "`friction.static` = 0.015 N",
+            "`friction.coulomb` = ",
+            "allowed from",
+        ],
+    );
+
+    let text = axis(&[("start.pressure_b", &quantity("1375403", "Pa"))]);
+    assert_all(
+        &text,
+        &[
+            "`start.pressure_b` = 1375403 Pa",
+            "`supply.set_pressure`",
+            "allowed up to",
+        ],
+    );
+
+    let robot = |changes: &[(&str, &str)]| {
+        let text = replaced(ROBOT, changes);
+        report(&RobotConfig::parse("my.toml", &text).expect_err("must be rejected"))
+    };
+    let text = robot(&[("spatial.chassis_roll_inertia", &quantity("0.05", "kg m2"))]);
+    let fields = [
+        "`spatial.chassis_roll_inertia` = 0.05",
+        "`body.chassis_pitch_inertia`",
+        "`spatial.chassis_yaw_inertia`",
+    ];
+    assert_all(
+        &text,
+        &[&fields[..], &["no body has these inertias"]].concat(),
+    );
+    let text = robot(&[(
+        "link.yaw_barrel.inertia",
+        &quantity("[1.0, 1e-6, 1e-6]", "kg m2"),
+    )]);
+    assert_all(
+        &text,
+        &["`link.yaw_barrel.inertia`", "no body has these inertias"],
+    );
+    let text = robot(&[("body.gravity", &quantity("[0.0, 0.0, 9.81]", "m/s2"))]);
+    assert_all(&text, &["`body.gravity` = [0, 0, 9.81]", "does not stand"]);
+}
