@@ -102,27 +102,15 @@ fn bar(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Bar> {
     let names: Vec<(&str, Measure)> = Measure::ALL.iter().map(|m| (m.name(), *m)).collect();
     let measure = r.choice(entry, "measure", &names)?;
     let mut end = |key: &'static str| {
-        let spec = FieldSpec {
-            key,
-            dimension: measure.dimension(),
-            min: -1e6,
-            max: 1e6,
-            components: 1,
-            integer: false,
-            doc: "end of the band",
-        };
+        let dimension = measure.dimension();
+        let spec = FieldSpec::scalar(key, dimension, [-1e6, 1e6], "end of the band");
         entry.get(key).map(|_| r.required(entry, &spec))
     };
     let (min, max) = (end("min"), end("max"));
     let info = entry.get("info").map(|_| {
         let spec = FieldSpec {
-            key: "info",
-            dimension: Dimension::Flag,
-            min: 0.0,
-            max: 1.0,
-            components: 1,
             integer: true,
-            doc: "it informs only",
+            ..FieldSpec::scalar("info", Dimension::Flag, [0.0, 1.0], "it informs only")
         };
         r.required(entry, &spec)
     });

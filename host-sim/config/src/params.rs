@@ -25,6 +25,26 @@ pub struct FieldSpec {
     pub doc: &'static str,
 }
 
+impl FieldSpec {
+    /// One number, between `min` and `max` SI.
+    pub(crate) const fn scalar(
+        key: &'static str,
+        dimension: Dimension,
+        [min, max]: [f64; 2],
+        doc: &'static str,
+    ) -> Self {
+        Self {
+            key,
+            dimension,
+            min,
+            max,
+            components: 1,
+            integer: false,
+            doc,
+        }
+    }
+}
+
 /// A Rust type that a parameter can have.
 pub trait ParamValue: Sized {
     /// Number of components.

@@ -149,25 +149,7 @@ const LEGS: [(&str, LegChoice); 2] = [("left", LegChoice::Left), ("right", LegCh
 
 /// Longest run, s: 104 days. Beyond it a time in seconds no longer tells nanoseconds apart (its
 /// 53 bits end at 9.007e15 ns).
-const MAX_DURATION_S: f64 = 9.0e6;
-
-const fn scalar(
-    key: &'static str,
-    dimension: Dimension,
-    min: f64,
-    max: f64,
-    doc: &'static str,
-) -> FieldSpec {
-    FieldSpec {
-        key,
-        dimension,
-        min,
-        max,
-        components: 1,
-        integer: false,
-        doc,
-    }
-}
+pub(crate) const MAX_DURATION_S: f64 = 9.0e6;
 
 impl Scenario {
     /// Reads a scenario from TOML text; `file` is its path, for messages and for the data files
@@ -208,11 +190,10 @@ fn read(r: &mut Reader, files: &Files) -> Option<Scenario> {
     let robot = r.text(&top, "robot");
     let duration = r.required(
         &top,
-        &scalar(
+        &FieldSpec::scalar(
             "duration",
             Dimension::Time,
-            0.01,
-            MAX_DURATION_S,
+            [0.01, MAX_DURATION_S],
             "simulated time",
         ),
     );
@@ -342,11 +323,10 @@ enum ActionKind {
 
 fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<ScenarioEvent> {
     let latest = duration_s.unwrap_or(MAX_DURATION_S);
-    let at = scalar(
+    let at = FieldSpec::scalar(
         "at",
         Dimension::Time,
-        0.0,
-        latest,
+        [0.0, latest],
         "time of the event, within the duration of the scenario",
     );
     let at_s = r.required(entry, &at);

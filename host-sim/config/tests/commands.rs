@@ -1,5 +1,8 @@
 //! Commands of scenario files: every argument of the master's table, by its name, unit and range.
 
+mod common;
+
+use common::{assert_all, report};
 use wheeleg_config::{ConfigError, EventAction, Motion, Scenario};
 use wheeleg_master::argument::{Argument, ArgumentKind, Limits};
 use wheeleg_master::command::{Command, CommandInfo, TABLE};
@@ -25,20 +28,12 @@ fn read(event: &str) -> Result<Command, ConfigError> {
     }
 }
 
-fn report(error: &ConfigError) -> String {
-    let problems = error.problems().iter();
-    let lines = problems.map(|p| format!("{} | {}", p.summary(), p.help_text().unwrap_or("")));
-    lines.collect::<Vec<String>>().join("\n")
-}
-
 /// What is said of a wrong event: one problem, with these words.
 fn assert_told(event: &str, parts: &[&str]) {
     let error = read(event).expect_err("must be rejected");
     let text = report(&error);
     assert_eq!(error.problems().len(), 1, "{text}");
-    for part in parts {
-        assert!(text.contains(part), "`{part}` is not in:\n{text}");
-    }
+    assert_all(&text, parts);
 }
 
 /// The gait of the paper and else the largest values: what a command takes.

@@ -1,20 +1,13 @@
 //! Robot and scenario files: what is wrong with them is said where it is wrong.
 
-use wheeleg_config::{AxisConfig, ConfigError, RobotConfig, Scenario, builtin};
+mod common;
+
+use common::{assert_all, report};
+use wheeleg_config::{AxisConfig, RobotConfig, Scenario, builtin};
 use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
 const SCENARIO: &str = include_str!("../../scenarios/three-step.toml");
-
-/// One line per problem, with its help.
-fn report(error: &ConfigError) -> String {
-    let lines: Vec<String> = error
-        .problems()
-        .iter()
-        .map(|p| format!("{} | {}", p.summary(), p.help_text().unwrap_or("")))
-        .collect();
-    lines.join("\n")
-}
 
 fn robot_with(from: &str, to: &str) -> String {
     assert_eq!(ROBOT.matches(from).count(), 1, "{from} must occur once");
@@ -32,12 +25,6 @@ fn scenario_with(from: &str, to: &str) -> String {
     assert_eq!(SCENARIO.matches(from).count(), 1, "{from} must occur once");
     let text = SCENARIO.replace(from, to);
     report(&Scenario::parse("my.toml", &text).expect_err("must be rejected"))
-}
-
-fn assert_all(report: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(report.contains(part), "`{part}` is not in:\n{report}");
-    }
 }
 
 /// Line of the robot file that holds `text`, from 1.

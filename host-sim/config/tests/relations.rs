@@ -1,24 +1,11 @@
 //! Fields that contradict each other are answered like single fields.
 
-use wheeleg_config::{AxisConfig, ConfigError, RobotConfig};
+mod common;
+
+use common::{assert_all, report};
+use wheeleg_config::{AxisConfig, RobotConfig};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
-
-/// One line per problem, with its help.
-fn report(error: &ConfigError) -> String {
-    let lines: Vec<String> = error
-        .problems()
-        .iter()
-        .map(|p| format!("{} | {}", p.summary(), p.help_text().unwrap_or("")))
-        .collect();
-    lines.join("\n")
-}
-
-fn assert_all(report: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(report.contains(part), "`{part}` is not in:\n{report}");
-    }
-}
 
 /// Fields that are within their ranges and cannot be together: each relation of the table is
 /// broken once, and the answer has every field with its line, and what would do.

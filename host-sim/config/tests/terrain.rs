@@ -1,5 +1,8 @@
 //! The ground of a scenario: what is accepted, and what is said of the rest.
 
+mod common;
+
+use common::{assert_all, report};
 use std::f64::consts::SQRT_2;
 
 use wheeleg_config::{ConfigError, Scenario};
@@ -15,19 +18,9 @@ fn accepted(terrain: &str) -> Scenario {
     parse(terrain).unwrap_or_else(|e| panic!("{}", report(&e)))
 }
 
-fn report(error: &ConfigError) -> String {
-    let lines = error
-        .problems()
-        .iter()
-        .map(|p| format!("{} | {}\n", p.summary(), p.help_text().unwrap_or("")));
-    lines.collect()
-}
-
 fn refused(terrain: &str, parts: &[&str]) {
     let report = report(&parse(terrain).map(drop).expect_err("must be refused"));
-    for part in parts {
-        assert!(report.contains(part), "`{part}` is not in:\n{report}");
-    }
+    assert_all(&report, parts);
 }
 
 #[test]

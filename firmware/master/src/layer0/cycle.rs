@@ -207,9 +207,8 @@ impl Layer0 {
     }
 
     fn sense_feet(&mut self, now_us: u64, events: &mut Events) {
-        let strokes = self.senses().vertical_mm.map(Option::unwrap_or_default);
-        let [left_mm, right_mm] = strokes;
-        let shorter_mm = left_mm.limit(PositionMm::ZERO, right_mm);
+        let [left_mm, right_mm] = self.senses().vertical_mm.map(Option::unwrap_or_default);
+        let shorter_mm = left_mm.min(right_mm);
         for side in [Side::Left, Side::Right] {
             let node = self.nodes.get(side.joint(Cylinder::Vertical));
             let Some(reply) = node.and_then(|node| node.reply) else {

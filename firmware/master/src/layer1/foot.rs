@@ -13,7 +13,7 @@ use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::params::{ParamError, STROKE_MM};
-use super::units::{seconds_to_us, us_to_seconds};
+use super::units::{metres, seconds_to_us, us_to_seconds};
 use crate::argument::{self, Argument, Value};
 use crate::contact::Side;
 use crate::mirror;
@@ -123,11 +123,6 @@ impl FootShape {
             [x * moving, y * moving, climb],
         )
     }
-}
-
-/// mm in I16F16 to m.
-fn metres(mm: PositionMm) -> f32 {
-    mm.get().to_num::<f32>() * 1.0e-3
 }
 
 /// A foot trajectory under way.

@@ -15,6 +15,12 @@ pub(crate) fn us_to_seconds(us: u64) -> f32 {
     us as f32 * 1.0e-6
 }
 
+/// mm in I16F16 to m.
+#[must_use]
+pub(crate) fn metres(mm: PositionMm) -> f32 {
+    mm.get().to_num::<f32>() * 1.0e-3
+}
+
 /// Distance in µm to mm in I16F16, to the nearest LSB (15 nm); saturates at ±32 m.
 #[must_use]
 pub(crate) fn um_to_mm(um: i64) -> PositionMm {

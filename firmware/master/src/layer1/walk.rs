@@ -18,13 +18,13 @@ mod order;
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use super::params::{ParamError, STROKE_MM};
+use super::params::ParamError;
 use crate::contact::Side;
 use crate::setpoint::{Cylinder, Feedback, Phase, Setpoints, TravelSetpoint, WHEELS, WheelTravel};
 pub use felt::Felt;
 pub use geometry::WalkGeometry;
 use geometry::{Twist, stance, time_left_s};
-use leg::{FOLLOW_MM, Leg, Sensed, TIPPING_MM};
+use leg::{FOLLOW_MM, HIGHER_MM, Leg, Sensed, TIPPING_MM, full_mm};
 pub use order::{WalkOrder, WalkPattern};
 
 /// Bus cycle, s.
@@ -51,9 +51,7 @@ const PATIENCE: u16 = 300;
 /// The robot then backs off for so many cycles (1 s) at this speed, m/s, …
 const BACK_OFF: u16 = 100;
 const BACK_M_S: f32 = 0.05;
-/// … and lifts its feet higher, mm, …
-const HIGHER_MM: f32 = 40.0;
-/// … until it has come so far, m, …
+/// … and lifts its feet higher ([`HIGHER_MM`]) until it has come so far, m, …
 const FREE_M: f32 = 0.5;
 /// … or has tried so many times.
 const TRIES: u8 = 3;
@@ -77,8 +75,6 @@ pub struct Walk {
     wheels_um: [i64; WHEELS],
     /// Cycles since the last swing began.
     since_swing: u16,
-    /// The leg that swung last.
-    last: Option<Side>,
     /// Duration of a swing, from those that were, s.
     swing_s: f32,
     steps: u16,
@@ -94,6 +90,13 @@ pub struct Walk {
     back_off: u16,
     tipping: bool,
     felt: [Option<Felt>; FELT],
+}
+
+/// Keeps what was met until it is told; the oldest counts.
+fn meet(all: &mut [Option<Felt>; FELT], felt: Option<Felt>) {
+    if let (Some(free), true) = (all.iter_mut().find(|one| one.is_none()), felt.is_some()) {
+        *free = felt;
+    }
 }
 
 impl Walk {
@@ -121,7 +124,6 @@ impl Walk {
             segment,
             wheels_um: feedback.wheels_um,
             since_swing: u16::MAX,
-            last: None,
             swing_s: SWING_S,
             steps: 0,
             stopping: false,
@@ -172,25 +174,24 @@ impl Walk {
     pub fn setpoints(&mut self, now_us: u64, feedback: &Feedback) -> Setpoints {
         let moved = self.moved(feedback);
         let lift_mm = self.order.lift_mm.get().to_num::<f32>();
-        let plan_mm = (STROKE_MM.get().to_num::<f32>() + self.order.nose_mm.get().to_num::<f32>())
-            .clamp(0.0, STROKE_MM.get().to_num::<f32>());
+        let nose_mm = self.order.nose_mm.get().to_num::<f32>();
+        let plan_mm = (full_mm() + nose_mm).clamp(0.0, full_mm());
         let wanted = self.wanted();
         self.since_swing = self.since_swing.saturating_add(1);
         let mut progress_m = 0.0;
-        let mut met = [None; WHEELS];
-        for (leg, met) in self.legs.iter_mut().zip(&mut met) {
+        for leg in &mut self.legs {
             let foothold = stance(wanted, &self.geometry, leg.side).begin_m;
             if let Some(sensed) = Sensed::of(feedback, leg.side) {
                 let stood = leg.stands();
                 progress_m += leg.way_m(&sensed, PROGRESS_M);
-                *met = leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
+                let met = leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
+                meet(&mut self.felt, met);
                 if !stood && leg.stands() {
                     let took = f32::from(self.since_swing) * CYCLE_S;
                     self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
                 }
             }
         }
-        met.into_iter().flatten().for_each(|felt| self.meet(felt));
         self.level(plan_mm);
         self.watch_progress(wanted, progress_m);
         let next = self.next_swing(wanted);
@@ -199,7 +200,6 @@ impl Walk {
         {
             leg.swing(if self.tries > 0 { HIGHER_MM } else { 0.0 });
             self.since_swing = 0;
-            self.last = Some(side);
             self.steps = self.steps.saturating_add(1);
         }
         for leg in &mut self.legs {
@@ -207,13 +207,6 @@ impl Walk {
         }
         self.accelerate(wanted);
         self.write(now_us, lift_mm)
-    }
-
-    /// Keeps what was met until it is told; the oldest counts.
-    fn meet(&mut self, felt: Felt) {
-        if let Some(free) = self.felt.iter_mut().find(|slot| slot.is_none()) {
-            *free = Some(felt);
-        }
     }
 
     /// Backs off where the feet make no progress, and gives up after some tries.
@@ -235,10 +228,10 @@ impl Walk {
             if self.tries < TRIES {
                 self.tries = self.tries.saturating_add(1);
                 self.back_off = BACK_OFF;
-                self.meet(Felt::BackOff);
+                meet(&mut self.felt, Some(Felt::BackOff));
             } else {
                 self.stopping = true;
-                self.meet(Felt::Stuck);
+                meet(&mut self.felt, Some(Felt::Stuck));
             }
         }
     }
@@ -278,23 +271,19 @@ impl Walk {
         let [left, right] = &self.legs;
         let stands = left.stands() && right.stands();
         let hang = stands && left.hangs() && right.hangs();
-        if hang && !self.tipping {
-            self.meet(Felt::TipGuard);
-        }
-        self.tipping = hang;
-        let [left, right] = &self.legs;
         let rise = if left.wants_nose_down() || right.wants_nose_down() {
             -plan_mm
         } else {
             plan_mm - 0.5 * (left.stand_mm + right.stand_mm)
         };
-        let most_mm = if hang { TIPPING_MM } else { FOLLOW_MM };
-        let mut met = [None; WHEELS];
-        let standing = self.legs.iter_mut().filter(|leg| leg.stands());
-        for (leg, met) in standing.zip(&mut met) {
-            *met = leg.level(rise, most_mm);
+        if hang && !self.tipping {
+            meet(&mut self.felt, Some(Felt::TipGuard));
         }
-        met.into_iter().flatten().for_each(|felt| self.meet(felt));
+        self.tipping = hang;
+        let most_mm = if hang { TIPPING_MM } else { FOLLOW_MM };
+        for leg in self.legs.iter_mut().filter(|leg| leg.stands()) {
+            meet(&mut self.felt, leg.level(rise, most_mm));
+        }
     }
 
     /// Time left of a leg's stance at a motion, s.
@@ -325,7 +314,7 @@ impl Walk {
         };
         let since_s = f32::from(self.since_swing) * CYCLE_S;
         let spent = self.left_s(wanted, next) <= EXCHANGE_S;
-        let apart = if self.last.is_none() || spent {
+        let apart = if self.steps == 0 || spent {
             0.0
         } else {
             libm::ceilf((apart_s - since_s) / CYCLE_S)

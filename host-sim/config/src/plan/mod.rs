@@ -28,6 +28,7 @@ use crate::error::ConfigError;
 use crate::params::FieldSpec;
 use crate::quantity::Dimension;
 use crate::reader::Reader;
+use crate::scenario::MAX_DURATION_S;
 
 /// How the values of factors that are not on a grid are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -190,15 +191,12 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         Some(_) => r.choice(&top, "keep", &KEEP),
         None => Some(KeepLogs::None),
     };
-    let limit = FieldSpec {
-        key: "limit",
-        dimension: Dimension::Time,
-        min: 0.01,
-        max: 9.0e6,
-        components: 1,
-        integer: false,
-        doc: "simulated time after which a case is given up",
-    };
+    let limit = FieldSpec::scalar(
+        "limit",
+        Dimension::Time,
+        [0.01, MAX_DURATION_S],
+        "simulated time after which a case is given up",
+    );
     let limit_s = match top.get("limit") {
         Some(_) => r.quantity(&top, &limit).map(|s| s.first().copied()),
         None => Some(None),

@@ -7,34 +7,17 @@ use crate::reader::{Entry, Reader};
 /// A field in degrees.
 pub(super) const fn angle(key: &'static str, degrees: [f64; 2], doc: &'static str) -> FieldSpec {
     let [min, max] = [degrees[0].to_radians(), degrees[1].to_radians()];
-    scalar(key, Dimension::Angle, [min, max], doc)
+    FieldSpec::scalar(key, Dimension::Angle, [min, max], doc)
 }
 
 /// A length in metres.
 pub(super) const fn length(key: &'static str, range_m: [f64; 2], doc: &'static str) -> FieldSpec {
-    scalar(key, Dimension::Length, range_m, doc)
+    FieldSpec::scalar(key, Dimension::Length, range_m, doc)
 }
 
 /// A pure number.
 pub(super) const fn number(key: &'static str, range: [f64; 2], doc: &'static str) -> FieldSpec {
-    scalar(key, Dimension::Number, range, doc)
-}
-
-const fn scalar(
-    key: &'static str,
-    dimension: Dimension,
-    [min, max]: [f64; 2],
-    doc: &'static str,
-) -> FieldSpec {
-    FieldSpec {
-        key,
-        dimension,
-        min,
-        max,
-        components: 1,
-        integer: false,
-        doc,
-    }
+    FieldSpec::scalar(key, Dimension::Number, range, doc)
 }
 
 /// A part as it is read; what nobody asked for is told in the end.

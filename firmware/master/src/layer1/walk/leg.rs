@@ -13,6 +13,7 @@ use super::felt::Felt;
 use super::geometry::{Twist, WalkGeometry};
 use crate::contact::{FootSwitches, Side};
 use crate::layer1::params::STROKE_MM;
+use crate::layer1::units::metres;
 use crate::mirror;
 use crate::setpoint::{Ahead, Cylinder, Feedback, JointSetpoint, OnLinkLoss, Reflex};
 
@@ -28,12 +29,12 @@ const SEARCH_MM: f32 = 1.0;
 /// The slow way begins when the piston is as near to its begin as this, mm.
 const SEARCH_FROM_MM: f32 = 5.0;
 /// Stroke by which a stance presses on beyond the first touch, mm: it takes its share of the load
-/// (`terrain` study: 4 mm against the air's stiffness give about 10 N).
+/// (4 mm against the stiffness of the air, about 2.7 N/mm).
 pub(super) const PRESS_MM: f32 = 4.0;
 /// Fastest change of a standing leg's height, mm per cycle (30 mm/s).
 const NOSE_MM: f32 = 0.3;
-/// A bump lifts a foot by so much more, mm.
-const HIGHER_MM: f32 = 40.0;
+/// A bump, or a try to get on, lifts a foot by so much more, mm.
+pub(super) const HIGHER_MM: f32 = 40.0;
 /// A foot that reaches slower than this, mm per cycle (10 mm/s), …
 const STALLED_MM: f32 = 0.1;
 /// … for so many cycles, from so many after the begin of the reach on, has run against something.
@@ -93,7 +94,6 @@ impl Sensed {
         let stroke = |cylinder| -> Option<PositionMm> {
             feedback.strokes_mm.get(side.joint(cylinder)).copied()?
         };
-        let metres = |mm: PositionMm| mm.get().to_num::<f32>() * 1e-3;
         let plane = [stroke(Cylinder::Yaw)?, stroke(Cylinder::Horizontal)?];
         let [s2, s5] = plane.map(metres);
         let s6 = metres(stroke(Cylinder::Vertical)?);
@@ -112,7 +112,7 @@ impl Sensed {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
     pub side: Side,
-    pub state: LegState,
+    state: LegState,
     /// Where the foot is meant to be, m from O4.
     pub foot_m: [f32; 2],
     /// Stroke of b6 at which the leg stands, mm.
@@ -122,7 +122,7 @@ pub(super) struct Leg {
     /// Cycles until it is going to rise, if it is.
     pub rises_in: Option<u8>,
     /// Cycles since the state began.
-    pub cycles: u16,
+    cycles: u16,
     /// Cycles for which the foot has been loaded without a break.
     pub loaded: u16,
     /// Cycles for which all switches have been open without a break.
@@ -409,7 +409,8 @@ fn in_plane(side: Side, [x, y]: [f32; 2], [ux, uy]: [f32; 2]) -> Option<[JointSe
     Some([joint(s2, v2), joint(s5, v5)])
 }
 
-fn full_mm() -> f32 {
+/// Stroke of b6, mm.
+pub(super) fn full_mm() -> f32 {
     STROKE_MM.get().to_num::<f32>()
 }
 
