@@ -58,17 +58,7 @@ pub fn failure_bound(failures: u32, trials: u32) -> f64 {
     if failures == trials {
         return 1.0;
     }
-    // The probability falls with p: bisection to the last bit or so.
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..60 {
-        let p = 0.5 * (low + high);
-        if at_most(failures.into(), trials.into(), p) > 0.05 {
-            low = p;
-        } else {
-            high = p;
-        }
-    }
-    high
+    binomial::falling(|p| at_most(failures.into(), trials.into(), p) - ALPHA)
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{BufWriter, Read, Seek, Write};
 use std::path::Path;
 
-use mcap::Compression;
 use mcap::records::MessageHeader;
+use mcap::{Compression, MAGIC};
 
 use super::registry::{ChannelDef, json_schema};
 use super::samples::channels;
@@ -28,6 +28,22 @@ pub(crate) fn options() -> mcap::WriteOptions {
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
         .library(concat!("wheeleg ", env!("CARGO_PKG_VERSION")))
+}
+
+/// Takes the first bytes of a log.
+///
+/// # Errors
+/// [`LogError::NotALog`] if they are others, [`LogError::Output`] if they cannot be read.
+pub(crate) fn begins_as_log(source: &mut impl Read, path: &Path) -> Result<(), LogError> {
+    let mut magic = Vec::new();
+    let mut begin = source.take(MAGIC.len() as u64);
+    begin
+        .read_to_end(&mut magic)
+        .map_err(|e| LogError::output("read the log", path, e))?;
+    if magic != MAGIC {
+        return Err(LogError::NotALog { path: path.into() });
+    }
+    Ok(())
 }
 
 /// Writes an MCAP log in compressed chunks.

@@ -13,6 +13,7 @@ use mcap::sans_io::LinearReaderOptions;
 use mcap::{MAGIC, McapError};
 use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
 
+use super::log_file::begins_as_log;
 use super::samples::channels;
 use crate::LogError;
 
@@ -67,12 +68,7 @@ pub fn read_from(
     take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
 ) -> Result<Read, LogError> {
     let unreadable = |e| LogError::output("read the log", path, e);
-    let mut magic = Vec::new();
-    let mut begin = source.by_ref().take(MAGIC.len() as u64);
-    begin.read_to_end(&mut magic).map_err(unreadable)?;
-    if magic != MAGIC {
-        return Err(LogError::NotALog { path: path.into() });
-    }
+    begins_as_log(&mut source, path)?;
     let source = MAGIC.chain(source);
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)

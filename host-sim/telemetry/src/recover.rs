@@ -1,14 +1,14 @@
 //! A whole log from one whose writer was killed.
 
 use std::fs::{self, File};
-use std::io::{BufReader, BufWriter, Read as _, Seek as _};
+use std::io::{BufReader, BufWriter, Seek as _};
 use std::path::Path;
 
+use mcap::McapError;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
-use mcap::{MAGIC, McapError};
 
-use super::log_file::options;
+use super::log_file::{begins_as_log, options};
 use crate::LogError;
 
 /// What [`recover`] made.
@@ -45,12 +45,7 @@ fn checked() -> LinearReaderOptions {
 pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
     let unreadable = |e| LogError::output("read the log", from, e);
     let mut source = File::open(from).map_err(unreadable)?;
-    let mut magic = Vec::new();
-    let mut begin = source.by_ref().take(MAGIC.len() as u64);
-    begin.read_to_end(&mut magic).map_err(unreadable)?;
-    if magic != MAGIC {
-        return Err(LogError::NotALog { path: from.into() });
-    }
+    begins_as_log(&mut source, from)?;
     source.rewind().map_err(unreadable)?;
     let target =
         File::create_new(to).map_err(|e| LogError::output("create the recovered log", to, e))?;

@@ -1,6 +1,6 @@
 //! The binomial distribution, and what it says of a share that was counted.
 
-/// Two-sided error probability of all intervals.
+/// Error probability: of both sides of an interval together, of the one side of a bound.
 pub const ALPHA: f64 = 0.05;
 /// Standard normal quantile at 1 − α/2.
 const Z: f64 = 1.959_963_984_540_054;
@@ -65,7 +65,7 @@ pub fn clopper_pearson(k: u64, n: u64) -> [f64; 2] {
 }
 
 /// Root in 0 … 1 of a function that falls, to the last bit or so.
-fn falling(f: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn falling(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
