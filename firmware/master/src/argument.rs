@@ -279,6 +279,17 @@ macro_rules! arguments {
     };
 }
 
+/// Speeds of a walk, mm/s.
+pub(crate) const WALK_SPEEDS: Limits<I16F16> = Limits {
+    min: I16F16::lit("-150"),
+    max: I16F16::lit("150"),
+};
+/// Rates of turning of a walk, rad/s.
+pub(crate) const TURNS: Limits<I16F16> = Limits {
+    min: I16F16::lit("-0.175"),
+    max: I16F16::lit("0.175"),
+};
+
 arguments! {
     JOINT = "joint", ArgumentKind::Whole(Limits { min: 1, max: 6 }), "Joint: left yaw, horizontal, vertical, then right.";
     STROKE = "stroke", FULL_STROKE, "Stroke of the joint, 0 retracted.";
@@ -313,8 +324,8 @@ arguments! {
     LEFT = "left", ArgumentKind::Length(Limits { min: I16F16::lit("-60"), max: I16F16::lit("60") }), "Travel of the foot over the whole arch, to the robot's left; 0 in the paper.";
     HEIGHT = "height", FULL_STROKE, "Height of the arch.";
     RATE = "rate", ArgumentKind::Rate(Limits { min: I16F16::lit("0.05"), max: I16F16::lit("2") }), "Rate of the sine's argument; 1/8 rad/s in the paper. The arch takes pi/rate.";
-    WALK_SPEED = "speed", ArgumentKind::Velocity(Limits { min: I16F16::lit("-150"), max: I16F16::lit("150") }), "Speed of the walk, positive forward.";
-    TURN = "turn", ArgumentKind::Rate(Limits { min: I16F16::lit("-0.175"), max: I16F16::lit("0.175") }), "Rate of turning, positive to the left; 0.0873 rad/s are 5 degrees a second.";
+    WALK_SPEED = "speed", ArgumentKind::Velocity(WALK_SPEEDS), "Speed of the walk, positive forward.";
+    TURN = "turn", ArgumentKind::Rate(TURNS), "Rate of turning, positive to the left; 0.0873 rad/s are 5 degrees a second.";
     WALK_PATTERN = "pattern", ArgumentKind::Choice(&["alternate", "tandem"]), "alternate: the legs swing half a cycle apart; tandem: one right after the other, then both pull.";
     WALK_LIFT = "lift", ArgumentKind::Length(Limits { min: I16F16::lit("20"), max: I16F16::lit("170") }), "Height of a swing over where the foot stood.";
     NOSE = "nose", ArgumentKind::Length(Limits { min: I16F16::lit("-120"), max: I16F16::ZERO }), "Height of the nose, 0 with the legs fully extended.";

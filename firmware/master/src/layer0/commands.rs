@@ -281,13 +281,16 @@ impl Layer0 {
         Ok(false)
     }
 
-    /// What tells a wheel board the speed and acceleration of its profiles.
+    /// What tells a wheel board the speed and acceleration of its profiles; where it is streamed
+    /// its references, the speed that these never exceed.
     fn profile_messages(&self) -> [Message; 2] {
+        let push = self.push.speed_mm_s;
+        let speed = match self.config.wheel_drive {
+            WheelDrive::Profile => self.units.speed(push),
+            WheelDrive::Stream => self.units.limit(push.max(self.config.walk.fastest_wheel())),
+        };
         [
-            proto::WheelMaxSpeed {
-                speed: self.units.speed(self.push.speed_mm_s),
-            }
-            .into(),
+            proto::WheelMaxSpeed { speed }.into(),
             proto::WheelAcceleration {
                 acceleration: self.units.acceleration(self.push.acceleration_mm_s2),
             }
@@ -296,12 +299,12 @@ impl Layer0 {
     }
 
     /// Takes over the profile that layer 1 wants for its pushes. Armed wheels
-    /// that make their own profile are told at once; the others when they arm.
+    /// are told at once, the others when they arm.
     pub(super) fn shape_pushes(&mut self, push: PushProfile) {
         if push == self.push {
             return;
         }
-        let tell = self.power == Power::Armed && self.config.wheel_drive == WheelDrive::Profile;
+        let tell = self.power == Power::Armed;
         // Not now is not never: layer 1 asks again in every cycle.
         if tell && !self.jobs.has_room(PROFILE_JOBS) {
             return;

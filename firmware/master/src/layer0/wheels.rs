@@ -35,6 +35,15 @@ impl WheelUnits {
         Speed7::new(counts as u8).unwrap_or_default()
     }
 
+    /// Limit of the speed of streamed references that reach `speed`: whole counts per sample,
+    /// 1..=127. Rounded up, and one more in which a wheel catches up with its reference; a limit
+    /// below the references would let them run away, and end a push in a jolt.
+    #[must_use]
+    pub fn limit(&self, speed: VelocityMmS) -> Speed7 {
+        let counts = (libm::ceilf(self.per_sample(speed)) + 1.0).clamp(1.0, 127.0);
+        Speed7::new(counts as u8).unwrap_or_default()
+    }
+
     /// Acceleration of a profile: nearest 1/256 count per sample², at least one.
     #[must_use]
     pub fn acceleration(&self, mm_s2: fixed::types::I16F16) -> Acceleration8p8 {

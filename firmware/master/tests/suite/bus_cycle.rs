@@ -66,6 +66,28 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
     );
 }
 
+/// A limit below what is streamed lets the wheels fall behind their references, and the stop at
+/// the end of a push becomes a jolt.
+#[test]
+fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
+    let mut rig = Rig::new(MasterConfig {
+        wheel_drive: WheelDrive::Stream,
+        ..MasterConfig::default()
+    });
+    rig.arm();
+    // 150 mm/s and 0.175 rad/s at 0.28 m: 199 mm/s, above the 180 mm/s of a push;
+    // 110.35 counts/mm and 520 µs make 11.42 counts of them, rounded up and one more.
+    assert_eq!(profiles(&mut rig), [[13, 5], [13, 5]]);
+    let faster = GaitParams {
+        push_speed_mm_s: VelocityMmS::from_int(250),
+        ..GaitParams::default()
+    };
+    rig.submit(Command::SetGait(faster));
+    rig.run(20);
+    // 14.35 counts.
+    assert_eq!(profiles(&mut rig), [[13, 5, 16, 5], [13, 5, 16, 5]]);
+}
+
 /// Speeds and accelerations that both wheels were told, in order.
 fn profiles(rig: &mut Rig) -> [Vec<u16>; 2] {
     [7, 8].map(|node| {

@@ -3,6 +3,9 @@
 //! Lengths in m, angles in rad, `f32`; X forward and Y left. A foot's place is told from the yaw
 //! axis O4 of its leg, in the robot's axes.
 
+use wheeleg_units::VelocityMmS;
+
+use crate::argument::{TURNS, WALK_SPEEDS};
 use crate::contact::Side;
 
 /// Dimensions of the robot that a walk needs.
@@ -24,6 +27,15 @@ impl Default for WalkGeometry {
             hip_y_m: 0.20,
             track_m: 0.56,
         }
+    }
+}
+
+impl WalkGeometry {
+    /// Speed of the outer wheel in the fastest and tightest walk that can be ordered.
+    pub(crate) fn fastest_wheel(&self) -> VelocityMmS {
+        let turn_rad_s = TURNS.max.to_num::<f32>();
+        let outward_mm_s = 1e3 * 0.5 * self.track_m * turn_rad_s;
+        VelocityMmS::from_f64(f64::from(WALK_SPEEDS.max.to_num::<f32>() + outward_mm_s))
     }
 }
 
