@@ -4,8 +4,8 @@
 
 Without a key and with a wrong one nothing is shown. With the right one: ready, walk, stop the gait,
 provoke a fault, read its remedy, stop with Esc from within a field. Who has the view key may look and
-stop. Signals are plotted, frozen and zoomed; what is done is recorded, and repeats to the bit. Wheels are driven
-by hand: who lets go holds. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
+stop. Signals are plotted, frozen and zoomed; what is done is recorded, and repeats to the bit. Somebody drives by
+hand, with wheels and legs and with the wheels alone: who lets go stops. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
 nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
@@ -95,7 +95,7 @@ def becomes_ready(page):
 def walks(page):
     for _ in range(ATTEMPTS):
         press(page, "Walk")
-        if waits(page, "Gait", ["lift", "reach", "lower", "push"]):
+        if waits(page, "Gait", ["walk, step"]):
             return True
         becomes_ready(page)
     return False
@@ -159,42 +159,62 @@ def place(page):
     return float(text.split("(")[1].split(",")[0])
 
 
-def drives(page, name, begin, end):
-    """Somebody holds on, and the robot moves; lets go, and it holds and stands. A busy browser may lose the control in
-    between: then all begins anew."""
+def drives(page, name, begin, end, ends, least_mm=2.0):
+    """Somebody holds on, and the robot moves; lets go, and it does what it `ends` with, and stands. A busy browser may
+    lose the control in between: then all begins anew."""
     for _ in range(ATTEMPTS):
         before = place(page)
         begin()
-        page.wait_for_timeout(1200)
+        page.wait_for_timeout(1500)
         end()
-        page.wait_for_timeout(900)
+        try:
+            page.wait_for_function("ends => document.querySelector('.answer').textContent.trim().startsWith(ends)", arg=f"{ends}: done", timeout=6000)
+            ended = True
+        except Exception:
+            ended = False
+        page.wait_for_timeout(2500)
         rest = place(page)
         page.wait_for_timeout(500)
-        answer = page.inner_text(".answer").strip()
-        moved, stands = abs(rest - before) > 2.0, abs(place(page) - rest) < 1.0
-        held = answer.startswith("Hold: done")
-        if moved and stands and held:
+        moved, stands = abs(rest - before) > least_mm, abs(place(page) - rest) < 1.0
+        if moved and stands and ended:
             return
+        answer = page.inner_text(".answer").strip()
         becomes_ready(page)
-    problems.append(f"{name}: moved {moved}, then stands {stands}, holds {held}: {answer!r}")
+    problems.append(f"{name}: moved {moved}, then stands {stands}, ends with {ends} {ended}: {answer!r}")
 
 
 def drives_by_hand(page):
     button = page.get_by_role("button", name="Forward")
     button.scroll_into_view_if_needed()
+    page.select_option("select[aria-label='What moves']", "wheels")
 
     def press_it():
         box = button.bounding_box()
         page.mouse.move(box["x"] + 10, box["y"] + 10)
         page.mouse.down()
 
-    drives(page, "the button", press_it, page.mouse.up)
+    drives(page, "the button", press_it, page.mouse.up, "Hold")
 
     def arrow():
         button.focus()
         page.keyboard.down("ArrowDown")
 
-    drives(page, "the arrow key", arrow, lambda: page.keyboard.up("ArrowDown"))
+    drives(page, "the arrow key", arrow, lambda: page.keyboard.up("ArrowDown"), "Hold")
+
+
+def walks_by_hand(page):
+    """The legs step along; who lets go stops with both feet down, and the robot is not held."""
+    page.select_option("select[aria-label='What moves']", "walk")
+    button = page.get_by_role("button", name="Forward")
+    button.scroll_into_view_if_needed()
+    box = button.bounding_box()
+
+    def press_it():
+        page.mouse.move(box["x"] + 10, box["y"] + 10)
+        page.mouse.down()
+
+    drives(page, "walking by hand", press_it, page.mouse.up, "StopGait", 20.0)
+    expect(cell(page, "State") == "ARMED", f"after a walk by hand: {cell(page, 'State')}")
 
 
 def drives_by_gamepad(page):
@@ -205,7 +225,7 @@ def drives_by_gamepad(page):
     before = place(page)
     page.wait_for_timeout(1200)
     expect(abs(place(page) - before) < 1.0, "a stick without its shoulder button drives")
-    drives(page, "the gamepad", lambda: page.evaluate(pad, True), lambda: page.evaluate(pad, False))
+    drives(page, "the gamepad", lambda: page.evaluate(pad, True), lambda: page.evaluate(pad, False), "Hold")
     page.evaluate("() => { window.testPad = null; }")
 
 
@@ -239,6 +259,8 @@ def journey(browser, console, folder):
     drives_by_hand(page)
     drives_by_gamepad(page)
     expect(becomes_ready(page), f"Ready after driving: {page.inner_text('.answer')!r}")
+    walks_by_hand(page)
+    expect(becomes_ready(page), f"Ready after driving: {page.inner_text('.answer')!r}")
     plots(page, folder)
     board_table(page)
     before = page.locator(".views .side svg").inner_html()
@@ -246,8 +268,8 @@ def journey(browser, console, folder):
     expect(page.locator(".views .side svg").inner_html() != before, "the robot stands still on the page while it walks")
     page.evaluate("scrollTo(0, 0)")
     page.screenshot(path=folder / "walking.png")
-    if page.locator(".buttons button", has_text="Stop gait").count():
-        press(page, "Stop gait")
+    if page.locator(".buttons button", has_text="Stop walking").count():
+        press(page, "Stop walking")
 
     page.select_option("select[aria-label=Fault]", "pot-open")
     page.fill("input[aria-label='Target and value']", ":joint3")

@@ -96,6 +96,12 @@ impl Phase {
     pub const fn is_moving(self) -> bool {
         !matches!(self, Self::Idle | Self::Ready | Self::Done | Self::Hold)
     }
+
+    /// Whether `StopGait` ends what the robot does: a gait, a walk or a trajectory.
+    #[must_use]
+    pub const fn is_stepping(self) -> bool {
+        self.is_moving() && !matches!(self, Self::Homing)
+    }
 }
 
 /// Coming change of a reference, for control ahead of a known move.

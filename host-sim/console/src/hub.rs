@@ -713,6 +713,7 @@ impl Inner {
             "hold": status.hold.as_ref().map(hold_name),
             "emergency_stop": status.emergency_stop,
             "phase": phase_name(status.phase),
+            "stepping": status.phase.is_stepping(),
             "step": status.step,
             "robot": robot,
             "simulated": true,

@@ -1,90 +1,141 @@
-// Driving by hand: the wheels follow as long as somebody holds on, by button, arrow key or gamepad.
-// Who lets go holds the robot. What moves is the command `WheelReference`, in short pieces, each
-// with a deadline of its own: nothing that is late moves anything.
+// Driving by hand: the robot moves as long as somebody holds on, by button, arrow key or gamepad.
+//
+// "Wheels and legs" gives the command `Walk`, anew where speed or turn has changed; who lets go stops
+// the walk, both feet down. "Wheels alone" gives `WheelReference` in short pieces; who lets go holds
+// the robot. Each command has a deadline of its own: nothing that is late moves anything.
 import { html, say } from "./dom.js";
 
-/** A piece is given this often, ms. */
+/** A command is given this often at most, ms. */
 const PIECE_MS = 200;
-/** Fastest, mm/s at the rim. */
+/** Fastest, mm/s at the rim and for the robot. */
 const FASTEST = 150;
+/** Tightest turn, degrees a second. */
+const TIGHTEST = 10;
+const RADIANS = Math.PI / 180;
 /** A stick nearer to its middle than this is in its middle. */
 const DEAD_ZONE = 0.12;
 /** Buttons of the standard gamepad that must be held: the shoulders. */
 const DEAD_MAN = [4, 5];
+/** Key, direction ahead and turn to the left. */
+const DIRECTIONS = [
+  ["Turn left", "←", "ArrowLeft", 0, 1],
+  ["Forward", "↑", "ArrowUp", 1, 0],
+  ["Backward", "↓", "ArrowDown", -1, 0],
+  ["Turn right", "→", "ArrowRight", 0, -1],
+];
+const HELP = "No gamepad. Hold a button, or an arrow key while one of them has the focus; letting go stops.";
 
 /** @param {(name: string, args?: Object<string, any>) => Promise<boolean>} command */
 export function driver(command) {
-  /** Who holds on, and how fast, as a share from −1 to 1. @type {Map<string, number>} */
+  /** Who holds on, and how far: ahead and to the left, each from −1 to 1. @type {Map<string, number[]>} */
   const held = new Map();
-  let moving = false;
+  /** What the robot does by our command. @type {null | "walk" | "wheels"} */
+  let moving = null;
+  let given = "";
   let busy = false;
-  const speed = html("input", { type: "range", min: 10, max: FASTEST, value: 60, step: 10, "aria-label": "Speed of driving, mm/s" });
-  const shown = html("output", {}, `${speed.value} mm/s`);
-  speed.addEventListener("input", () => say(shown, `${speed.value} mm/s`));
-  const pad = html("p", { class: "effect", role: "status" }, "No gamepad. Hold a button, or ↑ and ↓ while one of them has the focus; letting go holds the robot.");
 
-  const hold = (who, share) => held.set(who, share);
+  const slider = (name, unit, min, max, value, step) => {
+    const input = html("input", { type: "range", min, max, value, step, "aria-label": `${name}, ${unit}` });
+    const shown = html("output", {}, `${value} ${unit}`);
+    input.addEventListener("input", () => say(shown, `${input.value} ${unit}`));
+    return { input, row: html("label", {}, html("span", {}, name), input, shown) };
+  };
+  const choice = (name, options) => html("select", { "aria-label": name }, options.map(([value, text]) => html("option", { value }, text)));
+  const means = choice("What moves", [["walk", "Wheels and legs"], ["wheels", "Wheels alone"]]);
+  const speed = slider("Speed", "mm/s", 10, FASTEST, 100, 10);
+  const turn = slider("Turn", "°/s", 1, TIGHTEST, 4, 1);
+  const lift = slider("Lift", "mm", 20, 170, 60, 10);
+  const nose = slider("Nose", "mm", -120, 0, -20, 10);
+  const pattern = choice("Pattern", [["alternate", "legs alternate"], ["tandem", "legs in tandem"]]);
+  const gait = html("details", {}, html("summary", {}, "Steps"), html("div", { class: "drive" }, html("label", {}, html("span", {}, "Pattern"), pattern), lift.row, nose.row));
+  const pad = html("p", { class: "effect", role: "status" }, HELP);
+
+  /** A `Walk` with shares of the speed and turn that are set. */
+  function order(ahead, left) {
+    return {
+      speed: Math.round(ahead * Number(speed.input.value)),
+      turn: Math.round(left * Number(turn.input.value) * RADIANS * 1e3) / 1e3,
+      pattern: pattern.value,
+      lift: Number(lift.input.value),
+      nose: Number(nose.input.value),
+    };
+  }
+  const hold = (who, ahead, left) => held.set(who, [ahead, left]);
   const release = (who) => held.delete(who) && held.size === 0 && stop();
   /** Lets go of everything. */
   function stop() {
     held.clear();
-    if (!moving) return;
-    moving = false;
-    command("Hold");
+    const was = moving;
+    moving = null;
+    given = "";
+    if (was === "walk") command("StopGait");
+    if (was === "wheels") command("Hold");
   }
-  const button = (name, key, share) => {
-    const one = html("button", { class: "btn", type: "button" }, html("span", {}, name), html("small", {}, `hold, or ${key}`));
+  means.addEventListener("change", () => {
+    stop();
+    gait.hidden = means.value === "wheels";
+  });
+
+  const buttons = DIRECTIONS.map(([name, sign, key, ahead, left]) => {
+    const one = html("button", { class: "btn", type: "button" }, html("span", {}, name), html("small", {}, `hold, or ${sign}`));
     one.addEventListener("pointerdown", (event) => {
       one.setPointerCapture(event.pointerId);
-      hold(name, share);
+      hold(name, ahead, left);
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) one.addEventListener(end, () => release(name));
-    return one;
-  };
-  const buttons = [button("Backward", "↓", -1), button("Forward", "↑", 1)];
-  const root = html("section", { class: "panel", "aria-label": "Drive by hand" }, html("h2", {}, "Drive by hand"), html("div", { class: "drive" }, buttons, html("label", {}, speed, shown)), pad);
-  const KEYS = { ArrowUp: 1, ArrowDown: -1 };
-  for (const one of buttons) {
     one.addEventListener("keydown", (event) => {
-      const share = KEYS[event.key];
-      if (share === undefined) return;
+      const direction = DIRECTIONS.find((d) => d[2] === event.key);
+      if (!direction) return;
       event.preventDefault();
-      hold(event.key, share);
+      event.stopPropagation();
+      hold(event.key, direction[3], direction[4]);
     });
     one.addEventListener("keyup", (event) => release(event.key));
-    one.addEventListener("blur", () => Object.keys(KEYS).forEach(release));
-  }
+    one.addEventListener("blur", () => DIRECTIONS.forEach((d) => release(d[2])));
+    return one;
+  });
+  const root = html("section", { class: "panel", "aria-label": "Drive by hand" }, html("h2", {}, "Drive by hand"), html("div", { class: "drive" }, html("label", {}, html("span", {}, "Moves"), means), buttons, speed.row, turn.row), gait, pad);
   addEventListener("blur", stop);
 
   /** Reads the first gamepad; its stick moves nothing unless a shoulder is held. */
   function gamepad() {
     const one = [...navigator.getGamepads()].find((found) => found?.connected);
     if (!one) {
+      say(pad, HELP);
       release("gamepad");
       return;
     }
     const holds = DEAD_MAN.some((i) => one.buttons[i]?.pressed);
-    say(pad, `${one.id.slice(0, 40)}: hold a shoulder button and push the left stick; letting go holds the robot.`);
-    const share = -(one.axes[1] ?? 0);
-    if (holds) hold("gamepad", Math.abs(share) < DEAD_ZONE ? 0 : share);
+    say(pad, `${one.id.slice(0, 40)}: hold a shoulder button and push the left stick; letting go stops.`);
+    const [left, ahead] = [0, 1].map((axis) => {
+      const share = -(one.axes[axis] ?? 0);
+      return Math.abs(share) < DEAD_ZONE ? 0 : share;
+    });
+    if (holds) hold("gamepad", ahead, left);
     else release("gamepad");
   }
 
   setInterval(async () => {
     gamepad();
     if (held.size === 0 || busy) return;
-    const share = [...held.values()].reduce((sum, one) => sum + one, 0);
-    const travel = Math.max(-1, Math.min(1, share)) * Number(speed.value) * (PIECE_MS / 1000);
-    if (travel === 0) return;
+    const [ahead, left] = [0, 1].map((axis) => Math.max(-1, Math.min(1, [...held.values()].reduce((sum, one) => sum + one[axis], 0))));
+    const way = /** @type {"walk" | "wheels"} */ (means.value);
+    const walk = order(ahead, left);
+    // A walk goes on until it is changed or stopped; a piece of way ends by itself.
+    const wanted = JSON.stringify(walk);
+    const travel = Math.round(ahead * Number(speed.input.value) * PIECE_MS * 1e-2) / 10;
+    if (way === "walk" ? wanted === given || (moving === null && walk.speed === 0 && walk.turn === 0) : travel === 0) return;
     busy = true;
-    moving = true;
-    const done = await command("WheelReference", { travel: Math.round(travel * 10) / 10 });
+    moving = way;
+    given = wanted;
+    const done = await (way === "walk" ? command("Walk", walk) : command("WheelReference", { travel }));
     busy = false;
-    // Who is refused has let go: the next piece needs a new hold.
+    // Who is refused has let go: the next command needs a new hold.
     if (!done) {
       held.clear();
-      moving = false;
+      moving = null;
+      given = "";
     }
   }, PIECE_MS);
-  return { root, stop };
+  return { root, stop, order };
 }

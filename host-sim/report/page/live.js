@@ -220,14 +220,13 @@ form.addEventListener("submit", (submit) => {
 // ---- what the operator does ----
 const take = button("Take control", "0x0125", () => command(mine() ? "ReleaseControl" : "TakeControl"));
 const ready = button("Ready", "take, arm, stand", () => inTurn(...(mine() ? [] : ["TakeControl"]), "Arm", "Stand"));
-const walk = button("Walk", "StartGait", () => command(walking() ? "StopGait" : "StartGait"));
+const walk = button("Walk", "as set below", () => (stepping() ? command("StopGait") : command("Walk", byHand.order(1, 0))));
 const hold = button("Hold", "Space", () => command("Hold"));
 const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
 const byHand = driver(command);
 const mine = () => Boolean(link && now.state?.control?.session === link.session);
-const WALKING = new Set(["unload", "lift", "reach", "lower", "push", "rest", "trajectory"]);
-const walking = () => WALKING.has(now.state?.phase);
+const stepping = () => Boolean(now.state?.stepping);
 
 addEventListener("keydown", (key) => {
   const inField = key.target instanceof Element && key.target.matches("input, select, textarea");
@@ -241,7 +240,7 @@ addEventListener("keydown", (key) => {
     keys.open = !keys.open;
   }
 });
-const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, outside of a field"], ["↑ ↓", "drive by hand, on its buttons"], ["← →", "the cursor of the plots, by 20 ms; with Shift by 200 ms"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
+const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, outside of a field"], ["↑ ↓ ← →", "drive by hand, on its buttons"], ["← →", "on a plot: its cursor, by 20 ms; with Shift by 200 ms"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
 /** Who does not look does not drive. */
 const leaves = () => {
   byHand.stop();
@@ -303,14 +302,14 @@ function showState(state) {
   const stopped = state.emergency_stop ? "STOPPED" : state.hold ? `HOLD: ${state.hold.replaceAll("_", " ")}` : null;
   say(head.mode.value, !state.alive ? "master is dead" : stopped ?? (state.armed ? ROLE.armed : ROLE.disarmed));
   head.mode.root.classList.toggle("alarm", Boolean(stopped) || !state.alive);
-  say(head.gait.value, state.step > 0 && walking() ? `${state.phase}, step ${state.step}` : state.phase);
+  say(head.gait.value, state.step > 0 && state.stepping ? `${state.phase}, step ${state.step}` : state.phase);
   say(head.control.value, mine() ? "you" : (state.control?.holder ?? "free"));
   const speed = state.pace.paused ? "paused" : `× ${fixed(state.pace.factor)}`;
   say(head.speed.value, speed);
   say(take.firstElementChild, mine() ? "Release control" : "Take control");
   say(take.lastElementChild, mine() ? "0x0126" : "0x0125");
-  say(walk.firstElementChild, walking() ? "Stop gait" : "Walk");
-  say(walk.lastElementChild, walking() ? "StopGait" : "StartGait");
+  say(walk.firstElementChild, state.stepping ? "Stop walking" : "Walk");
+  say(walk.lastElementChild, state.stepping ? "feet down" : "as set below");
   const looks = link?.identity.role !== "control";
   for (const b of [take, ready, walk, hold, disarm, clear, record]) b.toggleAttribute("disabled", looks);
   boards.state(state);
@@ -365,7 +364,7 @@ const listener = {
     now.t_us = Math.max(now.t_us, state.master_us);
   },
   event(event) {
-    const bad = event.kind === "fault" || event.code === "fault";
+    const bad = event.kind === "fault";
     events.prepend(html("li", { class: bad ? "bad" : "" }, html("time", {}, fixed(event.t_ns * 1e-9, 2)), html("span", {}, event.text)));
     while (events.childElementCount > EVENTS) events.lastElementChild?.remove();
   },
