@@ -94,3 +94,9 @@ fn the_robot_walks_backward_and_turns_on_the_spot() {
 fn the_robot_walks_over_rocks() {
     met(&builtin::scenario("rocks-20").expect("built in"), [1]);
 }
+
+/// Nails are out of the sand before a foot moves ahead, and go in before it stands.
+#[test]
+fn the_robot_walks_on_sand() {
+    met(&builtin::scenario("sand-flat").expect("built in"), [1]);
+}

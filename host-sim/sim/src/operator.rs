@@ -116,7 +116,16 @@ impl Operator {
         }
         let (command, next) = match self.stage {
             Stage::Enumerating if world.master().is_ready() => (Command::Arm, Stage::Arming),
-            Stage::Arming if world.master().is_armed() => (Command::Stand, Stage::Homing),
+            Stage::Arming if world.master().is_armed() => {
+                if matches!(self.motion, Motion::Walk(_)) {
+                    // A walk begins where the robot stands.
+                    self.stage = Stage::Settling {
+                        until_ns: now_ns + self.rest_ns,
+                    };
+                    return Ok(false);
+                }
+                (Command::Stand, Stage::Homing)
+            }
             Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
             _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, HELP)),
             _ => return Ok(false),

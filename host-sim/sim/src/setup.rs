@@ -16,6 +16,13 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 use super::operator::side;
 use wheeleg_config::{LegChoice, Motion, RobotConfig, Scenario};
 
+/// Stroke of b5 with which a walk begins, m: almost as far out as a foothold can be, so that the
+/// feet carry as much as they can.
+const WALK_S5_M: f64 = 0.165;
+/// Places of a leg's cylinders.
+const YAW: usize = 0;
+const VERTICAL: usize = 2;
+
 /// The leg that moves; the left one where the scenario does not say.
 fn stepping_leg(scenario: &Scenario) -> LegChoice {
     match scenario.motion {
@@ -43,15 +50,31 @@ fn sums(robot: &RobotConfig) -> [Option<u32>; 8] {
 /// The plant of the robot, standing on the scenario's ground in the start pose of the gait.
 ///
 /// Powering up in the start pose, chambers at their initial pressures, is the
-/// paper's home position; the start-up then arms and settles there.
+/// paper's home position; the start-up then arms and settles there. For a walk
+/// it is set down with both feet far out and the nose where the walk wants it:
+/// with one leg drawn back and the nose up it falls on its tail on steep ground.
 pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
     let gait = &robot.gait;
     let home = [gait.yaw_s2_m, 0.0, gait.stroke_m];
     let held = [gait.yaw_s2_m, gait.held_leg_s5_m, gait.held_leg_s6_m];
     let mut plant = robot.plant.clone();
-    let (left, right) = match stepping_leg(scenario) {
-        LegChoice::Left => (home, held),
-        LegChoice::Right => (held, home),
+    let (left, right) = match scenario.motion {
+        Motion::Walk(order) => {
+            let nose_m = order.nose_mm.get().to_num::<f64>() * 1e-3;
+            let feet_out = [gait.yaw_s2_m, WALK_S5_M, gait.stroke_m + nose_m];
+            if nose_m < 0.0 {
+                // Not at its end stop: no pressure may push it there.
+                for leg in [0, 3] {
+                    let trapped = &robot.plant.cylinders[leg + YAW];
+                    let vertical = &mut plant.cylinders[leg + VERTICAL];
+                    vertical.initial_pressure_a_pa = trapped.initial_pressure_a_pa;
+                    vertical.initial_pressure_b_pa = trapped.initial_pressure_b_pa;
+                }
+            }
+            (feet_out, feet_out)
+        }
+        _ if stepping_leg(scenario) == LegChoice::Left => (home, held),
+        _ => (held, home),
     };
     plant.initial_stroke_m[..3].copy_from_slice(&left);
     plant.initial_stroke_m[3..].copy_from_slice(&right);
@@ -91,6 +114,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
             hip_x_m: body.o4_m[0] as f32,
             hip_y_m: body.o4_m[1] as f32,
             track_m: robot.plant.spatial.track_m as f32,
+            nail_m: robot.plant.contacts.foot.nails.length_m as f32,
         },
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,

@@ -17,6 +17,8 @@ pub struct WalkGeometry {
     pub hip_y_m: f32,
     /// Distance of the wheels' middles, m.
     pub track_m: f32,
+    /// Length of the nails below a sole, m: a foot moves ahead when they are out of the ground.
+    pub nail_m: f32,
 }
 
 impl Default for WalkGeometry {
@@ -26,6 +28,7 @@ impl Default for WalkGeometry {
             hip_x_m: 0.60,
             hip_y_m: 0.20,
             track_m: 0.56,
+            nail_m: 0.0,
         }
     }
 }
@@ -180,6 +183,7 @@ mod tests {
         hip_x_m: 0.60,
         hip_y_m: 0.20,
         track_m: 0.56,
+        nail_m: 0.0,
     };
 
     #[test]

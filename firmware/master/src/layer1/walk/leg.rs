@@ -17,8 +17,10 @@ use crate::layer1::units::metres;
 use crate::mirror;
 use crate::setpoint::{Ahead, Cylinder, Feedback, JointSetpoint, OnLinkLoss, Reflex};
 
-/// A foot is clear of the ground after half of the lift, or after so much of it, mm.
+/// A foot is clear of hard ground after half of the lift, or after so much of it, mm.
 const CLEAR_MM: f32 = 20.0;
+/// Nails are out of the ground after their length, or after this share of the lift.
+const NAILS_OUT: f32 = 0.9;
 /// Share of the way to the foothold after which the foot goes down: what is left takes as long as
 /// the way down.
 const LOWER_FROM: f32 = 0.6;
@@ -137,6 +139,8 @@ pub(super) struct Leg {
     without: u16,
     /// Footholds of this swing that had no ground.
     tries: u8,
+    /// Nails go into the ground: a touch does not end the way down yet.
+    through: bool,
     /// Foot of the last cycle, m.
     before_m: [f32; 2],
     /// Foot from which progress counts, m.
@@ -167,6 +171,7 @@ impl Leg {
             stalled: 0,
             without: 0,
             tries: 0,
+            through: false,
             before_m: sensed.foot_m,
             anchor_m: sensed.foot_m,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
@@ -189,6 +194,8 @@ impl Leg {
     pub(super) fn swing(&mut self, higher_mm: f32) {
         self.higher_mm = higher_mm;
         self.tries = 0;
+        // Where a touch would have been, as the leg stands now.
+        self.ground_mm = self.stand_mm - PRESS_MM;
         self.enter(LegState::Lift(self.stand_mm));
     }
 
@@ -235,7 +242,9 @@ impl Leg {
             }
             LegState::Lift(from_mm) => {
                 self.follow(moved, geometry);
-                let clear = CLEAR_MM.min(0.5 * lift_mm.min(from_mm));
+                let lift_mm = lift_mm.min(from_mm);
+                let hard = CLEAR_MM.min(0.5 * lift_mm);
+                let clear = hard.max((1e3 * geometry.nail_m).min(NAILS_OUT * lift_mm));
                 if sensed.height_mm <= from_mm - clear {
                     let foothold = self.nearer(foothold);
                     self.enter(LegState::Reach(distance(sensed.foot_m, foothold)));
@@ -252,7 +261,9 @@ impl Leg {
                 }
                 let started = self.cycles > STARTED;
                 self.stalled = count(self.stalled, started && slow);
-                if self.stalled < STALLED && !(started && sensed.touches) {
+                // Tips of nails may still scratch the ground.
+                let runs_against = started && sensed.touches && geometry.nail_m == 0.0;
+                if self.stalled < STALLED && !runs_against {
                     return None;
                 }
                 self.stalled = 0;
@@ -266,7 +277,11 @@ impl Leg {
                 }
                 Some(Felt::Bump(self.side))
             }
-            LegState::Lower(to_mm) => self.touch(sensed, to_mm),
+            LegState::Lower(to_mm) => {
+                // A nail feels the ground by its length before the sole is there.
+                self.through = geometry.nail_m > 0.0 && sensed.height_mm < self.ground_mm;
+                self.touch(sensed, to_mm)
+            }
         }
     }
 
@@ -278,7 +293,7 @@ impl Leg {
 
     /// A foot on its way down.
     fn touch(&mut self, sensed: &Sensed, to_mm: f32) -> Option<Felt> {
-        if sensed.touches {
+        if sensed.touches && !self.through {
             self.foot_m = sensed.foot_m;
             self.ground_mm = sensed.height_mm;
             self.stand_mm = (sensed.height_mm + PRESS_MM).min(full_mm());
@@ -372,6 +387,7 @@ impl Leg {
             LegState::Stance => (self.stand_mm, Reflex::None),
             LegState::Lift(from_mm) => (from_mm - lift_mm, Reflex::None),
             LegState::Reach(_) => (self.stand_mm - lift_mm, Reflex::None),
+            LegState::Lower(to_mm) if self.through => (to_mm, Reflex::None),
             LegState::Lower(to_mm) => (to_mm, Reflex::StopOnTouch),
         };
         let rises = self.rises_in.filter(|_| self.stands());
