@@ -1,6 +1,7 @@
 //! What a person asks of the simulator, one module a question.
 //!
 //! * [`run`]: one scenario with log, targets and report; [`analysis`] judges it;
+//! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
 //! * [`matrix`]: every fault, and what must come of it;
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`bench`]);
 //! * [`figures`]: the paper's figures and misprints;
@@ -24,6 +25,7 @@ pub mod compare;
 pub mod delay;
 mod error;
 pub mod export;
+pub mod field;
 pub mod figures;
 pub mod matrix;
 mod motion;

@@ -10,6 +10,7 @@ mod ctl;
 mod delay;
 mod export;
 mod faults;
+mod field;
 mod figures;
 mod interface;
 mod list;
@@ -95,6 +96,8 @@ enum Command {
     Commission(commission::CommissionArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
+    /// Try the walks over terrain on several seeds, beside what the paper claims.
+    Field(field::FieldArgs),
     /// Measure and explain the start delay of a pneumatic joint; writes a report.
     Delay(delay::DelayArgs),
     /// Compare controllers on one or more axes; writes report, figures and tables.
@@ -133,6 +136,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Commission(args)) => commission::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
+        Some(Command::Field(args)) => field::command(&args),
         Some(Command::Delay(args)) => delay::command(&args),
         Some(Command::Compare(args)) => compare::command(&args),
         Some(Command::Tune(args)) => tune::command(&args),
