@@ -339,6 +339,43 @@ fn arrows_point_one_way() {
     }
 }
 
+/// The list that a newcomer reads is the table that is held; crates of tests and tools are not in it.
+#[test]
+fn the_architecture_lists_the_arrows() {
+    let short = |name: &str| name.trim_start_matches("wheeleg-").to_owned();
+    let beside = [
+        "wheeleg-fuzz-targets",
+        "wheeleg-peers",
+        "wheeleg-tests",
+        "xtask",
+        "insn-plugin",
+    ];
+    let table: BTreeMap<String, BTreeSet<String>> = ARROWS
+        .iter()
+        .filter(|(name, _)| !beside.contains(name))
+        .map(|(name, uses)| (short(name), uses.iter().map(|name| short(name)).collect()))
+        .collect();
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("it is there");
+    let section = text.split("## Arrows").nth(1).expect("its arrows");
+    let section = section.split("## ").next().expect("a section");
+    let mut listed = BTreeMap::new();
+    for line in section.lines().filter_map(|line| line.strip_prefix("    ")) {
+        let (names, uses) = line.split_once(": ").expect("crates: crates");
+        let uses: BTreeSet<String> = match uses {
+            "none" => BTreeSet::new(),
+            uses => uses.split(", ").map(str::to_owned).collect(),
+        };
+        for name in names.split(", ") {
+            assert_eq!(
+                listed.insert(name.to_owned(), uses.clone()),
+                None,
+                "{name} twice"
+            );
+        }
+    }
+    assert_eq!(listed, table);
+}
+
 /// Of the crates that `name` depends on, those that its line in the table does not allow.
 fn upward(name: &str, dependencies: &BTreeSet<String>) -> Vec<String> {
     let line = ARROWS.iter().find(|(listed, _)| *listed == name);
@@ -561,6 +598,17 @@ fn every_source_file_can_be_read_in_one_sitting() {
         })
         .collect();
     assert!(long.is_empty(), "{long:?}");
+}
+
+/// What a newcomer reads first fits into an hour.
+#[test]
+fn the_first_documents_are_short() {
+    for (name, most) in [("README.md", 120), ("ARCHITECTURE.md", 150)] {
+        let text = fs::read_to_string(root().join(name)).expect(name);
+        let lines = text.lines().count();
+        assert!(lines <= most, "{name}: {lines} lines, at most {most}");
+        assert!(lines > most / 2, "{name}: {lines} lines");
+    }
 }
 
 /// Features of the board crate that plant a mistake in its images.
