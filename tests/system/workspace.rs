@@ -729,6 +729,24 @@ fn documents_point_to_what_exists() {
             }
         }
     }
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("it is there");
+    let pages = files().into_iter().filter_map(|(name, text)| {
+        let page = name.strip_prefix("docs/")?.to_owned();
+        page.ends_with(".md").then_some((page, text))
+    });
+    for (page, text) in pages {
+        if page != "SUMMARY.md" && !summary.contains(&format!("]({page})")) {
+            dead.push(format!("docs/SUMMARY.md lacks {page}"));
+        }
+        let decision = page
+            .strip_prefix("decisions/")
+            .filter(|p| *p != "README.md");
+        for head in ["Status: ", "## Context", "## Choice", "## Consequence"] {
+            if decision.is_some() && !text.lines().any(|line| line.starts_with(head)) {
+                dead.push(format!("docs/{page} lacks {head:?}"));
+            }
+        }
+    }
     let architecture = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("it is there");
     let places = architecture.split('`').skip(1).step_by(2);
     let tops = [

@@ -12,14 +12,15 @@ use tokio::sync::watch;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_telemetry::event::hold_name;
-use wheeleg_telemetry::{OwnedSample, channels};
+use wheeleg_telemetry::{OwnedSample, channels, phase};
 
 use crate::catalogue::Catalogue;
 use crate::live::{Answer, Input, Moving, Report, Robot, Signals, Status};
 use crate::outbox::{Close, Outbox};
+use crate::reason::Reason;
 use crate::record;
 use crate::request::{BadRequest, Body, HostCommand, Order, Spoken};
-use crate::words::{done, event_json, outcome, phase_name, refused, rounded};
+use crate::words::{done, event_json, outcome, refused, rounded};
 
 /// How often the rings are emptied.
 pub(crate) const PERIOD: Duration = Duration::from_millis(5);
@@ -261,7 +262,7 @@ impl Hub {
                         Some(now_us) => done(n, now_us),
                         None => refused(
                             n,
-                            "not_confirmed",
+                            Reason::NotConfirmed,
                             "NOT CONFIRMED within 200 ms: cut the air",
                         ),
                     };
@@ -270,7 +271,7 @@ impl Hub {
             }
             _ if limited => inner.tell(
                 id,
-                &refused(n, "busy", "too many frames: at most 100 per second"),
+                &refused(n, Reason::Busy, "too many frames: at most 100 per second"),
             ),
             Body::Subscribe { channels, hz } => {
                 inner.subscribe(id, &channels, hz);
@@ -418,13 +419,13 @@ impl Inner {
         };
         if client.role != Role::Control {
             let text = "the view key may look and stop; connect with the control key";
-            return self.tell(id, &refused(n, "role", text));
+            return self.tell(id, &refused(n, Reason::Role, text));
         }
         let holds = self.holder.as_ref().is_some_and(|h| h.client == id);
         let (input, what) = match order {
             Order::Robot(Command::EmergencyStop) => {
                 let text = "a stop is no command that waits: send {\"op\":\"stop\"}";
-                return self.tell(id, &refused(n, "bad_command", text));
+                return self.tell(id, &refused(n, Reason::BadCommand, text));
             }
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
@@ -445,7 +446,7 @@ impl Inner {
                     }
                     _ if !holds => {
                         let text = "take the control first";
-                        return self.tell(id, &refused(n, "not_in_control", text));
+                        return self.tell(id, &refused(n, Reason::NotInControl, text));
                     }
                     _ => {}
                 }
@@ -482,7 +483,10 @@ impl Inner {
             if takes && !holds {
                 self.holder = None;
             }
-            return self.tell(id, &refused(n, "busy", "the queue to the robot is full"));
+            return self.tell(
+                id,
+                &refused(n, Reason::Busy, "the queue to the robot is full"),
+            );
         }
         let pending = Pending {
             client: id,
@@ -498,7 +502,7 @@ impl Inner {
     /// The answer to who wants what another holds.
     fn held(&self, n: u64, holder: &Holder) -> Value {
         let text = format!("{:?} holds the control", holder.name);
-        let mut answer = refused(n, "control_held", &text);
+        let mut answer = refused(n, Reason::ControlHeld, &text);
         answer["holder"] = json!(holder.name);
         answer["age_ms"] = json!(self.age_ms());
         answer
@@ -712,7 +716,7 @@ impl Inner {
             "armed": status.armed,
             "hold": status.hold.as_ref().map(hold_name),
             "emergency_stop": status.emergency_stop,
-            "phase": phase_name(status.phase),
+            "phase": phase::name(status.phase),
             "stepping": status.phase.is_stepping(),
             "step": status.step,
             "robot": robot,

@@ -24,6 +24,7 @@ mod mac;
 mod outbox;
 mod page;
 mod rate;
+pub mod reason;
 mod record;
 pub mod replay;
 pub mod request;

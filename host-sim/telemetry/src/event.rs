@@ -172,6 +172,23 @@ pub enum EventKind {
 }
 
 impl EventKind {
+    /// All of them.
+    const ALL: [Self; 7] = [
+        Self::Info,
+        Self::Scenario,
+        Self::Command,
+        Self::Mode,
+        Self::Fault,
+        Self::Contact,
+        Self::Log,
+    ];
+
+    /// The kind of this name, as logged.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// Lower-case name, as logged.
     #[must_use]
     pub const fn name(self) -> &'static str {
