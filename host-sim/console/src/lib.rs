@@ -21,6 +21,7 @@ mod hub;
 pub mod keys;
 mod live;
 mod mac;
+mod messages;
 mod outbox;
 mod page;
 mod rate;
@@ -30,7 +31,6 @@ pub mod replay;
 pub mod request;
 mod server;
 mod session;
-mod words;
 
 pub use api::SUBPROTOCOL;
 pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};

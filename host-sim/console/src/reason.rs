@@ -95,7 +95,7 @@ mod tests {
     fn the_contract_lists_the_reasons() {
         let contract = include_str!("../PROTOCOL.md");
         let (_, table) = contract.split_once("| `reason` | |\n").expect("the table");
-        let rows = table.lines().take_while(|line| line.starts_with("| "));
+        let rows = table.lines().take_while(|line| line.starts_with('|'));
         let mut listed: BTreeSet<&str> = BTreeSet::new();
         for names in rows.filter_map(|row| row.split('|').nth(1)) {
             listed.extend(names.split('`').skip(1).step_by(2));

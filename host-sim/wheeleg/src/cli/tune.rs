@@ -111,7 +111,7 @@ fn text(tuned: &Tuned, report: &Path) -> String {
     );
     let _ = writeln!(
         text,
-        "opening delay  {found} (sheet {:.2} ms)\nvalve res.     {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})",
+        "opening delay  {found} (sheet {:.2} ms)\nresolution     {:.2} (of the valves: force of the shortest opening over what friction holds; coarse above {COARSE})",
         valve.t_on_s * 1e3,
         tuned.valve_resolution.ratio,
     );
