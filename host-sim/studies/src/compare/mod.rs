@@ -28,7 +28,7 @@ pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 use crate::StudyError;
 use crate::axis_sim::suite::{AxisSimError, TestRig};
 use crate::axis_sim::{Kind, design, optimal};
-use crate::study::{self, Ended, Finished, Job, Progress, Settings, Stopped};
+use crate::study::{self, Ended, Finished, Job, Progress, STACK, Settings, Stopped};
 use wheeleg_config::AxisConfig;
 
 /// What is compared.
@@ -166,6 +166,7 @@ impl Comparison {
     ) -> Result<Self, StudyError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(options.threads)
+            .stack_size(STACK)
             .build()
             .map_err(|e| {
                 StudyError::refused(format!("cannot start threads: {e}"), "try --threads 1")
