@@ -244,7 +244,6 @@ fn master(event: &MasterEvent) -> String {
     }
 }
 
-/// Name of a side or sector inside a sentence.
 /// What a walk has met, and what it does.
 fn walk(felt: Felt) -> String {
     match felt {
