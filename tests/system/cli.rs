@@ -108,7 +108,7 @@ fn json_is_one_object_with_every_key() {
     ] {
         assert!(object.contains_key(key), "no `{key}` in {json}");
     }
-    assert_eq!(json["seed"], 3);
+    assert_eq!(json["seed"], "3");
     let recorded = json["recorded_s"].as_f64().expect("a number");
     assert!((recorded - 0.5).abs() < 1e-6, "{recorded}");
     // The start-up is simulated too.

@@ -244,6 +244,15 @@ impl SupplyModel {
         ];
     }
 
+    /// The largest pressure that a chamber can have \[Pa\]: twice the highest of the supply. A piston
+    /// that runs against trapped air stays below it.
+    #[must_use]
+    pub fn most_pa(&self) -> f64 {
+        let p = &self.params;
+        let highest_pa = p.source_pressure_pa.max(p.set_pressure_pa);
+        2.0 * highest_pa.max(p.initial_pressure_pa)
+    }
+
     /// Refuses a state that is not finite or has left the model's range.
     ///
     /// # Errors

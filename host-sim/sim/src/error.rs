@@ -8,14 +8,23 @@ use wheeleg_telemetry::LogError;
 /// Why a simulation could not be built or continued.
 #[derive(Debug, Error, Diagnostic)]
 pub enum SimError {
-    /// A part refuses its parameters, the robot does not get ready, the plant leaves the range
-    /// of its model, or a fault cannot be injected.
+    /// A part refuses its parameters, the robot does not get ready, or a fault cannot be injected.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::simulation), help("{help}"))]
     Simulation {
         /// What went wrong.
         what: String,
         /// What the user can do.
+        help: String,
+    },
+
+    /// The plant has left the range of its model: the run ends at once.
+    #[error("{what}")]
+    #[diagnostic(code(wheeleg::unphysical), help("{help}"))]
+    Unphysical {
+        /// When, which part, and what was last known of it.
+        what: String,
+        /// The parameters that most likely did it.
         help: String,
     },
 

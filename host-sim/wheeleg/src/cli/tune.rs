@@ -109,11 +109,13 @@ fn text(tuned: &Tuned, report: &Path) -> String {
         || "not found".to_owned(),
         |d| format!("{:.2} ms", d.t_on_s * 1e3),
     );
+    let grain = tuned.grain.ratio;
+    let grain = grain.map_or_else(|| "n/a".to_owned(), |ratio| format!("{ratio:.2}"));
     let _ = writeln!(
         text,
-        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})",
+        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {} (force of the shortest opening over what friction holds; coarse above {COARSE})",
         valve.t_on_s * 1e3,
-        tuned.grain.ratio,
+        grain,
     );
     let parameters = report.with_file_name(PARAMETERS);
     for worse in &tuned.worse {
