@@ -5,6 +5,7 @@
 mod program;
 mod sil;
 
+mod axis_text;
 mod bus_budget;
 mod check_vectors;
 mod cli;
@@ -23,6 +24,7 @@ mod moving_mass;
 mod mutated_files;
 mod off_data;
 mod plant_check;
+mod practice;
 mod precharge;
 mod predictive_robot;
 #[cfg(unix)]

@@ -82,16 +82,20 @@ pub(super) fn number(value: Option<&Value>) -> Option<f64> {
 
 /// The number that a text begins with, and what follows it.
 fn split_number(text: &str) -> Option<(Value, &str)> {
+    let number = |text: &str| match text.parse::<i64>() {
+        Ok(whole) => Some(Value::from(whole)),
+        Err(_) => text.parse::<f64>().ok().map(Value::from),
+    };
+    let (word, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    if let Some(value) = number(word) {
+        return Some((value, rest));
+    }
+    // Without a space. A unit may begin with what could be part of a number.
     let is_part = |c: char| c.is_ascii_digit() || "+-._eE".contains(c);
     let longest = text.find(|c| !is_part(c)).unwrap_or(text.len());
-    // A unit may begin with what could be part of a number.
     (1..=longest).rev().find_map(|end| {
-        let (number, unit) = text.split_at_checked(end)?;
-        let value = match number.parse::<i64>() {
-            Ok(whole) => Value::from(whole),
-            Err(_) => Value::from(number.parse::<f64>().ok()?),
-        };
-        Some((value, unit))
+        let (begin, unit) = text.split_at_checked(end)?;
+        Some((number(begin)?, unit))
     })
 }
 
