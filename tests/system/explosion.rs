@@ -40,7 +40,7 @@ fn exploded(robot: &RobotConfig) -> (String, String) {
     for rows in &recording.joints {
         let last = &rows.last().expect("last values").v;
         for value in [last.pressure_a_bar, last.pressure_b_bar] {
-            assert!((0.0..23.0).contains(&value), "{value} bar");
+            assert!((0.0..45.0).contains(&value), "{value} bar");
         }
         assert!(
             last.velocity_mm_s.abs() < 1e5,
@@ -59,38 +59,36 @@ fn exploded(robot: &RobotConfig) -> (String, String) {
 
 #[test]
 fn what_explodes_is_named_with_its_likely_cause() {
-    // Bristles that a step of 100 µs cannot follow on these masses.
+    // Bristles that a step of 100 µs cannot follow on so light a rod.
     let mut stiff = robot();
+    stiff.plant.body.leg_bodies[5].mass_kg = 0.05;
     for cylinder in &mut stiff.plant.cylinders {
-        cylinder.friction.bristle_damping_n_s_m = 1e6;
+        cylinder.friction.bristle_damping_n_s_m = 2000.0;
     }
     let (what, help) = exploded(&stiff);
     assert!(what.contains("joint "), "{what}");
     assert!(help.contains("`friction.bristle_damping`"), "{help}");
 
-    // Chambers that a step empties.
+    // A reservoir that a step empties and fills.
     let mut small = robot();
-    for cylinder in &mut small.plant.cylinders {
-        cylinder.dead_volume_a_m3 = 1e-9;
-        cylinder.dead_volume_b_m3 = 1e-9;
-        cylinder.line_volume_m3 = 0.0;
-    }
+    small.plant.supply.reservoir_m3 = 1e-6;
+    small.plant.supply.droop_pa = 100.0;
     let (what, help) = exploded(&small);
-    assert!(what.contains("(/joint/"), "{what}");
-    assert!(help.contains("`cylinder.dead_volume_"), "{help}");
+    assert!(what.contains("the supply (/supply)"), "{what}");
+    assert!(help.contains("`supply.reservoir`"), "{help}");
 }
 
 /// A pressure that the supply cannot have made is none, long before it is a strange number.
 #[test]
-fn twice_the_supply_is_too_much() {
+fn four_times_the_supply_is_too_much() {
     let robot = robot();
     let plant = wheeleg_plant::Plant::new(&robot.plant).expect("a plant");
     let mut state = plant.initial_state(1).expect("it stands");
     let most_pa = plant.assembly.supply.most_pa();
     let source_pa = robot.plant.supply.source_pressure_pa;
-    assert!((most_pa / source_pa - 2.0).abs() < 1e-12, "{most_pa}");
+    assert!((most_pa / source_pa - 4.0).abs() < 1e-12, "{most_pa}");
     let chamber = &mut state.core.cylinders[2].chamber_a;
-    chamber.pv_j *= 5.0;
+    chamber.pv_j *= 10.0;
     let error = plant
         .tick(&mut state, &Inputs::default())
         .expect_err("too much");

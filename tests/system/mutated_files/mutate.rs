@@ -64,28 +64,31 @@ fn mistake(rng: &mut impl Rng, text: &str, other: &str) -> (String, String) {
         return (text.to_owned(), "nothing left".to_owned());
     };
     let what = match rng.random_range(0..100_u32) {
-        0..20 => changed(rng, &mut lines, &code, "unit", unit),
-        20..35 => changed(rng, &mut lines, &code, "sign", |_, line| {
+        0..22 => changed(rng, &mut lines, &code, "unit", unit),
+        22..38 => changed(rng, &mut lines, &code, "sign", |_, line| {
             number(line, |n| match n.strip_prefix('-') {
                 Some(positive) => positive.to_owned(),
                 None => format!("-{n}"),
             })
         }),
-        35..58 => changed(rng, &mut lines, &code, "magnitude", |rng, line| {
-            let power = [-6, -4, -3, -2, -1, 1, 2, 3, 4, 6];
+        38..68 => changed(rng, &mut lines, &code, "magnitude", |rng, line| {
+            let power = [-6, -3, -2, -1, -1, 1, 1, 2, 3, 6];
             let power = power[rng.random_range(0..power.len())];
-            number(line, |n| format!("{n}e{power}"))
+            number(line, |n| {
+                let value = n.parse::<f64>().unwrap_or_default();
+                format!("{:?}", value * 10_f64.powi(power))
+            })
         }),
-        58..66 => changed(rng, &mut lines, &code, "edge", |rng, line| {
+        68..74 => changed(rng, &mut lines, &code, "edge", |rng, line| {
             let edge = EDGES[rng.random_range(0..EDGES.len())];
             number(line, |_| edge.to_owned())
         }),
-        66..78 => {
+        74..82 => {
             let &to = pick(rng, &code).unwrap_or(&at);
             lines.swap(at, to);
             format!("lines {} and {} swapped", at + 1, to + 1)
         }
-        78..90 => {
+        82..92 => {
             let pasted = section(rng, other);
             let heads = code.iter().filter(|i| lines[**i].starts_with('['));
             let heads: Vec<usize> = heads.copied().collect();
@@ -94,8 +97,8 @@ fn mistake(rng: &mut impl Rng, text: &str, other: &str) -> (String, String) {
             lines.splice(place..place, pasted);
             what
         }
-        90..94 => format!("line {} lost: {}", at + 1, lines.remove(at)),
-        94..97 => {
+        92..95 => format!("line {} lost: {}", at + 1, lines.remove(at)),
+        95..98 => {
             lines.insert(at, lines[at].clone());
             format!("line {} twice", at + 1)
         }
