@@ -609,11 +609,9 @@ fn texts_of_a_file_are_quoted_wherever_they_go() {
         .args([&out, &scenario])
         .assert()
         .success();
-    for page in ["report.html"] {
-        let page = fs::read_to_string(out.join(page)).expect("a page");
-        assert!(!page.contains("<b onload") && !page.contains("</script><b"));
-        assert!(page.contains("&lt;b onload"), "it is shown");
-    }
+    let page = fs::read_to_string(out.join("report.html")).expect("a page");
+    assert!(!page.contains("<b onload") && !page.contains("</script><b"));
+    assert!(page.contains("&lt;b onload"), "it is shown");
     // A log page, a listing as JSON and an export read the same texts.
     wheeleg()
         .arg("view")

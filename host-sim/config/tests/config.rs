@@ -612,6 +612,18 @@ fn gait_times_that_contradict_each_other() {
             &format!("`push_speed` in line {}", line(speed)),
         ],
     );
+    // Beside a flag that is missing, too.
+    let flag = ROBOT
+        .lines()
+        .find(|line| line.starts_with("touchdown_reflex"));
+    let text = told(&[
+        (value, "period            = { value = 1.0"),
+        (flag.expect("present"), ""),
+    ]);
+    assert_all(
+        &text,
+        &["[gait] lacks touchdown_reflex", "`gait.push` contradict"],
+    );
     // All that is wrong at once.
     let text = told(&[
         (
