@@ -191,7 +191,8 @@ const PROGRAM: [&str; 12] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 17] = [
+const TESTED: [&str; 18] = [
+    "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-control",
     "wheeleg-identity",

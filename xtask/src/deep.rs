@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 13] = [
+const CHECKS: [Check; 14] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -69,6 +69,12 @@ const CHECKS: [Check; 13] = [
         "two hours of standing, longer than the 2^32 us of a counter, in bounded memory",
         8,
         long_run,
+    ),
+    Check(
+        "practice",
+        "400 built-in files with mistakes in them, run or refused in words",
+        10,
+        practice,
     ),
     Check(
         "state-flips",
@@ -209,6 +215,12 @@ fn long_run() -> StepResult<String> {
         ("WHEELEG_LONG_RUN_S", 7_200),
         " s simulated in ",
     )
+}
+
+fn practice() -> StepResult<String> {
+    let test = "mutated_files::each_is_run_or_refused_in_words";
+    let amount = ("WHEELEG_MUTATED_FILES", 400);
+    measured(["system", test], amount, " mutated files from number ")
 }
 
 fn fuzzing() -> StepResult<String> {

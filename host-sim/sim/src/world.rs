@@ -30,6 +30,7 @@ use super::downtime::DownTimes;
 use super::rogue_nodes::RogueNodes;
 use crate::SimError;
 use crate::faults::Injector;
+use crate::unphysical;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
@@ -253,7 +254,7 @@ impl World {
     fn advance_plant(&mut self) -> Result<(), SimError> {
         self.plant
             .advance_to(&mut self.state, self.now_ns)
-            .map_err(|e| unphysical(self.now_ns, &e))
+            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))
     }
 
     /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
@@ -298,7 +299,7 @@ impl World {
         self.inputs.dump = self.active_outputs(7).dump;
         self.plant
             .apply(&mut self.state, &self.inputs)
-            .map_err(|e| unphysical(self.now_ns, &e))?;
+            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))?;
         self.outputs = self.plant.outputs(&self.state);
         let sensed = match sensed {
             Some(sensed) => sensed,
@@ -487,16 +488,6 @@ impl World {
     pub(super) fn plant(&self) -> &Plant {
         &self.plant
     }
-}
-
-fn unphysical(now_ns: u64, error: &wheeleg_plant::PlantError) -> SimError {
-    SimError::simulation(
-        format!(
-            "the plant left its range at {:.4} s after power-up: {error}",
-            now_ns as f64 * 1e-9
-        ),
-        "what was logged up to here is complete; check the robot's parameters",
-    )
 }
 
 #[cfg(test)]

@@ -182,7 +182,10 @@ fn a_cut_log_is_recovered_as_a_whole_one() {
         let cut = (bytes.len() * tenth / 10 + 17 * tenth).min(bytes.len());
         let (from, to) = (path("cut.mcap"), path(&format!("{tenth}.mcap")));
         std::fs::write(&from, &bytes[..cut]).expect("written");
-        let recovered = recover(&from, &to).expect("a log");
+        let stopped = recover(&from, &to, &|| true).expect("a log");
+        assert!(stopped.is_none() && !to.exists());
+        let recovered = recover(&from, &to, &|| false).expect("a log");
+        let recovered = recovered.expect("to the end");
         assert_eq!(recovered.was_whole, tenth == 10);
         let read = std::fs::read(&to).expect("written");
         let strict = mcap::MessageStream::new(&read).expect("an MCAP file");
@@ -202,7 +205,7 @@ fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
     log_to(&path("log.mcap"), 10.0);
     let bytes = std::fs::read(path("log.mcap")).expect("written");
     let text = |from: &str, to: &str| {
-        let error = recover(&path(from), &path(to)).expect_err("refused");
+        let error = recover(&path(from), &path(to), &|| false).expect_err("refused");
         error.to_string()
     };
     std::fs::write(path("notes.txt"), "notes").expect("written");

@@ -253,9 +253,11 @@ fn announce(duration_s: f64) {
     if duration_s > LONG_S {
         let bytes = |per_s: f64| per_s * duration_s * 1e-9;
         let (log, tables) = (bytes(LOG_BYTES_PER_S), bytes(TABLE_BYTES_PER_S));
-        eprintln!(
+        let told = format!(
             "{duration_s:.0} s to simulate: about {log:.2} GB of log and {tables:.2} GB of tables"
         );
+        // Standard error may be closed or full.
+        let _ = writeln!(std::io::stderr(), "{told}");
     }
 }
 
