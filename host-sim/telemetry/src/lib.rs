@@ -17,9 +17,13 @@
 //! * **event**: something that happened, with cause and time
 //! * **sink**: a place where samples go
 //! * **provenance**: what went into a run: program, robot, scenario, seed
+//! * **derived channel**: one of the log that follows from others, in the words of other programs
 //! * **hash**: BLAKE3 over channel, time and value of all samples at full rate
 
+mod attachments;
+mod contact;
 mod csv_out;
+mod derived;
 mod difference;
 mod encode;
 mod error;
@@ -37,7 +41,10 @@ mod ring;
 pub mod samples;
 mod sink;
 
+pub use attachments::attachments;
+pub use contact::{Contact, ContactBody};
 pub use csv_out::Tables;
+pub use derived::{Attached, DERIVED_HZ, Derive, Derived, DerivedDef, Put, derived};
 pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use error::LogError;

@@ -13,6 +13,7 @@ use mcap::sans_io::LinearReaderOptions;
 use mcap::{MAGIC, McapError};
 use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
 
+use super::derived::derived;
 use super::log_file::begins_as_log;
 use super::samples::channels;
 use crate::LogError;
@@ -91,7 +92,12 @@ pub fn read_from(
                 break;
             }
         };
-        let channel = places.get(message.channel.topic.as_str());
+        let topic = message.channel.topic.as_str();
+        // What follows from the others.
+        if derived().iter().any(|def| def.topic == topic) {
+            continue;
+        }
+        let channel = places.get(topic);
         let Some(channel) = channel.filter(|_| message.data.len() <= MAX_MESSAGE) else {
             end.others += 1;
             continue;

@@ -1,8 +1,5 @@
-//! The robot for other programs.
+//! The robot and its logs for other programs.
 
 mod file;
-mod geometry;
-mod tree;
-pub mod urdf;
 
 pub use file::write_new;

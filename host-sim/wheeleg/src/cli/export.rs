@@ -7,8 +7,9 @@ use clap::{Args, Subcommand};
 
 use super::print;
 use wheeleg_config::builtin;
+use wheeleg_scene::urdf;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::export::{urdf, write_new};
+use wheeleg_studies::export::write_new;
 
 /// Arguments of `wheeleg export`.
 #[derive(Debug, Args)]
