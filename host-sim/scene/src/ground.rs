@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use wheeleg_plant::soil::Soil;
 use wheeleg_plant::terrain::{HeightMap, Material, Part, Shape, Surface, Terrain};
 
-use super::json::{Colour, Entity};
+use super::json::{Colour, Entity, ONCE};
 
 /// Half the side of the square of a plane that is drawn, about the start \[m\].
 const PLANE_M: f64 = 30.0;
@@ -35,7 +35,7 @@ pub(super) fn material(part: &Part) -> String {
 
 /// Appends the terrain as one entity of the world.
 pub(super) fn write(out: &mut Vec<u8>, t_ns: u64, terrain: &Terrain, world: &str) {
-    let mut entity = Entity::default();
+    let mut entity = Entity::new(ONCE);
     for part in &terrain.parts {
         let colour = if part.material.soil.is_some() {
             SOFT

@@ -3,8 +3,10 @@
 use nalgebra::{Isometry3, Quaternion, Vector3};
 use wheeleg_telemetry::push_fixed;
 
-/// Digits after the point of lengths in pictures, m.
-const PICTURE: u8 = 4;
+/// Digits after the point of lengths in a picture that is drawn once, m.
+pub(super) const ONCE: u8 = 4;
+/// The same of one that is drawn over and over.
+pub(super) const OFTEN: u8 = 3;
 
 /// Red, green, blue, opacity.
 pub(super) type Colour = [f64; 4];
@@ -77,13 +79,22 @@ const KINDS: [&str; 7] = [
 ];
 
 /// A thing of a scene.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Entity {
+    digits: u8,
     /// Bodies of the arrays of [`KINDS`].
     arrays: [Vec<u8>; 7],
 }
 
 impl Entity {
+    /// Nothing yet; lengths have this many digits.
+    pub(super) fn new(digits: u8) -> Self {
+        Self {
+            digits,
+            arrays: Default::default(),
+        }
+    }
+
     /// Begins the next element of an array.
     fn next(&mut self, kind: usize) -> &mut Vec<u8> {
         let array = &mut self.arrays[kind];
@@ -110,8 +121,9 @@ impl Entity {
                 nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI)
             });
         let head = 0.02_f64.min(0.5 * length);
+        let digits = self.digits;
         let out = self.next(1);
-        put_pose(out, &Isometry3::from_parts((*from).into(), turn));
+        put_pose(out, &Isometry3::from_parts((*from).into(), turn), digits);
         let sizes = [length - head, 0.006, head, 0.016];
         let names = [
             "shaft_length",
@@ -121,7 +133,7 @@ impl Entity {
         ];
         for (name, size) in names.into_iter().zip(sizes) {
             put(out, &format!(",\"{name}\":"));
-            push_fixed(out, size, PICTURE);
+            push_fixed(out, size, digits);
         }
         put_colour(out, colour);
         put(out, "}");
@@ -155,10 +167,11 @@ impl Entity {
         scales: &str,
         colour: Colour,
     ) {
+        let digits = self.digits;
         let out = self.next(kind);
-        put_pose(out, at);
+        put_pose(out, at, digits);
         put(out, ",");
-        put_vector(out, "size", size, PICTURE);
+        put_vector(out, "size", size, digits);
         put(out, scales);
         put_colour(out, colour);
         put(out, "}");
@@ -166,20 +179,22 @@ impl Entity {
 
     /// Separate lines between pairs of points \[m\], one pixel wide.
     pub(super) fn lines(&mut self, points: &[Vector3<f64>], colour: Colour) {
+        let digits = self.digits;
         let out = self.next(5);
         put(out, "\"type\":2,");
-        put_pose(out, &Isometry3::identity());
+        put_pose(out, &Isometry3::identity(), digits);
         put(out, ",\"thickness\":1,\"scale_invariant\":true");
-        put_points(out, points);
+        put_points(out, points, digits);
         put_colour(out, colour);
         put(out, ",\"colors\":[],\"indices\":[]}");
     }
 
     /// Triangles between points \[m\], by their numbers.
     pub(super) fn triangles(&mut self, points: &[Vector3<f64>], indices: &[usize], colour: Colour) {
+        let digits = self.digits;
         let out = self.next(6);
-        put_pose(out, &Isometry3::identity());
-        put_points(out, points);
+        put_pose(out, &Isometry3::identity(), digits);
+        put_points(out, points, digits);
         put_colour(out, colour);
         put(out, ",\"colors\":[],\"indices\":[");
         for (i, index) in indices.iter().enumerate() {
@@ -215,11 +230,11 @@ impl Entity {
     }
 }
 
-fn put_pose(out: &mut Vec<u8>, at: &Isometry3<f64>) {
+fn put_pose(out: &mut Vec<u8>, at: &Isometry3<f64>, digits: u8) {
     put(out, "\"pose\":{");
-    put_vector(out, "position", &at.translation.vector, PICTURE);
+    put_vector(out, "position", &at.translation.vector, digits);
     put(out, ",");
-    put_quaternion(out, "orientation", at.rotation.quaternion(), PICTURE);
+    put_quaternion(out, "orientation", at.rotation.quaternion(), digits);
     put(out, "}");
 }
 
@@ -232,13 +247,13 @@ fn put_colour(out: &mut Vec<u8>, colour: Colour) {
     put(out, "}");
 }
 
-fn put_points(out: &mut Vec<u8>, points: &[Vector3<f64>]) {
+fn put_points(out: &mut Vec<u8>, points: &[Vector3<f64>], digits: u8) {
     put(out, ",\"points\":[");
     for (i, point) in points.iter().enumerate() {
         if i > 0 {
             put(out, ",");
         }
-        put_point(out, point, PICTURE);
+        put_point(out, point, digits);
     }
     put(out, "]");
 }

@@ -10,7 +10,7 @@ use wheeleg_telemetry::{
 
 use super::frames::{Frames, JointState, Pose};
 use super::geometry::Tree;
-use super::json::{Colour, Entity, put, scene_update};
+use super::json::{Colour, Entity, OFTEN, put, scene_update};
 use super::messages::WORLD;
 use super::{SceneError, ground, messages, shapes, tree, urdf};
 
@@ -60,7 +60,7 @@ impl Scene {
             pose: Pose::default(),
             next_ns: 0,
             shown: false,
-            entity: Entity::default(),
+            entity: Entity::new(OFTEN),
             payload: Vec::new(),
         })
     }
@@ -101,7 +101,8 @@ impl Scene {
         give(Derived::JointStates, t_ns, &self.payload);
     }
 
-    fn draw(&mut self, contact: &Contact) {
+    /// Draws a contact, the one of this number of its body.
+    fn draw(&mut self, number: usize, contact: &Contact) {
         let force = Vector3::from(contact.force_n);
         if force.norm() < LEAST_N {
             return;
@@ -121,7 +122,8 @@ impl Scene {
             let at = Isometry3::from_parts((point + 0.5 * high * normal).into(), turn);
             self.entity.cone(&at, &Vector3::new(wide, wide, high), CONE);
         }
-        let place = contact.place;
+        // One place can touch two things.
+        let place = format!("{number}.{}", contact.place);
         let mut tell = |what: &str, value: String| {
             self.entity.tell(&format!("{place}.{what}"), &value);
         };
@@ -195,8 +197,9 @@ impl Derive for Scene {
         scene_update(&mut out, |out| {
             for (i, body) in ContactBody::ALL.into_iter().enumerate() {
                 self.entity.clear();
-                for contact in contacts.iter().filter(|c| c.body == body) {
-                    self.draw(contact);
+                let own = contacts.iter().filter(|c| c.body == body);
+                for (number, contact) in (1..).zip(own) {
+                    self.draw(number, contact);
                 }
                 put(out, if i > 0 { "," } else { "" });
                 self.entity.write(out, t_ns, WORLD, body.link());

@@ -3,12 +3,12 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::geometry::{MATERIALS, Shape, Solid, Tree};
-use super::json::{Colour, Entity, put};
+use super::json::{Colour, Entity, ONCE, put};
 
 /// Appends an entity for each link that has a shape, each with a comma before it.
 pub(super) fn write(out: &mut Vec<u8>, t_ns: u64, tree: &Tree) {
     for link in tree.links.iter().filter(|link| !link.shapes.is_empty()) {
-        let mut entity = Entity::default();
+        let mut entity = Entity::new(ONCE);
         for shape in &link.shapes {
             let (at, colour) = (pose(shape), colour(shape.material));
             match shape.solid {

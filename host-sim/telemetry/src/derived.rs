@@ -36,8 +36,10 @@ pub struct DerivedDef {
 
 /// Messages per second of what moves. A drawing between two of them errs by less than its line.
 pub const DERIVED_HZ: u32 = 50;
+/// The same of forces: they take most room, and are for the eye.
+pub const CONTACTS_HZ: u32 = 25;
 /// Its period, ns.
-pub(crate) const DERIVED_PERIOD_NS: u64 = 1_000_000_000 / DERIVED_HZ as u64;
+pub(crate) const CONTACTS_PERIOD_NS: u64 = 1_000_000_000 / CONTACTS_HZ as u64;
 
 const SCENE_UPDATE: (&str, &str) = (
     "foxglove.SceneUpdate",
@@ -88,7 +90,7 @@ static DERIVED: [DerivedDef; 5] = [
     def(
         "/scene/contacts",
         SCENE_UPDATE,
-        DERIVED_HZ,
+        CONTACTS_HZ,
         "Force of the ground at each contact, 2 mm per newton, with depth, slip and material",
     ),
     def(
@@ -104,6 +106,20 @@ impl Derived {
     #[must_use]
     pub fn def(self) -> &'static DerivedDef {
         &DERIVED[self as usize]
+    }
+
+    /// The channel of a topic.
+    #[must_use]
+    pub fn of_topic(topic: &str) -> Option<Self> {
+        [
+            Self::Tf,
+            Self::JointStates,
+            Self::Scene,
+            Self::Contacts,
+            Self::Log,
+        ]
+        .into_iter()
+        .find(|channel| channel.def().topic == topic)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::contact::Contact;
-use super::derived::DERIVED_PERIOD_NS;
+use super::derived::CONTACTS_PERIOD_NS;
 use super::filter::LowPass2;
 use super::hash::TelemetryHash;
 use super::log_file::LogFile;
@@ -194,7 +194,7 @@ impl<'a> Recorder<'a> {
     /// Shows all contacts with the ground to the sinks that draw them: no samples, and no part of
     /// the hash.
     pub fn contacts(&mut self, t_ns: u64, contacts: &[Contact]) {
-        self.next_contacts_ns = (t_ns / DERIVED_PERIOD_NS + 1) * DERIVED_PERIOD_NS;
+        self.next_contacts_ns = (t_ns / CONTACTS_PERIOD_NS + 1) * CONTACTS_PERIOD_NS;
         for sink in self.sinks.iter_mut().filter(|sink| sink.wants_contacts()) {
             sink.contacts(t_ns, contacts, self.disk_full);
         }

@@ -1,5 +1,10 @@
 //! The robot and its logs for other programs.
 
 mod file;
+mod folder;
+pub mod layout;
+pub mod parquet;
+pub mod ros2;
 
 pub use file::write_new;
+pub use folder::log_of;

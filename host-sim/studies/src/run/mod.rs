@@ -68,7 +68,7 @@ pub struct Run {
 /// Samples per second in the CSV files; 500 per second are in the MCAP log.
 const CSV_RATE_HZ: u32 = 100;
 /// Measured on the three-step test and rounded up: log, bytes per simulated second.
-const LOG_BYTES_PER_S: f64 = 250e3;
+const LOG_BYTES_PER_S: f64 = 330e3;
 /// The same of the tables.
 const TABLE_BYTES_PER_S: f64 = 110e3;
 /// From this duration on the program says how much disk a run takes, s.
