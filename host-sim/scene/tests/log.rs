@@ -179,10 +179,12 @@ fn feet_are_where_the_plant_has_them() {
         // Each cylinder goes out, comes in or rests for a while.
         if ms % 150 == 0 {
             inputs.valve_on_us = std::array::from_fn(|_| match random() % 3 {
-                0 => [500, 0, 0, 500],
-                1 => [0, 500, 500, 0],
+                0 => [1000, 0, 0, 1000],
+                1 => [0, 1000, 1000, 0],
                 _ => [0; 4],
             });
+        } else if ms % 150 == 30 {
+            inputs.valve_on_us = [[0; 4]; 6];
         }
         plant.tick(&mut state, &inputs).expect("a tick");
     }
