@@ -47,10 +47,12 @@ pub(super) fn put_quaternion(out: &mut Vec<u8>, key: &str, q: &Quaternion<f64>, 
 /// `"timestamp":{"sec":…,"nsec":…}`.
 pub(super) fn put_time(out: &mut Vec<u8>, t_ns: u64) {
     let (sec, nsec) = (t_ns / 1_000_000_000, t_ns % 1_000_000_000);
-    put(
-        out,
-        &format!("\"timestamp\":{{\"sec\":{sec},\"nsec\":{nsec}}}"),
-    );
+    put(out, "\"timestamp\":{\"sec\":");
+    // Whole numbers far below 2^53.
+    push_fixed(out, sec as f64, 0);
+    put(out, ",\"nsec\":");
+    push_fixed(out, nsec as f64, 0);
+    put(out, "}");
 }
 
 /// A text between quotation marks.
@@ -126,13 +128,13 @@ impl Entity {
         put_pose(out, &Isometry3::from_parts((*from).into(), turn), digits);
         let sizes = [length - head, 0.006, head, 0.016];
         let names = [
-            "shaft_length",
-            "shaft_diameter",
-            "head_length",
-            "head_diameter",
+            ",\"shaft_length\":",
+            ",\"shaft_diameter\":",
+            ",\"head_length\":",
+            ",\"head_diameter\":",
         ];
         for (name, size) in names.into_iter().zip(sizes) {
-            put(out, &format!(",\"{name}\":"));
+            put(out, name);
             push_fixed(out, size, digits);
         }
         put_colour(out, colour);
@@ -217,7 +219,9 @@ impl Entity {
             ",\"lifetime\":{\"sec\":0,\"nsec\":0},\"frame_locked\":true",
         );
         for (kind, array) in KINDS.into_iter().zip(&self.arrays) {
-            put(out, &format!(",\"{kind}\":["));
+            put(out, ",\"");
+            put(out, kind);
+            put(out, "\":[");
             out.extend_from_slice(array);
             put(out, "]");
         }
