@@ -15,6 +15,7 @@ use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_plant::PlantError;
+use wheeleg_plant::body::ContactPoint;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::Address;
 use wheeleg_remote_link as link;
@@ -447,6 +448,13 @@ impl World {
     /// Everything that can be seen of the plant at the last joint tick.
     pub(super) fn outputs(&self) -> &Outputs {
         &self.outputs
+    }
+
+    /// Every contact with the ground; none where the pose cannot be evaluated.
+    pub(super) fn contact_points(&self) -> Vec<ContactPoint> {
+        let mechanics = &self.plant.assembly.mechanics;
+        let points = mechanics.contact_points(&self.state.core.motion);
+        points.unwrap_or_default()
     }
 
     /// BLAKE3 of the plant's state.

@@ -8,6 +8,7 @@ use mcap::McapError;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
+use super::attachments::attachments;
 use super::log_file::{begins_as_log, options};
 use crate::LogError;
 
@@ -82,6 +83,15 @@ fn copy(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Recovered>, LogError> {
     let mut log = options().create(BufWriter::new(target))?;
+    for file in attachments(from)? {
+        log.attach(&mcap::Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: file.name,
+            media_type: file.media_type,
+            data: file.data.into(),
+        })?;
+    }
     let mut recovered = Recovered {
         messages: 0,
         last_ns: 0,
