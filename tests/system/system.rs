@@ -5,6 +5,7 @@
 mod program;
 mod sil;
 
+mod behaviours;
 mod bus_budget;
 mod check_vectors;
 mod cli;

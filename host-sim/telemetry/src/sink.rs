@@ -2,8 +2,8 @@
 
 use super::registry::Sample;
 use super::samples::{
-    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
-    ProvenanceSample, StateSample, SupplySample, WheelSample,
+    BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
+    MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample,
 };
 use crate::LogError;
 
@@ -87,6 +87,7 @@ sample_ref! {
     Bus: BusSample,
     Supply: SupplySample,
     Master: MasterSample,
+    Behaviour: BehaviourSample,
     State: StateSample,
     Event: EventSample,
     Link: LinkSample,
