@@ -130,15 +130,18 @@ fn peak_n(rows: &[Row<FootSample>]) -> f64 {
     rows.iter().map(|r| r.v.normal_force_n).fold(0.0, f64::max)
 }
 
-/// Mean of the largest forces in the first 0.2 s of a foot on the ground, N.
+/// Mean of the largest forces in the first 50 ms of a foot that comes down, N.
 fn touchdown_force_n(recording: &Recording) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (foot, codes) in recording.feet.iter().zip(codes(recording)) {
-        for t in begins(&codes, LOWER, STANCE) {
-            let end = foot.last().map_or(0.0, Row::t_s);
-            if t > 2.0 && t + 0.2 < end {
-                // The stance may begin some cycles after the touch.
-                sum += peak_n(sil::window(foot, t - 0.15, t + 0.15));
+        let end = foot.last().map_or(0.0, Row::t_s);
+        for t in begins(&codes, REACH, LOWER) {
+            if t < 2.0 || t + 1.0 > end {
+                continue;
+            }
+            let way = sil::window(foot, t, t + 0.9);
+            if let Some(touch) = way.iter().find(|r| r.v.normal_force_n > 1.0) {
+                sum += peak_n(sil::window(foot, touch.t_s(), touch.t_s() + 0.05));
                 count += 1.0;
             }
         }
@@ -260,7 +263,7 @@ fn level(_: u64) -> String {
 
 /// Ground that ends in a pit of 60 mm below the left foot, from a place that the seed chooses.
 fn pits(seed: u64) -> String {
-    let from = 1.2 + 0.01 * seed as f64;
+    let from = 1.0 + 0.01 * seed as f64;
     let mut text =
         String::from("[[terrain]]\nkind = \"plane\"\nheight = { value = -60.0, unit = \"mm\" }\n");
     let mut block = |x: [f64; 2], y: [f64; 2]| {
@@ -273,8 +276,11 @@ fn pits(seed: u64) -> String {
     block([-3.0, 9.0], [-2.0, 0.1]);
     block([-3.0, 9.0], [0.255, 2.0]);
     block([-3.0, from], [0.1, 0.255]);
-    block([from + 0.12, from + 0.4], [0.1, 0.255]);
-    block([from + 0.52, 9.0], [0.1, 0.255]);
+    for i in 0..4 {
+        let at = from + 0.3 * f64::from(i);
+        block([at + 0.15, at + 0.3], [0.1, 0.255]);
+    }
+    block([from + 1.2, 9.0], [0.1, 0.255]);
     text
 }
 
@@ -283,7 +289,7 @@ fn kerb(seed: u64) -> String {
     format!(
         "[[terrain]]\nkind = \"plane\"\n[[terrain]]\nkind = \"block\"\n\
          x = {{ value = [{:.3}, {:.3}], unit = \"m\" }}\ny = {{ value = [-0.25, 0.25], unit = \"m\" }}\n\
-         height = {{ value = 55.0, unit = \"mm\" }}\n",
+         height = {{ value = 100.0, unit = \"mm\" }}\n",
         0.95 + 0.008 * seed as f64,
         1.55 + 0.008 * seed as f64,
     )

@@ -7,7 +7,9 @@
 //! | B2, B6 | tip guard, lost contact | `contact` |
 //! | B3, B4 | touchdown, search | `touchdown` |
 //! | B5 | bump | `bump` |
+//! | B7 | slip | `slip` |
 //! | B9 | stuck | `stuck` |
+//! | B10 | load share | `load_share` |
 //! | B11 | stroke governor | layer 1: only the gait knows how long a swing will take |
 //!
 //! What each wants of the wheels meets in `pace`; the first in priority wins, which among speeds is
@@ -15,9 +17,11 @@
 
 mod bump;
 mod contact;
+mod load_share;
 mod orphan;
 mod overload;
 mod pace;
+mod slip;
 mod stuck;
 mod touchdown;
 
@@ -35,9 +39,11 @@ use crate::setpoint::{
 };
 use bump::Bump;
 use contact::Contact;
+use load_share::LoadShare;
 pub(super) use orphan::Orphan;
 use overload::Overload;
 use pace::Pace;
+use slip::Slip;
 use stuck::Stuck;
 use touchdown::Touchdown;
 
@@ -119,7 +125,9 @@ pub struct Behaving {
     contact: Contact,
     touchdown: [Touchdown; WHEELS],
     bump: [Bump; WHEELS],
+    slip: Slip,
     stuck: Stuck,
+    load_share: LoadShare,
     pace: Pace,
     acts: Acts,
 }
@@ -138,7 +146,9 @@ impl Behaving {
             contact: Contact::default(),
             touchdown: Default::default(),
             bump: Default::default(),
+            slip: Slip::default(),
             stuck: Stuck::default(),
+            load_share: LoadShare::default(),
             pace: Pace::default(),
             acts: Acts {
                 enabled,
@@ -206,6 +216,12 @@ impl Behaving {
         {
             tell(act);
         }
+        if let Some(act) = self.slip.update(senses, &plan, enabled) {
+            tell(act);
+        }
+        if let Some(act) = self.load_share.update(senses, &plan, enabled) {
+            tell(act);
+        }
         let mut landed = [false; WHEELS];
         for side in SIDES {
             let leg = plan.leg(side);
@@ -233,7 +249,7 @@ impl Behaving {
             }
         }
         let stuck = self.stuck.update(senses, &plan, setpoints, enabled);
-        self.pace.wish(self.contact.pace());
+        self.pace.wish(self.contact.pace().min(self.slip.pace()));
         self.acts = Acts {
             enabled,
             landing: self.touchdown.map(|one| one.landing()),
@@ -261,27 +277,30 @@ impl Behaving {
     pub fn apply(&self, joint: usize, setpoint: JointSetpoint, plan: &WalkPlan) -> JointSetpoint {
         let mut out = setpoint;
         for side in SIDES {
+            let stands = plan.leg(side) == LegPlan::Stance;
+            let add =
+                |mm: PositionMm, more| mm.saturating_add(more).limit(PositionMm::ZERO, STROKE_MM);
+            if joint == side.joint(Cylinder::Horizontal) && stands {
+                let lead = PositionMm::ZERO.saturating_sub(self.slip.lead_mm(side));
+                out.reference_mm = add(out.reference_mm, lead);
+            }
             if joint != side.joint(Cylinder::Vertical) {
                 continue;
             }
-            match plan.leg(side) {
-                LegPlan::Stance => {
-                    let beyond = self.contact.followed_mm();
-                    let beyond = beyond.get(side.index()).copied().unwrap_or_default();
-                    let add = |mm: PositionMm| {
-                        mm.saturating_add(beyond).limit(PositionMm::ZERO, STROKE_MM)
-                    };
-                    out.reference_mm = add(out.reference_mm);
-                    if let Some(ahead) = &mut out.ahead {
-                        ahead.reference_mm = add(ahead.reference_mm);
-                    }
+            if stands {
+                let of = |all: [PositionMm; WHEELS]| all.get(side.index()).copied();
+                let beyond = of(self.contact.followed_mm()).unwrap_or_default();
+                let longer = of(self.load_share.longer_mm()).unwrap_or_default();
+                let more = beyond.saturating_add(longer);
+                out.reference_mm = add(out.reference_mm, more);
+                if let Some(ahead) = &mut out.ahead {
+                    ahead.reference_mm = add(ahead.reference_mm, more);
                 }
-                LegPlan::Lower(from_mm) => {
-                    if let Some(touchdown) = self.touchdown.get(side.index()) {
-                        out.reference_mm = touchdown.reference(from_mm, self.enabled);
-                    }
-                }
-                LegPlan::Lift | LegPlan::Reach => {}
+            }
+            if let (LegPlan::Lower(from_mm), Some(touchdown)) =
+                (plan.leg(side), self.touchdown.get(side.index()))
+            {
+                out.reference_mm = touchdown.reference(from_mm, self.enabled);
             }
         }
         self.overload.apply(joint, out)
