@@ -26,7 +26,7 @@ pub const ROBOTS: &[(&str, &str, &str)] =
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
-    "walk", "sand-flat", "rocks-20", "slope-10", "rock-field", "height-map",
+    "walk", "rocks-20", "pit", "frozen-layer-1", "sand-flat", "slope-10", "rock-field", "height-map",
 );
 
 /// Plans of campaigns: name, file name for messages, text.

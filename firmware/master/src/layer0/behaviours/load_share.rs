@@ -50,7 +50,8 @@ impl LoadShare {
         for (side, effort) in SIDES.into_iter().zip(&mut self.effort) {
             let joint = senses.joint(side, Cylinder::Vertical).unwrap_or_default();
             let away = I16F16::saturating_from_num(joint.duty.get()).saturating_sub(*effort);
-            *effort = effort.saturating_add(away >> SMOOTH);
+            let part = away.checked_shr(SMOOTH).unwrap_or(I16F16::ZERO);
+            *effort = effort.saturating_add(part);
         }
         let [left, right] = self.effort;
         let more = left.saturating_sub(right);

@@ -236,8 +236,11 @@ impl Behaving {
                     tell(act);
                 }
             }
+            let b5 = setpoints.joints.get(side.joint(Cylinder::Horizontal));
+            let b5 = b5.copied().flatten().unwrap_or_default();
+            let wanted_mm = b5.reference_mm;
             if let Some(bump) = self.bump.get_mut(side.index())
-                && bump.update(leg, senses, side, enabled)
+                && bump.update(leg, senses, side, wanted_mm, enabled)
             {
                 tell(Act::Bump(side));
             }
@@ -283,6 +286,14 @@ impl Behaving {
             if joint == side.joint(Cylinder::Horizontal) && stands {
                 let lead = PositionMm::ZERO.saturating_sub(self.slip.lead_mm(side));
                 out.reference_mm = add(out.reference_mm, lead);
+            }
+            let bump = self.bump.get(side.index());
+            if let Some(back) = bump.and_then(Bump::back_mm)
+                && joint == side.joint(Cylinder::Horizontal)
+                && plan.leg(side) == LegPlan::Reach
+            {
+                out.reference_mm = back;
+                out.velocity_mm_s = VelocityMmS::ZERO;
             }
             if joint != side.joint(Cylinder::Vertical) {
                 continue;

@@ -16,6 +16,9 @@ use crate::setpoint::{Cylinder, LegPlan, WHEELS, WalkPlan};
 const WINDOW: usize = 30;
 /// Way of the wheels below which nothing is compared, µm (20 mm/s).
 const LEAST_UM: i64 = 6_000;
+/// A leg counts when it has stood for so many cycles (0.3 s): before, its b5 still follows from where
+/// it landed.
+const STOOD: u16 = 30;
 /// Slip above which the legs pull, and below which they have pulled enough.
 const SLIPS: I16F16 = I16F16::lit("0.15");
 const HOLDS: I16F16 = I16F16::lit("0.10");
@@ -38,6 +41,8 @@ pub(super) struct Slip {
     ways_um: [[i32; 2]; WINDOW],
     at: usize,
     b5_mm: [Option<PositionMm>; WHEELS],
+    /// Cycles for which a leg has stood.
+    stood: [u16; WHEELS],
     wheels_um: Option<[i64; WHEELS]>,
     /// Slip; `None`: the wheels hardly turn.
     slip: Option<I16F16>,
@@ -53,6 +58,7 @@ impl Default for Slip {
             ways_um: [[0; 2]; WINDOW],
             at: 0,
             b5_mm: [None; WHEELS],
+            stood: [0; WHEELS],
             wheels_um: None,
             slip: None,
             backward: false,
@@ -129,13 +135,19 @@ impl Slip {
             now.saturating_sub(before.get(i).copied().unwrap_or(now))
         });
         let (mut sum, mut feet) = ([0_i64; 2], 0_u8);
-        for (side, b5) in SIDES.into_iter().zip(&mut self.b5_mm) {
+        let legs = self.b5_mm.iter_mut().zip(&mut self.stood);
+        for (side, (b5, stood)) in SIDES.into_iter().zip(legs) {
             let stroke = senses
                 .joint(side, Cylinder::Horizontal)
                 .map(|j| j.stroke_mm);
             let stroke = stroke.filter(|_| plan.leg(side) == LegPlan::Stance);
+            *stood = if stroke.is_some() {
+                stood.saturating_add(1)
+            } else {
+                0
+            };
             let before = core::mem::replace(b5, stroke);
-            let (Some(now), Some(before)) = (stroke, before) else {
+            let (Some(now), Some(before), true) = (stroke, before, *stood > STOOD) else {
                 continue;
             };
             let (own, other) = match side {
