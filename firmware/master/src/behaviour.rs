@@ -51,7 +51,7 @@ behaviours! {
     LostContact = 6, "lost-contact";
     /// Wheels that slip slow down, and the legs pull.
     Slip = 7, "slip";
-    /// A foot that holds on something pulls harder.
+    /// A foot that holds on something pulls harder; its place is kept, it does nothing yet.
     Hook = 8, "hook";
     /// A robot that does not get on backs off, and stands after three tries.
     Stuck = 9, "stuck";
@@ -168,11 +168,6 @@ pub enum Act {
         /// Its leg.
         Side,
     ),
-    /// A foot stands on one of its sides: it is set down anew, to that side.
-    Edge(
-        /// Its leg.
-        Side,
-    ),
     /// A leg at its full length finds no ground: the nose goes down, then the foot is set nearer.
     NoGround(
         /// The leg.
@@ -190,11 +185,6 @@ pub enum Act {
     ),
     /// The wheels slip: they slow down and the legs pull.
     Slip,
-    /// A foot holds on something: it pulls harder.
-    Hooked(
-        /// Its leg.
-        Side,
-    ),
     /// No progress: the robot backs off, and lifts its feet higher.
     BackOff,
     /// No progress after several tries: the robot stands.
@@ -212,12 +202,11 @@ impl Act {
         match self {
             Self::Overload { .. } => Behaviour::Overload,
             Self::TipGuard => Behaviour::TipGuard,
-            Self::EarlyGround(_) | Self::LateGround(_) | Self::Edge(_) => Behaviour::Touchdown,
+            Self::EarlyGround(_) | Self::LateGround(_) => Behaviour::Touchdown,
             Self::NoGround(_) => Behaviour::Search,
             Self::Bump(_) => Behaviour::Bump,
             Self::LostGround(_) => Behaviour::LostContact,
             Self::Slip => Behaviour::Slip,
-            Self::Hooked(_) => Behaviour::Hook,
             Self::BackOff | Self::Stuck => Behaviour::Stuck,
             Self::LoadShare => Behaviour::LoadShare,
             Self::Governor => Behaviour::StrokeGovernor,
@@ -230,11 +219,9 @@ impl Act {
         match self {
             Self::EarlyGround(side)
             | Self::LateGround(side)
-            | Self::Edge(side)
             | Self::NoGround(side)
             | Self::Bump(side)
-            | Self::LostGround(side)
-            | Self::Hooked(side) => Some(side),
+            | Self::LostGround(side) => Some(side),
             _ => None,
         }
     }

@@ -260,10 +260,6 @@ fn act(act: Behaves) -> String {
             "{} foot has met the ground 20 mm or more below where it was expected",
             word(side)
         ),
-        Behaves::Edge(side) => format!(
-            "{} foot stands on one of its sides: it is set down anew, 15 mm to that side",
-            word(side)
-        ),
         Behaves::NoGround(side) => format!(
             "{} leg finds no ground at its full length: the nose goes down, then the foot is set nearer",
             word(side)
@@ -275,8 +271,7 @@ fn act(act: Behaves) -> String {
         Behaves::LostGround(side) => {
             format!("{} foot has lost the ground and follows it", word(side))
         }
-        Behaves::Slip => "the wheels slip: they slow down, and the legs pull".to_owned(),
-        Behaves::Hooked(side) => format!("{} foot holds on something and pulls", word(side)),
+        Behaves::Slip => "the wheels slip: the legs pull".to_owned(),
         Behaves::BackOff => "no progress: the robot backs off and lifts its feet higher".to_owned(),
         Behaves::Stuck => {
             "no progress after three tries: the robot stands. Turn it, or lead it another way"

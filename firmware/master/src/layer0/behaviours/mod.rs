@@ -251,7 +251,8 @@ impl Behaving {
                 self.tally.count(Behaviour::Touchdown);
             }
         }
-        let stuck = self.stuck.update(senses, &plan, setpoints, enabled);
+        let bumps = self.bump.map(|one| one.met());
+        let stuck = self.stuck.update(senses, &plan, setpoints, bumps, enabled);
         self.pace.wish(self.contact.pace().min(self.slip.pace()));
         self.acts = Acts {
             enabled,
@@ -259,7 +260,7 @@ impl Behaving {
             lost: self.contact.lost(),
             deep: self.contact.deep(),
             beyond_mm: self.contact.followed_mm(),
-            bump: self.bump.map(|one| one.met()),
+            bump: bumps,
             stuck,
             pace: self.pace.share(),
         };

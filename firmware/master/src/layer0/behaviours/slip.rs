@@ -22,8 +22,9 @@ const STOOD: u16 = 30;
 /// Slip above which the legs pull, and below which they have pulled enough.
 const SLIPS: I16F16 = I16F16::lit("0.15");
 const HOLDS: I16F16 = I16F16::lit("0.10");
-/// Slip at which wheels pull most: above it they slow down.
-const BEST: I16F16 = I16F16::lit("0.30");
+/// Slip at which wheels pull most in the soils that we have: more of it only digs them in, and they
+/// slow down. Below it the slip follows from the pull that is asked for, not from the speed.
+const BEST: I16F16 = I16F16::lit("0.75");
 /// Change of the pace in a cycle, down and up, and its smallest.
 const SLOWER: I16F16 = I16F16::lit("0.02");
 const FASTER: I16F16 = I16F16::lit("0.005");

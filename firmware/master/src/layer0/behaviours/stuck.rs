@@ -6,10 +6,15 @@ use super::{SIDES, Senses};
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, Setpoints, WHEELS, WalkPlan};
 
-/// Legs that have moved less than this …
+/// A standing leg that has moved by less than this, …
 const PROGRESS_MM: PositionMm = PositionMm::from_int(5);
-/// … in so many cycles (3 s) make no progress.
+/// … or wheels that have turned by less than this, µm, …
+const PROGRESS_UM: i64 = 10_000;
+/// … in so many cycles (3 s) make no progress: legs that step on the spot move, too.
 const PATIENCE: u16 = 300;
+/// So many swings in a row that ran against something make no progress, whatever wheels and legs
+/// do: before a wall both may slip alike.
+const BUMPED: u8 = 6;
 /// Motor command that is all that a wheel has, %, …
 const EFFORT_PERCENT: u16 = 90;
 /// … at less than this share of the speed asked for, 1/n, …
@@ -22,8 +27,19 @@ const BLOCKED: u16 = 100;
 pub(super) struct Stuck {
     /// Strokes of yaw and b5 from which progress counts.
     anchor: [[PositionMm; 2]; WHEELS],
+    /// There is something to count from.
+    begun: bool,
+    /// A leg has moved since the last progress.
+    moved: bool,
+    /// Travel of the wheels from which progress counts, µm.
+    anchor_um: [i64; WHEELS],
     /// Cycles since a standing leg has moved.
     idle: u16,
+    /// The swing of a leg has run against something.
+    bumped: [bool; WHEELS],
+    /// Swings in a row that have.
+    bumps: u8,
+    went_down: [bool; WHEELS],
     /// Cycles for which a wheel has been blocked.
     blocked: [u16; WHEELS],
     /// Travel of the wheels in the last cycle, µm.
@@ -37,12 +53,15 @@ impl Stuck {
         senses: &Senses,
         plan: &WalkPlan,
         setpoints: &Setpoints,
+        bumps: [bool; WHEELS],
         enabled: Behaviours,
     ) -> bool {
+        self.count(plan, bumps);
         let progress = self.progress(senses, plan);
         let blocked = self.blocked(senses, setpoints);
         if !enabled.contains(Behaviour::Stuck) || !plan.driven {
             self.idle = 0;
+            self.bumps = 0;
             self.blocked = [0; WHEELS];
             return false;
         }
@@ -51,17 +70,35 @@ impl Stuck {
         } else {
             self.idle.saturating_add(1)
         };
-        let stuck = self.idle > PATIENCE || blocked;
+        let stuck = self.idle > PATIENCE || blocked || self.bumps >= BUMPED;
         if stuck {
             self.idle = 0;
+            self.bumps = 0;
             self.blocked = [0; WHEELS];
         }
         stuck
     }
 
-    /// Whether a standing leg has moved since it was last found to have.
+    /// Counts the swings in a row that ran against something.
+    fn count(&mut self, plan: &WalkPlan, bumps: [bool; WHEELS]) {
+        let legs = self.bumped.iter_mut().zip(&mut self.went_down).zip(bumps);
+        for (side, ((bumped, went_down), bump)) in SIDES.into_iter().zip(legs) {
+            *bumped |= bump;
+            let stands = plan.leg(side) == LegPlan::Stance;
+            if stands && *went_down {
+                self.bumps = if *bumped {
+                    self.bumps.saturating_add(1)
+                } else {
+                    0
+                };
+                *bumped = false;
+            }
+            *went_down = matches!(plan.leg(side), LegPlan::Lower(_));
+        }
+    }
+
+    /// Whether a standing leg and a wheel have moved since they were last found to have.
     fn progress(&mut self, senses: &Senses, plan: &WalkPlan) -> bool {
-        let mut progress = false;
         for (side, anchor) in SIDES.into_iter().zip(&mut self.anchor) {
             let stroke = |cylinder| senses.joint(side, cylinder).unwrap_or_default().stroke_mm;
             let now = [stroke(Cylinder::Yaw), stroke(Cylinder::Horizontal)];
@@ -73,7 +110,19 @@ impl Stuck {
             if moved || !stands {
                 *anchor = now;
             }
-            progress |= moved && stands;
+            self.moved |= moved && stands && self.begun;
+        }
+        let now = senses.wheels.map(|wheel| wheel.travel_um);
+        let far = |(a, b): (i64, &i64)| a.saturating_sub(*b).saturating_abs() >= PROGRESS_UM;
+        if !self.begun {
+            self.begun = true;
+            self.anchor_um = now;
+        }
+        let turned = now.into_iter().zip(&self.anchor_um).any(far);
+        let progress = self.moved && turned;
+        if progress {
+            self.moved = false;
+            self.anchor_um = now;
         }
         progress
     }
