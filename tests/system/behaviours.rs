@@ -97,11 +97,16 @@ fn judge(pair: &Pair, runs: &[[f64; 2]]) -> (bool, String) {
     } else {
         on >= pair.bar * off
     };
+    let change = if off == 0.0 {
+        "from nothing".to_owned()
+    } else {
+        format!("{:+.0} %", 100.0 * (on - off) / off.abs())
+    };
     println!(
-        "pair {}: {} {on:.2} with, {off:.2} without ({:+.0} %), better in {wins} of {} (p {p:.2e}), bar {}",
+        "pair {}: {} {on:.2} with, {off:.2} without ({}), better in {wins} of {} (p {p:.2e}), bar {}",
         pair.behaviour.name(),
         pair.metric,
-        100.0 * (on - off) / off.abs().max(1e-9),
+        change,
         runs.len(),
         if met { "met" } else { "missed" },
     );

@@ -85,10 +85,10 @@ pub(super) const PAIRS: &[Pair] = &[
         metric: "time on the tail, s",
         less: true,
         bar: 0.0,
-        required: false,
+        required: true,
         duration_s: 10.0,
         walk: UP,
-        rest: |seed| slope(21.0 + 0.5 * seed as f64),
+        rest: |seed| slope(21.2 + 0.04 * seed as f64),
         measure: chassis_contact_s,
     },
     Pair {
