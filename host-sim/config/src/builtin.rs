@@ -26,7 +26,8 @@ pub const ROBOTS: &[(&str, &str, &str)] =
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
-    "walk", "rocks-20", "pit", "frozen-layer-1", "sand-flat", "slope-10", "rock-field", "height-map",
+    "walk", "sand-flat", "rocks-20", "pit", "frozen-layer-1", "slope-10", "rock-field",
+    "height-map",
 );
 
 /// Plans of campaigns: name, file name for messages, text.

@@ -154,7 +154,7 @@ impl Layer0 {
             odometry: Odometry::new(config.wheels),
             wheels: Wheels::default(),
             reflexes: Reflexes::default(),
-            behaving: Behaving::new(config.behaviours),
+            behaving: Behaving::new(config.behaviours, config.walk.nail_m > 0.0),
             orphan: Orphan::default(),
             jobs: Jobs::new(),
             requester: Requester::new(RequesterConfig::DEFAULT, config.first_sequence),

@@ -35,7 +35,7 @@ impl Robot {
             ..JointSense::default()
         };
         Self {
-            behaving: Behaving::new(enabled),
+            behaving: Behaving::new(enabled, false),
             senses: Senses {
                 feet: [Some(FootSwitches(0x0F)); 2],
                 joints: [Some(joint); 6],
@@ -226,6 +226,26 @@ fn b3_a_foot_stops_where_its_switches_close() {
         Landing::Waiting,
         "touches and goes on"
     );
+}
+
+#[test]
+fn b3_nails_do_not_end_the_way_down_before_the_ground_that_is_expected() {
+    for (at, nailed, lands) in [
+        (129.9, true, false),
+        (130.0, true, true),
+        (129.9, false, true),
+    ] {
+        let mut robot = Robot::all([LegPlan::Lower(mm(120.0)), LegPlan::Stance]);
+        robot.behaving = Behaving::new(Behaviours::ALL, nailed);
+        robot.joint(B6).stroke_mm = mm(at);
+        robot.run(1);
+        let landed = robot.acts().landing[0] != Landing::Waiting;
+        assert_eq!(landed, lands, "{at} {nailed}");
+    }
+    let mut robot = Robot::all([LegPlan::Reach, LegPlan::Stance]);
+    robot.behaving = Behaving::new(Behaviours::ALL, true);
+    robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(100);
+    assert_eq!(robot.run(60), [], "tips scratch the ground");
 }
 
 #[test]

@@ -47,7 +47,7 @@ impl Robot {
         let walk = Walk::new(WalkGeometry::default(), order, &feedback, 7);
         Self {
             walk: walk.expect("in range").expect("all heard"),
-            behaving: Behaving::new(Behaviours::ALL),
+            behaving: Behaving::new(Behaviours::ALL, false),
             told: Vec::new(),
             speeds: [0.0; 6],
             strokes,

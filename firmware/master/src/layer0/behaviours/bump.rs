@@ -41,13 +41,14 @@ impl Bump {
         self.back.map(|(stroke, _)| stroke)
     }
 
-    /// One cycle; `wanted_mm` is the reference of b5. Whether the foot has run against something.
+    /// One cycle; `wanted_mm` is the reference of b5, `nailed` a foot with nails. Whether the foot has run against something.
     pub(super) fn update(
         &mut self,
         plan: LegPlan,
         senses: &Senses,
         side: Side,
         wanted_mm: PositionMm,
+        nailed: bool,
         enabled: Behaviours,
     ) -> bool {
         if plan != LegPlan::Reach || !enabled.contains(Behaviour::Bump) {
@@ -72,7 +73,8 @@ impl Bump {
         } else {
             0
         };
-        let touches = senses.touches(side).unwrap_or(false);
+        // Tips of nails may still scratch the ground.
+        let touches = !nailed && senses.touches(side).unwrap_or(false);
         self.met = self.stalled >= STALLED || started && touches;
         if self.met {
             self.stalled = 0;

@@ -120,6 +120,8 @@ impl Senses {
 #[derive(Clone, Copy, Debug)]
 pub struct Behaving {
     enabled: Behaviours,
+    /// Feet have nails, which touch before the sole does.
+    nailed: bool,
     tally: Tally,
     overload: Overload,
     contact: Contact,
@@ -136,11 +138,12 @@ pub struct Behaving {
 const SIDES: [Side; WHEELS] = [Side::Left, Side::Right];
 
 impl Behaving {
-    /// At rest; those of the set may act.
+    /// At rest; those of the set may act. `nailed`: nails of the feet touch before the soles do.
     #[must_use]
-    pub fn new(enabled: Behaviours) -> Self {
+    pub fn new(enabled: Behaviours, nailed: bool) -> Self {
         Self {
             enabled,
+            nailed,
             tally: Tally::default(),
             overload: Overload::default(),
             contact: Contact::default(),
@@ -162,7 +165,7 @@ impl Behaving {
         *self = Self {
             tally: self.tally,
             pace: self.pace,
-            ..Self::new(enabled)
+            ..Self::new(enabled, self.nailed)
         };
     }
 
@@ -170,7 +173,7 @@ impl Behaving {
     pub fn reset(&mut self) {
         *self = Self {
             tally: self.tally,
-            ..Self::new(self.enabled)
+            ..Self::new(self.enabled, self.nailed)
         };
     }
 
@@ -228,7 +231,8 @@ impl Behaving {
             if let Some(touchdown) = self.touchdown.get_mut(side.index()) {
                 let b6 = senses.joint(side, Cylinder::Vertical).unwrap_or_default();
                 let touches = senses.touches(side).unwrap_or(false);
-                let act = touchdown.update(side, leg, &b6, touches, enabled);
+                let early = self.nailed && nails_first(leg, &b6);
+                let act = touchdown.update(side, leg, &b6, touches && !early, enabled);
                 if let Some(landed) = landed.get_mut(side.index()) {
                     *landed = matches!(touchdown.landing(), Landing::Down(_));
                 }
@@ -240,7 +244,7 @@ impl Behaving {
             let b5 = b5.copied().flatten().unwrap_or_default();
             let wanted_mm = b5.reference_mm;
             if let Some(bump) = self.bump.get_mut(side.index())
-                && bump.update(leg, senses, side, wanted_mm, enabled)
+                && bump.update(leg, senses, side, wanted_mm, self.nailed, enabled)
             {
                 tell(Act::Bump(side));
             }
@@ -271,7 +275,7 @@ impl Behaving {
         *self = Self {
             tally: self.tally,
             pace: self.pace,
-            ..Self::new(self.enabled)
+            ..Self::new(self.enabled, self.nailed)
         };
         self.pace.wish(I16F16::ONE);
     }
@@ -328,4 +332,9 @@ impl Behaving {
     pub(super) fn stop_wheels(&mut self) {
         self.pace.stop();
     }
+}
+
+/// Whether a foot with nails is not yet where ground was: what touches are the nails.
+fn nails_first(plan: LegPlan, b6: &JointSense) -> bool {
+    matches!(plan, LegPlan::Lower(from) if b6.stroke_mm < from.saturating_add(touchdown::APPROACH_MM))
 }

@@ -12,7 +12,7 @@ use crate::layer1::params::STROKE_MM;
 use crate::setpoint::{Landing, LegPlan};
 
 /// Ground is expected so far below where the slow way begins.
-const APPROACH_MM: PositionMm = PositionMm::from_int(10);
+pub(super) const APPROACH_MM: PositionMm = PositionMm::from_int(10);
 /// Slow way in a cycle: 100 mm/s.
 const SEARCH_MM: PositionMm = PositionMm::from_int(1);
 /// The slow way goes on when the piston is as near as this.
