@@ -6,6 +6,7 @@ mod program;
 mod sil;
 
 mod axis_text;
+mod behaviours;
 mod bus_budget;
 mod check_vectors;
 mod cli;

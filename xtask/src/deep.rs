@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 14] = [
+const CHECKS: [Check; 15] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -57,6 +57,12 @@ const CHECKS: [Check; 14] = [
         "the paper's claims on 100 seeds each, with intervals",
         60,
         field,
+    ),
+    Check(
+        "behaviours",
+        "each behaviour of a walk with and without, 20 seeds and a sign test",
+        20,
+        behaviours,
     ),
     Check(
         "campaign",
@@ -205,6 +211,15 @@ fn cylinders() -> StepResult<String> {
         ["system", test],
         ("WHEELEG_CYLINDERS", 240),
         " cylinders from number ",
+    )
+}
+
+fn behaviours() -> StepResult<String> {
+    let test = "behaviours::each_behaviour_does_what_it_is_there_for";
+    measured(
+        ["system", test],
+        ("WHEELEG_BEHAVIOUR_SEEDS", 20),
+        " behaviours with and without: ",
     )
 }
 

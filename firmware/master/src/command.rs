@@ -12,11 +12,13 @@ use core::fmt;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::argument::{
-    ACCELERATION, Argument, BOARD, CORRECTION, FORWARD, GAIN, HEIGHT, HELD_LEG_S5, HELD_LEG_S6,
-    JOINT, LEFT, LEG, LIFT, LOWER, NOSE, PARAMETER, PATTERN, PERIOD, POLE, PUSH, PUSH_ACCELERATION,
-    PUSH_SPEED, RATE, REACH, SIDE, SPEED, STEP_STROKE, STEPPING_LEG, STEPS, STROKE,
-    TOUCHDOWN_REFLEX, TRAVEL, TURN, VALUE, WALK_LIFT, WALK_PATTERN, WALK_SPEED, YAW_S2, ZERO,
+    ACCELERATION, Argument, BEHAVIOURS, BOARD, CORRECTION, FORWARD, GAIN, HEIGHT, HELD_LEG_S5,
+    HELD_LEG_S6, JOINT, LEFT, LEG, LIFT, LOWER, NOSE, PARAMETER, PATTERN, PERIOD, POLE, PUSH,
+    PUSH_ACCELERATION, PUSH_SPEED, RATE, REACH, SIDE, SPEED, STEP_STROKE, STEPPING_LEG, STEPS,
+    STROKE, TOUCHDOWN_REFLEX, TRAVEL, TURN, VALUE, WALK_LIFT, WALK_PATTERN, WALK_SPEED, YAW_S2,
+    ZERO,
 };
+use crate::behaviour::Behaviours;
 use crate::contact::Side;
 use crate::layer1::foot::FootShape;
 use crate::layer1::params::GaitParams;
@@ -163,6 +165,11 @@ pub enum Command {
     TakeControl,
     /// Give the control back.
     ReleaseControl,
+    /// Choose the behaviours of a walk that may act.
+    SetBehaviours(
+        /// Those that may.
+        Behaviours,
+    ),
     /// Move to the start pose of the gait parameters.
     Stand,
     /// Freeze every joint where it is.
@@ -282,6 +289,7 @@ commands! {
     Commission = 0x0124, [], "Takes the boards as they are for the commissioned ones; refused unless disarmed and every board is identified.", Self::Commission =>
     TakeControl = 0x0125, [], "Takes the control for the operator, for as long as they are seen to look; refused to a scenario.", Self::TakeControl =>
     ReleaseControl = 0x0126, [], "Gives the control back; refused while layer 1 moves the robot.", Self::ReleaseControl =>
+    SetBehaviours = 0x0127, [BEHAVIOURS], "Chooses the behaviours of a walk that may act, also while it walks.", Self::SetBehaviours(_) =>
     ReadParameter = 0x0130, [BOARD, PARAMETER], "Reads a parameter of a board.", Self::ReadParameter { .. } =>
     WriteParameter = 0x0131, [BOARD, PARAMETER, VALUE], "Sets a parameter of a board, which checks it against its limits.", Self::WriteParameter { .. } =>
     SaveParameters = 0x0132, [BOARD], "Stores a board's parameters in its memory; refused unless disarmed.", Self::SaveParameters { .. } =>

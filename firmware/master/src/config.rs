@@ -1,5 +1,6 @@
 //! Configuration of the master.
 
+use crate::behaviour::Behaviours;
 use crate::layer0::odometry::WheelGeometry;
 use crate::layer1::homing::HomingConfig;
 use crate::layer1::params::GaitParams;
@@ -54,6 +55,8 @@ pub struct MasterConfig {
     pub wheel_sample_us: u32,
     /// How the wheels are led.
     pub wheel_drive: WheelDrive,
+    /// Behaviours of a walk that may act.
+    pub behaviours: Behaviours,
     /// Frame of the right foot's switches.
     pub switch_frame: SwitchFrame,
     /// Sequence of the first acyclic request; one that differs from run to run
@@ -79,6 +82,7 @@ impl Default for MasterConfig {
             walk: WalkGeometry::default(),
             wheel_sample_us: 520,
             wheel_drive: WheelDrive::default(),
+            behaviours: Behaviours::ALL,
             switch_frame: SwitchFrame::default(),
             first_sequence: 1,
             commissioned: [None; NODES],

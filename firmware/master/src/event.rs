@@ -4,11 +4,11 @@ use heapless::Deque;
 use wheeleg_protocol::{FaultRecord, LinkRecord, LogEntry, Warning};
 use wheeleg_units::PositionMm;
 
+use crate::behaviour::Act;
 use crate::config::UniqueId;
 use crate::contact::{Sector, Side};
 use crate::dispatcher::{Refusal, Ticket};
 use crate::finding::Finding;
-use crate::layer1::walk::Felt;
 
 /// Why all axes were told to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,10 +172,10 @@ pub enum Event {
         /// First joint (1..=6) out of tolerance.
         joint: u8,
     },
-    /// A walk has met something, and answers.
-    Walk(
-        /// What.
-        Felt,
+    /// A behaviour acts.
+    Behaviour(
+        /// What it does.
+        Act,
     ),
     /// The gait is over.
     GaitDone {

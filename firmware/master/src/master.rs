@@ -136,6 +136,7 @@ impl Master {
         }
         let (mut record, feedback) = self.layer0.finish_cycle(now_us, &mut self.events);
         if record.cycle > 0 {
+            record.counters.behaviours = record.counters.behaviours.with(self.layer1.tally());
             record.counters.lost_setpoints = self.layer1.lost_setpoints();
             record.counters.lost_feedback = self.losses.feedback;
             record.counters.lost_records = self.losses.telemetry;

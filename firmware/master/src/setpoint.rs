@@ -3,6 +3,7 @@
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use crate::behaviour::Behaviours;
 use crate::contact::{FootSwitches, Side};
 
 /// Number of cylinder joints.
@@ -183,6 +184,94 @@ impl TravelSetpoint {
     }
 }
 
+/// What a leg of a walk is about, as its vertical cylinder shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LegPlan {
+    /// Foot on the ground.
+    #[default]
+    Stance,
+    /// Foot rises.
+    Lift,
+    /// Foot on its way to the foothold.
+    Reach,
+    /// Foot goes down: fast to this stroke, 10 mm above where ground is expected, then slowly.
+    Lower(
+        /// mm.
+        PositionMm,
+    ),
+}
+
+/// What a walk is about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WalkPlan {
+    /// Left and right leg.
+    pub legs: [LegPlan; WHEELS],
+    /// The robot is meant to get on.
+    pub driven: bool,
+}
+
+impl WalkPlan {
+    /// The plan of one leg.
+    #[must_use]
+    pub fn leg(&self, side: Side) -> LegPlan {
+        self.legs.get(side.index()).copied().unwrap_or_default()
+    }
+}
+
+/// How far a foot that goes down has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Landing {
+    /// It does not go down, or is still on its way.
+    #[default]
+    Waiting,
+    /// It stands, b6 at this stroke, mm.
+    Down(
+        /// mm.
+        PositionMm,
+    ),
+    /// The leg has been at its full length for so many cycles, and has found no ground.
+    Nothing(
+        /// Cycles.
+        u16,
+    ),
+}
+
+/// What the behaviours of layer 0 tell the walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Acts {
+    /// Those that may act.
+    pub enabled: Behaviours,
+    /// How far the feet have come that go down.
+    pub landing: [Landing; WHEELS],
+    /// A standing foot has lost the ground and follows it.
+    pub lost: [bool; WHEELS],
+    /// It has followed as far as it may: below is a foothold of its own.
+    pub deep: [bool; WHEELS],
+    /// What b6 of a standing leg stands beyond its reference, mm.
+    pub beyond_mm: [PositionMm; WHEELS],
+    /// A swinging foot has just run against something.
+    pub bump: [bool; WHEELS],
+    /// The robot has made no progress for long; true for a cycle.
+    pub stuck: bool,
+    /// Share of the walk's speed at which the wheels go, 0 to 1.
+    pub pace: I16F16,
+}
+
+impl Default for Acts {
+    fn default() -> Self {
+        Self {
+            enabled: Behaviours::ALL,
+            landing: [Landing::Waiting; WHEELS],
+            lost: [false; WHEELS],
+            deep: [false; WHEELS],
+            beyond_mm: [PositionMm::ZERO; WHEELS],
+            bump: [false; WHEELS],
+            stuck: false,
+            pace: I16F16::ONE,
+        }
+    }
+}
+
 /// One cycle's references, layer 1 to layer 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Setpoints {
@@ -198,6 +287,8 @@ pub struct Setpoints {
     pub joints: [Option<JointSetpoint>; JOINTS],
     /// Reference of the wheels; `None` withdraws them.
     pub travel: Option<TravelSetpoint>,
+    /// What a walk is about; `None`: none is under way, and no behaviour acts.
+    pub walk: Option<WalkPlan>,
     /// Speed and acceleration of the pushes to come, for wheel boards that make
     /// their own profile; `None` leaves them as they are.
     pub push: Option<PushProfile>,
@@ -223,6 +314,7 @@ impl Setpoints {
             stepping: None,
             joints: [None; JOINTS],
             travel: None,
+            walk: None,
             push: None,
         }
     }
@@ -241,6 +333,8 @@ pub struct Feedback {
     pub travel_um: i64,
     /// Travel of the left and the right wheel since start-up, µm (positive forward).
     pub wheels_um: [i64; WHEELS],
+    /// What the behaviours of layer 0 do.
+    pub acts: Acts,
     /// All nodes armed, alive and free of faults: motion may go on.
     pub motion_allowed: bool,
 }

@@ -2,9 +2,10 @@
 
 use wheeleg_protocol::{LinkQuality, NODES, SlotReply, SyncSlots};
 
+use crate::behaviour::Tally;
 use crate::contact::FootSwitches;
 use crate::event::HoldReason;
-use crate::setpoint::{Phase, WHEELS};
+use crate::setpoint::{Acts, Phase, WHEELS, WalkPlan};
 
 /// What is counted, since start-up. Counters wrap, those of the protocol
 /// crate stop at their maximum.
@@ -28,6 +29,8 @@ pub struct Counters {
     pub lost_records: u32,
     /// Events lost.
     pub lost_events: u32,
+    /// How often each behaviour has acted.
+    pub behaviours: Tally,
     /// Frames and frame errors seen on the bus.
     pub link: LinkQuality,
 }
@@ -60,6 +63,10 @@ pub struct Record {
     pub bearing_rad: [Option<f32>; WHEELS],
     /// Mean wheel travel since start-up, µm.
     pub travel_um: i64,
+    /// What a walk was about in this cycle, if one is under way.
+    pub walk: Option<WalkPlan>,
+    /// What the behaviours do after it.
+    pub acts: Acts,
     /// Counters at the end of the cycle.
     pub counters: Counters,
 }

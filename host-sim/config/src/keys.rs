@@ -27,7 +27,7 @@ pub(crate) const fn names<const N: usize>(keys: &[Key; N]) -> [&'static str; N] 
 }
 
 /// Before the first section, and the names of the sections.
-pub const TOP: [Key; 11] = [
+pub const TOP: [Key; 12] = [
     key("name", "text", "part of the output folder; free"),
     key("description", "text", "one line"),
     key(
@@ -47,6 +47,11 @@ pub const TOP: [Key; 11] = [
         "what the run is judged by",
     ),
     key("motion", "section", "what the robot does"),
+    key(
+        "behaviours",
+        "section",
+        "which behaviours of a walk are off; all are on where left out",
+    ),
     key("events", "sections", "what happens to it; may be left out"),
     key(
         "terrain",

@@ -1,6 +1,7 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
 use wheeleg_master::argument;
+use wheeleg_master::behaviour::{Behaviour, Behaviours};
 use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_master::layer1::walk::WalkOrder;
 
@@ -107,6 +108,8 @@ pub struct Scenario {
     pub seed: u64,
     /// What the robot does.
     pub motion: Motion,
+    /// Behaviours of a walk that may act.
+    pub behaviours: Behaviours,
     /// What happens to it, in order of time.
     pub events: Vec<ScenarioEvent>,
     /// What it stands on.
@@ -119,7 +122,7 @@ pub struct Scenario {
     pub bars: Vec<Bar>,
 }
 
-const TOP: [&str; 11] = keys::names(&keys::TOP);
+const TOP: [&str; 12] = keys::names(&keys::TOP);
 
 /// Names of the sets of targets.
 pub const TARGETS: [(&str, TargetSet); 10] = [
@@ -201,6 +204,7 @@ fn read(r: &mut Reader, files: &Files) -> Option<Scenario> {
     };
     let targets = r.choice(&top, "targets", &TARGETS);
     let motion = motion(r);
+    let behaviours = behaviours(r);
     let mut events: Vec<ScenarioEvent> = Vec::new();
     for i in 0..r.array_len("events") {
         let entry = r.entry("events", i);
@@ -226,12 +230,28 @@ fn read(r: &mut Reader, files: &Files) -> Option<Scenario> {
         duration_s: duration?,
         seed: seed?,
         motion: motion?,
+        behaviours,
         events,
         ground,
         faults,
         targets: targets?,
         bars,
     })
+}
+
+/// Those that are not switched off in the section `[behaviours]`.
+fn behaviours(r: &mut Reader) -> Behaviours {
+    let Some(entry) = r.table("behaviours") else {
+        return Behaviours::ALL;
+    };
+    r.reject_misplaced(&entry, &["off"], &TOP);
+    let off = r.texts(&entry, "off", |text| {
+        Behaviour::of_name(text).ok_or_else(|| {
+            let names = Behaviour::ALL.map(Behaviour::name).join(", ");
+            format!("`{text}` is no behaviour; allowed: {names}")
+        })
+    });
+    off.into_iter().fold(Behaviours::ALL, Behaviours::without)
 }
 
 #[derive(Clone, Copy)]

@@ -1,8 +1,9 @@
 //! Samples of the running world for the recorder: what was commanded, what the
 //! boards sensed, what physically is.
 
+use wheeleg_master::behaviour::Behaviour;
 use wheeleg_master::contact::Side;
-use wheeleg_master::setpoint::Phase;
+use wheeleg_master::setpoint::{LegPlan, Phase};
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
 use wheeleg_plant::body::{ContactPoint, Toucher};
@@ -14,8 +15,8 @@ use super::world::World;
 use wheeleg_telemetry::event::{BoardChange, Cause};
 use wheeleg_telemetry::phase;
 use wheeleg_telemetry::{
-    BodySample, BusSample, Contact, ContactBody, FootSample, JointSample, MasterSample, Recorder,
-    SupplySample, WheelSample,
+    BehaviourSample, BodySample, BusSample, Contact, ContactBody, FootSample, JointSample,
+    MasterSample, Recorder, SupplySample, WheelSample,
 };
 
 const PA_PER_BAR: f64 = 1e5;
@@ -310,6 +311,9 @@ impl Observer {
             },
         );
         self.cycles += 1;
+        if let Some(sample) = last.as_ref().and_then(behaviours) {
+            recorder.behaviours(began_ns.saturating_sub(start_ns), sample);
+        }
         recorder.master(
             began_ns.saturating_sub(start_ns),
             self.master_sample(world.master_alive()),
@@ -351,4 +355,33 @@ impl Observer {
                 + counters.lost_events,
         }
     }
+}
+
+/// Legs and behaviours of a walk, if one is under way.
+fn behaviours(record: &Record) -> Option<BehaviourSample> {
+    let plan = record.walk?;
+    let code = |side| match plan.leg(side) {
+        LegPlan::Stance => 1,
+        LegPlan::Lift => 2,
+        LegPlan::Reach => 3,
+        LegPlan::Lower(_) => 4,
+    };
+    let count = |one| record.counters.behaviours.of(one);
+    Some(BehaviourSample {
+        left: code(Side::Left),
+        right: code(Side::Right),
+        enabled: record.acts.enabled.bits(),
+        pace: record.acts.pace.to_num(),
+        overload: count(Behaviour::Overload),
+        tip_guard: count(Behaviour::TipGuard),
+        touchdown: count(Behaviour::Touchdown),
+        search: count(Behaviour::Search),
+        bump: count(Behaviour::Bump),
+        lost_contact: count(Behaviour::LostContact),
+        slip: count(Behaviour::Slip),
+        hook: count(Behaviour::Hook),
+        stuck: count(Behaviour::Stuck),
+        load_share: count(Behaviour::LoadShare),
+        stroke_governor: count(Behaviour::StrokeGovernor),
+    })
 }

@@ -118,6 +118,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         },
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
+        behaviours: scenario.behaviours,
         commissioned: robot.commissioned,
         parameters: sums(robot),
         ..MasterConfig::default()

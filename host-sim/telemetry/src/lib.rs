@@ -60,7 +60,7 @@ pub use recover::{Recovered, recover};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, json_schema};
 pub use ring::{Message, Ring};
 pub use samples::{
-    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
-    ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
+    BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
+    MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
 };
 pub use sink::{OwnedSample, SampleRef, Sink, Taken};

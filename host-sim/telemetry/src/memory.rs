@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::samples::{
-    BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample, SupplySample,
-    WheelSample, channels,
+    BehaviourSample, BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample,
+    SupplySample, WheelSample, channels,
 };
 use super::sink::{SampleRef, Taken};
 use crate::Event;
@@ -43,6 +43,8 @@ pub struct Recording {
     pub supply: Vec<Row<SupplySample>>,
     /// Master.
     pub master: Vec<Row<MasterSample>>,
+    /// Legs and behaviours of a walk.
+    pub behaviours: Vec<Row<BehaviourSample>>,
     /// Bus as each board has heard it, addresses 1 to 8.
     pub links: [Vec<Row<LinkSample>>; 8],
     /// Events.
@@ -177,6 +179,7 @@ impl Memory {
             SampleRef::Bus(v) => push(&mut data.bus, t_ns, v),
             SampleRef::Supply(v) => push(&mut data.supply, t_ns, v),
             SampleRef::Master(v) => push(&mut data.master, t_ns, v),
+            SampleRef::Behaviour(v) => push(&mut data.behaviours, t_ns, v),
             SampleRef::Link(v) => {
                 if self.keep.last_link {
                     data.links[number].clear();

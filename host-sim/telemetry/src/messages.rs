@@ -6,11 +6,11 @@ mod refusal;
 use std::fmt;
 
 use wheeleg_interface::{Side, first_difference};
+use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::config::UniqueId;
 use wheeleg_master::contact::Side as FootSide;
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
 use wheeleg_master::finding::Finding;
-use wheeleg_master::layer1::walk::Felt;
 use wheeleg_protocol::param::params_at;
 use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord, LinkQuality};
 
@@ -223,7 +223,7 @@ fn master(event: &MasterEvent) -> String {
         MasterEvent::Hold(reason) => format!("all axes hold: {}", hold_reason(&reason)),
         MasterEvent::Homed => "start pose reached".to_owned(),
         MasterEvent::HomingFailed { joint } => format!("start pose not reached: joint {joint}"),
-        MasterEvent::Walk(felt) => walk(felt),
+        MasterEvent::Behaviour(one) => act(one),
         MasterEvent::GaitDone { steps } => format!("gait over after {steps} steps"),
         MasterEvent::TrajectoryDone => "foot trajectory over".to_owned(),
         MasterEvent::TouchDown { side, sector } => match sector {
@@ -245,31 +245,49 @@ fn master(event: &MasterEvent) -> String {
     }
 }
 
-/// What a walk has met, and what it does.
-fn walk(felt: Felt) -> String {
-    match felt {
-        Felt::Bump(side) => format!(
-            "{} foot runs against something in its swing: it is lifted higher, or set down there",
+/// What a behaviour does, and why.
+fn act(act: Behaves) -> String {
+    match act {
+        Behaves::Overload { node } => format!(
+            "{} pulls at its limit for 0.5 s and does not move: it holds where it is",
+            board(node)
+        ),
+        Behaves::TipGuard => "no foot carries: the wheels slow down".to_owned(),
+        Behaves::EarlyGround(side) => format!(
+            "{} foot has met the ground 20 mm or more above where it was expected",
             word(side)
         ),
-        Felt::NoGround(side) => format!(
+        Behaves::LateGround(side) => format!(
+            "{} foot has met the ground 20 mm or more below where it was expected",
+            word(side)
+        ),
+        Behaves::NoGround(side) => format!(
             "{} leg finds no ground at its full length: the nose goes down, then the foot is set nearer",
             word(side)
         ),
-        Felt::LostGround(side) => {
+        Behaves::Bump(side) => format!(
+            "{} foot runs against something in its swing: it is lifted higher, or set down there",
+            word(side)
+        ),
+        Behaves::LostGround(side) => {
             format!("{} foot has lost the ground and follows it", word(side))
         }
-        Felt::TipGuard => "no foot carries: the wheels slow down".to_owned(),
-        Felt::BackOff => {
-            "no progress for 3 s: the robot backs off and lifts its feet higher".to_owned()
-        }
-        Felt::Stuck => {
+        Behaves::Slip => "the wheels slip: the legs pull".to_owned(),
+        Behaves::BackOff => "no progress: the robot backs off and lifts its feet higher".to_owned(),
+        Behaves::Stuck => {
             "no progress after three tries: the robot stands. Turn it, or lead it another way"
                 .to_owned()
+        }
+        Behaves::LoadShare => {
+            "one leg carries more than the other: they are brought to share".to_owned()
+        }
+        Behaves::Governor => {
+            "a standing foot is at the end of its reach: the wheels slow down for it".to_owned()
         }
     }
 }
 
+/// Name of a side or sector inside a sentence.
 fn word(name: impl std::fmt::Debug) -> String {
     format!("{name:?}").to_lowercase()
 }
@@ -296,7 +314,10 @@ fn hold_reason(reason: &HoldReason) -> String {
             "supply pressure lost. Check compressor, hose and regulator, then clear and arm."
                 .to_owned()
         }
-        HoldReason::LayerOneStalled => "layer 1 gave nothing for 100 ms".to_owned(),
+        HoldReason::LayerOneStalled => {
+            "layer 1 gave nothing for 100 ms; a walk is brought to a stand by its behaviours"
+                .to_owned()
+        }
         HoldReason::OperatorLost => {
             "the operator in control is gone. Reconnect, take the control, then clear and arm."
                 .to_owned()

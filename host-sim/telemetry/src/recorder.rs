@@ -10,8 +10,8 @@ use super::log_file::LogFile;
 use super::memory::{Keep, Memory, Recording};
 use super::registry::{ChannelDef, Sample};
 use super::samples::{
-    BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample, ProvenanceSample,
-    StateSample, SupplySample, WheelSample, channels,
+    BehaviourSample, BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample,
+    ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
 };
 use super::sink::{SampleRef, Sink, Taken};
 use crate::{Event, LogError};
@@ -69,6 +69,7 @@ mod index {
     pub(super) const EVENTS: usize = 15;
     pub(super) const RUN: usize = 16;
     pub(super) const LINK: usize = 17;
+    pub(super) const BEHAVIOURS: usize = 25;
 }
 
 impl<'a> Recorder<'a> {
@@ -168,6 +169,11 @@ impl<'a> Recorder<'a> {
     /// Records the master.
     pub fn master(&mut self, t_ns: u64, sample: MasterSample) {
         self.put(index::MASTER, 0, t_ns, &sample);
+    }
+
+    /// Records the legs and behaviours of a walk.
+    pub fn behaviours(&mut self, t_ns: u64, sample: BehaviourSample) {
+        self.put(index::BEHAVIOURS, 0, t_ns, &sample);
     }
 
     /// True when a state fingerprint is due at `t_ns`; hashing a state costs
@@ -315,6 +321,7 @@ mod tests {
         assert_eq!(topic(index::EVENTS), "/events");
         assert_eq!(topic(index::RUN), "/run");
         assert_eq!(topic(index::LINK), "/link/1");
-        assert_eq!(channels().len(), index::LINK + 8);
+        assert_eq!(topic(index::BEHAVIOURS), "/behaviours");
+        assert_eq!(channels().len(), index::BEHAVIOURS + 1);
     }
 }

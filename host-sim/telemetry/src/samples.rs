@@ -312,6 +312,40 @@ samples! {
         fifo_drops: u32, "1", 0, Master;
     }
 
+    /// What a walk and its behaviours do, once per bus cycle of a walk.
+    BehaviourSample = "wheeleg.Behaviour" {
+        /// Left leg: 1 stance, 2 lift, 3 reach, 4 lower.
+        left: u8, "code", 0, Master;
+        /// Right leg, as the left.
+        right: u8, "code", 0, Master;
+        /// Behaviours that may act: bit 0 overload to bit 10 stroke governor.
+        enabled: u16, "bits", 0, Master;
+        /// Share of the walk's speed at which the wheels go.
+        pace: f64, "1", 4, Master;
+        /// Acts since the start of the robot: axes overloaded.
+        overload: u32, "1", 0, Master;
+        /// Tip guard.
+        tip_guard: u32, "1", 0, Master;
+        /// Touchdowns that the switches ended.
+        touchdown: u32, "1", 0, Master;
+        /// Legs at full length without ground.
+        search: u32, "1", 0, Master;
+        /// Feet that ran against something.
+        bump: u32, "1", 0, Master;
+        /// Standing feet that lost the ground.
+        lost_contact: u32, "1", 0, Master;
+        /// Slip of the wheels.
+        slip: u32, "1", 0, Master;
+        /// Feet hooked.
+        hook: u32, "1", 0, Master;
+        /// Backing off, and giving up.
+        stuck: u32, "1", 0, Master;
+        /// Load shared.
+        load_share: u32, "1", 0, Master;
+        /// Wheels that waited for a foot.
+        stroke_governor: u32, "1", 0, Master;
+    }
+
     /// Fingerprint of the whole simulated state, so that a difference below the resolution of the log still changes the hash.
     StateSample = "wheeleg.State" {
         /// BLAKE3 of the plant state, hexadecimal.
@@ -395,7 +429,7 @@ const FAST_HZ: u32 = 500;
 /// One sample per bus cycle.
 const CYCLE_HZ: u32 = 100;
 
-static CHANNELS: [ChannelDef; 25] = [
+static CHANNELS: [ChannelDef; 26] = [
     channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
     channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),
     channel::<JointSample>("/joint/3", FAST_HZ, "Left vertical cylinder (b6)"),
@@ -421,6 +455,7 @@ static CHANNELS: [ChannelDef; 25] = [
     channel::<LinkSample>("/link/6", 0, "Bus as heard by joint 6"),
     channel::<LinkSample>("/link/7", 0, "Bus as heard by wheel 7"),
     channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8"),
+    channel::<BehaviourSample>("/behaviours", CYCLE_HZ, "Legs and behaviours of a walk"),
 ];
 
 #[cfg(test)]

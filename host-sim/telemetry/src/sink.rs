@@ -3,8 +3,8 @@
 use super::contact::Contact;
 use super::registry::Sample;
 use super::samples::{
-    BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample, MasterSample,
-    ProvenanceSample, StateSample, SupplySample, WheelSample,
+    BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
+    MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample,
 };
 use crate::LogError;
 
@@ -88,6 +88,7 @@ sample_ref! {
     Bus: BusSample,
     Supply: SupplySample,
     Master: MasterSample,
+    Behaviour: BehaviourSample,
     State: StateSample,
     Event: EventSample,
     Link: LinkSample,

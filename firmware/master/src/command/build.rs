@@ -7,6 +7,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::{Command, CommandCode, CorrectionKind};
 use crate::argument::{self, Argument, OutOfRange, Value};
+use crate::behaviour::Behaviours;
 use crate::contact::Side;
 use crate::layer1::foot::FootShape;
 use crate::layer1::params::{GaitParams, ParamError, Pattern};
@@ -139,6 +140,10 @@ impl Command {
             CommandCode::EmergencyStop => Self::EmergencyStop,
             CommandCode::TakeControl => Self::TakeControl,
             CommandCode::ReleaseControl => Self::ReleaseControl,
+            CommandCode::SetBehaviours => {
+                let bits = read.whole::<u16>(&argument::BEHAVIOURS)?;
+                Self::SetBehaviours(Behaviours::from_bits(bits))
+            }
             CommandCode::Commission => Self::Commission,
             CommandCode::ReadParameter => Self::ReadParameter {
                 node: read.byte(&argument::BOARD)?,

@@ -155,6 +155,10 @@ impl Layer0 {
                 Ok(true)
             }
             Command::ReleaseControl => self.release_control().map(|()| true),
+            Command::SetBehaviours(enabled) => {
+                self.behaving.enable(enabled);
+                Ok(true)
+            }
             Command::Commission => {
                 if self.power != Power::Disarmed {
                     return Err(Refusal::NotDisarmed);

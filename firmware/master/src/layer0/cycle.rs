@@ -8,8 +8,8 @@ use wheeleg_protocol::{
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::behaviours::{JointSense, Senses, WheelSense};
 use super::questions::has_started;
-use super::reflex::Senses;
 use super::{Layer0, Power};
 use crate::TxBytes;
 use crate::config::SwitchFrame;
@@ -25,6 +25,7 @@ impl Layer0 {
     pub fn finish_cycle(&mut self, now_us: u64, events: &mut Events) -> (Record, Feedback) {
         self.supervise(now_us, events);
         self.sense_feet(now_us, events);
+        self.behave(now_us, events);
         let mut replies = [None; crate::setpoint::NODES];
         for (slot, (_, node)) in replies.iter_mut().zip(self.nodes.iter()) {
             *slot = node.reply;
@@ -35,6 +36,7 @@ impl Layer0 {
             feet: self.feet,
             travel_um: self.odometry.travel_um(),
             wheels_um: [Side::Left, Side::Right].map(|side| self.odometry.wheel_um(side)),
+            acts: *self.behaving.acts(),
             motion_allowed: self.motion_allowed(),
         };
         for (stroke, reply) in feedback.strokes_mm.iter_mut().zip(replies) {
@@ -42,6 +44,7 @@ impl Layer0 {
         }
         self.counters.missed = self.liveness.total_missed();
         self.counters.link = *self.decoder.quality();
+        self.counters.behaviours = *self.behaving.tally();
         let bearing = |side: Side| self.foot(side)?.bearing_rad(side);
         let record = Record {
             cycle: self.cycle,
@@ -56,6 +59,8 @@ impl Layer0 {
             feet: self.feet,
             bearing_rad: [bearing(Side::Left), bearing(Side::Right)],
             travel_um: feedback.travel_um,
+            walk: self.setpoints.walk,
+            acts: feedback.acts,
             counters: self.counters,
         };
         (record, feedback)
@@ -69,7 +74,7 @@ impl Layer0 {
                 self.stale_cycles = 0;
                 self.take(setpoints);
             }
-            None => self.stale_cycles = self.stale_cycles.saturating_add(1),
+            None => self.miss(),
         }
         self.cycle = self.cycle.wrapping_add(1);
         self.cycle_start_us = now_us;
@@ -99,8 +104,31 @@ impl Layer0 {
         if let Some(push) = setpoints.push {
             self.shape_pushes(push);
         }
-        if self.frozen.is_none() {
+        if self.frozen.is_none() && !self.orphan.given_up {
             self.setpoints = setpoints;
+            self.orphan.note(&setpoints, self.behaving.acts());
+        }
+    }
+
+    /// Layer 1 has given nothing for this cycle. A walk goes on by its behaviours.
+    fn miss(&mut self) {
+        self.stale_cycles = self.stale_cycles.saturating_add(1);
+        if self.setpoints.walk.is_some() && self.power == Power::Armed {
+            let senses = self.senses();
+            let acts = *self.behaving.acts();
+            self.orphan.carry(&mut self.setpoints, &senses, &acts);
+        }
+    }
+
+    /// The behaviours of a walk, at the end of a cycle.
+    fn behave(&mut self, now_us: u64, events: &mut Events) {
+        if self.power == Power::Armed && self.frozen.is_none() {
+            let senses = self.senses();
+            self.behaving
+                .observe(&senses, &self.setpoints, now_us, events);
+            if self.orphan.given_up {
+                self.behaving.stop_wheels();
+            }
         }
     }
 
@@ -111,9 +139,10 @@ impl Layer0 {
         }
         let senses = self.senses();
         let setpoints = self.setpoints;
-        self.reflexes.observe(&setpoints, &senses);
+        let travel_um = self.odometry.travel_um();
+        self.reflexes.observe(&setpoints, &senses, travel_um);
         for (index, address) in Address::nodes().enumerate().take(JOINTS) {
-            let joint = self.joint_reference(index, &senses);
+            let joint = self.joint_reference(index, travel_um);
             let measured = self.nodes.get(index).and_then(|node| node.last);
             let slot = match (joint, measured) {
                 (Some(joint), _) => self.wire_joint(joint),
@@ -130,7 +159,11 @@ impl Layer0 {
             let _is_joint = slots.set_joint(address, slot);
         }
         let direct = self.direct_travel.map(|travel| travel.setpoint(now_us));
-        if let Some(travel) = direct.or(setpoints.travel) {
+        let (walks, fresh) = (setpoints.walk.is_some(), self.fresh());
+        let led = setpoints
+            .travel
+            .map(|travel| self.behaving.lead(travel, walks, fresh));
+        if let Some(travel) = direct.or(led) {
             for (side, number) in [(Side::Left, 7), (Side::Right, 8)] {
                 let slot = self.wheels.setpoint(
                     side,
@@ -148,7 +181,7 @@ impl Layer0 {
     }
 
     /// Reference of joint index 0..6: frozen, the user's, or layer 1's.
-    fn joint_reference(&self, index: usize, senses: &Senses) -> Option<JointSetpoint> {
+    fn joint_reference(&self, index: usize, travel_um: i64) -> Option<JointSetpoint> {
         let plain = |reference_mm| JointSetpoint {
             reference_mm,
             ..JointSetpoint::default()
@@ -160,8 +193,11 @@ impl Layer0 {
             return Some(plain(direct));
         }
         let setpoint = self.setpoints.joints.get(index).copied().flatten()?;
-        let mut setpoint = self.reflexes.apply(index, setpoint, senses);
-        if self.stale_cycles > 0 {
+        let mut setpoint = self.reflexes.apply(index, setpoint, travel_um);
+        if let Some(plan) = &self.setpoints.walk {
+            setpoint = self.behaving.apply(index, setpoint, plan);
+        }
+        if !self.fresh() {
             // Layer 1 is late: its last reference is held, not extrapolated.
             setpoint.velocity_mm_s = VelocityMmS::ZERO;
             setpoint.ahead = None;
@@ -188,16 +224,29 @@ impl Layer0 {
         }
     }
 
+    /// Whether layer 1 has given the references of this cycle.
+    fn fresh(&self) -> bool {
+        self.stale_cycles == 0 && !self.orphan.given_up
+    }
+
+    /// What the boards have said in their slots.
     fn senses(&self) -> Senses {
-        let vertical = |side: Side| -> Option<PositionMm> {
-            let node = self.nodes.get(side.joint(Cylinder::Vertical))?;
-            node.last.map(|reply| reply.joint_position())
-        };
-        Senses {
-            travel_um: self.odometry.travel_um(),
+        let mut senses = Senses {
             feet: self.feet,
-            vertical_mm: [vertical(Side::Left), vertical(Side::Right)],
+            ..Senses::default()
+        };
+        for (joint, (_, node)) in senses.joints.iter_mut().zip(self.nodes.iter()) {
+            *joint = node.last.as_ref().map(JointSense::of);
         }
+        for (wheel, side) in senses.wheels.iter_mut().zip([Side::Left, Side::Right]) {
+            let node = self.nodes.get(JOINTS.saturating_add(side.index()));
+            let reply = node.and_then(|node| node.last);
+            *wheel = WheelSense {
+                travel_um: self.odometry.wheel_um(side),
+                effort_percent: reply.map_or(0, |reply| reply.effort_raw),
+            };
+        }
+        senses
     }
 
     /// Switches of a foot in the leg's own frame.
@@ -207,7 +256,8 @@ impl Layer0 {
     }
 
     fn sense_feet(&mut self, now_us: u64, events: &mut Events) {
-        let [left_mm, right_mm] = self.senses().vertical_mm.map(Option::unwrap_or_default);
+        let senses = self.senses();
+        let [left_mm, right_mm] = [Side::Left, Side::Right].map(|side| senses.vertical_mm(side));
         let shorter_mm = left_mm.min(right_mm);
         for side in [Side::Left, Side::Right] {
             let node = self.nodes.get(side.joint(Cylinder::Vertical));

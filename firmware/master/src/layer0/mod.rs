@@ -3,13 +3,14 @@
 //!
 //! One bus cycle of 10 ms:
 //!
-//! 1. [`Layer0::finish_cycle`]: which nodes answered, odometry, feet, faults;
+//! 1. [`Layer0::finish_cycle`]: which nodes answered, odometry, feet, faults, behaviours;
 //!    gives the telemetry record and the feedback for layer 1.
 //! 2. [`Layer0::start_cycle`]: builds SYNC from the newest set-points.
 //! 3. [`Layer0::on_bus_bytes`]: collects slot replies and answers.
 //! 4. [`Layer0::next_acyclic`]: requests in the rest of the cycle.
 
 pub mod acyclic;
+pub mod behaviours;
 mod commands;
 mod cycle;
 pub mod feet;
@@ -37,6 +38,7 @@ use crate::event::HoldReason;
 use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
+use behaviours::{Behaving, Orphan};
 use feet::FootWatch;
 use left_behind::LeftBehind;
 use line::Line;
@@ -97,6 +99,8 @@ pub struct Layer0 {
     odometry: Odometry,
     wheels: Wheels,
     reflexes: Reflexes,
+    behaving: Behaving,
+    orphan: Orphan,
     jobs: Jobs,
     requester: Requester,
     in_flight: Option<Job>,
@@ -150,6 +154,8 @@ impl Layer0 {
             odometry: Odometry::new(config.wheels),
             wheels: Wheels::default(),
             reflexes: Reflexes::default(),
+            behaving: Behaving::new(config.behaviours, config.walk.nail_m > 0.0),
+            orphan: Orphan::default(),
             jobs: Jobs::new(),
             requester: Requester::new(RequesterConfig::DEFAULT, config.first_sequence),
             in_flight: None,

@@ -2,6 +2,7 @@
 
 use wheeleg_units::PositionMm;
 
+use super::behaviours::Senses;
 use crate::contact::{FootSwitches, Side};
 use crate::layer1::params::STROKE_MM;
 use crate::layer1::units::um_to_mm;
@@ -30,24 +31,14 @@ pub struct Reflexes {
     travel_origin_um: i64,
 }
 
-/// What the reflexes see in a cycle.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Senses {
-    /// Mean wheel travel, µm.
-    pub travel_um: i64,
-    /// Foot switches, left and right.
-    pub feet: [Option<FootSwitches>; WHEELS],
-    /// Measured strokes of the two vertical joints, left and right.
-    pub vertical_mm: [Option<PositionMm>; WHEELS],
-}
-
 impl Reflexes {
     /// Takes note of a cycle; to be called once per cycle before [`Self::apply`].
-    pub fn observe(&mut self, setpoints: &Setpoints, senses: &Senses) {
+    /// `travel_um` is the mean travel of the wheels.
+    pub fn observe(&mut self, setpoints: &Setpoints, senses: &Senses, travel_um: i64) {
         let segment = setpoints.travel.map(|travel| travel.segment);
         if segment != self.segment {
             self.segment = segment;
-            self.travel_origin_um = senses.travel_um;
+            self.travel_origin_um = travel_um;
         }
         for side in [Side::Left, Side::Right] {
             let asked = setpoints
@@ -57,7 +48,8 @@ impl Reflexes {
                 .flatten()
                 .is_some_and(|joint| joint.reflex == Reflex::StopOnTouch);
             let foot = senses.feet.get(side.index()).copied().flatten();
-            let stroke = senses.vertical_mm.get(side.index()).copied().flatten();
+            let b6 = senses.joint(side, Cylinder::Vertical);
+            let stroke = b6.map(|joint| joint.stroke_mm);
             if let Some(touch) = self.touch.get_mut(side.index()) {
                 *touch = touch.next(asked, foot.map(FootSwitches::any), stroke);
             }
@@ -66,12 +58,12 @@ impl Reflexes {
 
     /// The set-point of joint index 0..6 after its reflex.
     #[must_use]
-    pub fn apply(&self, joint: usize, setpoint: JointSetpoint, senses: &Senses) -> JointSetpoint {
+    pub fn apply(&self, joint: usize, setpoint: JointSetpoint, travel_um: i64) -> JointSetpoint {
         let mut out = setpoint;
         match setpoint.reflex {
             Reflex::None => {}
             Reflex::FollowTravel => {
-                let travelled = senses.travel_um.saturating_sub(self.travel_origin_um);
+                let travelled = travel_um.saturating_sub(self.travel_origin_um);
                 out.reference_mm = setpoint
                     .reference_mm
                     .saturating_sub(um_to_mm(travelled))

@@ -34,9 +34,10 @@ impl Layer0 {
     /// SYNC, wheels are withdrawn, and every node is asked to brake (E-stop: the
     /// bit in SYNC does it). The first reason stays until cleared.
     pub(super) fn hold_all(&mut self, reason: HoldReason, now_us: u64, events: &mut Events) {
-        if self.hold.is_some() {
+        if self.hold.is_some() && !self.orphan.given_up {
             return;
         }
+        self.orphan.given_up = false;
         self.hold = Some(reason);
         events.push(now_us, Event::Hold(reason));
         self.freeze();
@@ -46,6 +47,20 @@ impl Layer0 {
             self.jobs
                 .ask_all(EmergencyBrake {}.into(), |index| liveness.alive(index));
         }
+    }
+
+    /// Layer 1 stands still. Where it walked, the behaviours bring the robot to a stand; otherwise
+    /// all axes hold.
+    fn give_up_layer_one(&mut self, now_us: u64, events: &mut Events) {
+        let reason = HoldReason::LayerOneStalled;
+        if self.hold.is_some() || self.setpoints.walk.is_none() {
+            self.hold_all(reason, now_us, events);
+            return;
+        }
+        self.hold = Some(reason);
+        events.push(now_us, Event::Hold(reason));
+        self.orphan.given_up = true;
+        self.drop_requests(now_us, events);
     }
 
     /// Ends the requests to open valves, waiting or under way.
@@ -103,6 +118,8 @@ impl Layer0 {
         self.direct_travel = None;
         self.wheels.reset();
         self.reflexes = Default::default();
+        self.behaving.reset();
+        self.orphan = Default::default();
         self.setpoints = Setpoints::idle(self.cycle_start_us);
     }
 
@@ -258,8 +275,8 @@ impl Layer0 {
         if self.has_no_air() {
             self.hold_all(HoldReason::SupplyLost, now_us, events);
         }
-        if self.stale_cycles >= STALL_CYCLES {
-            self.hold_all(HoldReason::LayerOneStalled, now_us, events);
+        if self.stale_cycles >= STALL_CYCLES && !self.orphan.given_up {
+            self.give_up_layer_one(now_us, events);
         }
     }
 }

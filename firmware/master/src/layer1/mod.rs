@@ -17,6 +17,7 @@ pub mod walk;
 use heapless::spsc::{Consumer, Producer};
 use wheeleg_units::PositionMm;
 
+use crate::behaviour::Tally;
 use crate::command::Command;
 use crate::contact::Side;
 use crate::dispatcher::{Accepted, Refusal, Ticket};
@@ -65,6 +66,7 @@ pub struct Layer1 {
     active: Option<Ticket>,
     segment: u16,
     lost_setpoints: u32,
+    tally: Tally,
 }
 
 impl Layer1 {
@@ -87,6 +89,7 @@ impl Layer1 {
             active: None,
             segment: 0,
             lost_setpoints: 0,
+            tally: Tally::default(),
         })
     }
 
@@ -100,6 +103,12 @@ impl Layer1 {
     #[must_use]
     pub const fn lost_setpoints(&self) -> u32 {
         self.lost_setpoints
+    }
+
+    /// How often the behaviours of layer 1 have acted.
+    #[must_use]
+    pub const fn tally(&self) -> &Tally {
+        &self.tally
     }
 
     /// Runs one cycle: newest feedback, all waiting commands (at most as many
@@ -252,8 +261,9 @@ impl Layer1 {
             }
             Mode::Walk(walk) => {
                 let out = walk.setpoints(now_us, &self.feedback);
-                for felt in walk.take_felt() {
-                    events.push(now_us, Event::Walk(felt));
+                for act in walk.take_acts() {
+                    self.tally.count(act.behaviour());
+                    events.push(now_us, Event::Behaviour(act));
                 }
                 self.segment = walk.segment();
                 let steps = walk.steps();

@@ -11,7 +11,6 @@
 //! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the
 //!   standing foot has room for it.
 
-mod felt;
 mod geometry;
 mod leg;
 mod order;
@@ -19,12 +18,14 @@ mod order;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::params::ParamError;
+use crate::behaviour::{Act, Behaviour};
 use crate::contact::Side;
-use crate::setpoint::{Cylinder, Feedback, Phase, Setpoints, TravelSetpoint, WHEELS, WheelTravel};
-pub use felt::Felt;
+use crate::setpoint::{
+    Acts, Cylinder, Feedback, Phase, Setpoints, TravelSetpoint, WHEELS, WalkPlan, WheelTravel,
+};
 pub use geometry::WalkGeometry;
 use geometry::{Twist, stance, time_left_s};
-use leg::{FOLLOW_MM, HIGHER_MM, Leg, Sensed, TIPPING_MM, full_mm};
+use leg::{HIGHER_MM, Leg, Sensed, full_mm};
 pub use order::{WalkOrder, WalkPattern};
 
 /// Bus cycle, s.
@@ -44,19 +45,20 @@ const SWING_MAX_S: f32 = 3.0;
 const EXCHANGE_S: f32 = 0.12;
 /// The references wait for wheels that are behind by so much, mm, and stand still at twice that.
 const LEAD_MM: f32 = 40.0;
-/// Feet that have moved less than this, m, …
+/// Feet that have moved less than this, m, have not moved.
 const PROGRESS_M: f32 = 0.005;
-/// … in so many cycles (3 s) of a walk make no progress.
-const PATIENCE: u16 = 300;
-/// The robot then backs off for so many cycles (1 s) at this speed, m/s, …
+/// A robot that is stuck backs off for so many cycles (1 s) at this speed, m/s, …
 const BACK_OFF: u16 = 100;
 const BACK_M_S: f32 = 0.05;
 /// … and lifts its feet higher ([`HIGHER_MM`]) until it has come so far, m, …
 const FREE_M: f32 = 0.5;
 /// … or has tried so many times.
 const TRIES: u8 = 3;
-/// Things met that wait to be told; a leg each and the robot can meet one in a cycle.
-const FELT: usize = 4;
+/// The governor is told when it takes more than this share of the speed, and again only after it
+/// has given all of it back.
+const GOVERNED: f32 = 0.5;
+/// Acts that wait to be told.
+const TOLD: usize = 2;
 /// The wheels' references begin anew after this distance, mm, far below what they can tell.
 const SEGMENT_MM: f32 = 4000.0;
 
@@ -81,22 +83,15 @@ pub struct Walk {
     stopping: bool,
     /// What the references of the wheels are ahead of them, mm.
     lead_mm: [f32; WHEELS],
-    /// Cycles since a standing foot has moved.
-    idle: u16,
     /// Way since the last try to get on, m.
     free_m: f32,
     tries: u8,
     /// Cycles of backing off that are left.
     back_off: u16,
-    tipping: bool,
-    felt: [Option<Felt>; FELT],
-}
-
-/// Keeps what was met until it is told; the oldest counts.
-fn meet(all: &mut [Option<Felt>; FELT], felt: Option<Felt>) {
-    if let (Some(free), true) = (all.iter_mut().find(|one| one.is_none()), felt.is_some()) {
-        *free = felt;
-    }
+    /// What the behaviours of layer 0 do.
+    acts: Acts,
+    governed: bool,
+    told: [Option<Act>; TOLD],
 }
 
 impl Walk {
@@ -128,12 +123,12 @@ impl Walk {
             steps: 0,
             stopping: false,
             lead_mm: [0.0; WHEELS],
-            idle: 0,
             free_m: 0.0,
             tries: 0,
             back_off: 0,
-            tipping: false,
-            felt: [None; FELT],
+            acts: feedback.acts,
+            governed: false,
+            told: [None; TOLD],
         }))
     }
 
@@ -159,9 +154,16 @@ impl Walk {
         self.steps
     }
 
-    /// What it has met since it was asked last.
-    pub fn take_felt(&mut self) -> impl Iterator<Item = Felt> + use<> {
-        core::mem::take(&mut self.felt).into_iter().flatten()
+    /// What its own behaviours have done since it was asked last: [`Behaviour::Stuck`] and
+    /// [`Behaviour::StrokeGovernor`].
+    pub fn take_acts(&mut self) -> impl Iterator<Item = Act> + use<> {
+        core::mem::take(&mut self.told).into_iter().flatten()
+    }
+
+    fn tell(&mut self, act: Act) {
+        if let Some(free) = self.told.iter_mut().find(|one| one.is_none()) {
+            *free = Some(act);
+        }
     }
 
     /// Number of the wheels' motion in use.
@@ -172,6 +174,7 @@ impl Walk {
 
     /// The references of this cycle.
     pub fn setpoints(&mut self, now_us: u64, feedback: &Feedback) -> Setpoints {
+        self.acts = feedback.acts;
         let moved = self.moved(feedback);
         let lift_mm = self.order.lift_mm.get().to_num::<f32>();
         let nose_mm = self.order.nose_mm.get().to_num::<f32>();
@@ -184,8 +187,14 @@ impl Walk {
             if let Some(sensed) = Sensed::of(feedback, leg.side) {
                 let stood = leg.stands();
                 progress_m += leg.way_m(&sensed, PROGRESS_M);
-                let met = leg.advance(&sensed, moved, &self.geometry, foothold, lift_mm);
-                meet(&mut self.felt, met);
+                leg.advance(
+                    &sensed,
+                    &self.acts,
+                    moved,
+                    &self.geometry,
+                    foothold,
+                    lift_mm,
+                );
                 if !stood && leg.stands() {
                     let took = f32::from(self.since_swing) * CYCLE_S;
                     self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
@@ -193,12 +202,13 @@ impl Walk {
             }
         }
         self.level(plan_mm);
-        self.watch_progress(wanted, progress_m);
+        self.watch_progress(progress_m);
         let next = self.next_swing(wanted);
         if let Some((side, 0)) = next
             && let Some(leg) = self.legs.get_mut(side.index())
         {
-            leg.swing(if self.tries > 0 { HIGHER_MM } else { 0.0 });
+            let higher_mm = if self.tries > 0 { HIGHER_MM } else { 0.0 };
+            leg.swing(higher_mm, &self.acts);
             self.since_swing = 0;
             self.steps = self.steps.saturating_add(1);
         }
@@ -210,7 +220,7 @@ impl Walk {
     }
 
     /// Backs off where the feet make no progress, and gives up after some tries.
-    fn watch_progress(&mut self, wanted: Twist, progress_m: f32) {
+    fn watch_progress(&mut self, progress_m: f32) {
         self.free_m += progress_m;
         if self.free_m > FREE_M {
             self.tries = 0;
@@ -219,20 +229,17 @@ impl Walk {
             self.back_off = self.back_off.saturating_sub(1);
             return;
         }
-        self.idle = self.idle.saturating_add(1);
-        if wanted == Twist::default() || progress_m > 0.0 {
-            self.idle = 0;
-        } else if self.idle > PATIENCE {
-            self.idle = 0;
-            self.free_m = 0.0;
-            if self.tries < TRIES {
-                self.tries = self.tries.saturating_add(1);
-                self.back_off = BACK_OFF;
-                meet(&mut self.felt, Some(Felt::BackOff));
-            } else {
-                self.stopping = true;
-                meet(&mut self.felt, Some(Felt::Stuck));
-            }
+        if !self.acts.stuck {
+            return;
+        }
+        self.free_m = 0.0;
+        if self.tries < TRIES {
+            self.tries = self.tries.saturating_add(1);
+            self.back_off = BACK_OFF;
+            self.tell(Act::BackOff);
+        } else {
+            self.stopping = true;
+            self.tell(Act::Stuck);
         }
     }
 
@@ -269,20 +276,13 @@ impl Walk {
     /// Keeps the mean height of the legs, and feet on the ground.
     fn level(&mut self, plan_mm: f32) {
         let [left, right] = &self.legs;
-        let stands = left.stands() && right.stands();
-        let hang = stands && left.hangs() && right.hangs();
         let rise = if left.wants_nose_down() || right.wants_nose_down() {
             -plan_mm
         } else {
-            plan_mm - 0.5 * (left.stand_mm + right.stand_mm)
+            plan_mm - 0.5 * (left.stood_mm(&self.acts) + right.stood_mm(&self.acts))
         };
-        if hang && !self.tipping {
-            meet(&mut self.felt, Some(Felt::TipGuard));
-        }
-        self.tipping = hang;
-        let most_mm = if hang { TIPPING_MM } else { FOLLOW_MM };
         for leg in self.legs.iter_mut().filter(|leg| leg.stands()) {
-            meet(&mut self.felt, leg.level(rise, most_mm));
+            leg.level(rise, &self.acts);
         }
     }
 
@@ -343,7 +343,12 @@ impl Walk {
             self.travel_mm = [0.0; WHEELS];
             self.segment = self.segment.wrapping_add(1);
         }
-        let target = wanted.scaled(self.allowed(wanted));
+        let allowed = self.allowed(wanted);
+        if allowed < GOVERNED && !self.governed {
+            self.tell(Act::Governor);
+        }
+        self.governed = allowed < if self.governed { 1.0 } else { GOVERNED };
+        let target = wanted.scaled(allowed);
         let toward = |now: f32, to: f32, step: f32| now + (to - now).clamp(-step, step);
         self.twist = Twist {
             forward_m_s: toward(
@@ -357,6 +362,7 @@ impl Walk {
                 TURN_RAD_S2 * CYCLE_S,
             ),
         };
+        let pace = self.pace();
         for (side, travel) in [Side::Left, Side::Right]
             .into_iter()
             .zip(&mut self.travel_mm)
@@ -364,23 +370,28 @@ impl Walk {
             let step = 1e3 * CYCLE_S * self.twist.wheel_m_s(&self.geometry, side);
             *travel += step;
             if let Some(lead) = self.lead_mm.get_mut(side.index()) {
-                *lead += step;
+                *lead += pace * step;
             }
         }
     }
 
+    /// Share of the references' motion that layer 0 makes the wheels' own.
+    fn pace(&self) -> f32 {
+        self.acts.pace.to_num()
+    }
+
     /// Share of the motion asked for at which no standing foot runs out of reach before it may
-    /// swing, and the wheels follow; nothing while no foot carries.
+    /// swing, and the wheels follow.
     fn allowed(&self, wanted: Twist) -> f32 {
-        if self.tipping {
-            return 0.0;
-        }
         let behind = [Side::Left, Side::Right]
             .into_iter()
             .zip(self.lead_mm)
             .map(|(side, lead)| lead * libm::copysignf(1.0, wanted.wheel_m_s(&self.geometry, side)))
             .fold(0.0, f32::max);
         let follows = (2.0 - behind / LEAD_MM).clamp(0.0, 1.0);
+        if !self.acts.enabled.contains(Behaviour::StrokeGovernor) {
+            return follows;
+        }
         let [left, right] = &self.legs;
         let share = |leg: &Leg, other: &Leg| {
             if !leg.stands() {
@@ -420,8 +431,19 @@ impl Walk {
             .iter()
             .find(|leg| !leg.stands())
             .map(|leg| leg.side);
+        let wanted = self.wanted();
+        let walks = out.phase == Phase::Walk;
+        let [left, right] = &self.legs;
+        out.walk = walks.then(|| WalkPlan {
+            legs: [left.plan(), right.plan()],
+            driven: wanted != Twist::default() && self.back_off == 0,
+        });
+        let speed = self.twist.scaled(self.pace());
         for leg in &mut self.legs {
-            let joints = leg.setpoints(self.twist, &self.geometry, lift_mm);
+            if !walks {
+                leg.absorb(&self.acts);
+            }
+            let joints = leg.setpoints(speed, &self.geometry, lift_mm);
             let cylinders = [Cylinder::Yaw, Cylinder::Horizontal, Cylinder::Vertical];
             for (cylinder, joint) in cylinders.into_iter().zip(joints) {
                 if let Some(slot) = out.joints.get_mut(leg.side.joint(cylinder)) {

@@ -1,5 +1,6 @@
 //! Dispatcher: routing by code, deadlines, duplicates, queues.
 
+use wheeleg_master::behaviour::Behaviours;
 use wheeleg_master::command::{Command, CommandCode, CorrectionKind, Layer, TABLE, write_markdown};
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject, Request};
@@ -51,6 +52,7 @@ fn all() -> Vec<Command> {
         Command::Commission,
         Command::TakeControl,
         Command::ReleaseControl,
+        Command::SetBehaviours(Behaviours::ALL),
         Command::ReadParameter { node: 1, id: 1 },
         Command::WriteParameter {
             node: 1,

@@ -3,6 +3,7 @@
 
 mod answers;
 mod arguments;
+mod behaviours;
 mod bus_cycle;
 mod commands;
 mod common;

@@ -4,8 +4,9 @@ use proptest::prelude::*;
 use wheeleg_master::contact::{
     BEARING_ERROR_RAD, FRONT, FootSwitches, INNER, OUTER, REAR, Sector, Side, bearing_of,
 };
+use wheeleg_master::layer0::behaviours::{JointSense, Senses};
 use wheeleg_master::layer0::odometry::{Odometry, WheelGeometry};
-use wheeleg_master::layer0::reflex::{Reflexes, Senses};
+use wheeleg_master::layer0::reflex::Reflexes;
 use wheeleg_master::layer1::homing::{Homing, HomingConfig, HomingStep};
 use wheeleg_master::setpoint::{Feedback, JointSetpoint, Reflex, Setpoints, TravelSetpoint};
 use wheeleg_units::{PositionMm, WheelCount};
@@ -133,12 +134,8 @@ fn a_standing_foot_follows_the_measured_travel() {
             segment,
             ..TravelSetpoint::default()
         });
-        let senses = Senses {
-            travel_um,
-            ..Senses::default()
-        };
-        reflexes.observe(&setpoints, &senses);
-        reflexes.apply(1, joint, &senses).reference_mm.to_f64()
+        reflexes.observe(&setpoints, &Senses::default(), travel_um);
+        reflexes.apply(1, joint, travel_um).reference_mm.to_f64()
     };
     assert_eq!(
         at(1, 5_000_000),
@@ -161,13 +158,17 @@ fn touchdown_stops_the_lowering_and_a_stuck_switch_does_not() {
         ..JointSetpoint::default()
     };
     let run = |reflexes: &mut Reflexes, setpoints: &Setpoints, closed: bool, stroke| {
+        let b6 = JointSense {
+            stroke_mm: mm(stroke),
+            ..JointSense::default()
+        };
         let senses = Senses {
             feet: [Some(FootSwitches(u8::from(closed))), None],
-            vertical_mm: [Some(mm(stroke)), None],
+            joints: [None, None, Some(b6), None, None, None],
             ..Senses::default()
         };
-        reflexes.observe(setpoints, &senses);
-        reflexes.apply(2, lower, &senses).reference_mm
+        reflexes.observe(setpoints, &senses, 0);
+        reflexes.apply(2, lower, 0).reference_mm
     };
     setpoints.joints[2] = Some(lower);
     let mut reflexes = Reflexes::default();

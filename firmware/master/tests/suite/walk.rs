@@ -3,8 +3,11 @@
 //! within what the air gives way, touches the ground.
 
 use fixed::types::I16F16;
+use wheeleg_master::behaviour::{Act, Behaviours};
 use wheeleg_master::contact::{FootSwitches, Side};
-use wheeleg_master::layer1::walk::{Felt, Walk, WalkGeometry, WalkOrder, WalkPattern};
+use wheeleg_master::event::{Event, Events};
+use wheeleg_master::layer0::behaviours::{Behaving, JointSense, Senses, WheelSense};
+use wheeleg_master::layer1::walk::{Walk, WalkGeometry, WalkOrder, WalkPattern};
 use wheeleg_master::mirror;
 use wheeleg_master::setpoint::{Cylinder, Feedback, Phase, Setpoints};
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -14,6 +17,10 @@ const PISTON_MM: f64 = 3.0;
 
 struct Robot {
     walk: Walk,
+    behaving: Behaving,
+    /// What was told in the last cycle.
+    told: Vec<Act>,
+    speeds: [f64; 6],
     strokes: [f64; 6],
     /// Depth of the ground below each foot, mm.
     ground: [f64; 2],
@@ -40,6 +47,9 @@ impl Robot {
         let walk = Walk::new(WalkGeometry::default(), order, &feedback, 7);
         Self {
             walk: walk.expect("in range").expect("all heard"),
+            behaving: Behaving::new(Behaviours::ALL, false),
+            told: Vec::new(),
+            speeds: [0.0; 6],
             strokes,
             ground,
             wheels_mm: [0.0; 2],
@@ -64,13 +74,33 @@ impl Robot {
 
     fn cycle(&mut self) -> Setpoints {
         self.now_us += 10_000;
-        let feedback = sensed(&self.strokes, &self.ground, self.wheels_mm);
-        let out = self.walk.setpoints(self.now_us, &feedback);
-        for (stroke, joint) in self.strokes.iter_mut().zip(out.joints) {
-            let to = joint.expect("every joint is led").reference_mm.to_f64();
-            *stroke += (to - *stroke).clamp(-PISTON_MM, PISTON_MM);
+        let mut feedback = sensed(&self.strokes, &self.ground, self.wheels_mm);
+        let mut events = Events::new();
+        let senses = self.senses(&feedback);
+        self.behaving
+            .observe(&senses, &self.last, self.now_us, &mut events);
+        feedback.acts = *self.behaving.acts();
+        let mut out = self.walk.setpoints(self.now_us, &feedback);
+        self.told = self.walk.take_acts().collect();
+        while let Some((_, event)) = events.pop() {
+            match event {
+                Event::Behaviour(act) => self.told.push(act),
+                other => panic!("{other:?}"),
+            }
+        }
+        let before = self.strokes;
+        for (joint, slot) in out.joints.iter_mut().enumerate() {
+            let wanted = slot.as_mut().expect("every joint is led");
+            if let Some(plan) = &out.walk {
+                *wanted = self.behaving.apply(joint, *wanted, plan);
+            }
+            let to = wanted.reference_mm.to_f64();
+            self.strokes[joint] += (to - self.strokes[joint]).clamp(-PISTON_MM, PISTON_MM);
+            self.speeds[joint] = 100.0 * (self.strokes[joint] - before[joint]);
         }
         let travel = out.travel.expect("the wheels are led");
+        let travel = self.behaving.lead(travel, out.walk.is_some(), true);
+        out.travel = Some(travel);
         if travel.segment != self.segment {
             self.segment = travel.segment;
             self.origin_mm = self.wheels_mm;
@@ -80,6 +110,22 @@ impl Robot {
         }
         self.last = out;
         out
+    }
+
+    fn senses(&self, feedback: &Feedback) -> Senses {
+        let joint = |i: usize| JointSense {
+            stroke_mm: PositionMm::from_f64(self.strokes[i]),
+            velocity_mm_s: VelocityMmS::from_f64(self.speeds[i]),
+            ..JointSense::default()
+        };
+        Senses {
+            feet: feedback.feet,
+            joints: std::array::from_fn(|i| Some(joint(i))),
+            wheels: feedback.wheels_um.map(|travel_um| WheelSense {
+                travel_um,
+                effort_percent: 0,
+            }),
+        }
     }
 
     fn run(&mut self, seconds: f64) {
@@ -270,9 +316,9 @@ fn a_walk_that_cannot_go_on_backs_off_three_times_and_stands() {
     for _ in 0..6000 {
         let out = robot.cycle();
         farthest = farthest.max(robot.wheels_mm[0]);
-        for felt in robot.walk.take_felt() {
-            tries += u32::from(felt == Felt::BackOff);
-            if felt == Felt::Stuck {
+        for act in &robot.told {
+            tries += u32::from(*act == Act::BackOff);
+            if *act == Act::Stuck {
                 assert_eq!(tries, 3);
             }
         }

@@ -1,11 +1,14 @@
 //! The machine-readable summary of a run.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, Target};
 use crate::study;
 use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_master::behaviour::Behaviour;
 use wheeleg_master::dispatcher::Ticket;
 use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_remote_host::PilSummary;
@@ -74,6 +77,9 @@ pub struct Summary {
     pub passed: bool,
     /// Targets with values and verdicts.
     pub targets: Vec<Target>,
+    /// How often each behaviour of a walk has acted; not there if the robot did not walk.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub behaviours: Option<BTreeMap<&'static str, u32>>,
     /// Boards outside of this process and their comparison, if there were any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pil: Option<PilSummary>,
@@ -128,6 +134,26 @@ fn messages(recording: &Recording) -> Vec<String> {
     lines
 }
 
+/// How often each behaviour has acted, by its name.
+fn behaviours(recording: &Recording) -> Option<BTreeMap<&'static str, u32>> {
+    let last = &recording.behaviours.last()?.v;
+    let count = |one: Behaviour| match one {
+        Behaviour::Overload => last.overload,
+        Behaviour::TipGuard => last.tip_guard,
+        Behaviour::Touchdown => last.touchdown,
+        Behaviour::Search => last.search,
+        Behaviour::Bump => last.bump,
+        Behaviour::LostContact => last.lost_contact,
+        Behaviour::Slip => last.slip,
+        Behaviour::Hook => last.hook,
+        Behaviour::Stuck => last.stuck,
+        Behaviour::LoadShare => last.load_share,
+        Behaviour::StrokeGovernor => last.stroke_governor,
+    };
+    let named = |one: Behaviour| (one.name(), count(one));
+    Some(Behaviour::ALL.map(named).into_iter().collect())
+}
+
 impl Summary {
     /// Collects the summary of a run.
     #[must_use]
@@ -158,6 +184,7 @@ impl Summary {
             passed: info.complete && analysis.passed(),
             pil: info.pil,
             targets: analysis.targets.clone(),
+            behaviours: behaviours(recording),
         }
     }
 }

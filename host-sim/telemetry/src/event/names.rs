@@ -1,9 +1,9 @@
 //! Names and kinds of events as the log has them. They stay the same from version to version.
 
+use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
-use wheeleg_master::layer1::walk::Felt;
 use wheeleg_protocol::LogEvent;
 use wheeleg_protocol::param::params_at;
 
@@ -37,20 +37,27 @@ pub(super) const fn master_kind(event: &MasterEvent) -> EventKind {
         | MasterEvent::Link { .. }
         | MasterEvent::NodeBack(_)
         | MasterEvent::Homed
-        | MasterEvent::Walk(_)
+        | MasterEvent::Behaviour(_)
         | MasterEvent::GaitDone { .. }
         | MasterEvent::TrajectoryDone => EventKind::Info,
     }
 }
 
-const fn felt_name(felt: Felt) -> &'static str {
-    match felt {
-        Felt::Bump(_) => "bump",
-        Felt::NoGround(_) => "no_ground",
-        Felt::LostGround(_) => "lost_ground",
-        Felt::TipGuard => "tip_guard",
-        Felt::BackOff => "back_off",
-        Felt::Stuck => "stuck",
+/// Name of an act of a behaviour, in snake case.
+const fn act_name(act: Behaves) -> &'static str {
+    match act {
+        Behaves::Overload { .. } => "overload",
+        Behaves::TipGuard => "tip_guard",
+        Behaves::EarlyGround(_) => "early_ground",
+        Behaves::LateGround(_) => "late_ground",
+        Behaves::NoGround(_) => "no_ground",
+        Behaves::Bump(_) => "bump",
+        Behaves::LostGround(_) => "lost_ground",
+        Behaves::Slip => "slip",
+        Behaves::BackOff => "back_off",
+        Behaves::Stuck => "stuck",
+        Behaves::LoadShare => "load_share",
+        Behaves::Governor => "governor",
     }
 }
 
@@ -77,7 +84,7 @@ pub(super) const fn master_code(event: &MasterEvent) -> &'static str {
         MasterEvent::Hold(_) => "hold",
         MasterEvent::Homed => "homed",
         MasterEvent::HomingFailed { .. } => "homing_failed",
-        MasterEvent::Walk(felt) => felt_name(*felt),
+        MasterEvent::Behaviour(act) => act_name(*act),
         MasterEvent::GaitDone { .. } => "gait_done",
         MasterEvent::TrajectoryDone => "trajectory_done",
         MasterEvent::TouchDown { .. } => "touch_down",
@@ -97,9 +104,10 @@ pub(super) fn master_detail(event: &MasterEvent) -> String {
         MasterEvent::Hold(reason) => hold_name(reason).to_owned(),
         MasterEvent::TouchDown { side, .. }
         | MasterEvent::FootSwitch { side, .. }
-        | MasterEvent::LiftOff(side)
-        | MasterEvent::Walk(Felt::Bump(side) | Felt::NoGround(side) | Felt::LostGround(side)) => {
-            side_name(*side).to_owned()
+        | MasterEvent::LiftOff(side) => side_name(*side).to_owned(),
+        MasterEvent::Behaviour(act) => {
+            let side = act.side();
+            side.map_or_else(String::new, |side| side_name(side).to_owned())
         }
         _ => String::new(),
     }
@@ -123,6 +131,7 @@ pub(super) const fn master_board(event: &MasterEvent) -> Option<u8> {
         | MasterEvent::HomingFailed { joint: node }
         | MasterEvent::Position { joint: node, .. } => Some(node),
         MasterEvent::Found { node, .. } => node,
+        MasterEvent::Behaviour(Behaves::Overload { node }) => Some(node),
         MasterEvent::Refused { reason, .. } => refusing_board(&reason),
         MasterEvent::Hold(reason) => match reason {
             HoldReason::NodeLost(node)

@@ -9,13 +9,14 @@
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use super::felt::Felt;
 use super::geometry::{Twist, WalkGeometry};
 use crate::contact::{FootSwitches, Side};
 use crate::layer1::params::STROKE_MM;
 use crate::layer1::units::metres;
 use crate::mirror;
-use crate::setpoint::{Ahead, Cylinder, Feedback, JointSetpoint, OnLinkLoss, Reflex};
+use crate::setpoint::{
+    Acts, Ahead, Cylinder, Feedback, JointSetpoint, Landing, LegPlan, OnLinkLoss,
+};
 
 /// A foot is clear of hard ground after half of the lift, or after so much of it, mm.
 const CLEAR_MM: f32 = 20.0;
@@ -24,12 +25,8 @@ const NAILS_OUT: f32 = 0.9;
 /// Share of the way to the foothold after which the foot goes down: what is left takes as long as
 /// the way down.
 const LOWER_FROM: f32 = 0.6;
-/// From so far above the ground that is expected, mm, …
+/// From so far above the ground that is expected, mm, layer 0 leads a foot slowly until it touches.
 const APPROACH_MM: f32 = 10.0;
-/// … a foot goes down at this speed until it touches, mm per cycle (100 mm/s).
-const SEARCH_MM: f32 = 1.0;
-/// The slow way begins when the piston is as near to its begin as this, mm.
-const SEARCH_FROM_MM: f32 = 5.0;
 /// Stroke by which a stance presses on beyond the first touch, mm: it takes its share of the load
 /// (4 mm against the stiffness of the air, about 2.7 N/mm).
 pub(super) const PRESS_MM: f32 = 4.0;
@@ -37,27 +34,14 @@ pub(super) const PRESS_MM: f32 = 4.0;
 const NOSE_MM: f32 = 0.3;
 /// A bump, or a try to get on, lifts a foot by so much more, mm.
 pub(super) const HIGHER_MM: f32 = 40.0;
-/// A foot that reaches slower than this, mm per cycle (10 mm/s), …
-const STALLED_MM: f32 = 0.1;
-/// … for so many cycles, from so many after the begin of the reach on, has run against something.
-const STALLED: u16 = 20;
-const STARTED: u16 = 25;
 /// A foot that finds no ground is set nearer by so much, m, …
 const NEARER_M: f32 = 0.06;
 /// … after so many cycles at full length (1.5 s), …
 const PATIENCE: u16 = 150;
 /// … so many times.
 const TRIES: u8 = 2;
-/// A leg is at its full length from here on, mm.
-const FULL_MM: f32 = 178.0;
 /// Cycles at full length, without ground, after which the nose goes down.
 const NO_GROUND: u16 = 20;
-/// Cycles with all switches open after which a standing foot has lost the ground (50 ms).
-const LOST: u16 = 5;
-/// Farthest that a standing leg extends after lost ground, mm.
-pub(super) const FOLLOW_MM: f32 = 20.0;
-/// The same while no foot carries: a leg that extends lifts the nose.
-pub(super) const TIPPING_MM: f32 = 10.0;
 /// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
 /// presses less.
 const ANNOUNCED: u8 = 8;
@@ -123,26 +107,14 @@ pub(super) struct Leg {
     ground_mm: f32,
     /// Cycles until it is going to rise, if it is.
     pub rises_in: Option<u8>,
-    /// Cycles since the state began.
-    cycles: u16,
     /// Cycles for which the foot has been loaded without a break.
     pub loaded: u16,
-    /// Cycles for which all switches have been open without a break.
-    open: u16,
-    /// What it has extended after lost ground in this stance, mm.
-    followed_mm: f32,
     /// What this swing is lifted beyond the order, mm.
     higher_mm: f32,
-    /// Cycles for which the reach has not gone on.
-    stalled: u16,
     /// Cycles at full length without ground.
     without: u16,
     /// Footholds of this swing that had no ground.
     tries: u8,
-    /// Nails go into the ground: a touch does not end the way down yet.
-    through: bool,
-    /// Foot of the last cycle, m.
-    before_m: [f32; 2],
     /// Foot from which progress counts, m.
     anchor_m: [f32; 2],
     /// The last pose that could be computed: yaw and b5.
@@ -163,16 +135,10 @@ impl Leg {
             stand_mm: sensed.height_mm,
             ground_mm: sensed.height_mm,
             rises_in: None,
-            cycles: 0,
             loaded: 0,
-            open: 0,
-            followed_mm: 0.0,
             higher_mm: 0.0,
-            stalled: 0,
             without: 0,
             tries: 0,
-            through: false,
-            before_m: sensed.foot_m,
             anchor_m: sensed.foot_m,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
                 reference_mm,
@@ -185,18 +151,38 @@ impl Leg {
         self.state == LegState::Stance
     }
 
-    fn enter(&mut self, state: LegState) {
-        self.state = state;
-        self.cycles = 0;
+    /// What layer 0 is told of it.
+    pub(super) fn plan(&self) -> LegPlan {
+        match self.state {
+            LegState::Stance => LegPlan::Stance,
+            LegState::Lift(_) => LegPlan::Lift,
+            LegState::Reach(_) => LegPlan::Reach,
+            LegState::Lower(from_mm) => LegPlan::Lower(stroke_mm(from_mm)),
+        }
+    }
+
+    /// Stroke at which a standing leg stands, with what layer 0 has made of it, mm.
+    pub(super) fn stood_mm(&self, acts: &Acts) -> f32 {
+        let beyond = acts.beyond_mm.get(self.side.index()).copied();
+        let beyond_mm = beyond.unwrap_or_default().get().to_num::<f32>();
+        (self.stand_mm + beyond_mm).min(full_mm())
+    }
+
+    /// What layer 0 has made of a stance is the leg's own from now on.
+    pub(super) fn absorb(&mut self, acts: &Acts) {
+        if self.stands() {
+            self.stand_mm = self.stood_mm(acts);
+        }
     }
 
     /// Begins a swing, `higher_mm` above the order's.
-    pub(super) fn swing(&mut self, higher_mm: f32) {
+    pub(super) fn swing(&mut self, higher_mm: f32, acts: &Acts) {
+        self.absorb(acts);
         self.higher_mm = higher_mm;
         self.tries = 0;
         // Where a touch would have been, as the leg stands now.
         self.ground_mm = self.stand_mm - PRESS_MM;
-        self.enter(LegState::Lift(self.stand_mm));
+        self.state = LegState::Lift(self.stand_mm);
     }
 
     /// At full length it finds no ground: the nose is to go down.
@@ -219,27 +205,24 @@ impl Leg {
     }
 
     /// One cycle: `moved` is what the ground has passed below, m and rad; `foothold` where the
-    /// swing is to end, `lift_mm` its height. Tells what it has met.
+    /// swing is to end, `lift_mm` its height.
     pub(super) fn advance(
         &mut self,
         sensed: &Sensed,
+        acts: &Acts,
         moved: Twist,
         geometry: &WalkGeometry,
         foothold: [f32; 2],
         lift_mm: f32,
-    ) -> Option<Felt> {
-        self.cycles = self.cycles.saturating_add(1);
-        let count = |cycles: u16, on: bool| if on { cycles.saturating_add(1) } else { 0 };
-        self.loaded = count(self.loaded, sensed.touches);
-        self.open = count(self.open, !sensed.touches);
+    ) {
+        self.loaded = if sensed.touches {
+            self.loaded.saturating_add(1)
+        } else {
+            0
+        };
         let lift_mm = lift_mm + self.higher_mm;
-        let slow = distance(sensed.foot_m, self.before_m) < 1e-3 * STALLED_MM;
-        self.before_m = sensed.foot_m;
         match self.state {
-            LegState::Stance => {
-                self.follow(moved, geometry);
-                None
-            }
+            LegState::Stance => self.follow(moved, geometry),
             LegState::Lift(from_mm) => {
                 self.follow(moved, geometry);
                 let lift_mm = lift_mm.min(from_mm);
@@ -247,27 +230,19 @@ impl Leg {
                 let clear = hard.max((1e3 * geometry.nail_m).min(NAILS_OUT * lift_mm));
                 if sensed.height_mm <= from_mm - clear {
                     let foothold = self.nearer(foothold);
-                    self.enter(LegState::Reach(distance(sensed.foot_m, foothold)));
-                    self.stalled = 0;
+                    self.state = LegState::Reach(distance(sensed.foot_m, foothold));
                 }
-                None
             }
             LegState::Reach(way_m) => {
                 self.foot_m = self.nearer(foothold);
                 let left_m = distance(sensed.foot_m, self.foot_m);
                 if left_m <= (1.0 - LOWER_FROM) * way_m {
                     self.lower();
-                    return None;
+                    return;
                 }
-                let started = self.cycles > STARTED;
-                self.stalled = count(self.stalled, started && slow);
-                // Tips of nails may still scratch the ground.
-                let runs_against = started && sensed.touches && geometry.nail_m == 0.0;
-                if self.stalled < STALLED && !runs_against {
-                    return None;
+                if acts.bump.get(self.side.index()) != Some(&true) {
+                    return;
                 }
-                self.stalled = 0;
-                self.cycles = 0;
                 if lift_mm < self.stand_mm {
                     self.higher_mm += HIGHER_MM;
                 } else {
@@ -275,46 +250,37 @@ impl Leg {
                     self.foot_m = sensed.foot_m;
                     self.lower();
                 }
-                Some(Felt::Bump(self.side))
             }
-            LegState::Lower(to_mm) => {
-                // A nail feels the ground by its length before the sole is there.
-                self.through = geometry.nail_m > 0.0 && sensed.height_mm < self.ground_mm;
-                self.touch(sensed, to_mm)
-            }
+            LegState::Lower(_) => self.land(sensed, acts),
         }
     }
 
     /// Goes down to just above the ground that is expected.
     fn lower(&mut self) {
         self.without = 0;
-        self.enter(LegState::Lower((self.ground_mm - APPROACH_MM).max(0.0)));
+        self.state = LegState::Lower((self.ground_mm - APPROACH_MM).max(0.0));
     }
 
-    /// A foot on its way down.
-    fn touch(&mut self, sensed: &Sensed, to_mm: f32) -> Option<Felt> {
-        if sensed.touches && !self.through {
-            self.foot_m = sensed.foot_m;
-            self.ground_mm = sensed.height_mm;
-            self.stand_mm = (sensed.height_mm + PRESS_MM).min(full_mm());
-            self.followed_mm = 0.0;
-            self.enter(LegState::Stance);
-            return None;
+    /// A foot on its way down, which layer 0 leads.
+    fn land(&mut self, sensed: &Sensed, acts: &Acts) {
+        match acts.landing.get(self.side.index()) {
+            Some(Landing::Down(stroke)) => {
+                self.foot_m = sensed.foot_m;
+                self.ground_mm = stroke.get().to_num();
+                self.stand_mm = (self.ground_mm + PRESS_MM).min(full_mm());
+                self.state = LegState::Stance;
+            }
+            Some(Landing::Nothing(cycles)) => {
+                self.without = *cycles;
+                if self.without > PATIENCE && self.tries < TRIES {
+                    self.tries = self.tries.saturating_add(1);
+                    self.without = 0;
+                    self.stand_mm = sensed.height_mm;
+                    self.state = LegState::Lift(sensed.height_mm);
+                }
+            }
+            _ => {}
         }
-        if sensed.height_mm >= to_mm - SEARCH_FROM_MM {
-            self.state = LegState::Lower((to_mm + SEARCH_MM).min(full_mm()));
-        }
-        if sensed.height_mm < FULL_MM {
-            return None;
-        }
-        self.without = self.without.saturating_add(1);
-        if self.without > PATIENCE && self.tries < TRIES {
-            self.tries = self.tries.saturating_add(1);
-            self.without = 0;
-            self.stand_mm = sensed.height_mm;
-            self.enter(LegState::Lift(sensed.height_mm));
-        }
-        (self.without == NO_GROUND).then_some(Felt::NoGround(self.side))
     }
 
     /// A foothold, set nearer to the middle of the reach for each one that had no ground.
@@ -331,30 +297,19 @@ impl Leg {
         self.foot_m = [x + dx, y + dy];
     }
 
-    /// All switches have been open for long.
-    pub(super) fn hangs(&self) -> bool {
-        self.open > LOST
-    }
-
-    /// Height of a standing leg: `rise_mm` is wanted by the nose; lost ground is followed, by
-    /// `most_mm` at most.
-    pub(super) fn level(&mut self, rise_mm: f32, most_mm: f32) -> Option<Felt> {
-        if self.hangs() && self.followed_mm < most_mm {
-            let first = self.followed_mm == 0.0;
-            self.followed_mm += SEARCH_MM;
-            self.stand_mm = (self.stand_mm + SEARCH_MM).min(full_mm());
-            return first.then_some(Felt::LostGround(self.side));
-        }
-        if self.hangs() && most_mm >= FOLLOW_MM {
-            // Deeper than that it is a foothold of its own.
+    /// Height of a standing leg: `rise_mm` is wanted by the nose, unless the foot looks for ground.
+    pub(super) fn level(&mut self, rise_mm: f32, acts: &Acts) {
+        let is = |all: &[bool]| all.get(self.side.index()) == Some(&true);
+        if is(&acts.deep) {
+            // It is a foothold of its own.
+            self.absorb(acts);
             self.without = 0;
             self.tries = 0;
-            self.enter(LegState::Lower(self.stand_mm));
-            return None;
+            self.state = LegState::Lower(self.stand_mm);
+        } else if !is(&acts.lost) {
+            let step = rise_mm.clamp(-NOSE_MM, NOSE_MM);
+            self.stand_mm = (self.stand_mm + step).clamp(0.0, full_mm());
         }
-        let step = rise_mm.clamp(-NOSE_MM, NOSE_MM);
-        self.stand_mm = (self.stand_mm + step).clamp(0.0, full_mm());
-        None
     }
 
     /// References: yaw, b5, b6. `speed` is the robot's.
@@ -383,12 +338,11 @@ impl Leg {
             }
         }
         let [mut yaw, mut horizontal] = self.last;
-        let (height_mm, reflex) = match self.state {
-            LegState::Stance => (self.stand_mm, Reflex::None),
-            LegState::Lift(from_mm) => (from_mm - lift_mm, Reflex::None),
-            LegState::Reach(_) => (self.stand_mm - lift_mm, Reflex::None),
-            LegState::Lower(to_mm) if self.through => (to_mm, Reflex::None),
-            LegState::Lower(to_mm) => (to_mm, Reflex::StopOnTouch),
+        let height_mm = match self.state {
+            LegState::Stance => self.stand_mm,
+            LegState::Lift(from_mm) => from_mm - lift_mm,
+            LegState::Reach(_) => self.stand_mm - lift_mm,
+            LegState::Lower(from_mm) => from_mm,
         };
         let rises = self.rises_in.filter(|_| self.stands());
         let rises = rises.filter(|cycles| (1..=ANNOUNCED).contains(cycles));
@@ -398,7 +352,6 @@ impl Leg {
                 reference_mm: stroke_mm(height_mm - lift_mm),
                 cycles,
             }),
-            reflex,
             ..JointSetpoint::default()
         };
         if airborne {

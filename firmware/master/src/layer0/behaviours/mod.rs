@@ -1,0 +1,340 @@
+//! What a walking robot does by itself: eleven behaviours, each a state and an update over what
+//! the boards say in their slots. They go on when layer 1 stands still.
+//!
+//! | | behaviour | file |
+//! |---|---|---|
+//! | B1 | overload | `overload` |
+//! | B2, B6 | tip guard, lost contact | `contact` |
+//! | B3, B4 | touchdown, search | `touchdown` |
+//! | B5 | bump | `bump` |
+//! | B7 | slip | `slip` |
+//! | B9 | stuck | `stuck` |
+//! | B10 | load share | `load_share` |
+//! | B11 | stroke governor | layer 1: only the gait knows how long a swing will take |
+//!
+//! What each wants of the wheels meets in `pace`; the first in priority wins, which among speeds is
+//! the slowest. `orphan` goes on for a layer 1 that stands still.
+
+mod bump;
+mod contact;
+mod load_share;
+mod orphan;
+mod overload;
+mod pace;
+mod slip;
+mod stuck;
+mod touchdown;
+
+use fixed::types::I16F16;
+use wheeleg_protocol::{Limit, SlotReply};
+use wheeleg_units::{Duty, PositionMm, VelocityMmS};
+
+use crate::behaviour::{Act, Behaviour, Behaviours, Tally};
+use crate::contact::{FootSwitches, Side};
+use crate::event::{Event, Events};
+use crate::layer1::params::STROKE_MM;
+use crate::setpoint::{
+    Acts, Cylinder, JOINTS, JointSetpoint, Landing, LegPlan, Setpoints, TravelSetpoint, WHEELS,
+    WalkPlan,
+};
+use bump::Bump;
+use contact::Contact;
+use load_share::LoadShare;
+pub(super) use orphan::Orphan;
+use overload::Overload;
+use pace::Pace;
+use slip::Slip;
+use stuck::Stuck;
+use touchdown::Touchdown;
+
+/// What a joint board says in its slot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointSense {
+    /// Stroke.
+    pub stroke_mm: PositionMm,
+    /// Speed of the piston.
+    pub velocity_mm_s: VelocityMmS,
+    /// Duty of the drive.
+    pub duty: Duty,
+    /// The drive is at its limit.
+    pub saturated: bool,
+}
+
+impl JointSense {
+    /// From a board's reply.
+    #[must_use]
+    pub const fn of(reply: &SlotReply) -> Self {
+        Self {
+            stroke_mm: reply.joint_position(),
+            velocity_mm_s: reply.joint_velocity(),
+            duty: reply.joint_duty(),
+            saturated: reply.limits.contains(Limit::DutySaturated),
+        }
+    }
+}
+
+/// What a wheel board says in its slot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WheelSense {
+    /// Travel of the rim since start-up, µm.
+    pub travel_um: i64,
+    /// Command of the motor, -100 to 100 %.
+    pub effort_percent: i16,
+}
+
+/// All that the behaviours sense, made of slot replies alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Senses {
+    /// Switches of the feet, in each leg's frame.
+    pub feet: [Option<FootSwitches>; WHEELS],
+    /// The joints; `None`: never heard.
+    pub joints: [Option<JointSense>; JOINTS],
+    /// The wheels.
+    pub wheels: [WheelSense; WHEELS],
+}
+
+impl Senses {
+    /// A cylinder of a leg.
+    #[must_use]
+    pub fn joint(&self, side: Side, cylinder: Cylinder) -> Option<JointSense> {
+        self.joints.get(side.joint(cylinder)).copied().flatten()
+    }
+
+    /// Stroke of a leg's vertical cylinder, 0 if never heard.
+    #[must_use]
+    pub fn vertical_mm(&self, side: Side) -> PositionMm {
+        self.joint(side, Cylinder::Vertical)
+            .unwrap_or_default()
+            .stroke_mm
+    }
+
+    /// Whether a foot touches; `None`: never heard.
+    #[must_use]
+    pub fn touches(&self, side: Side) -> Option<bool> {
+        let foot = self.feet.get(side.index()).copied().flatten()?;
+        Some(foot.any())
+    }
+}
+
+/// The behaviours.
+#[derive(Clone, Copy, Debug)]
+pub struct Behaving {
+    enabled: Behaviours,
+    /// Feet have nails, which touch before the sole does.
+    nailed: bool,
+    tally: Tally,
+    overload: Overload,
+    contact: Contact,
+    touchdown: [Touchdown; WHEELS],
+    bump: [Bump; WHEELS],
+    slip: Slip,
+    stuck: Stuck,
+    load_share: LoadShare,
+    pace: Pace,
+    acts: Acts,
+}
+
+/// Both sides, in the order of arrays.
+const SIDES: [Side; WHEELS] = [Side::Left, Side::Right];
+
+impl Behaving {
+    /// At rest; those of the set may act. `nailed`: nails of the feet touch before the soles do.
+    #[must_use]
+    pub fn new(enabled: Behaviours, nailed: bool) -> Self {
+        Self {
+            enabled,
+            nailed,
+            tally: Tally::default(),
+            overload: Overload::default(),
+            contact: Contact::default(),
+            touchdown: Default::default(),
+            bump: Default::default(),
+            slip: Slip::default(),
+            stuck: Stuck::default(),
+            load_share: LoadShare::default(),
+            pace: Pace::default(),
+            acts: Acts {
+                enabled,
+                ..Acts::default()
+            },
+        }
+    }
+
+    /// Changes the set of those that may act; what they remember of this walk is forgotten.
+    pub fn enable(&mut self, enabled: Behaviours) {
+        *self = Self {
+            tally: self.tally,
+            pace: self.pace,
+            ..Self::new(enabled, self.nailed)
+        };
+    }
+
+    /// Forgets everything but the counts and the set.
+    pub fn reset(&mut self) {
+        *self = Self {
+            tally: self.tally,
+            ..Self::new(self.enabled, self.nailed)
+        };
+    }
+
+    /// How often each has acted.
+    #[must_use]
+    pub const fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// What layer 1 is told.
+    #[must_use]
+    pub const fn acts(&self) -> &Acts {
+        &self.acts
+    }
+
+    /// Takes note of a cycle of a walk; to be called once per cycle. `setpoints` are those that
+    /// held in it.
+    pub fn observe(
+        &mut self,
+        senses: &Senses,
+        setpoints: &Setpoints,
+        now_us: u64,
+        events: &mut Events,
+    ) {
+        let Some(plan) = setpoints.walk else {
+            self.rest();
+            return;
+        };
+        let enabled = self.enabled;
+        let tally = &mut self.tally;
+        let mut tell = |act: Act| {
+            tally.count(act.behaviour());
+            events.push(now_us, Event::Behaviour(act));
+        };
+        if let Some(act) = self.overload.update(senses, &plan, enabled) {
+            tell(act);
+        }
+        for act in self
+            .contact
+            .update(senses, &plan, enabled)
+            .into_iter()
+            .flatten()
+        {
+            tell(act);
+        }
+        if let Some(act) = self.slip.update(senses, &plan, enabled) {
+            tell(act);
+        }
+        if let Some(act) = self.load_share.update(senses, &plan, enabled) {
+            tell(act);
+        }
+        let mut landed = [false; WHEELS];
+        for side in SIDES {
+            let leg = plan.leg(side);
+            if let Some(touchdown) = self.touchdown.get_mut(side.index()) {
+                let b6 = senses.joint(side, Cylinder::Vertical).unwrap_or_default();
+                let touches = senses.touches(side).unwrap_or(false);
+                let early = self.nailed && nails_first(leg, &b6);
+                let act = touchdown.update(side, leg, &b6, touches && !early, enabled);
+                if let Some(landed) = landed.get_mut(side.index()) {
+                    *landed = matches!(touchdown.landing(), Landing::Down(_));
+                }
+                if let Some(act) = act {
+                    tell(act);
+                }
+            }
+            let b5 = setpoints.joints.get(side.joint(Cylinder::Horizontal));
+            let b5 = b5.copied().flatten().unwrap_or_default();
+            let wanted_mm = b5.reference_mm;
+            if let Some(bump) = self.bump.get_mut(side.index())
+                && bump.update(leg, senses, side, wanted_mm, self.nailed, enabled)
+            {
+                tell(Act::Bump(side));
+            }
+        }
+        if enabled.contains(Behaviour::Touchdown) {
+            // Told as a touchdown of the foot already.
+            for _ in landed.into_iter().filter(|one| *one) {
+                self.tally.count(Behaviour::Touchdown);
+            }
+        }
+        let bumps = self.bump.map(|one| one.met());
+        let stuck = self.stuck.update(senses, &plan, setpoints, bumps, enabled);
+        self.pace.wish(self.contact.pace().min(self.slip.pace()));
+        self.acts = Acts {
+            enabled,
+            landing: self.touchdown.map(|one| one.landing()),
+            lost: self.contact.lost(),
+            deep: self.contact.deep(),
+            beyond_mm: self.contact.followed_mm(),
+            bump: bumps,
+            stuck,
+            pace: self.pace.share(),
+        };
+    }
+
+    /// No walk: nothing is remembered, and what the wheels were held back stays.
+    fn rest(&mut self) {
+        *self = Self {
+            tally: self.tally,
+            pace: self.pace,
+            ..Self::new(self.enabled, self.nailed)
+        };
+        self.pace.wish(I16F16::ONE);
+    }
+
+    /// The set-point of joint index 0..6 of a walk after what the behaviours make of it.
+    #[must_use]
+    pub fn apply(&self, joint: usize, setpoint: JointSetpoint, plan: &WalkPlan) -> JointSetpoint {
+        let mut out = setpoint;
+        for side in SIDES {
+            let stands = plan.leg(side) == LegPlan::Stance;
+            let add =
+                |mm: PositionMm, more| mm.saturating_add(more).limit(PositionMm::ZERO, STROKE_MM);
+            if joint == side.joint(Cylinder::Horizontal) && stands {
+                let lead = PositionMm::ZERO.saturating_sub(self.slip.lead_mm(side));
+                out.reference_mm = add(out.reference_mm, lead);
+            }
+            let bump = self.bump.get(side.index());
+            if let Some(back) = bump.and_then(Bump::back_mm)
+                && joint == side.joint(Cylinder::Horizontal)
+                && plan.leg(side) == LegPlan::Reach
+            {
+                out.reference_mm = back;
+                out.velocity_mm_s = VelocityMmS::ZERO;
+            }
+            if joint != side.joint(Cylinder::Vertical) {
+                continue;
+            }
+            if stands {
+                let of = |all: [PositionMm; WHEELS]| all.get(side.index()).copied();
+                let beyond = of(self.contact.followed_mm()).unwrap_or_default();
+                let longer = of(self.load_share.longer_mm()).unwrap_or_default();
+                let more = beyond.saturating_add(longer);
+                out.reference_mm = add(out.reference_mm, more);
+                if let Some(ahead) = &mut out.ahead {
+                    ahead.reference_mm = add(ahead.reference_mm, more);
+                }
+            }
+            if let (LegPlan::Lower(from_mm), Some(touchdown)) =
+                (plan.leg(side), self.touchdown.get(side.index()))
+            {
+                out.reference_mm = touchdown.reference(from_mm, self.enabled);
+            }
+        }
+        self.overload.apply(joint, out)
+    }
+
+    /// The wheels of a walk, at the pace that the behaviours allow. `fresh`: layer 1 has just given
+    /// these references; otherwise it is late, and the wheels go on as they did.
+    pub fn lead(&mut self, travel: TravelSetpoint, walks: bool, fresh: bool) -> TravelSetpoint {
+        self.pace.lead(travel, walks, fresh)
+    }
+
+    /// Layer 1 stands still: the wheels slow down to a stop.
+    pub(super) fn stop_wheels(&mut self) {
+        self.pace.stop();
+    }
+}
+
+/// Whether a foot with nails is not yet where ground was: what touches are the nails.
+fn nails_first(plan: LegPlan, b6: &JointSense) -> bool {
+    matches!(plan, LegPlan::Lower(from) if b6.stroke_mm < from.saturating_add(touchdown::APPROACH_MM))
+}

@@ -1,0 +1,162 @@
+//! B9 stuck: a robot that is driven and does not get on. What it then tries is layer 1's.
+
+use wheeleg_units::PositionMm;
+
+use super::{SIDES, Senses};
+use crate::behaviour::{Behaviour, Behaviours};
+use crate::setpoint::{Cylinder, LegPlan, Setpoints, WHEELS, WalkPlan};
+
+/// A standing leg that has moved by less than this, …
+const PROGRESS_MM: PositionMm = PositionMm::from_int(5);
+/// … or wheels that have turned by less than this, µm, …
+const PROGRESS_UM: i64 = 10_000;
+/// … in so many cycles (3 s) make no progress: legs that step on the spot move, too.
+const PATIENCE: u16 = 300;
+/// So many swings in a row that ran against something make no progress, whatever wheels and legs
+/// do: before a wall both may slip alike.
+const BUMPED: u8 = 6;
+/// Motor command that is all that a wheel has, %, …
+const EFFORT_PERCENT: u16 = 90;
+/// … at less than this share of the speed asked for, 1/n, …
+const SPEED_SHARE: i64 = 5;
+/// … for so many cycles (1 s).
+const BLOCKED: u16 = 100;
+
+/// Progress of a walk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Stuck {
+    /// Strokes of yaw and b5 from which progress counts.
+    anchor: [[PositionMm; 2]; WHEELS],
+    /// There is something to count from.
+    begun: bool,
+    /// A leg has moved since the last progress.
+    moved: bool,
+    /// Travel of the wheels from which progress counts, µm.
+    anchor_um: [i64; WHEELS],
+    /// Cycles since a standing leg has moved.
+    idle: u16,
+    /// The swing of a leg has run against something.
+    bumped: [bool; WHEELS],
+    /// Swings in a row that have.
+    bumps: u8,
+    went_down: [bool; WHEELS],
+    /// Cycles for which a wheel has been blocked.
+    blocked: [u16; WHEELS],
+    /// Travel of the wheels in the last cycle, µm.
+    wheels_um: [Option<i64>; WHEELS],
+}
+
+impl Stuck {
+    /// One cycle; whether the robot is stuck. It is told again after as long a time.
+    pub(super) fn update(
+        &mut self,
+        senses: &Senses,
+        plan: &WalkPlan,
+        setpoints: &Setpoints,
+        bumps: [bool; WHEELS],
+        enabled: Behaviours,
+    ) -> bool {
+        self.count(plan, bumps);
+        let progress = self.progress(senses, plan);
+        let blocked = self.blocked(senses, setpoints);
+        if !enabled.contains(Behaviour::Stuck) || !plan.driven {
+            self.idle = 0;
+            self.bumps = 0;
+            self.blocked = [0; WHEELS];
+            return false;
+        }
+        self.idle = if progress {
+            0
+        } else {
+            self.idle.saturating_add(1)
+        };
+        let stuck = self.idle > PATIENCE || blocked || self.bumps >= BUMPED;
+        if stuck {
+            self.idle = 0;
+            self.bumps = 0;
+            self.blocked = [0; WHEELS];
+        }
+        stuck
+    }
+
+    /// Counts the swings in a row that ran against something.
+    fn count(&mut self, plan: &WalkPlan, bumps: [bool; WHEELS]) {
+        let legs = self.bumped.iter_mut().zip(&mut self.went_down).zip(bumps);
+        for (side, ((bumped, went_down), bump)) in SIDES.into_iter().zip(legs) {
+            *bumped |= bump;
+            let stands = plan.leg(side) == LegPlan::Stance;
+            if stands && *went_down {
+                self.bumps = if *bumped {
+                    self.bumps.saturating_add(1)
+                } else {
+                    0
+                };
+                *bumped = false;
+            }
+            *went_down = matches!(plan.leg(side), LegPlan::Lower(_));
+        }
+    }
+
+    /// Whether a standing leg and a wheel have moved since they were last found to have.
+    fn progress(&mut self, senses: &Senses, plan: &WalkPlan) -> bool {
+        for (side, anchor) in SIDES.into_iter().zip(&mut self.anchor) {
+            let stroke = |cylinder| senses.joint(side, cylinder).unwrap_or_default().stroke_mm;
+            let now = [stroke(Cylinder::Yaw), stroke(Cylinder::Horizontal)];
+            let far = |(a, b): (&PositionMm, PositionMm)| {
+                a.saturating_sub(b).saturating_abs() >= PROGRESS_MM
+            };
+            let moved = anchor.iter().zip(now).any(far);
+            let stands = plan.leg(side) == LegPlan::Stance;
+            if moved || !stands {
+                *anchor = now;
+            }
+            self.moved |= moved && stands && self.begun;
+        }
+        let now = senses.wheels.map(|wheel| wheel.travel_um);
+        let far = |(a, b): (i64, &i64)| a.saturating_sub(*b).saturating_abs() >= PROGRESS_UM;
+        if !self.begun {
+            self.begun = true;
+            self.anchor_um = now;
+        }
+        let turned = now.into_iter().zip(&self.anchor_um).any(far);
+        let progress = self.moved && turned;
+        if progress {
+            self.moved = false;
+            self.anchor_um = now;
+        }
+        progress
+    }
+
+    /// Whether a wheel gives all that it has, and hardly turns.
+    fn blocked(&mut self, senses: &Senses, setpoints: &Setpoints) -> bool {
+        let mut blocked = false;
+        for side in SIDES {
+            let at = side.index();
+            let (Some(count), Some(before), Some(wheel)) = (
+                self.blocked.get_mut(at),
+                self.wheels_um.get_mut(at),
+                senses.wheels.get(at),
+            ) else {
+                continue;
+            };
+            let way_um = before
+                .replace(wheel.travel_um)
+                .map_or(0, |before| wheel.travel_um.saturating_sub(before));
+            let asked = setpoints.travel.and_then(|t| t.wheels.get(at).copied());
+            // mm/s × 10 ms = 10 µm.
+            let asked_um = asked.map_or(0, |wheel| {
+                i64::from(wheel.velocity_mm_s.get().to_num::<i32>()).saturating_mul(10)
+            });
+            let slow =
+                way_um.saturating_abs().saturating_mul(SPEED_SHARE) < asked_um.saturating_abs();
+            let gives_all = wheel.effort_percent.unsigned_abs() > EFFORT_PERCENT;
+            *count = if slow && gives_all {
+                count.saturating_add(1)
+            } else {
+                0
+            };
+            blocked |= *count >= BLOCKED;
+        }
+        blocked
+    }
+}

@@ -1,0 +1,140 @@
+//! B3 touchdown and B4 search: a foot that goes down.
+//!
+//! Fast to 10 mm above where ground is expected, then at 100 mm/s until a switch closes, or the leg
+//! is at its full length.
+
+use wheeleg_units::{PositionMm, VelocityMmS};
+
+use super::JointSense;
+use crate::behaviour::{Act, Behaviour, Behaviours};
+use crate::contact::Side;
+use crate::layer1::params::STROKE_MM;
+use crate::setpoint::{Landing, LegPlan};
+
+/// Ground is expected so far below where the slow way begins.
+pub(super) const APPROACH_MM: PositionMm = PositionMm::from_int(10);
+/// Slow way in a cycle: 100 mm/s.
+const SEARCH_MM: PositionMm = PositionMm::from_int(1);
+/// The slow way goes on when the piston is as near as this.
+const NEAR_MM: PositionMm = PositionMm::from_int(5);
+/// A foot that is not stopped by its switches presses on so far below the ground that is expected.
+const PRESS_MM: PositionMm = PositionMm::from_int(4);
+/// A leg is at its full length from here on.
+const FULL_MM: PositionMm = PositionMm::from_int(178);
+/// Cycles at full length, without ground, after which it is told (200 ms).
+const NO_GROUND: u16 = 20;
+/// Ground so far from where it was expected is told.
+const SURPRISE_MM: PositionMm = PositionMm::from_int(20);
+/// A piston slower than this …
+const STILL_MM_S: VelocityMmS = VelocityMmS::from_int(10);
+/// … for so many cycles, after so many, has arrived.
+const STILL: u16 = 10;
+const BEGUN: u16 = 10;
+
+/// A foot that goes down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Touchdown {
+    /// Reference of b6; `None`: the foot does not go down.
+    at_mm: Option<PositionMm>,
+    cycles: u16,
+    still: u16,
+    landing: Landing,
+}
+
+/// Where the slow way begins, and where the foot stops that does not search.
+const fn limits_mm(from_mm: PositionMm, enabled: Behaviours) -> [PositionMm; 2] {
+    let plan_mm = from_mm
+        .saturating_add(APPROACH_MM)
+        .saturating_add(PRESS_MM)
+        .limit(PositionMm::ZERO, STROKE_MM);
+    let begin = if enabled.contains(Behaviour::Touchdown) {
+        from_mm
+    } else {
+        plan_mm
+    };
+    let end = if enabled.contains(Behaviour::Search) {
+        STROKE_MM
+    } else {
+        plan_mm
+    };
+    [begin, end]
+}
+
+impl Touchdown {
+    pub(super) const fn landing(&self) -> Landing {
+        self.landing
+    }
+
+    /// Reference of b6 for a foot that goes down from `from_mm` on.
+    pub(super) fn reference(&self, from_mm: PositionMm, enabled: Behaviours) -> PositionMm {
+        let [begin, _] = limits_mm(from_mm, enabled);
+        self.at_mm.unwrap_or(begin)
+    }
+
+    /// One cycle with the plan of the leg, its b6 and whether a switch is closed.
+    pub(super) fn update(
+        &mut self,
+        side: Side,
+        plan: LegPlan,
+        b6: &JointSense,
+        touches: bool,
+        enabled: Behaviours,
+    ) -> Option<Act> {
+        let LegPlan::Lower(from_mm) = plan else {
+            *self = Self::default();
+            return None;
+        };
+        let [begin, end] = limits_mm(from_mm, enabled);
+        let at = self.at_mm.unwrap_or(begin);
+        self.cycles = self.cycles.saturating_add(1);
+        let still = self.cycles > BEGUN && b6.velocity_mm_s.saturating_abs() < STILL_MM_S;
+        self.still = if still {
+            self.still.saturating_add(1)
+        } else {
+            0
+        };
+        let arrived = b6.stroke_mm >= at.saturating_sub(PRESS_MM) || self.still >= STILL;
+        let (stops, searches) = (
+            enabled.contains(Behaviour::Touchdown),
+            enabled.contains(Behaviour::Search),
+        );
+        if touches && (stops || (at >= end || searches) && arrived && self.cycles > BEGUN) {
+            let stroke = if stops {
+                b6.stroke_mm
+            } else {
+                at.saturating_sub(PRESS_MM)
+            };
+            self.landing = Landing::Down(stroke);
+            let expected = from_mm.saturating_add(APPROACH_MM);
+            let off = stroke.saturating_sub(expected);
+            return match off {
+                _ if !stops => None,
+                off if off <= PositionMm::ZERO.saturating_sub(SURPRISE_MM) => {
+                    Some(Act::EarlyGround(side))
+                }
+                off if off >= SURPRISE_MM => Some(Act::LateGround(side)),
+                _ => None,
+            };
+        }
+        if !searches && at >= end && self.still >= STILL {
+            // Nobody looks whether there is ground.
+            self.landing = Landing::Down(at.saturating_sub(PRESS_MM));
+            return None;
+        }
+        self.at_mm = Some(if b6.stroke_mm >= at.saturating_sub(NEAR_MM) {
+            at.saturating_add(SEARCH_MM).limit(PositionMm::ZERO, end)
+        } else {
+            at
+        });
+        if !searches || b6.stroke_mm < FULL_MM {
+            self.landing = Landing::Waiting;
+            return None;
+        }
+        let cycles = match self.landing {
+            Landing::Nothing(cycles) => cycles.saturating_add(1),
+            _ => 1,
+        };
+        self.landing = Landing::Nothing(cycles);
+        (cycles == NO_GROUND).then_some(Act::NoGround(side))
+    }
+}

@@ -1,0 +1,509 @@
+//! Every threshold of the behaviours, from below and from above.
+
+use wheeleg_master::behaviour::{Act, Behaviour, Behaviours};
+use wheeleg_master::contact::{FootSwitches, Side};
+use wheeleg_master::event::{Event, Events};
+use wheeleg_master::layer0::behaviours::{Behaving, JointSense, Senses, WheelSense};
+use wheeleg_master::setpoint::{
+    Acts, JointSetpoint, Landing, LegPlan, Setpoints, TravelSetpoint, WalkPlan, WheelTravel,
+};
+use wheeleg_units::{Duty, PositionMm, VelocityMmS};
+
+const STAND: [LegPlan; 2] = [LegPlan::Stance; 2];
+/// Indices of left yaw, b5 and b6.
+const YAW: usize = 0;
+const B5: usize = 1;
+const B6: usize = 2;
+
+fn mm(mm: f64) -> PositionMm {
+    PositionMm::from_f64(mm)
+}
+
+/// A robot of which a test says all that its boards say.
+struct Robot {
+    behaving: Behaving,
+    senses: Senses,
+    setpoints: Setpoints,
+    told: Vec<Act>,
+    travel_mm: f64,
+}
+
+impl Robot {
+    fn new(legs: [LegPlan; 2], enabled: Behaviours) -> Self {
+        let joint = JointSense {
+            stroke_mm: mm(100.0),
+            ..JointSense::default()
+        };
+        Self {
+            behaving: Behaving::new(enabled, false),
+            senses: Senses {
+                feet: [Some(FootSwitches(0x0F)); 2],
+                joints: [Some(joint); 6],
+                wheels: [WheelSense::default(); 2],
+            },
+            setpoints: Setpoints {
+                walk: Some(WalkPlan { legs, driven: true }),
+                ..Setpoints::idle(0)
+            },
+            told: Vec::new(),
+            travel_mm: 0.0,
+        }
+    }
+
+    fn all(legs: [LegPlan; 2]) -> Self {
+        Self::new(legs, Behaviours::ALL)
+    }
+
+    fn joint(&mut self, index: usize) -> &mut JointSense {
+        self.senses.joints[index].as_mut().expect("heard")
+    }
+
+    fn touch(&mut self, feet: [bool; 2]) {
+        self.senses.feet = feet.map(|touches| Some(FootSwitches(if touches { 0x0F } else { 0 })));
+    }
+
+    /// Cycles; what is told in them.
+    fn run(&mut self, cycles: u32) -> Vec<Act> {
+        let mut told = Vec::new();
+        let mut events = Events::new();
+        for _ in 0..cycles {
+            self.behaving
+                .observe(&self.senses, &self.setpoints, 0, &mut events);
+            while let Some((_, event)) = events.pop() {
+                match event {
+                    Event::Behaviour(act) => told.push(act),
+                    other => panic!("{other:?}"),
+                }
+            }
+            self.lead(self.speed(), true);
+        }
+        self.told.extend(&told);
+        told
+    }
+
+    fn acts(&self) -> &Acts {
+        self.behaving.acts()
+    }
+
+    fn speed(&self) -> f64 {
+        let travel = self.setpoints.travel;
+        travel.map_or(0.0, |travel| travel.wheels[0].velocity_mm_s.to_f64())
+    }
+
+    /// Leads the wheels for a cycle at a speed, mm/s; gives the speed that they are led at.
+    fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
+        if fresh {
+            self.travel_mm += 0.01 * mm_s;
+        }
+        let wheel = WheelTravel {
+            travel_mm: mm(self.travel_mm),
+            target_mm: mm(self.travel_mm),
+            velocity_mm_s: VelocityMmS::from_f64(mm_s),
+        };
+        let travel = TravelSetpoint::common(wheel, 1);
+        self.setpoints.travel = Some(travel);
+        self.behaving.lead(travel, true, fresh)
+    }
+
+    fn reference(&self, joint: usize, mm_asked: f64) -> f64 {
+        let asked = JointSetpoint {
+            reference_mm: mm(mm_asked),
+            ..JointSetpoint::default()
+        };
+        let plan = self.setpoints.walk.expect("walks");
+        self.behaving
+            .apply(joint, asked, &plan)
+            .reference_mm
+            .to_f64()
+    }
+}
+
+#[test]
+fn b1_a_cylinder_at_its_limit_for_half_a_second_gives_way() {
+    for (duty, back) in [(900, 95.0), (-900, 105.0)] {
+        let mut robot = Robot::all(STAND);
+        robot.joint(B5).saturated = true;
+        robot.joint(B5).duty = Duty::from_per_mille(duty);
+        assert_eq!(robot.run(49), []);
+        assert_eq!(robot.reference(B5, 60.0), 60.0);
+        assert_eq!(robot.run(1), [Act::Overload { node: 2 }]);
+        assert_eq!(robot.reference(B5, 60.0), back);
+        assert_eq!(robot.run(200), [], "told once");
+        // Another phase of the leg, another try.
+        robot.setpoints.walk = Some(WalkPlan {
+            legs: [LegPlan::Lift, LegPlan::Stance],
+            driven: true,
+        });
+        robot.run(1);
+        assert_eq!(robot.reference(B5, 60.0), 60.0);
+    }
+    // 5 mm in the half second are motion, 4.9 mm are none.
+    for (way_mm, told) in [(4.9, true), (5.0, false)] {
+        let mut robot = Robot::all(STAND);
+        robot.joint(B5).saturated = true;
+        robot.run(25);
+        robot.joint(B5).stroke_mm = mm(100.0 + way_mm);
+        assert_eq!(!robot.run(26).is_empty(), told, "{way_mm}");
+    }
+}
+
+#[test]
+fn b2_two_hanging_feet_stop_the_wheels_and_no_leg_extends_far() {
+    let mut robot = Robot::all(STAND);
+    robot.touch([false; 2]);
+    assert_eq!(robot.run(5), [], "50 ms");
+    let told = robot.run(1);
+    assert_eq!(told[0], Act::TipGuard);
+    robot.run(60);
+    assert_eq!(robot.acts().pace, 0);
+    assert_eq!(robot.acts().beyond_mm, [mm(10.0); 2]);
+    assert_eq!(robot.acts().deep, [false; 2]);
+    // One that swings does not stand on nothing.
+    let mut robot = Robot::all([LegPlan::Stance, LegPlan::Reach]);
+    robot.touch([false; 2]);
+    assert!(!robot.run(60).contains(&Act::TipGuard));
+}
+
+#[test]
+fn the_wheels_slow_down_and_speed_up_by_0_3_m_s2() {
+    let mut robot = Robot::new(STAND, Behaviours::ALL.without(Behaviour::LostContact));
+    robot.run(1);
+    let mut last = 120.0;
+    robot.touch([false; 2]);
+    for cycle in 0..80 {
+        robot.run(1);
+        let led = robot.lead(120.0, true).wheels[0].velocity_mm_s.to_f64();
+        // Led twice in a cycle here.
+        assert!(last - led < 6.1, "{cycle}: {last} {led}");
+        last = led;
+    }
+    assert_eq!(last, 0.0);
+}
+
+#[test]
+fn b3_a_foot_stops_where_its_switches_close() {
+    let from = mm(120.0);
+    let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
+    robot.touch([false, true]);
+    assert_eq!(robot.reference(B6, 0.0), 120.0, "fast to here");
+    robot.joint(B6).stroke_mm = mm(114.9);
+    robot.run(1);
+    assert_eq!(robot.reference(B6, 0.0), 120.0, "not near yet");
+    robot.joint(B6).stroke_mm = mm(115.0);
+    robot.run(7);
+    assert_eq!(
+        robot.reference(B6, 0.0),
+        121.0,
+        "1 mm a cycle, while it is near"
+    );
+    robot.joint(B6).stroke_mm = mm(121.0);
+    robot.touch([true; 2]);
+    assert_eq!(robot.run(1), []);
+    assert_eq!(robot.acts().landing[0], Landing::Down(mm(121.0)));
+    assert_eq!(robot.behaving.tally().of(Behaviour::Touchdown), 1);
+    // 20 mm beside where it was expected (130 mm) is told, less is not.
+    for (at, told) in [
+        (110.0, vec![Act::EarlyGround(Side::Left)]),
+        (110.1, vec![]),
+        (149.9, vec![]),
+        (150.0, vec![Act::LateGround(Side::Left)]),
+    ] {
+        let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
+        robot.joint(B6).stroke_mm = mm(at);
+        assert_eq!(robot.run(1), told, "{at}");
+    }
+    // Without it the foot goes down on what was expected, and 4 mm more.
+    let mut robot = Robot::new(
+        [LegPlan::Lower(from), LegPlan::Stance],
+        Behaviours::ALL.without(Behaviour::Touchdown),
+    );
+    assert_eq!(robot.reference(B6, 0.0), 134.0);
+    robot.joint(B6).stroke_mm = mm(90.0);
+    robot.joint(B6).velocity_mm_s = VelocityMmS::from_int(200);
+    robot.run(3);
+    assert_eq!(
+        robot.acts().landing[0],
+        Landing::Waiting,
+        "touches and goes on"
+    );
+}
+
+#[test]
+fn b3_nails_do_not_end_the_way_down_before_the_ground_that_is_expected() {
+    for (at, nailed, lands) in [
+        (129.9, true, false),
+        (130.0, true, true),
+        (129.9, false, true),
+    ] {
+        let mut robot = Robot::all([LegPlan::Lower(mm(120.0)), LegPlan::Stance]);
+        robot.behaving = Behaving::new(Behaviours::ALL, nailed);
+        robot.joint(B6).stroke_mm = mm(at);
+        robot.run(1);
+        let landed = robot.acts().landing[0] != Landing::Waiting;
+        assert_eq!(landed, lands, "{at} {nailed}");
+    }
+    let mut robot = Robot::all([LegPlan::Reach, LegPlan::Stance]);
+    robot.behaving = Behaving::new(Behaviours::ALL, true);
+    robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(100);
+    assert_eq!(robot.run(60), [], "tips scratch the ground");
+}
+
+#[test]
+fn b4_a_foot_searches_down_to_its_full_length() {
+    let from = mm(140.0);
+    let search = |enabled| {
+        let mut robot = Robot::new([LegPlan::Lower(from), LegPlan::Stance], enabled);
+        robot.touch([false, true]);
+        let mut told = Vec::new();
+        for _ in 0..100 {
+            let reference = robot.reference(B6, 0.0);
+            robot.joint(B6).stroke_mm = mm(reference.min(179.0));
+            told.extend(robot.run(1));
+        }
+        (robot, told)
+    };
+    let (robot, told) = search(Behaviours::ALL);
+    assert_eq!(robot.reference(B6, 0.0), 180.0);
+    assert_eq!(told, [Act::NoGround(Side::Left)]);
+    // From 178 mm on it is at its full length: 38 cycles down, 62 at the end.
+    assert_eq!(robot.acts().landing[0], Landing::Nothing(62));
+    let (robot, told) = search(Behaviours::ALL.without(Behaviour::Search));
+    assert_eq!(
+        robot.reference(B6, 0.0),
+        154.0,
+        "4 mm beyond what was expected"
+    );
+    assert_eq!(told, []);
+    assert_eq!(
+        robot.acts().landing[0],
+        Landing::Down(mm(150.0)),
+        "stands on nothing"
+    );
+}
+
+#[test]
+fn b4_no_ground_is_told_after_200_ms() {
+    let mut robot = Robot::all([LegPlan::Lower(mm(170.0)), LegPlan::Stance]);
+    robot.touch([false, true]);
+    robot.joint(B6).stroke_mm = mm(177.9);
+    assert_eq!(robot.run(30), []);
+    robot.joint(B6).stroke_mm = mm(178.0);
+    assert_eq!(robot.run(19), []);
+    assert_eq!(robot.run(1), [Act::NoGround(Side::Left)]);
+}
+
+#[test]
+fn b5_a_reach_that_stalls_or_touches_has_met_something() {
+    let reach = [LegPlan::Reach, LegPlan::Stance];
+    let mut robot = Robot::all(reach);
+    robot.touch([false, true]);
+    robot.joint(B5).velocity_mm_s = VelocityMmS::from_f64(9.9);
+    robot.joint(YAW).velocity_mm_s = VelocityMmS::from_f64(-9.9);
+    robot.setpoints.joints[B5] = Some(JointSetpoint {
+        reference_mm: mm(150.0),
+        ..JointSetpoint::default()
+    });
+    assert_eq!(robot.run(25 + 9), []);
+    assert_eq!(robot.reference(B5, 150.0), 150.0);
+    assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+    assert!(robot.acts().bump[0]);
+    assert_eq!(robot.reference(B5, 150.0), 85.0, "15 mm back");
+    assert_eq!(robot.run(24), []);
+    assert_eq!(robot.reference(B5, 150.0), 85.0);
+    assert_eq!(robot.run(1), []);
+    assert_eq!(robot.reference(B5, 150.0), 150.0);
+    assert_eq!(robot.run(9), [], "it starts anew");
+    assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+    for moving in [YAW, B5] {
+        let mut robot = Robot::all(reach);
+        robot.touch([false, true]);
+        robot.joint(moving).velocity_mm_s = VelocityMmS::from_int(10);
+        assert_eq!(robot.run(200), []);
+        robot.touch([true; 2]);
+        assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+    }
+    // A foot that leaves the ground touches it still.
+    let mut robot = Robot::all(reach);
+    robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(100);
+    assert_eq!(robot.run(25), []);
+    assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+}
+
+#[test]
+fn b6_a_foot_follows_lost_ground_by_20_mm_at_half_the_speed() {
+    let mut robot = Robot::all(STAND);
+    robot.touch([false, true]);
+    assert_eq!(robot.run(5), [], "50 ms");
+    assert_eq!(robot.run(1), [Act::LostGround(Side::Left)]);
+    assert_eq!(robot.reference(B6, 100.0), 101.0);
+    robot.run(18);
+    assert!(!robot.acts().deep[0]);
+    assert_eq!(robot.reference(B6, 100.0), 119.0);
+    robot.run(10);
+    assert_eq!(robot.reference(B6, 100.0), 120.0);
+    assert_eq!(robot.reference(5, 100.0), 100.0, "the other leg holds");
+    assert!(robot.acts().deep[0] && robot.acts().lost[0]);
+    for _ in 0..60 {
+        robot.lead(100.0, true);
+    }
+    assert_eq!(
+        robot.lead(100.0, true).wheels[0].velocity_mm_s.to_f64(),
+        50.0
+    );
+    // What it has found is kept until the stance ends.
+    robot.touch([true; 2]);
+    robot.run(10);
+    assert_eq!(robot.reference(B6, 100.0), 120.0);
+    assert!(!robot.acts().lost[0]);
+}
+
+/// A robot whose wheels go and whose legs follow with this slip, for a second; λ and pace act.
+fn slipping(slip: f64, enabled: Behaviours) -> Robot {
+    let mut robot = Robot::new(STAND, enabled);
+    let (mut wheels, mut stroke) = (0.0, 170.0);
+    for _ in 0..100 {
+        wheels += 1.0;
+        stroke -= 1.0 - slip;
+        robot.senses.wheels = [WheelSense {
+            travel_um: (1e3 * wheels) as i64,
+            effort_percent: 20,
+        }; 2];
+        for joint in [B5, 4] {
+            robot.joint(joint).stroke_mm = mm(stroke);
+        }
+        robot.run(1);
+    }
+    robot
+}
+
+#[test]
+fn b7_wheels_that_slip_slow_down_and_the_legs_pull() {
+    let b5 = |robot: &Robot| robot.reference(B5, 100.0);
+    let robot = slipping(0.13, Behaviours::ALL);
+    assert_eq!((robot.told.len(), b5(&robot)), (0, 100.0));
+    // The legs pull, by 30 mm at most; the wheels are at their best.
+    for slip in [0.17, 0.73] {
+        let robot = slipping(slip, Behaviours::ALL);
+        assert_eq!(robot.told, [Act::Slip]);
+        assert_eq!((b5(&robot), robot.acts().pace.to_num()), (70.0, 1.0));
+    }
+    let robot = slipping(0.77, Behaviours::ALL);
+    assert_eq!(robot.told, [Act::Slip]);
+    assert!(robot.acts().pace < 1);
+    let robot = slipping(0.77, Behaviours::ALL.without(Behaviour::Slip));
+    assert_eq!((robot.told.len(), b5(&robot)), (0, 100.0));
+}
+
+#[test]
+fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
+    let mut robot = Robot::all(STAND);
+    robot.run(300);
+    assert!(!robot.acts().stuck);
+    robot.run(1);
+    assert!(robot.acts().stuck);
+    robot.run(1);
+    assert!(!robot.acts().stuck, "for a cycle");
+    // A leg that moves by 5 mm with wheels that turn by 10 mm gets on.
+    for (leg_mm, wheels_um, stuck) in [
+        (5.1, 10_000, false),
+        (4.9, 10_000, true),
+        (5.1, 9_900, true),
+    ] {
+        let mut robot = Robot::all(STAND);
+        robot.run(150);
+        robot.joint(B5).stroke_mm = mm(100.0 + leg_mm);
+        for wheel in &mut robot.senses.wheels {
+            wheel.travel_um = wheels_um;
+        }
+        let mut found = false;
+        for _ in 0..160 {
+            robot.run(1);
+            found |= robot.acts().stuck;
+        }
+        assert_eq!(found, stuck, "{leg_mm} {wheels_um}");
+    }
+    // All that the motor has, at less than a fifth of the speed.
+    for (effort, way_um, stuck) in [(91, 190, true), (90, 190, false), (91, 210, false)] {
+        let mut robot = Robot::all(STAND);
+        robot.lead(100.0, true);
+        let mut found = false;
+        for _ in 0..110 {
+            robot.senses.wheels[0].travel_um += way_um;
+            robot.senses.wheels[0].effort_percent = effort;
+            robot.run(1);
+            found |= robot.acts().stuck;
+        }
+        assert_eq!(found, stuck, "{effort} {way_um}");
+    }
+}
+
+#[test]
+fn b9_six_swings_in_a_row_that_run_against_something_are_stuck() {
+    let mut robot = Robot::all(STAND);
+    let mut swing = |bumps: bool| {
+        let mut stuck = false;
+        for (leg, cycles) in [
+            (LegPlan::Reach, 40),
+            (LegPlan::Lower(mm(99.0)), 1),
+            (LegPlan::Stance, 1),
+        ] {
+            robot.setpoints.walk = Some(WalkPlan {
+                legs: [leg, LegPlan::Stance],
+                driven: true,
+            });
+            let reaches = leg == LegPlan::Reach;
+            robot.touch([!reaches, true]);
+            robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(if bumps { 0 } else { 100 });
+            // Wheels and legs go on as if nothing were.
+            for wheel in &mut robot.senses.wheels {
+                wheel.travel_um += 20_000;
+            }
+            let stroke = robot.joint(4).stroke_mm.to_f64();
+            robot.joint(4).stroke_mm = mm(if stroke > 100.0 { 90.0 } else { 110.0 });
+            for _ in 0..cycles {
+                robot.run(1);
+                stuck |= robot.acts().stuck;
+            }
+        }
+        stuck
+    };
+    let mut swings = |all: &[bool]| all.iter().map(|bumps| swing(*bumps)).collect::<Vec<_>>();
+    assert_eq!(
+        swings(&[true; 6]),
+        [false, false, false, false, false, true]
+    );
+    assert_eq!(swings(&[true; 5]), [false; 5]);
+    assert_eq!(swings(&[false, true, true]), [false; 3]);
+}
+
+#[test]
+fn b10_the_leg_that_works_more_gives_way() {
+    for (per_mille, told) in [(190, false), (230, true)] {
+        let mut robot = Robot::all(STAND);
+        robot.joint(B6).duty = Duty::from_per_mille(per_mille);
+        assert_eq!(
+            robot.run(200).contains(&Act::LoadShare),
+            told,
+            "{per_mille}"
+        );
+        let [left, right] = [B6, 5].map(|joint| robot.reference(joint, 100.0));
+        let wanted = if told { [90.0, 110.0] } else { [100.0; 2] };
+        assert_eq!([left, right], wanted);
+    }
+}
+
+#[test]
+fn what_is_switched_off_does_nothing_and_a_robot_that_does_not_walk_has_no_behaviours() {
+    let mut robot = Robot::new(STAND, Behaviours::NONE);
+    robot.touch([false; 2]);
+    robot.joint(B5).saturated = true;
+    robot.joint(B6).duty = Duty::from_per_mille(900);
+    assert_eq!(robot.run(400), []);
+    assert_eq!(robot.reference(B6, 100.0), 100.0);
+    assert_eq!(robot.acts().pace, 1);
+    let mut robot = Robot::all(STAND);
+    robot.setpoints.walk = None;
+    robot.touch([false; 2]);
+    assert_eq!(robot.run(400), []);
+    assert_eq!(robot.acts(), &Acts::default());
+}

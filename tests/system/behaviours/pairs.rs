@@ -1,0 +1,213 @@
+//! The pairs: which robot walks where, and what is held against what.
+
+use wheeleg_master::behaviour::Behaviour;
+
+use super::Pair;
+use super::metrics::{
+    chassis_contact_s, drag_mm, load_difference_n, nose_drop_mm, onto_nothing, progress_mm,
+    pull_n_s, stalled_swings, stands_stuck, touchdown_force_n,
+};
+
+const FLAT: &str = "speed = { value = 100.0, unit = \"mm/s\" }\nturn = { value = 0.0, unit = \"rad/s\" }\n\
+                    lift = { value = 60.0, unit = \"mm\" }\nnose = { value = -40.0, unit = \"mm\" }";
+const UP: &str = "speed = { value = 60.0, unit = \"mm/s\" }\nturn = { value = 0.0, unit = \"rad/s\" }\n\
+                  lift = { value = 60.0, unit = \"mm\" }\nnose = { value = -20.0, unit = \"mm\" }";
+const FAST: &str = "speed = { value = 150.0, unit = \"mm/s\" }\nturn = { value = 0.0, unit = \"rad/s\" }\n\
+                    lift = { value = 150.0, unit = \"mm\" }\nnose = { value = -20.0, unit = \"mm\" }";
+const LOW: &str = "speed = { value = 85.0, unit = \"mm/s\" }\nturn = { value = 0.0, unit = \"rad/s\" }\n\
+                   lift = { value = 30.0, unit = \"mm\" }\nnose = { value = -40.0, unit = \"mm\" }";
+
+const SAND: &str = "speed = { value = 60.0, unit = \"mm/s\" }\nturn = { value = 0.0, unit = \"rad/s\" }\n\
+                    lift = { value = 90.0, unit = \"mm\" }\nnose = { value = -100.0, unit = \"mm\" }";
+
+fn level(_: u64) -> String {
+    String::new()
+}
+
+/// Ground whose strip below the left foot is 60 mm deeper from a place on that the seed chooses.
+fn pits(seed: u64) -> String {
+    let from = 1.0 + 0.01 * seed as f64;
+    let mut text =
+        String::from("[[terrain]]\nkind = \"plane\"\nheight = { value = -60.0, unit = \"mm\" }\n");
+    let mut block = |x: [f64; 2], y: [f64; 2]| {
+        text.push_str(&format!(
+            "[[terrain]]\nkind = \"block\"\nx = {{ value = {x:?}, unit = \"m\" }}\n\
+             y = {{ value = {y:?}, unit = \"m\" }}\nheight = {{ value = 60.0, unit = \"mm\" }}\n"
+        ));
+    };
+    // The wheels' tracks and the right foot's, then the left foot's with its pits.
+    block([-3.0, 9.0], [-2.0, 0.1]);
+    block([-3.0, 9.0], [0.255, 2.0]);
+    block([-3.0, from], [0.1, 0.255]);
+    text
+}
+
+/// A low kerb across the feet's way, at a place that the seed chooses.
+fn kerb(seed: u64) -> String {
+    format!(
+        "[[terrain]]\nkind = \"plane\"\n[[terrain]]\nkind = \"block\"\n\
+         x = {{ value = [{:.3}, {:.3}], unit = \"m\" }}\ny = {{ value = [-0.25, 0.25], unit = \"m\" }}\n\
+         height = {{ value = 100.0, unit = \"mm\" }}\n",
+        0.95 + 0.008 * seed as f64,
+        1.55 + 0.008 * seed as f64,
+    )
+}
+
+/// A wall that the robot cannot climb.
+fn wall(seed: u64) -> String {
+    format!(
+        "[[terrain]]\nkind = \"plane\"\n[[terrain]]\nkind = \"block\"\n\
+         x = {{ value = [{:.3}, 4.0], unit = \"m\" }}\ny = {{ value = [-2.0, 2.0], unit = \"m\" }}\n\
+         height = {{ value = 300.0, unit = \"mm\" }}\n",
+        1.0 + 0.005 * seed as f64,
+    )
+}
+
+/// The right foot's way is 25 mm higher than the left one's.
+fn ledges(seed: u64) -> String {
+    format!(
+        "[[terrain]]\nkind = \"plane\"\n[[terrain]]\nkind = \"block\"\n\
+         x = {{ value = [{:.3}, 6.0], unit = \"m\" }}\ny = {{ value = [-0.25, 0.0], unit = \"m\" }}\n\
+         height = {{ value = 25.0, unit = \"mm\" }}\n",
+        0.9 + 0.008 * seed as f64,
+    )
+}
+
+fn slope(degrees: f64) -> String {
+    format!("[[terrain]]\nkind = \"plane\"\nslope = {{ value = {degrees:.2}, unit = \"deg\" }}\n")
+}
+
+pub(super) const PAIRS: &[Pair] = &[
+    Pair {
+        behaviour: Behaviour::TipGuard,
+        without: &[],
+        robot: "wheeleg",
+        metric: "time on the tail, s",
+        less: true,
+        bar: 0.0,
+        required: true,
+        duration_s: 10.0,
+        walk: UP,
+        rest: |seed| slope(21.2 + 0.04 * seed as f64),
+        measure: chassis_contact_s,
+    },
+    Pair {
+        behaviour: Behaviour::Touchdown,
+        without: &[],
+        robot: "wheeleg",
+        metric: "touchdown force, N",
+        less: true,
+        bar: 0.7,
+        required: true,
+        duration_s: 12.0,
+        walk: FLAT,
+        rest: level,
+        measure: touchdown_force_n,
+    },
+    Pair {
+        behaviour: Behaviour::Search,
+        without: &[],
+        robot: "wheeleg",
+        metric: "steps onto nothing",
+        less: true,
+        bar: 0.2,
+        required: true,
+        duration_s: 15.0,
+        walk: FLAT,
+        rest: pits,
+        measure: onto_nothing,
+    },
+    Pair {
+        behaviour: Behaviour::Bump,
+        without: &[],
+        robot: "wheeleg",
+        metric: "stalled swings and swings that a board took for a fault",
+        less: true,
+        bar: 0.2,
+        required: true,
+        duration_s: 15.0,
+        walk: LOW,
+        rest: kerb,
+        measure: stalled_swings,
+    },
+    Pair {
+        behaviour: Behaviour::LostContact,
+        // Its 10 mm would hide what this one does alone.
+        without: &[Behaviour::TipGuard],
+        robot: "wheeleg",
+        metric: "nose drop, mm",
+        less: true,
+        bar: 0.95,
+        required: true,
+        duration_s: 6.0,
+        walk: FLAT,
+        rest: |_| "faults = [\"layer1-stall@2s\", \"foot-loses-contact=0.04@4s\"]".to_owned(),
+        measure: nose_drop_mm,
+    },
+    Pair {
+        behaviour: Behaviour::Overload,
+        // It would draw the foot back before.
+        without: &[Behaviour::Bump],
+        robot: "wheeleg",
+        metric: "pull of stalled cylinders, N s",
+        less: true,
+        bar: 0.5,
+        required: false,
+        duration_s: 15.0,
+        walk: LOW,
+        rest: kerb,
+        measure: pull_n_s,
+    },
+    Pair {
+        behaviour: Behaviour::Slip,
+        without: &[],
+        robot: "wheeleg-field",
+        metric: "way up 15 degrees of sand, mm",
+        less: false,
+        bar: 1.2,
+        required: false,
+        duration_s: 15.0,
+        walk: SAND,
+        rest: |seed| slope(14.5 + 0.1 * seed as f64) + "material = \"volcanic-sand\"\n",
+        measure: progress_mm,
+    },
+    Pair {
+        behaviour: Behaviour::LoadShare,
+        without: &[],
+        robot: "wheeleg",
+        metric: "difference of the loads, N",
+        less: true,
+        bar: 0.6,
+        required: false,
+        duration_s: 15.0,
+        walk: FLAT,
+        rest: ledges,
+        measure: load_difference_n,
+    },
+    Pair {
+        behaviour: Behaviour::Stuck,
+        without: &[],
+        robot: "wheeleg",
+        metric: "stuck runs ended safely",
+        less: false,
+        bar: 1.0,
+        required: true,
+        duration_s: 35.0,
+        walk: FLAT,
+        rest: wall,
+        measure: stands_stuck,
+    },
+    Pair {
+        behaviour: Behaviour::StrokeGovernor,
+        without: &[],
+        robot: "wheeleg",
+        metric: "foot drag, mm",
+        less: true,
+        bar: 0.2,
+        required: true,
+        duration_s: 12.0,
+        walk: FAST,
+        rest: level,
+        measure: drag_mm,
+    },
+];
