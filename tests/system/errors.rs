@@ -13,6 +13,7 @@ use wheeleg_control::joint::{ConfigError, JointParameter};
 use wheeleg_plant::PlantError;
 use wheeleg_remote_host::RemoteError;
 use wheeleg_report::ReportError;
+use wheeleg_scene::SceneError;
 use wheeleg_sim::SimError;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::suite::AxisSimError;
@@ -133,6 +134,21 @@ fn driven() -> Vec<Driven> {
     );
     let simulation = || SimError::simulation("it", "do that");
     add("SimError::Simulation", Box::new(simulation()), vec![]);
+    let leg = || SceneError::Leg {
+        side: "left",
+        reason: text(),
+    };
+    add("SceneError::Leg", Box::new(leg()), vec!["left leg"]);
+    add(
+        "SceneError::Xml",
+        Box::new(SceneError::Xml(text())),
+        vec!["URDF"],
+    );
+    add(
+        "StudyError::Scene",
+        Box::new(StudyError::from(leg())),
+        vec!["left leg"],
+    );
     let unphysical = SimError::Unphysical {
         what: text(),
         help: text(),
