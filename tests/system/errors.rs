@@ -15,7 +15,7 @@ use wheeleg_remote_host::RemoteError;
 use wheeleg_report::ReportError;
 use wheeleg_sim::SimError;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::axis_sim::suite::BenchError;
+use wheeleg_studies::axis_sim::suite::AxisSimError;
 use wheeleg_studies::check::vectors::{VectorsError, check_text};
 use wheeleg_telemetry::LogError;
 
@@ -133,6 +133,11 @@ fn driven() -> Vec<Driven> {
     );
     let simulation = || SimError::simulation("it", "do that");
     add("SimError::Simulation", Box::new(simulation()), vec![]);
+    let not_ready = SimError::NotReady {
+        what: text(),
+        help: text(),
+    };
+    add("SimError::NotReady", Box::new(not_ready), vec![]);
     let unphysical = SimError::Unphysical {
         what: text(),
         help: text(),
@@ -170,17 +175,17 @@ fn driven() -> Vec<Driven> {
     );
 
     add(
-        "BenchError::Plant",
-        Box::new(BenchError::Plant(bore())),
+        "AxisSimError::Plant",
+        Box::new(AxisSimError::Plant(bore())),
         vec!["bore_m", "9"],
     );
     let design = ConfigError::OutOfRange(JointParameter::Stroke);
     add(
-        "BenchError::Design",
-        Box::new(BenchError::Design(design)),
+        "AxisSimError::Design",
+        Box::new(AxisSimError::Design(design)),
         vec!["`stroke_min`"],
     );
-    let parameter = BenchError::Parameter {
+    let parameter = AxisSimError::Parameter {
         name: "stroke_max",
         value: 3.0,
         min: 0.0,
@@ -188,13 +193,13 @@ fn driven() -> Vec<Driven> {
         unit: "m",
     };
     add(
-        "BenchError::Parameter",
+        "AxisSimError::Parameter",
         Box::new(parameter),
         vec!["stroke_max", "3 m", "0 to 2 m"],
     );
     add(
-        "BenchError::Board",
-        Box::new(BenchError::Board(text())),
+        "AxisSimError::Board",
+        Box::new(AxisSimError::Board(text())),
         vec![],
     );
 

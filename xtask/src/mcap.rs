@@ -77,10 +77,16 @@ fn viewers(run_dir: &Path) -> StepResult<()> {
         folder.join("parquet"),
         folder.join("ros2"),
     );
-    run(command(&wheeleg).args(["export", "urdf", robot, "--out"]).arg(&urdf))?;
+    run(command(&wheeleg)
+        .args(["export", "urdf", robot, "--out"])
+        .arg(&urdf))?;
     for (format, out) in [("parquet", &tables), ("ros2", &bag)] {
         let mut export = command(&wheeleg);
-        run(export.args(["export", format]).arg(run_dir).arg("--out").arg(out))?;
+        run(export
+            .args(["export", format])
+            .arg(run_dir)
+            .arg("--out")
+            .arg(out))?;
     }
     run(command(tools::python()?)
         .arg("tests/python/check_viewers.py")
