@@ -149,6 +149,11 @@ fn driven() -> Vec<Driven> {
         Box::new(StudyError::from(leg())),
         vec!["left leg"],
     );
+    let not_ready = SimError::NotReady {
+        what: text(),
+        help: text(),
+    };
+    add("SimError::NotReady", Box::new(not_ready), vec![]);
     let unphysical = SimError::Unphysical {
         what: text(),
         help: text(),
