@@ -1,4 +1,4 @@
-//! System tests across crates; see the folder `tests` beside this one.
+//! System tests across crates; see the folder `system` beside this one.
 //!
 //! # Glossary
 //!

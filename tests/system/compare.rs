@@ -13,9 +13,9 @@ use predicates::prelude::*;
 use predicates::str::contains;
 use serde_json::Value;
 use wheeleg_config::{AxisConfig, RobotConfig};
-use wheeleg_studies::bench::suite::{self, Factors, StartUp};
-use wheeleg_studies::bench::{Kind, Metrics};
-use wheeleg_studies::compare::{self, Comparison, Move, Options, Scene, Variation};
+use wheeleg_studies::axis_sim::suite::{self, Factors, StartUp};
+use wheeleg_studies::axis_sim::{Kind, Metrics};
+use wheeleg_studies::compare::{self, Case, Comparison, Move, Options, Variation};
 use wheeleg_studies::study::{Progress, Settings};
 
 const AXIS: &str = "bench-vq110u";
@@ -164,10 +164,10 @@ fn a_row_is_what_the_moves_give_without_the_comparison() {
             StartUp::Identified,
         ),
     ] {
-        let scene = Scene::new(AXIS, &sheet, variation, 4).expect("runs");
+        let case = Case::new(AXIS, &sheet, variation, 4).expect("runs");
         for kind in [Kind::Predictive, Kind::FuzzyPd] {
-            let played = scene.play(kind, Move::Step100).expect("runs");
-            let row = scene.row(kind, Move::Step100, played.as_ref(), Some([0.25, 0.2]));
+            let played = case.play(kind, Move::Step100).expect("runs");
+            let row = case.row(kind, Move::Step100, played.as_ref(), Some([0.25, 0.2]));
             // Ends of the 100 mm step about the middle of 180 mm.
             let targets = [0.14, 0.04, 0.14];
             let traces =
@@ -202,7 +202,7 @@ fn a_case_can_be_played_alone_and_gives_its_row_again() {
     let comparison = Comparison::run(&small(2), &Progress::silent()).expect("runs");
     let row = &comparison.rows[comparison.rows.len() - 1];
     assert!(
-        row.case.variation.starts_with("combination="),
+        matches!(row.case.variation, Variation::Combination(_)),
         "{}",
         row.case.id
     );
@@ -450,10 +450,10 @@ fn an_axis_that_cannot_hold_its_load_is_refused() {
     let comparison = Comparison::run(&options, &Progress::silent());
     let comparison = comparison.expect("runs");
     assert!(comparison.rows.iter().any(|r| !r.case.feasible));
-    let listed = comparison.infeasible();
+    let listed = comparison.beyond_force();
     let nominal = listed
         .iter()
-        .find(|(_, v, _)| *v == "nominal")
+        .find(|(_, v, _)| *v == Variation::Nominal)
         .expect("listed");
     assert!((nominal.2 - 143.3 / 130.0).abs() < 0.01, "{nominal:?}");
     for row in comparison.rows.iter().filter(|r| !r.case.feasible) {

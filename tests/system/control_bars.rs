@@ -7,11 +7,11 @@ use wheeleg_config::AxisConfig;
 use wheeleg_control::axis::AxisData;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::testing::wheeleg_2003_axis;
-use wheeleg_studies::bench::suite::{self, Factors, StartUp, TestRig};
-use wheeleg_studies::bench::{
+use wheeleg_studies::axis_sim::suite::{self, Factors, StartUp, TestRig};
+use wheeleg_studies::axis_sim::{
     Kind, Metrics, Motion, Trace, axis_data, design, identify, optimal, plant_check,
 };
-use wheeleg_studies::compare::{Figures, Move, RECOVERY_S, Scene, Sizes, Variation};
+use wheeleg_studies::compare::{Case, Figures, Move, RECOVERY_S, Sizes, Variation};
 use wheeleg_units::{Duty, PositionMm};
 
 fn bench_axis() -> AxisParams {
@@ -46,13 +46,13 @@ fn moves(
 /// Figures of a case of `wheeleg compare`, as on the sheet.
 fn nominal(axis: &str, kind: Kind, motion: Move, seed: u64) -> Figures {
     let sheet = AxisConfig::load(axis).expect("built in").axis;
-    let scene = Scene::new(axis, &sheet, Variation::Nominal, seed).expect("runs");
-    let played = scene
+    let case = Case::new(axis, &sheet, Variation::Nominal, seed).expect("runs");
+    let played = case
         .play(kind, motion)
         .expect("runs")
         .expect("no load is feasible");
     let figures = Figures::of(motion, &played, None);
-    let name = scene.id(kind, motion);
+    let name = case.id(kind, motion);
     assert_eq!(
         (figures.faults.as_str(), figures.stopped),
         ("", Some(false)),
@@ -212,8 +212,8 @@ fn off_the_bench_axis_few_combinations_miss() {
         let mut missed = Vec::new();
         for number in 0..count {
             let variation = Variation::Combination(number);
-            let scene = Scene::new(name, &sheet, variation, 1).expect("runs");
-            let played = scene.play(Kind::Predictive, Move::Step100).expect("runs");
+            let case = Case::new(name, &sheet, variation, 1).expect("runs");
+            let played = case.play(Kind::Predictive, Move::Step100).expect("runs");
             let f = Figures::of(Move::Step100, &played.expect("feasible"), None);
             let holds = f.steady_error_mm.is_some_and(|mm| mm.abs() <= 0.5)
                 && f.overshoot_mm.is_some_and(|mm| mm <= 6.0)

@@ -7,9 +7,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_studies::bench::suite::{Factors, StartUp, steps};
-use wheeleg_studies::bench::valve_resolution::{COARSE, ValveResolution};
-use wheeleg_studies::bench::{Kind, Metrics};
+use wheeleg_studies::axis_sim::suite::{Factors, StartUp, steps};
+use wheeleg_studies::axis_sim::valve_resolution::{COARSE, ValveResolution};
+use wheeleg_studies::axis_sim::{Kind, Metrics};
 
 /// How many cylinders are drawn, and the number of the first: others than those that the law's
 /// factors were searched on (1000 to 1119 of the generator at 8239838) show whether they hold.
@@ -88,8 +88,8 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
             (0.5 * sheet.cylinder.stroke_m).min(0.1),
         );
         let (far, near) = (middle + 0.5 * span, middle - 0.5 * span);
-        let grain = ValveResolution::of(&sheet).ratio;
-        let [runs, misses, alarms] = &mut tally[usize::from(grain > COARSE)];
+        let resolution = ValveResolution::of(&sheet).ratio;
+        let [runs, misses, alarms] = &mut tally[usize::from(resolution > COARSE)];
         for case in 0..COMBINATIONS {
             let seed = which * COMBINATIONS + case;
             let factors = Factors::random(&sheet, seed);
@@ -109,7 +109,7 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
             if alarm || !holds {
                 *misses += 1;
                 missed.push(format!(
-                    "cylinder {which}, grain {grain:.2}, case {case}, {told:?}: {all:?}"
+                    "cylinder {which}, valve resolution {resolution:.2}, case {case}, {told:?}: {all:?}"
                 ));
             }
         }

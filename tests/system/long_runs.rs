@@ -122,8 +122,9 @@ fn memory_does_not_grow_with_simulated_time() {
         assert!(missed(&summary).is_empty(), "{summary}");
     }
     assert!(long < 300.0, "{long} MB");
-    // The index of the log, which is written at its end, has 4 kB per second.
-    assert!(slope_kb_s < 12.0, "{short} MB, then {long} MB");
+    // The index of the log, which is written at its end, has 4 kB per second. Over 435 s, 4 kB/s more
+    // are 1.7 MB: by about 1 MB two runs differ.
+    assert!(slope_kb_s < 8.0, "{short} MB, then {long} MB");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Faults with the firmware images on emulated boards: the master dies, a program
 //! stops, the supply fails in mid-move and in mid-save. (Flipped bits: `pil_flips.rs`.)
-//! Each ends in the safe state of ARCHITECTURE.md, seen on the commanded, the
+//! Each ends in the safe state of `docs/decisions/0010-safe-states.md`, seen on the commanded, the
 //! sensed and the physical side. And a disturbed line, of which every board must hear
 //! what its native application hears. `cargo xtask pil` runs this.
 

@@ -25,15 +25,15 @@ const BYTE_NS: u64 = 10_000;
 /// Puts a request to the board.
 type Ask<'a> = dyn FnMut(&Request) -> Reply + 'a;
 
-/// One board and what it does while it is struck.
+/// One board and what it does while bits of it flip.
 struct Subject {
     /// Its image.
     image: &'static str,
     address: u8,
     /// Runs it, with all requests through the function.
-    course: fn(&mut Ask<'_>),
+    timeline: fn(&mut Ask<'_>),
     /// Edges at which flips happen: from arming until there is too little left to see.
-    struck: Range<u64>,
+    flip_edges: Range<u64>,
     /// Ticks in which all seals of its configuration are looked at once.
     round: usize,
     /// Its tick, ns.
@@ -54,8 +54,8 @@ struct Subject {
 const JOINT: Subject = Subject {
     image: "joint",
     address: bench::ADDRESS,
-    course: |ask| drop(closed_loop(480, ask)),
-    struck: 120..330,
+    timeline: |ask| drop(closed_loop(480, ask)),
+    flip_edges: 120..330,
     round: joint::PARTS,
     period_ns: 1_000_000,
     cycle: 10,
@@ -68,8 +68,8 @@ const JOINT: Subject = Subject {
 const WHEEL: Subject = Subject {
     image: "wheel",
     address: WHEEL_ADDRESS,
-    course: follow,
-    struck: 240..680,
+    timeline: follow,
+    flip_edges: 240..680,
     round: wheel::PARTS,
     period_ns: SAMPLE_NS,
     cycle: 20,
@@ -162,9 +162,9 @@ struct Flip {
 impl Flip {
     fn new(number: u64, subject: &Subject, size: u32) -> Self {
         let random = mix(number.wrapping_add(1).wrapping_mul(STEP));
-        let instants = subject.struck.end - subject.struck.start;
+        let instants = subject.flip_edges.end - subject.flip_edges.start;
         Self {
-            edge: subject.struck.start + (random >> 40) % instants,
+            edge: subject.flip_edges.start + (random >> 40) % instants,
             offset: (random >> 8) as u32 % size,
             bit: (random & 7) as u8,
         }
@@ -187,7 +187,7 @@ enum Came {
     /// The board took the link for lost within two ticks, says so, and does what it does
     /// then: a wheel's drive falls, and turns nowhere.
     LinkLost,
-    /// It struck the decoder of the bus: the board does exactly what it does when the
+    /// It hit the decoder of the bus: the board does exactly what it does when the
     /// next frame is lost on the line, and has counted that frame as a broken one.
     FrameLost,
     /// Anything else.
@@ -203,7 +203,7 @@ fn driven(outputs: &Outputs) -> [u16; 6] {
 
 const OFF: [u16; 6] = [0; 6];
 
-/// What happens to a board on its course.
+/// What happens to a board in its timeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Incident {
     None,
@@ -214,7 +214,7 @@ enum Incident {
 
 /// What a board did.
 #[derive(Debug, Clone, PartialEq)]
-struct Course {
+struct Timeline {
     /// What it drove from edge to edge.
     driving: Vec<[u16; 6]>,
     /// Edges before each delivery.
@@ -226,9 +226,9 @@ struct Course {
     fault: Option<(Fault, u64)>,
 }
 
-fn course(subject: &Subject, incident: Incident) -> Course {
+fn run_timeline(subject: &Subject, incident: Incident) -> Timeline {
     let mut board = Board::new(image(subject.image).expect("an image"));
-    let mut did = Course {
+    let mut did = Timeline {
         driving: Vec::new(),
         delivered: Vec::new(),
         reset: false,
@@ -236,7 +236,7 @@ fn course(subject: &Subject, incident: Incident) -> Course {
         fault: None,
     };
     let mut now_ns = 0;
-    (subject.course)(&mut |request| {
+    (subject.timeline)(&mut |request| {
         let ticks = match request {
             Request::Run(run) => {
                 now_ns = run.until_ns;
@@ -308,7 +308,7 @@ fn ask_both(board: &mut Board, subject: &Subject, mut edge_ns: u64) -> Vec<Messa
 }
 
 /// Whether the board took the link for lost at once and let its drive fall.
-fn took_the_link_for_lost(subject: &Subject, flip: Flip, flipped: &Course) -> bool {
+fn took_the_link_for_lost(subject: &Subject, flip: Flip, flipped: &Timeline) -> bool {
     let at = flip.edge as usize;
     let within = (flip.edge * subject.period_ns..=(flip.edge + 2) * subject.period_ns)
         .contains(&flipped.fault.map_or(0, |(_, at_ns)| at_ns));
@@ -328,49 +328,52 @@ fn took_the_link_for_lost(subject: &Subject, flip: Flip, flipped: &Course) -> bo
 
 /// Whether the board did what it does when the first frame after the flip is lost, and
 /// counted that frame as broken.
-fn lost_one_frame(subject: &Subject, sound: &Course, flip: Flip, flipped: &Course) -> bool {
+fn lost_one_frame(subject: &Subject, baseline: &Timeline, flip: Flip, flipped: &Timeline) -> bool {
     let next = sound
         .delivered
         .iter()
         .position(|edges| *edges > flip.edge as usize);
-    let Some((next, [frames, errors])) = next.zip(sound.heard) else {
+    let Some((next, [frames, errors])) = next.zip(baseline.heard) else {
         return false;
     };
     flipped.heard == Some([frames - 1, errors + 1])
-        && course(subject, Incident::Lost(next)).driving == flipped.driving
+        && run_timeline(subject, Incident::Lost(next)).driving == flipped.driving
 }
 
-fn judge(subject: &Subject, sound: &Course, flip: Flip) -> Came {
-    let flipped = course(subject, Incident::Flip(flip));
+fn judge(subject: &Subject, baseline: &Timeline, flip: Flip) -> Came {
+    let flipped = run_timeline(subject, Incident::Flip(flip));
     let at = flip.edge as usize;
     assert_eq!(
-        sound.driving[..at],
+        baseline.driving[..at],
         flipped.driving[..at],
         "equal up to {flip:?}"
     );
     // An emulator that has stopped says nothing about the rest.
-    let whole = flipped.driving.len() == sound.driving.len();
+    let whole = flipped.driving.len() == baseline.driving.len();
     // The edge after the flip still shows what was prepared before it.
     let off = |from: usize| whole && flipped.driving[from..].iter().all(|d| *d == OFF);
     match () {
-        () if flipped.driving == sound.driving => Came::Nothing,
+        () if flipped.driving == baseline.driving => Came::Nothing,
         () if flipped.reset && off(at + subject.reset) => Came::Reset,
         () if off(at + 2) => Came::Held,
         () if off(at + 1 + subject.round) => Came::HeldInARound,
         () if off(at + 2 + subject.cycle) => Came::HeldBySync,
         () if whole && took_the_link_for_lost(subject, flip, &flipped) => Came::LinkLost,
-        () if lost_one_frame(subject, sound, flip, &flipped) => Came::FrameLost,
+        () if lost_one_frame(subject, baseline, flip, &flipped) => Came::FrameLost,
         () => Came::Changed,
     }
 }
 
 fn every_flip_is_found_or_does_nothing(subject: &Subject) {
-    let sound = course(subject, Incident::None);
-    assert!(!sound.reset);
-    let [frames, errors] = sound.heard.expect("an answer");
-    assert_eq!((frames as usize, errors), (sound.delivered.len() + 1, 0));
-    for part in [subject.struck.start as usize, subject.struck.end as usize] {
-        let busy = sound.driving[part..]
+    let baseline = run_timeline(subject, Incident::None);
+    assert!(!baseline.reset);
+    let [frames, errors] = baseline.heard.expect("an answer");
+    assert_eq!((frames as usize, errors), (baseline.delivered.len() + 1, 0));
+    for part in [
+        subject.flip_edges.start as usize,
+        subject.flip_edges.end as usize,
+    ] {
+        let busy = baseline.driving[part..]
             .iter()
             .filter(|driving| **driving != OFF);
         assert!(
@@ -383,7 +386,7 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
     let size = object_size(subject.image, "NODE");
     let mut outcomes: Vec<(Flip, Came)> = in_two_halves(flips, |number| {
         let flip = Flip::new(number, subject, size);
-        (flip, judge(subject, &sound, flip))
+        (flip, judge(subject, &baseline, flip))
     });
     outcomes.sort_by_key(|(flip, _)| (flip.edge, flip.offset, flip.bit));
     let count = |came: Came| outcomes.iter().filter(|(_, c)| *c == came).count() as u64;
@@ -398,7 +401,7 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
          {}, {} by the next SYNC, {} without effect, {} reset, {} took the link for lost, {} lost a frame and counted it, \
          {} other {changed:?}",
         subject.image,
-        subject.struck,
+        subject.flip_edges,
         count(Came::HeldInARound),
         subject.round,
         count(Came::HeldBySync),

@@ -5,7 +5,9 @@ use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
-use wheeleg_studies::bench::plant_check::{Made, PlantCheck, Quantity, Verdict, check, check_made};
+use wheeleg_studies::axis_sim::plant_check::{
+    Made, PlantCheck, Quantity, Verdict, check, check_made,
+};
 
 const BENCH: &str = include_str!("../../host-sim/axes/bench-vq110u.toml");
 
@@ -205,6 +207,6 @@ fn a_step_that_is_too_long_is_told_apart() {
     let try_s = try_s.expect("a step is proposed");
     axis.step_ns = (try_s * 1e9) as u64;
     let finer = check(&axis).expect("it can be simulated");
-    let holds = |f: &wheeleg_studies::bench::plant_check::Finding| f.verdict == Verdict::Holds;
+    let holds = |f: &wheeleg_studies::axis_sim::plant_check::Finding| f.verdict == Verdict::Holds;
     assert!(finer.findings.iter().all(holds), "{finer:#?}");
 }

@@ -8,7 +8,7 @@ use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{Arm, ClearFault, Limit, LinkLossAction, LogEvent, SCHEMA_HASH};
-use wheeleg_studies::bench::{AxisSim, Kind, Motion, Node, Trace, design};
+use wheeleg_studies::axis_sim::{AxisSim, Kind, Motion, Node, Trace, design};
 use wheeleg_telemetry::Cause;
 
 /// Raw value of a bar.

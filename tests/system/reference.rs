@@ -7,8 +7,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::program;
-use wheeleg_config::builtin;
 use wheeleg_config::faults::{KINDS, NOT_IMPLEMENTED};
+use wheeleg_config::keys::{self, Key};
+use wheeleg_config::{Measure, TARGETS, builtin};
 use wheeleg_telemetry::channels;
 
 /// Compares a page with the committed one, or writes it.
@@ -121,8 +122,8 @@ fn parameters_page() {
             ],
         );
     }
-    let intro = "Every parameter of a robot file, with the values of `wheeleg-2003`. \
-                 `wheeleg params` prints the same.";
+    let intro = "Every parameter of a robot file, with the values of `wheeleg-2003`, the paper's \
+                 robot. `wheeleg params` prints the same.";
     page(
         "parameters.md",
         "Parameters of a robot",
@@ -148,25 +149,59 @@ fn scenarios_page() {
             &[&name, &s.robot, &duration, &events, &s.description],
         );
     }
-    let intro = "The scenarios that are part of the program: `wheeleg run NAME`.";
+    let table = |body: &mut String, title: &str, keys: &[Key]| {
+        let _ = writeln!(body, "\n### {title}\n");
+        head(body, &["key", "value", "what"]);
+        for key in keys {
+            row(body, &[&format!("`{}`", key.key), key.value, key.what]);
+        }
+    };
+    let _ = writeln!(
+        body,
+        "\n## Keys of scenario files\n\nQuantities have a unit: `{{ value = 10, unit = \"s\" }}` or \
+         `\"10 s\"`. Ranges of commands' arguments are among the [commands](commands.md)."
+    );
+    table(&mut body, "Before the first section", &keys::TOP);
+    let sets: Vec<String> = TARGETS
+        .iter()
+        .map(|(name, _)| format!("`{name}`"))
+        .collect();
+    let _ = writeln!(body, "\nSets of `targets`: {}.", sets.join(", "));
+    for (kind, keys) in keys::MOTIONS {
+        table(&mut body, &format!("[motion], kind {kind}"), keys);
+    }
+    table(&mut body, "[[events]]", &keys::EVENT);
+    table(&mut body, "[[bars]]", &keys::BAR);
+    body.push('\n');
+    head(&mut body, &["measure", "unit", "what"]);
+    for measure in Measure::ALL {
+        let name = format!("`{}`", measure.name());
+        row(&mut body, &[&name, measure.unit(), measure.meaning()]);
+    }
+    body.push_str("\n### [[terrain]]\n\nIts kinds and fields are in [Choose the terrain](../guide/terrain.md).\n");
+    let intro = "The scenarios that are part of the program, `wheeleg run NAME`, and the keys of scenario files.";
     page("scenarios.md", "Scenarios", intro, &body);
 }
 
 #[test]
 fn exit_codes_page() {
-    let mut program = std::process::Command::new(program::path());
-    let output = program.arg("--help").output().expect("it runs");
-    let help = String::from_utf8(output.stdout).expect("UTF-8");
-    let codes = help
-        .lines()
-        .find_map(|line| line.strip_prefix("Exit codes: "));
-    let codes = codes.expect("they are in the help").trim_end_matches('.');
     let mut body = String::new();
-    head(&mut body, &["code", "when"]);
-    for code in codes.split("; ") {
-        let (code, when) = code.split_once(' ').expect("code and text");
-        row(&mut body, &[code, when]);
+    for command in ["", "campaign", "ctl", "replay"] {
+        let mut program = std::process::Command::new(program::path());
+        let arguments = command.split_whitespace().chain(["--help"]);
+        let output = program.args(arguments).output().expect("it runs");
+        let help = String::from_utf8(output.stdout).expect("UTF-8");
+        let (_, codes) = help.split_once("Exit codes:\n").expect("they are there");
+        if !command.is_empty() {
+            let _ = writeln!(body, "\n## wheeleg {command}\n");
+        }
+        head(&mut body, &["code", "when"]);
+        for line in codes.lines().filter(|line| !line.trim().is_empty()) {
+            let (code, when) = line.trim().split_once(' ').expect("code and text");
+            row(&mut body, &[code, when.trim_start()]);
+        }
     }
-    let intro = "What the program tells the shell, as in `wheeleg --help`.";
+    let intro = "What the program tells the shell, as in `wheeleg --help`. Commands with codes of their \
+                 own have a section below.";
     page("exit-codes.md", "Exit codes", intro, &body);
 }

@@ -42,7 +42,7 @@ fn slices_of_any_length_give_the_recording_of_a_run() {
 #[test]
 fn inputs_from_outside_act_and_repeat() {
     let brake_and_fault = || {
-        let (mut braked, mut struck) = (false, false);
+        let (mut braked, mut injected) = (false, false);
         driven(10 * MS, &mut |session, recorder| {
             let Some(t_s) = session.scenario_s() else {
                 return;
@@ -52,8 +52,8 @@ fn inputs_from_outside_act_and_repeat() {
                 let command = Command::EmergencyBrake { joint: 2 };
                 session.submit(command, recorder);
             }
-            if t_s >= 1.0 && !struck {
-                struck = true;
+            if t_s >= 1.0 && !injected {
+                injected = true;
                 let fault = "pot-open:joint3@0s".parse().expect("a fault");
                 session.inject(&fault, true, recorder).expect("injected");
             }

@@ -15,6 +15,7 @@ mod control_bars;
 mod cylinders;
 mod delay;
 mod fault_matrix;
+mod field;
 mod figures;
 mod foot_sides;
 mod long_runs;

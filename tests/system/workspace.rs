@@ -10,6 +10,7 @@ use serde_json::Value;
 use wheeleg_identity::sources::{self, Images};
 
 mod circles;
+mod documents;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
@@ -645,58 +646,4 @@ fn no_test_is_switched_off_or_asserts_nothing() {
         );
     }
     assert!(tests > 50, "only {tests} tests found");
-}
-
-#[test]
-fn continuous_integration_runs_the_command_of_the_readme() {
-    let readme = fs::read_to_string(root().join("README.md")).expect("README.md");
-    let script = fs::read_to_string(root().join(".ci/run")).expect(".ci/run");
-    let command = "cargo xtask test";
-    assert!(readme.lines().any(|line| line.trim() == command));
-    assert!(script.contains("set -euo pipefail"));
-    assert!(script.lines().any(|line| {
-        let line = line.trim();
-        !line.starts_with('#') && line.starts_with(&format!("exec {command}"))
-    }));
-}
-
-/// Links and file names in documents: a move that forgets them sends a newcomer nowhere.
-#[test]
-fn documents_point_to_what_exists() {
-    let mut links = 0;
-    let mut dead = Vec::new();
-    for (name, text) in files() {
-        if !name.ends_with(".md") {
-            continue;
-        }
-        let folder = Path::new(&name).parent().expect("a folder");
-        for target in text.split("](").skip(1) {
-            let target = target.split([')', '#', ' ']).next().expect("a target");
-            if target.is_empty() || target.contains("://") || target.starts_with("mailto:") {
-                continue;
-            }
-            links += 1;
-            if !root().join(folder).join(target).exists() {
-                dead.push(format!("{name}: link {target}"));
-            }
-        }
-    }
-    let architecture = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("it is there");
-    let places = architecture.split('`').skip(1).step_by(2);
-    let tops = [
-        "firmware/",
-        "host-sim/",
-        "protocol/",
-        "tests/",
-        "xtask/",
-        "docs/",
-    ];
-    for place in places.filter(|p| tops.iter().any(|top| p.starts_with(top))) {
-        links += 1;
-        if !root().join(place).exists() {
-            dead.push(format!("ARCHITECTURE.md: {place}"));
-        }
-    }
-    assert!(links > 100, "only {links} links found");
-    assert!(dead.is_empty(), "{dead:#?}");
 }

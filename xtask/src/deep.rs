@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 13] = [
+const CHECKS: [Check; 14] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -57,6 +57,12 @@ const CHECKS: [Check; 13] = [
         "each behaviour of a walk with and without, 20 seeds and a sign test",
         20,
         behaviours,
+    ),
+    Check(
+        "field",
+        "the paper's claims on 100 seeds each, with intervals",
+        60,
+        field,
     ),
     Check(
         "campaign",
@@ -169,6 +175,28 @@ fn off_data() -> StepResult<String> {
     let test = "off_data::nothing_trips_on_a_robot_off_its_data";
     let amount = ("WHEELEG_OFF_ROBOTS", 200);
     measured(["system", test], amount, " false alarms; ")
+}
+
+/// The scenarios that the paper's claims rest on.
+fn field() -> StepResult<String> {
+    let claims = ["sand-flat", "sand-slope-20", "rocks-30"];
+    let printed = output(
+        cargo()
+            .args([
+                "run",
+                "--locked",
+                "--release",
+                "--quiet",
+                "-p",
+                "wheeleg",
+                "--",
+                "field",
+            ])
+            .args(claims)
+            .args(["--seeds", "100", "--out", "target/deep/field"]),
+    )?;
+    let lines = printed.lines().filter(|line| !line.starts_with("report"));
+    Ok(lines.map(str::trim).collect::<Vec<_>>().join("; "))
 }
 
 fn cylinders() -> StepResult<String> {

@@ -132,7 +132,7 @@ pub(crate) fn build() -> StepResult<Vec<Image>> {
 
 /// Builds all images in one of the ways and lays them down in `folder`.
 pub(crate) fn build_into(way: Way, folder: &Path) -> StepResult<Vec<Image>> {
-    println!("    way: {}", way.describe());
+    println!("    way: {}", way.text());
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut images = Vec::new();
     for (feature, names) in IMAGES {

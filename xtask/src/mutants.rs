@@ -24,7 +24,7 @@ const GROUPS: [(&[&str], &[&str]); 4] = [
             "firmware/node/src/faults.rs",
             "firmware/node/src/debounce.rs",
             "firmware/node/src/overrun.rs",
-            "firmware/node/src/seal.rs",
+            "firmware/node/src/checksum.rs",
             "firmware/node/src/sensor.rs",
             "firmware/node/src/supervisor.rs",
             "firmware/node/src/store/mod.rs",

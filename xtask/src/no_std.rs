@@ -50,7 +50,7 @@ pub(crate) enum Way {
 
 impl Way {
     /// The way, for people.
-    pub(crate) const fn describe(self) -> &'static str {
+    pub(crate) const fn text(self) -> &'static str {
         match self {
             Self::Rustup => "rustup's target",
             Self::DebianBuildStd => "Debian's rustc, core built from source",
@@ -68,7 +68,7 @@ pub(crate) fn steps(report: &mut Report) {
 
 fn check(target: &str) -> StepResult {
     let way = way(target)?;
-    println!("    way: {} for {target}", way.describe());
+    println!("    way: {} for {target}", way.text());
     let mut wrong = Vec::new();
     for package in CRATES {
         let mut command = cargo_for(way, "check");

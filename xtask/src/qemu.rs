@@ -70,7 +70,7 @@ pub(crate) fn emulator() -> StepResult {
 /// Builds the images in one of the ways; gives the folder in which they lie. They link
 /// only if no panic can be reached.
 pub(crate) fn images(way: Way) -> StepResult<PathBuf> {
-    println!("    way: {}", way.describe());
+    println!("    way: {}", way.text());
     let products = match way {
         Way::Rustup => target_dir(),
         Way::DebianBuildStd => target_dir().join("debian"),

@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[derive(Default)]
-    struct Rig {
+    struct TestRig {
         bytes: VecDeque<(u32, Vec<u8>)>,
         ticks: VecDeque<u32>,
         sending: bool,
@@ -277,7 +277,7 @@ mod tests {
         did: Vec<Did>,
     }
 
-    impl Board for Rig {
+    impl Board for TestRig {
         fn next_event(&mut self) -> Option<Event> {
             let bytes = self.bytes.front().map(|(t, _)| Micros(*t));
             let event = older(bytes, self.ticks.front().map(|t| Micros(*t)));
@@ -390,10 +390,10 @@ mod tests {
 
     #[test]
     fn events_run_in_the_order_of_their_times_whatever_was_pending() {
-        let mut board = Rig {
+        let mut board = TestRig {
             bytes: [(999, vec![1]), (1000, vec![2]), (1001, vec![3])].into(),
             ticks: [1000, 2000].into(),
-            ..Rig::default()
+            ..TestRig::default()
         };
         let mut application = Echo::default();
         for _ in 0..6 {
@@ -427,12 +427,12 @@ mod tests {
 
     #[test]
     fn a_save_waits_for_a_tick_and_the_transmitter_and_what_came_meanwhile_is_forgotten() {
-        let mut board = Rig {
+        let mut board = TestRig {
             bytes: [(2500, vec![1])].into(),
             ticks: [1000, 2000].into(),
             sending: true,
             cut_off: true,
-            ..Rig::default()
+            ..TestRig::default()
         };
         let mut application = Echo {
             save: true,
@@ -460,7 +460,7 @@ mod tests {
     #[test]
     fn a_slot_that_has_passed_stays_empty_and_an_answer_is_late_rather_than_lost() {
         let play = |in_slots, frames: &[u32]| {
-            let mut board = Rig::default();
+            let mut board = TestRig::default();
             let mut application = Echo {
                 in_slots,
                 frames: frames.iter().copied().collect(),
@@ -483,7 +483,7 @@ mod tests {
 
     #[test]
     fn a_second_frame_waits_for_the_transmitter() {
-        let mut board = Rig::default();
+        let mut board = TestRig::default();
         let mut application = Echo {
             frames: [50, 400].into(),
             ..Echo::default()

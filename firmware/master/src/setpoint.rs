@@ -114,7 +114,7 @@ pub struct Ahead {
     pub cycles: u8,
 }
 
-/// What a node does when the bus falls silent in this phase, ARCHITECTURE.md "Safe states".
+/// What a node does when the bus falls silent in this phase, `docs/decisions/0010-safe-states.md`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnLinkLoss {
     /// Valves shut, air trapped: a loaded leg must not collapse.

@@ -40,6 +40,7 @@
 
 pub mod acceptance;
 mod board;
+pub mod checksum;
 pub mod clock;
 pub mod debounce;
 pub mod faults;
@@ -50,7 +51,6 @@ pub mod mode;
 pub mod overrun;
 pub mod parameters;
 pub mod port;
-pub mod seal;
 pub mod sensor;
 pub mod snapshot;
 pub mod store;

@@ -206,7 +206,7 @@ impl SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::seal::Seal;
+    use crate::checksum::Checksum;
 
     /// 4096 code steps per 16 mm: 1 mm = 256 codes.
     const CONFIG: SensorConfig = SensorConfig {
@@ -352,7 +352,7 @@ mod tests {
                 damaged[2].good_in_row ^= 1 << (bit % 16);
                 damaged[3].has_last = !has_last;
                 for (field, damaged) in damaged.iter().enumerate() {
-                    assert_ne!(Seal::of(damaged), Seal::of(&sound), "{field} {bit}");
+                    assert_ne!(Checksum::of(damaged), Checksum::of(&sound), "{field} {bit}");
                 }
             }
         }

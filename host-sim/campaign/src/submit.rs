@@ -119,7 +119,7 @@ impl Submission {
     /// [`CampaignError::Refused`] if Slurm is not there, allows fewer tasks, or refuses;
     /// [`CampaignError::Output`] if the script cannot be written.
     pub fn submit_to_slurm(&self, further: &[String]) -> Result<[String; 2], CampaignError> {
-        let config = told("scontrol", &["show".to_owned(), "config".to_owned()])?;
+        let config = output_of("scontrol", &["show".to_owned(), "config".to_owned()])?;
         if let Some(most) = max_array_size(&config)
             && self.shards > most
         {
@@ -138,8 +138,8 @@ impl Submission {
         crate::store::write_whole(&script, self.slurm_script().as_bytes())?;
         let mut arguments = self.slurm_arguments(further);
         arguments.push(script.to_string_lossy().into_owned());
-        let job = number(&told("sbatch", &arguments)?);
-        let merge = number(&told("sbatch", &self.merge_arguments(&job, further))?);
+        let job = number(&output_of("sbatch", &arguments)?);
+        let merge = number(&output_of("sbatch", &self.merge_arguments(&job, further))?);
         Ok([job, merge])
     }
 
@@ -191,7 +191,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// What a program prints.
-fn told(program: &str, arguments: &[String]) -> Result<String, CampaignError> {
+fn output_of(program: &str, arguments: &[String]) -> Result<String, CampaignError> {
     let output = Command::new(program)
         .args(arguments)
         .output()

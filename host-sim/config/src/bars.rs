@@ -1,5 +1,6 @@
 //! Bars: what a run's way over the ground is held against, each a measure with its band.
 
+use super::keys;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
@@ -98,7 +99,7 @@ pub(super) fn read(r: &mut Reader, top: &[&str]) -> Vec<Bar> {
 }
 
 fn bar(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Bar> {
-    r.reject_misplaced(entry, &["measure", "min", "max", "info"], top);
+    r.reject_misplaced(entry, &keys::names(&keys::BAR), top);
     let names: Vec<(&str, Measure)> = Measure::ALL.iter().map(|m| (m.name(), *m)).collect();
     let measure = r.choice(entry, "measure", &names)?;
     let mut end = |key: &'static str| {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use toml_edit::{ArrayOfTables, DocumentMut, Item};
+
 use super::error::{ConfigError, Problem};
 use super::terrain::Files;
 use super::{RobotConfig, Scenario, closest};
@@ -26,8 +28,8 @@ pub const ROBOTS: &[(&str, &str, &str)] =
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
-    "walk", "sand-flat", "rocks-20", "pit", "frozen-layer-1", "slope-10", "rock-field",
-    "height-map",
+    "walk", "sand-flat", "sand-slope-10", "sand-slope-20", "rocks-20", "pit", "frozen-layer-1",
+    "rocks-30", "rock-slope", "turn", "spin", "wall-30", "slope-10", "rock-field", "height-map",
 );
 
 /// Plans of campaigns: name, file name for messages, text.
@@ -122,6 +124,31 @@ pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
         return read.map(|(scenario, _)| scenario);
     }
     Scenario::parse(&file, &text)
+}
+
+/// A built-in scenario on other ground: `seed` takes the place of the seed of each of its fields
+/// of rocks.
+///
+/// # Errors
+/// As [`scenario`].
+pub fn scenario_on_ground(name: &str, seed: u64) -> Result<Scenario, ConfigError> {
+    let (file, text) = find("scenario", name, SCENARIOS)?;
+    let text = with_ground_seed(&text, seed).unwrap_or(text);
+    Scenario::parse_with(&file, &text, &Files::BuiltIn(DATA)).map(|(scenario, _)| scenario)
+}
+
+/// The text of a scenario with another seed of its rocks; `None` if it is not TOML.
+fn with_ground_seed(text: &str, seed: u64) -> Option<String> {
+    let mut document: DocumentMut = text.parse().ok()?;
+    let parts = document
+        .get_mut("terrain")
+        .and_then(Item::as_array_of_tables_mut);
+    for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
+        if let Some(value) = part.get_mut("seed") {
+            *value = toml_edit::value(i64::try_from(seed).ok()?);
+        }
+    }
+    Some(document.to_string())
 }
 
 /// Whether a name is that of a file.

@@ -21,6 +21,7 @@ mod commissioned;
 mod drawing;
 mod error;
 pub mod faults;
+pub mod keys;
 mod law;
 mod node;
 mod params;
@@ -48,5 +49,5 @@ pub use quantity::{brief, pretty};
 pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
-pub use scenario::{EventAction, LegChoice, Motion, Scenario, ScenarioEvent, TargetSet};
+pub use scenario::{EventAction, LegChoice, Motion, Scenario, ScenarioEvent, TARGETS, TargetSet};
 pub use suggest::closest;

@@ -8,6 +8,7 @@ use wheeleg_master::layer1::walk::WalkOrder;
 use super::bars::{self, Bar};
 use super::command;
 use super::error::ConfigError;
+use super::keys;
 use super::params::{FieldSpec, ParameterInfo};
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
@@ -121,22 +122,10 @@ pub struct Scenario {
     pub bars: Vec<Bar>,
 }
 
-const TOP: [&str; 12] = [
-    "name",
-    "description",
-    "robot",
-    "duration",
-    "seed",
-    "targets",
-    "motion",
-    "behaviours",
-    "events",
-    "terrain",
-    "faults",
-    "bars",
-];
+const TOP: [&str; 12] = keys::names(&keys::TOP);
 
-const TARGETS: [(&str, TargetSet); 10] = [
+/// Names of the sets of targets.
+pub const TARGETS: [(&str, TargetSet); 10] = [
     ("three-step", TargetSet::ThreeStep),
     ("stand", TargetSet::Stand),
     ("master-lost", TargetSet::MasterLost),
@@ -294,25 +283,23 @@ fn motion(r: &mut Reader) -> Option<Motion> {
     ];
     match r.choice(&entry, "kind", &kinds)? {
         MotionKind::Stand => {
-            r.reject_misplaced(&entry, &["kind"], &TOP);
+            r.reject_misplaced(&entry, &keys::names(&keys::STAND), &TOP);
             Some(Motion::Stand)
         }
         MotionKind::Walk => {
-            let known = ["kind", "speed", "turn", "pattern", "lift", "nose"];
-            r.reject_misplaced(&entry, &known, &TOP);
+            r.reject_misplaced(&entry, &keys::names(&keys::WALK), &TOP);
             match command::arguments(r, &entry, CommandCode::Walk)? {
                 Command::Walk(order) => Some(Motion::Walk(order)),
                 _ => None,
             }
         }
         MotionKind::SquareWave => {
-            r.reject_misplaced(&entry, &["kind", "leg"], &TOP);
+            r.reject_misplaced(&entry, &keys::names(&keys::SQUARE_WAVE), &TOP);
             let leg = r.choice(&entry, "leg", &LEGS)?;
             Some(Motion::SquareWave { leg })
         }
         MotionKind::Sinusoid => {
-            let known = ["kind", "leg", "length", "height", "rate"];
-            r.reject_misplaced(&entry, &known, &TOP);
+            r.reject_misplaced(&entry, &keys::names(&keys::SINUSOID), &TOP);
             let leg = r.choice(&entry, "leg", &LEGS);
             // The master's own ranges, under the names of this section.
             let length = FieldSpec {

@@ -21,15 +21,16 @@ mod hub;
 pub mod keys;
 mod live;
 mod mac;
+mod messages;
 mod outbox;
 mod page;
 mod rate;
+pub mod reason;
 mod record;
 pub mod replay;
 pub mod request;
 mod server;
 mod session;
-mod words;
 
 pub use api::SUBPROTOCOL;
 pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};

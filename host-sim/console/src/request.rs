@@ -10,6 +10,7 @@ use wheeleg_master::command::{Command, CommandCode, Given};
 use wheeleg_telemetry::channels;
 
 use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
+use crate::reason::Reason;
 
 /// Largest frame of a client, MAC included.
 pub const FRAME_MAX: usize = 4096;
@@ -122,7 +123,7 @@ pub enum HostCommand {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BadRequest {
     /// Name that stays the same.
-    pub reason: &'static str,
+    pub reason: Reason,
     /// For a person.
     pub text: String,
 }
@@ -207,7 +208,7 @@ fn body(raw: Raw) -> Result<Body, Malformed> {
                     Body::Subscribe { channels, hz: None }
                 }
                 ("subscribe", Some(_)) => Body::Refused(BadRequest {
-                    reason: "bad_argument",
+                    reason: Reason::BadArgument,
                     text: format!("`hz`: allowed are 1 to {HZ_MAX}, and \"all\""),
                 }),
                 ("unsubscribe", None) => Body::Unsubscribe { channels },
@@ -244,7 +245,7 @@ fn indices(topics: &[String]) -> Result<Vec<u16>, BadRequest> {
     let find = |topic: &String| {
         let found = channels().iter().position(|channel| channel.topic == topic);
         found.map(|index| index as u16).ok_or_else(|| BadRequest {
-            reason: "unknown_channel",
+            reason: Reason::UnknownChannel,
             text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
         })
     };
@@ -264,7 +265,7 @@ fn valid_us(order: &Order, valid_ms: u64) -> Result<u64, BadRequest> {
         Ok(valid_ms * 1_000)
     } else {
         Err(BadRequest {
-            reason: "bad_argument",
+            reason: Reason::BadArgument,
             text: format!("`valid_ms`: allowed are 1 to {most}, not {valid_ms}"),
         })
     }
@@ -278,14 +279,14 @@ fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
         return host(info, args).map(Order::Host);
     }
     Err(BadRequest {
-        reason: "bad_command",
+        reason: Reason::BadCommand,
         text: format!("there is no command {name:?}; /api/v1/commands lists them"),
     })
 }
 
 fn bad_argument(text: impl ToString) -> BadRequest {
     BadRequest {
-        reason: "bad_argument",
+        reason: Reason::BadArgument,
         text: text.to_string(),
     }
 }
@@ -492,7 +493,7 @@ mod tests {
         ] {
             let (got, text) = refused(cmd, args, 500);
             assert!(
-                got == reason && text.contains(word),
+                got.name() == reason && text.contains(word),
                 "{cmd} {args}: {got} {text}"
             );
         }

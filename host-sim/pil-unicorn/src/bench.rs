@@ -21,7 +21,7 @@ use crate::soc::Soc;
 use crate::soc::flash::STORE_SIZE;
 use crate::soc::rcc::{BROWN_OUT_RESET, PIN_RESET};
 
-/// Rate of the line [bit/s]; the PC opens it with that (host-sim/src/hil).
+/// Rate of the line [bit/s]; the PC opens it with that (host-sim/remote/src/serial.rs).
 const BAUD: u64 = 1_000_000;
 /// Most by which two ends may differ: half a bit in ten, shared between both.
 const TOLERANCE: u64 = BAUD / 50;

@@ -53,6 +53,14 @@ pub struct BoardFigures {
     pub cut_frames: u16,
 }
 
+/// Median of sorted values, as `wheeleg-report` defines it: of an even number the mean of the middle
+/// two, here rounded down to whole instructions.
+fn median(sorted: &[u32]) -> Option<u32> {
+    let high = *sorted.get(sorted.len() / 2)?;
+    let low = *sorted.get(sorted.len().checked_sub(1)? / 2)?;
+    Some(low.midpoint(high))
+}
+
 impl BoardFigures {
     pub(crate) fn new(
         address: u8,
@@ -81,7 +89,7 @@ impl BoardFigures {
             compared_bits: compared.bits,
             differing_bits: compared.differing,
             ticks: ticks.len() as u64,
-            tick_instructions_median: sorted.get(sorted.len() / 2).copied().and_then(known),
+            tick_instructions_median: median(&sorted).and_then(known),
             // Not above the largest tick.
             tick_instructions_mean: known(mean as u32),
             tick_instructions_worst: sorted.last().copied().and_then(known),
@@ -115,4 +123,18 @@ pub struct PilSummary {
     pub first_difference: Option<String>,
     /// The boards outside.
     pub boards: Vec<BoardFigures>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn the_median_of_an_even_number_is_between_the_middle_two() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[7]), Some(7));
+        assert_eq!(median(&[10, 20]), Some(15));
+        assert_eq!(median(&[1, 10, 13, 90]), Some(11));
+        assert_eq!(median(&[1, 10, 90]), Some(10));
+    }
 }

@@ -28,8 +28,7 @@ pub const PLUGIN_VARIABLE: &str = "WHEELEG_QEMU_PLUGIN";
 /// Number of the next emulator.
 static NUMBER: AtomicU64 = AtomicU64::new(0);
 
-/// Version that the project is tested with is 7.2; machine and options are the
-/// command of record of ARCHITECTURE.md.
+/// Machine and options of QEMU. The project is tested with version 7.2.
 const ARGUMENTS: [&str; 16] = [
     "-machine",
     "mps2-an386",

@@ -8,12 +8,22 @@ use wheeleg_telemetry::LogError;
 /// Why a simulation could not be built or continued.
 #[derive(Debug, Error, Diagnostic)]
 pub enum SimError {
-    /// A part refuses its parameters, the robot does not get ready, the plant leaves the range
-    /// of its model, or a fault cannot be injected.
+    /// A part refuses its parameters, the plant leaves the range of its model, or a fault cannot
+    /// be injected.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::simulation), help("{help}"))]
     Simulation {
         /// What went wrong.
+        what: String,
+        /// What the user can do.
+        help: String,
+    },
+
+    /// The robot does not get ready: boards miss or differ, or it does not reach its start pose.
+    #[error("{what}")]
+    #[diagnostic(code(wheeleg::simulation), help("{help}"))]
+    NotReady {
+        /// How far it got, and what it reported.
         what: String,
         /// What the user can do.
         help: String,

@@ -12,6 +12,7 @@ use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQualit
 use super::boards::WheelBoard;
 use super::world::World;
 use wheeleg_telemetry::event::{BoardChange, Cause};
+use wheeleg_telemetry::phase;
 use wheeleg_telemetry::{
     BehaviourSample, BodySample, BusSample, FootSample, JointSample, MasterSample, Recorder,
     SupplySample, WheelSample,
@@ -288,15 +289,7 @@ impl Observer {
                 ..MasterSample::default()
             };
         };
-        let phase = match record.phase {
-            Phase::Unload => 1,
-            Phase::Lift | Phase::Reach => 2,
-            Phase::Lower => 3,
-            Phase::Push => 5,
-            Phase::Rest => 4,
-            Phase::Walk => 6,
-            _ => 0,
-        };
+        let phase = phase::code(record.phase);
         let moving = phase != 0 || record.phase == Phase::Trajectory;
         if moving {
             self.step = record.step + 1;

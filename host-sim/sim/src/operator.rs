@@ -81,7 +81,7 @@ impl Operator {
     /// its start pose.
     ///
     /// # Errors
-    /// [`SimError::Simulation`] with the reason if it does not get there.
+    /// [`SimError::NotReady`] with the reason if it does not get there.
     pub(super) fn prepare(&mut self, world: &mut World) -> Result<bool, SimError> {
         let now_ns = world.now_ns();
         let now_us = now_ns / 1000;
@@ -147,15 +147,15 @@ impl Operator {
             .rev()
             .map(|(us, cause)| format!("{:.3} s: {cause}", *us as f64 * 1e-6))
             .collect();
-        SimError::simulation(
-            format!(
+        SimError::NotReady {
+            what: format!(
                 "the robot did not get ready in {:.2} s of simulated time (stage: {}); last events: {}",
                 now_ns as f64 * 1e-9,
                 self.stage.name(),
                 story.join("; ")
             ),
-            help,
-        )
+            help: help.to_owned(),
+        }
     }
 
     /// Writes the story of the start-up into the record, at time 0.

@@ -1,8 +1,9 @@
 //! What a person asks of the simulator, one module a question.
 //!
 //! * [`run`]: one scenario with log, targets and report; [`analysis`] judges it;
+//! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
 //! * [`matrix`]: every fault, and what must come of it;
-//! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`bench`]);
+//! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`axis_sim`]);
 //! * [`figures`]: the paper's figures and misprints;
 //! * [`study`]: what all of them do in the same way;
 //! * [`view`]: a log, or two, as a page;
@@ -18,12 +19,13 @@
 //! * **job**: folder, progress and stop signal of a study
 
 pub mod analysis;
-pub mod bench;
+pub mod axis_sim;
 pub mod check;
 pub mod compare;
 pub mod delay;
 mod error;
 pub mod export;
+pub mod field;
 pub mod figures;
 pub mod matrix;
 mod motion;

@@ -70,16 +70,13 @@ impl Motion {
 /// Name of a code of [`MasterSample::phase`](wheeleg_telemetry::MasterSample), and whether a foot
 /// is in the air then.
 pub(crate) fn phase_name(phase: u8, step: u32) -> Option<(String, bool)> {
-    let (name, air) = match phase {
-        1 => ("unload", false),
-        2 => ("lift, reach", true),
-        3 => ("lower", true),
-        4 => ("rest", false),
-        6 => ("walk", false),
-        5 => return Some((format!("push, step {step}"), false)),
-        _ => return None,
+    let logged = wheeleg_telemetry::phase::logged(phase)?;
+    let name = if logged.numbered {
+        format!("{}, step {step}", logged.name)
+    } else {
+        logged.name
     };
-    Some((name.to_owned(), air))
+    Some((name, logged.in_air))
 }
 
 /// A thousandth of a unit is finer than a drawing shows.

@@ -29,6 +29,7 @@ mod hash;
 mod log_file;
 mod memory;
 pub mod messages;
+pub mod phase;
 mod read;
 mod recorder;
 mod recover;

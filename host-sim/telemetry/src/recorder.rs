@@ -15,7 +15,7 @@ use super::sink::{SampleRef, Sink, Taken};
 use crate::{Event, LogError};
 
 /// Corner of the low-pass on force and acceleration signals, Hz
-/// (ARCHITECTURE.md, "Forces").
+/// (`docs/decisions/0024-forces-in-plots.md`).
 pub const PLOT_CUTOFF_HZ: f64 = 20.0;
 /// Period of the samples that [`Recorder::joint`] is given, s.
 const SAMPLE_PERIOD_S: f64 = 1e-3;

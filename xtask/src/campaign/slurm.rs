@@ -186,7 +186,7 @@ fn process(shard: &str, folder: &Path) -> Option<u32> {
 }
 
 /// The value behind a word of what the program prints.
-fn told<'a>(text: &'a str, word: &str) -> Result<&'a str> {
+fn field<'a>(text: &'a str, word: &str) -> Result<&'a str> {
     let line = text.lines().find_map(|line| line.strip_prefix(word));
     Ok(line
         .with_context(|| format!("no `{word}` in {text}"))?
@@ -231,7 +231,7 @@ pub(crate) fn check() -> Result<String> {
             &["merge", &folder.display().to_string()],
             &folder.join("c.parquet"),
         )?;
-        Ok(told(&text, "hash ")?.to_owned())
+        Ok(field(&text, "hash ")?.to_owned())
     };
     let expected = hash(&alone)?;
 
@@ -242,7 +242,7 @@ pub(crate) fn check() -> Result<String> {
         command.args(["campaign", "submit", &file_name, "--slurm", "--shards"]);
         command.arg(SHARDS.to_string()).arg("--out").arg(&shared);
         let text = ask(&mut command).context("submit")?;
-        Ok(told(&text, "array ")?.to_owned())
+        Ok(field(&text, "array ")?.to_owned())
     };
     let array = submit()?;
     // Two tasks run at a time: one is killed, one given back to the queue.

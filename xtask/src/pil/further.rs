@@ -19,7 +19,7 @@ use crate::sizes;
 const PAPER: &str = "wheeleg-2003";
 const PREDICTIVE: &str = "wheeleg";
 
-/// Runs in which boards latch faults, with what strikes them: the master falls silent, a
+/// Runs in which boards latch faults, with what causes them: the master falls silent, a
 /// wheel runs against its drive, a valve does not open, the emergency stop; in which a
 /// board's supply or program fails in mid-move, and a request to brake ends with a tick
 /// edge; and what must be told of it.

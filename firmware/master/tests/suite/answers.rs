@@ -1,6 +1,6 @@
 //! Whose answers count, until when a request is sent, and when a group of them is over.
 
-use crate::common::Rig;
+use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Refusal, Request};
@@ -10,7 +10,7 @@ use wheeleg_protocol::{Address, Envelope, Fault, MAX_ENCODED, Message, NodeMode}
 #[test]
 fn a_slot_reply_to_another_than_the_master_is_no_reply() {
     for (to, heard) in [(Address::MASTER, true), (Address::joint(1).unwrap(), false)] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
         rig.node(3).silent = true;
         let sync = rig.cycle();
@@ -37,7 +37,7 @@ fn disarming_ends_with_the_last_board_that_answers_or_does_not() {
         ([0, 0, 0, 0, 0, 0, 0, 2], true),
         ([9; 8], false),
     ] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
         rig.node(1).unanswered = unanswered[0];
         rig.node(8).unanswered = unanswered[7];
@@ -57,7 +57,7 @@ fn disarming_ends_with_the_last_board_that_answers_or_does_not() {
 #[test]
 fn a_request_is_sent_until_its_deadline_and_not_after_it() {
     for (deadline_us, sent) in [(3_600, true), (3_599, false)] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         let request = Request {
             client: 1,

@@ -10,7 +10,7 @@ use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_master::layer1::params::{ParamError, Pattern};
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use crate::common::Rig;
+use crate::common::TestRig;
 
 /// Arguments that the master accepts: those of the paper's gait, else about the middle.
 fn usual(argument: &'static Argument) -> Value {
@@ -177,7 +177,7 @@ fn forced(command: Command, name: &str, value: Value) -> Option<Command> {
 
 /// Whether the master refuses the command for its arguments, and which.
 fn refused(command: Command) -> Option<Refusal> {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     match command {
         Command::FootTrajectory { .. } => rig.stand(),
         Command::BlowThrough { .. } | Command::SaveParameters { .. } => rig.run(30),

@@ -1,6 +1,6 @@
 //! Bus cycle, enumeration, arming, supervision and stops, against fake nodes.
 
-use crate::common::{CYCLE_US, FakeNode, Rig, decode, emit};
+use crate::common::{CYCLE_US, FakeNode, TestRig, decode, emit};
 use fixed::types::I16F16;
 use proptest::prelude::*;
 use wheeleg_master::command::Command;
@@ -44,7 +44,7 @@ fn cycle_counter_and_time_advance_and_wrap() {
 
 #[test]
 fn every_node_is_identified_then_armed_with_wheel_setup() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     assert!(!rig.master.is_ready());
     rig.arm();
     for node in 1..=8 {
@@ -70,7 +70,7 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
 /// the end of a push becomes a jolt.
 #[test]
 fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
-    let mut rig = Rig::new(MasterConfig {
+    let mut rig = TestRig::new(MasterConfig {
         wheel_drive: WheelDrive::Stream,
         ..MasterConfig::default()
     });
@@ -89,7 +89,7 @@ fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
 }
 
 /// Speeds and accelerations that both wheels were told, in order.
-fn profiles(rig: &mut Rig) -> [Vec<u16>; 2] {
+fn profiles(rig: &mut TestRig) -> [Vec<u16>; 2] {
     [7, 8].map(|node| {
         let told = rig.node(node).requests.iter().filter_map(|m| match m {
             Message::WheelMaxSpeed(speed) => Some(u16::from(speed.speed.get())),
@@ -107,7 +107,7 @@ fn new_gait_parameters_reach_the_wheels_profiles() {
         push_acceleration_mm_s2: I16F16::from_num(acceleration),
         ..GaitParams::default()
     };
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     assert_eq!(profiles(&mut rig), [[10, 5], [10, 5]]);
     // Armed: told at once, once, and only where something changed.
@@ -131,7 +131,7 @@ fn new_gait_parameters_reach_the_wheels_profiles() {
 
 #[test]
 fn schema_mismatch_refuses_arming_and_names_both() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.node(5).schema_hash = 0x1234;
     rig.run(60);
     let mismatch = Event::SchemaMismatch {
@@ -158,14 +158,14 @@ fn schema_mismatch_refuses_arming_and_names_both() {
 
 #[test]
 fn misplaced_board_and_missing_node_refuse_arming() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.node(7).board = BoardKind::Joint;
     rig.run(60);
     let ticket = rig.submit(Command::Arm);
     rig.run(3);
     assert_eq!(rig.refusal(ticket), Some(Refusal::WrongRole { node: 7 }));
 
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.node(2).silent = true;
     rig.run(60);
     let ticket = rig.submit(Command::Arm);
@@ -179,7 +179,7 @@ fn misplaced_board_and_missing_node_refuse_arming() {
 
 #[test]
 fn one_refusal_while_arming_disarms_the_others() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.node(6).refuse_arm = true;
     rig.run(60);
     let ticket = rig.submit(Command::Arm);
@@ -199,7 +199,7 @@ fn one_refusal_while_arming_disarms_the_others() {
 
 #[test]
 fn arming_waits_for_slow_answers_however_long_they_take_in_all() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     for node in &mut rig.nodes {
         node.unanswered = 1;
@@ -218,7 +218,7 @@ fn arming_waits_for_slow_answers_however_long_they_take_in_all() {
 
 /// Asks for arming; one board acknowledges it and does not close its loop. Gives the
 /// ticket in the cycle in which the last board has acknowledged.
-fn armed_but_for_one(rig: &mut Rig) -> Ticket {
+fn armed_but_for_one(rig: &mut TestRig) -> Ticket {
     rig.run(60);
     rig.node(5).never_arms = true;
     let ticket = rig.submit(Command::Arm);
@@ -232,7 +232,7 @@ fn armed_but_for_one(rig: &mut Rig) -> Ticket {
 
 #[test]
 fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     let ticket = armed_but_for_one(&mut rig);
     rig.run(10);
     assert_eq!(rig.refusal(ticket), None);
@@ -242,7 +242,7 @@ fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged()
     assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Idle));
 
     // In the last of them it is not too late.
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     let ticket = armed_but_for_one(&mut rig);
     rig.run(9);
     rig.node(5).mode = NodeMode::Armed;
@@ -252,7 +252,7 @@ fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged()
 
 #[test]
 fn arming_is_done_when_no_joint_fills_any_more() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     // A wheel that waits for a change of direction delays nobody.
     rig.node(7).limits = Limit::DriveInhibited.mask();
@@ -265,7 +265,7 @@ fn arming_is_done_when_no_joint_fills_any_more() {
     assert!(rig.done(ticket) && rig.master.is_armed());
 
     // One that fills for ever is not waited for.
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(4).limits = Limit::DriveInhibited.mask();
     let ticket = rig.submit(Command::Arm);
@@ -276,7 +276,7 @@ fn arming_is_done_when_no_joint_fills_any_more() {
 
 #[test]
 fn arming_without_room_for_all_requests_arms_nobody() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(1).silent = true;
     let mut tickets = Vec::new();
@@ -304,7 +304,7 @@ fn arming_without_room_for_all_requests_arms_nobody() {
 
 #[test]
 fn a_user_command_behind_a_failed_arming_is_answered() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.node(6).refuse_arm = true;
     rig.run(60);
     let arm = rig.submit(Command::Arm);
@@ -321,12 +321,12 @@ fn a_wheel_move_beyond_the_encoder_circle_is_refused() {
         counts_per_revolution: 520_000,
         circumference_um: 942_478,
     };
-    let mut rig = Rig::new(MasterConfig {
+    let mut rig = TestRig::new(MasterConfig {
         wheels,
         ..MasterConfig::default()
     });
     rig.arm();
-    let go = |rig: &mut Rig, mm| {
+    let go = |rig: &mut TestRig, mm| {
         let travel_mm = PositionMm::from_int(mm);
         let ticket = rig.submit(Command::WheelReference { travel_mm });
         rig.cycle();
@@ -351,7 +351,7 @@ fn a_wheel_reference_is_at_most_2_to_the_22_less_one_counts_away() {
         counts_per_revolution: 1_000_000,
         circumference_um: 1_000_000,
     };
-    let mut rig = Rig::new(MasterConfig {
+    let mut rig = TestRig::new(MasterConfig {
         wheels,
         ..MasterConfig::default()
     });
@@ -359,7 +359,7 @@ fn a_wheel_reference_is_at_most_2_to_the_22_less_one_counts_away() {
     for wheel in [7, 8] {
         rig.node(wheel).rate = 0;
     }
-    let go = |rig: &mut Rig, counts: i32| {
+    let go = |rig: &mut TestRig, counts: i32| {
         let travel_mm = PositionMm::from_f64(f64::from(counts) / 1e3);
         let ticket = rig.submit(Command::WheelReference { travel_mm });
         rig.cycle();
@@ -410,7 +410,7 @@ fn wheels_that_were_turned_while_stopped_go_on_from_where_they_are() {
     let disarm = [Command::Disarm];
     let stop = [Command::EmergencyStop, Command::ClearFault];
     for end in [&disarm[..], &stop] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
         let travel_mm = PositionMm::from_int(100);
         rig.submit(Command::WheelReference { travel_mm });
@@ -436,7 +436,7 @@ fn wheels_that_were_turned_while_stopped_go_on_from_where_they_are() {
 
 #[test]
 fn direct_references_reach_their_slot_only_while_nothing_moves() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(30);
     let stroke_mm = PositionMm::from_int(33);
     let command = Command::JointReference {
@@ -480,7 +480,7 @@ fn direct_references_reach_their_slot_only_while_nothing_moves() {
 #[test]
 fn wheel_moves_start_at_the_last_reference_and_wrap() {
     for drive in [WheelDrive::Profile, WheelDrive::Stream] {
-        let mut rig = Rig::new(MasterConfig {
+        let mut rig = TestRig::new(MasterConfig {
             wheel_drive: drive,
             ..MasterConfig::default()
         });
@@ -518,9 +518,9 @@ fn wheel_moves_start_at_the_last_reference_and_wrap() {
 
 #[test]
 fn a_wheel_that_starts_anew_has_not_moved() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
-    let travel_um = |rig: &Rig| rig.master.layer0().odometry().travel_um();
+    let travel_um = |rig: &TestRig| rig.master.layer0().odometry().travel_um();
     let before = travel_um(&rig);
     // It is back before three replies are missed, and counts from 0.
     let wheel = &mut rig.nodes[6];
@@ -539,7 +539,7 @@ fn a_wheel_that_starts_anew_has_not_moved() {
 
 #[test]
 fn user_requests_are_answered_by_the_node() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     let ticket = rig.submit(Command::TransmitPosition { joint: 4 });
     rig.run(2);
@@ -567,7 +567,7 @@ fn touch_sides_are_those_of_the_robot_on_both_legs() {
     ];
     for (bit, left, right) in cases {
         for (frame, right) in [(SwitchFrame::Leg, right), (SwitchFrame::Robot, left)] {
-            let mut rig = Rig::new(MasterConfig {
+            let mut rig = TestRig::new(MasterConfig {
                 switch_frame: frame,
                 ..MasterConfig::default()
             });
@@ -589,7 +589,7 @@ fn touch_sides_are_those_of_the_robot_on_both_legs() {
 
 #[test]
 fn telemetry_drops_the_oldest_and_counts() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.keep_telemetry = true;
     rig.run(101);
     let mut records = Vec::new();
@@ -648,7 +648,7 @@ proptest! {
 
 #[test]
 fn answers_to_nobody_are_counted_and_ignored() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     let ack = Message::from(wheeleg_protocol::Ack { request: 0x11 });
     let bytes = emit(&ack, Address::joint(1).unwrap(), 999);

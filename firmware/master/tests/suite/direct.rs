@@ -1,6 +1,6 @@
 //! Commands of the user to single axes: what reaches which board, and when nothing may.
 
-use crate::common::Rig;
+use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::{Command, CorrectionKind};
 use wheeleg_master::contact::Side;
@@ -50,7 +50,7 @@ fn each_command_reaches_its_board_alone() {
         ),
     ];
     for (command, board, wanted) in commands {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         let ticket = rig.submit(command);
         rig.run(10);
@@ -63,7 +63,7 @@ fn each_command_reaches_its_board_alone() {
     }
 }
 
-fn lead(rig: &mut Rig) -> Result<(), Refusal> {
+fn lead(rig: &mut TestRig) -> Result<(), Refusal> {
     let stroke_mm = PositionMm::from_int(50);
     let ticket = rig.submit(Command::JointReference {
         joint: 1,
@@ -77,7 +77,7 @@ fn lead(rig: &mut Rig) -> Result<(), Refusal> {
 
 #[test]
 fn after_a_stop_of_one_axis_no_other_may_be_led_until_it_is_cleared() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     assert_eq!(lead(&mut rig), Ok(()));
     rig.submit(Command::EmergencyBrake { joint: 2 });
@@ -90,7 +90,7 @@ fn after_a_stop_of_one_axis_no_other_may_be_led_until_it_is_cleared() {
 
 #[test]
 fn valves_of_a_disarmed_joint_stop_nothing() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     let ticket = rig.submit(Command::OpenAllValves { joint: 2 });
     rig.run(10);
@@ -100,11 +100,11 @@ fn valves_of_a_disarmed_joint_stop_nothing() {
 
 #[test]
 fn a_second_stop_keeps_the_axes_where_the_first_did() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.submit(Command::EmergencyBrake { joint: 2 });
     rig.run(3);
-    let kept = |rig: &mut Rig| {
+    let kept = |rig: &mut TestRig| {
         let sync = rig.cycle();
         let slot = sync.slots.joint(Address::joint(1).unwrap()).unwrap();
         slot.reference
@@ -121,7 +121,7 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
 
 /// Counts by which the left wheel goes in a gait, after moves of the user of so many mm.
 fn gait_after(moves_mm: &[i16]) -> i64 {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
     // A second time: the numbers begin anew with neither.
     let ticket = rig.submit(Command::Stand);

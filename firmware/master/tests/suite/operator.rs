@@ -1,6 +1,6 @@
 //! The lease of control: who may command, and what comes of an operator who is gone.
 
-use crate::common::{CYCLE_US, Rig};
+use crate::common::{CYCLE_US, TestRig};
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::config::{
@@ -14,13 +14,13 @@ use wheeleg_protocol::{Address, NodeMode, SyncFlags};
 
 /// An operator at a console, who numbers what they give.
 struct Console {
-    rig: Rig,
+    rig: TestRig,
     next_id: u32,
 }
 
 impl Console {
     fn new() -> Self {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.run(100);
         assert!(rig.master.is_ready());
         Self { rig, next_id: 1 }
@@ -214,7 +214,7 @@ fn a_late_repeated_or_future_beat_gains_nothing() {
 fn the_timeout_cannot_be_switched_off() {
     for (asked, most) in [(0, TIMEOUT_MIN_US), (u32::MAX, TIMEOUT_MAX_US)] {
         let mut console = Console::new();
-        console.rig = Rig::new(MasterConfig {
+        console.rig = TestRig::new(MasterConfig {
             operator_timeout_us: asked,
             ..MasterConfig::default()
         });

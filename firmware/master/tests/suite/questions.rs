@@ -1,7 +1,7 @@
 //! What the master asks by itself, and what it says of boards and line: causes of
 //! faults and restarts, link counters, logs, commissioned boards, babble.
 
-use crate::common::{NO_LOG, Rig, emit};
+use crate::common::{NO_LOG, TestRig, emit};
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Refusal;
@@ -16,12 +16,12 @@ use wheeleg_protocol::{
 const ROUND: usize = 160;
 
 /// The master hears a broken frame.
-fn noise(rig: &mut Rig) {
+fn noise(rig: &mut TestRig) {
     let broken = [0, 5, 9, 9, 9, 9, 9, 0];
     rig.master.on_bus_bytes(&broken, rig.now_us);
 }
 
-fn diagnoses(rig: &Rig) -> Vec<(u8, FaultRecord)> {
+fn diagnoses(rig: &TestRig) -> Vec<(u8, FaultRecord)> {
     let events = rig.events.iter();
     let diagnosis = |(_, event): &(u64, Event)| match *event {
         Event::Diagnosis { node, record } => Some((node, record)),
@@ -30,7 +30,7 @@ fn diagnoses(rig: &Rig) -> Vec<(u8, FaultRecord)> {
     events.filter_map(diagnosis).collect()
 }
 
-fn found(rig: &Rig, wanted: Finding) -> Vec<Option<u8>> {
+fn found(rig: &TestRig, wanted: Finding) -> Vec<Option<u8>> {
     let events = rig.events.iter();
     let of = |(_, event): &(u64, Event)| match *event {
         Event::Found { node, finding } if finding == wanted => Some(node),
@@ -41,7 +41,7 @@ fn found(rig: &Rig, wanted: Finding) -> Vec<Option<u8>> {
 
 #[test]
 fn a_board_with_a_new_fault_is_asked_why_in_the_same_cycle_and_once() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     assert_eq!(diagnoses(&rig), [], "nothing has happened");
     let node = rig.node(5);
@@ -64,7 +64,7 @@ fn a_board_with_a_new_fault_is_asked_why_in_the_same_cycle_and_once() {
 fn a_board_that_restarted_is_asked_why_whether_it_was_missed_or_not() {
     // Within a cycle: found by its mode, armed or not.
     for armed in [true, false] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
         if !armed {
             rig.submit(Command::Disarm);
@@ -86,7 +86,7 @@ fn a_board_that_restarted_is_asked_why_whether_it_was_missed_or_not() {
         );
     }
     // Missed for long: asked when it is heard again.
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(7).silent = true;
     rig.run(30);
@@ -102,7 +102,7 @@ fn a_board_that_restarted_is_asked_why_whether_it_was_missed_or_not() {
 
 #[test]
 fn a_restart_that_nobody_saw_shows_in_the_count_of_frames() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     for node in &mut rig.nodes {
         node.link.frames = 5_000;
     }
@@ -120,7 +120,7 @@ fn a_restart_that_nobody_saw_shows_in_the_count_of_frames() {
 
 #[test]
 fn counters_and_logs_of_every_board_arrive_within_a_round_of_questions() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(20);
     for (n, node) in (1..).zip(&mut rig.nodes) {
         node.link.crc = n;
@@ -159,7 +159,7 @@ fn counters_and_logs_of_every_board_arrive_within_a_round_of_questions() {
         "none of no records"
     );
     // One exchange in ten cycles, and nothing more while all is well.
-    let requests = |rig: &Rig| rig.nodes.iter().map(|n| n.requests.len()).sum::<usize>();
+    let requests = |rig: &TestRig| rig.nodes.iter().map(|n| n.requests.len()).sum::<usize>();
     let before = requests(&rig);
     rig.run(ROUND);
     assert_eq!(requests(&rig) - before, ROUND / 10);
@@ -169,7 +169,7 @@ fn counters_and_logs_of_every_board_arrive_within_a_round_of_questions() {
 fn a_board_with_other_parameters_than_wanted_is_named_whenever_they_change() {
     let mut parameters = [None; 8];
     parameters[2] = Some(1234);
-    let mut rig = Rig::new(MasterConfig {
+    let mut rig = TestRig::new(MasterConfig {
         parameters,
         ..MasterConfig::default()
     });
@@ -187,9 +187,9 @@ fn a_board_with_other_parameters_than_wanted_is_named_whenever_they_change() {
 
 #[test]
 fn on_a_sound_line_links_are_asked_for_in_every_eighth_round() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(300);
-    let asked = |rig: &Rig, node: usize| {
+    let asked = |rig: &TestRig, node: usize| {
         let asked = rig.nodes[node].requests.iter();
         asked
             .filter(|m| matches!(m, Message::LinkReport(_)))
@@ -205,9 +205,9 @@ fn on_a_sound_line_links_are_asked_for_in_every_eighth_round() {
 
 #[test]
 fn the_rest_of_a_log_is_asked_for_at_once() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(20);
-    let asked = |rig: &mut Rig| {
+    let asked = |rig: &mut TestRig| {
         let asked = rig.node(5).requests.iter();
         asked.filter(|m| matches!(m, Message::LogRead(_))).count()
     };
@@ -225,7 +225,7 @@ fn another_board_than_the_commissioned_one_bars_arming_and_both_ids_are_named() 
     let mut commissioned: [_; 8] = std::array::from_fn(|i| Some([i as u8 + 1; 12]));
     // Joint 3 and joint 4 were swapped; nothing was commissioned for wheel 8.
     commissioned[7] = None;
-    let mut rig = Rig::new(MasterConfig {
+    let mut rig = TestRig::new(MasterConfig {
         commissioned,
         ..MasterConfig::default()
     });
@@ -263,7 +263,7 @@ fn another_board_than_the_commissioned_one_bars_arming_and_both_ids_are_named() 
 
 #[test]
 fn boards_are_not_commissioned_while_one_is_missing_or_of_another_version() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.node(6).schema_hash ^= 1;
     rig.run(20);
     let ticket = rig.submit(Command::Commission);
@@ -277,7 +277,7 @@ fn boards_are_not_commissioned_while_one_is_missing_or_of_another_version() {
 
 #[test]
 fn parameters_are_read_written_and_saved_and_a_save_is_no_loss() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(20);
     let ticket = rig.submit(Command::WriteParameter {
         node: 3,
@@ -317,7 +317,7 @@ fn parameters_are_read_written_and_saved_and_a_save_is_no_loss() {
 /// Only the board that saves is not missed meanwhile.
 #[test]
 fn another_board_that_falls_silent_during_a_save_is_missed_at_once() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(20);
     rig.node(3).save_cycles = 30;
     rig.submit(Command::SaveParameters { node: 3 });
@@ -330,7 +330,7 @@ fn another_board_that_falls_silent_during_a_save_is_missed_at_once() {
 
 #[test]
 fn a_board_reset_in_mid_save_has_not_saved_whatever_it_says_afterwards() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(20);
     rig.node(3).link.frames = 900;
     rig.node(3).save_cycles = 5;
@@ -355,7 +355,7 @@ fn a_board_reset_in_mid_save_has_not_saved_whatever_it_says_afterwards() {
 #[test]
 fn a_board_that_babbles_in_its_slot_is_named_and_one_that_is_silent_is_not_accused() {
     for rubbish in [true, false] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
         rig.node(5).silent = true;
         for _ in 0..6 {
@@ -375,7 +375,7 @@ fn a_board_that_babbles_in_its_slot_is_named_and_one_that_is_silent_is_not_accus
 
 #[test]
 fn babble_without_a_guard_is_told_and_its_source_when_the_line_is_quiet_again() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(2 * ROUND);
     for node in &mut rig.nodes {
         node.silent = true;
@@ -400,7 +400,7 @@ fn babble_without_a_guard_is_told_and_its_source_when_the_line_is_quiet_again() 
 
 #[test]
 fn who_fills_the_line_is_named() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     let record = LinkRecord {
         frames: 1,

@@ -1,6 +1,6 @@
 //! What stops the robot, how fast, and what it takes to go on.
 
-use crate::common::{CYCLE_US, FakeNode, Rig, emit};
+use crate::common::{CYCLE_US, FakeNode, TestRig, emit};
 use proptest::prelude::*;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
@@ -14,7 +14,7 @@ use wheeleg_protocol::{
 
 #[test]
 fn a_clear_queued_before_an_e_stop_does_not_take_it_back() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     let clear = rig.submit(Command::ClearFault);
     let stop = rig.submit(Command::EmergencyStop);
@@ -34,7 +34,7 @@ fn a_clear_queued_before_an_e_stop_does_not_take_it_back() {
 
 #[test]
 fn a_silent_node_is_lost_after_three_cycles_and_the_rest_hold() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
     let ticket = rig.submit(Command::StartGait);
     rig.run(60);
@@ -79,7 +79,7 @@ fn a_silent_node_is_lost_after_three_cycles_and_the_rest_hold() {
 
 #[test]
 fn a_node_that_repeats_an_old_reply_is_lost_too() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(3).echo_offset = 1;
     rig.run(4);
@@ -89,7 +89,7 @@ fn a_node_that_repeats_an_old_reply_is_lost_too() {
 
 #[test]
 fn two_missed_cycles_are_no_loss() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     for _ in 0..10 {
         rig.node(3).silent = true;
@@ -104,7 +104,7 @@ fn two_missed_cycles_are_no_loss() {
 
 #[test]
 fn emergency_stop_sets_the_bit_until_cleared_and_never_queues() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     // Fill the queue of layer 0 first.
     while rig.master.submit(Command::Disarm, rig.now_us).is_ok() {}
@@ -124,20 +124,20 @@ fn emergency_stop_sets_the_bit_until_cleared_and_never_queues() {
 
 #[test]
 fn an_e_stop_is_the_bit_in_sync_alone_and_a_hold_asks_for_brakes() {
-    let brakes = |rig: &mut Rig| {
+    let brakes = |rig: &mut TestRig| {
         let asked = |node: &mut FakeNode| core::mem::take(&mut node.requests);
         let requests = rig.nodes.iter_mut().flat_map(asked);
         requests
             .filter(|request| matches!(request, Message::EmergencyBrake(_)))
             .count()
     };
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.submit(Command::EmergencyStop);
     rig.run(20);
     assert_eq!(brakes(&mut rig), 0, "the bit in SYNC does it");
 
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(7).inputs = InputBits::NONE;
     rig.run(20);
@@ -145,7 +145,7 @@ fn an_e_stop_is_the_bit_in_sync_alone_and_a_hold_asks_for_brakes() {
     assert_eq!(brakes(&mut rig), 8);
 
     // Nobody drives: there is nothing to brake, and nothing to hold.
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(7).inputs = InputBits::NONE;
     rig.run(20);
@@ -155,7 +155,7 @@ fn an_e_stop_is_the_bit_in_sync_alone_and_a_hold_asks_for_brakes() {
 
 #[test]
 fn a_silent_node_is_named_while_nobody_drives_too() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(4).silent = true;
     rig.run(4);
@@ -165,9 +165,9 @@ fn a_silent_node_is_named_while_nobody_drives_too() {
 
 #[test]
 fn a_wheel_board_that_starts_anew_counts_from_a_new_origin_and_the_way_stays() {
-    let way = |rig: &Rig| rig.master.layer0().odometry().travel_um();
+    let way = |rig: &TestRig| rig.master.layer0().odometry().travel_um();
     for wheel in [7, 8] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         rig.node(wheel).position += 50_000;
         rig.run(2);
@@ -187,7 +187,7 @@ fn a_wheel_board_that_starts_anew_counts_from_a_new_origin_and_the_way_stays() {
 
 #[test]
 fn node_fault_and_supply_loss_hold_all() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(2).faults = Fault::SensorRange.into();
     rig.run(2);
@@ -197,7 +197,7 @@ fn node_fault_and_supply_loss_hold_all() {
     };
     assert!(rig.saw(|event| *event == Event::Hold(reason)));
 
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(7).inputs = InputBits::NONE;
     rig.run(2);
@@ -210,7 +210,7 @@ fn node_fault_and_supply_loss_hold_all() {
     let ticket = rig.submit(Command::Arm);
     rig.run(5);
     assert_eq!(rig.refusal(ticket), Some(Refusal::NoAir));
-    let armed = |rig: &mut Rig| {
+    let armed = |rig: &mut TestRig| {
         let requests = rig.node(3).requests.iter();
         requests.filter(|m| matches!(m, Message::Arm(_))).count()
     };
@@ -223,7 +223,7 @@ fn node_fault_and_supply_loss_hold_all() {
 
 #[test]
 fn a_stalled_layer_one_is_held_for_a_tenth_of_a_second() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
     rig.submit(Command::StartGait);
     rig.run(60);
@@ -246,7 +246,7 @@ fn a_stalled_layer_one_is_held_for_a_tenth_of_a_second() {
 
 #[test]
 fn a_node_that_restarts_faster_than_it_is_missed_stops_the_others() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
     rig.submit(Command::StartGait);
     rig.run(60);
@@ -263,7 +263,7 @@ fn a_node_that_restarts_faster_than_it_is_missed_stops_the_others() {
     let others = [1, 2, 3, 5, 6].map(|joint| rig.node(joint).mode);
     assert_eq!(others, [NodeMode::Hold; 5]);
     // Disarming on request is no such event.
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.submit(Command::Disarm);
     rig.run(20);
@@ -272,7 +272,7 @@ fn a_node_that_restarts_faster_than_it_is_missed_stops_the_others() {
 
 #[test]
 fn emergency_brake_of_one_joint_stops_motion_and_keeps_the_others() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
     let gait = rig.submit(Command::StartGait);
     rig.run(60);
@@ -289,7 +289,7 @@ fn emergency_brake_of_one_joint_stops_motion_and_keeps_the_others() {
 
 #[test]
 fn blow_through_is_for_maintenance_only() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     let ticket = rig.submit(Command::BlowThrough { joint: 2 });
     rig.run(3);
@@ -302,7 +302,7 @@ fn blow_through_is_for_maintenance_only() {
 
 #[test]
 fn a_stop_reaches_the_others_before_the_silent_node_times_out() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     // A request to the node that is about to die is under way.
     rig.node(1).silent = true;
@@ -325,7 +325,7 @@ proptest! {
         garbage in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 120),
         forged in prop::collection::vec((1_u8..=8, any::<i32>(), any::<u8>(), any::<bool>()), 120),
     ) {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.stand();
         rig.submit(Command::StartGait);
         rig.run(20);
@@ -370,7 +370,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
         _ => None,
     };
     for boards in [&[4][..], &[1, 2, 3, 4, 5, 6, 7, 8], &[8]] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         for board in boards {
             rig.node(*board).mode = NodeMode::Armed;
@@ -387,7 +387,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
         }
     }
     // One that does not hear is asked again, and named once.
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(4).mode = NodeMode::Armed;
     rig.node(4).unanswered = 5;
@@ -402,14 +402,14 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
     assert_eq!(told, [Some(4)]);
     // Arming and disarming on request are no such thing, whoever is slow.
     for slow in [6, 8] {
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
         rig.node(slow).unanswered = 3;
         let ticket = rig.submit(Command::Disarm);
         rig.run(60);
         assert!(rig.done(ticket) && !rig.saw(|event| left(event).is_some()));
         // Nor is an arming that is given up.
-        let mut rig = Rig::new(MasterConfig::default());
+        let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         rig.node(2).never_arms = true;
         rig.submit(Command::Arm);
@@ -424,9 +424,9 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
 /// Behind a board that does not answer, requests wait for its repetitions.
 #[test]
 fn a_valve_is_not_opened_long_after_it_was_asked_for() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
-    let open = |rig: &mut Rig, unanswered: u8| {
+    let open = |rig: &mut TestRig, unanswered: u8| {
         rig.node(2).unanswered = unanswered;
         for _ in 0..20 {
             rig.submit(Command::TransmitPosition { joint: 2 });
@@ -447,7 +447,7 @@ fn a_valve_is_not_opened_long_after_it_was_asked_for() {
 /// With the robot held already, an E-stop still drops what waits.
 #[test]
 fn an_e_stop_of_a_held_robot_drops_what_was_asked_before() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(2).faults = Fault::SensorRange.into();
     rig.run(20);

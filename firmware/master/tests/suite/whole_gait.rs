@@ -1,7 +1,7 @@
 //! The three-step test through dispatcher, layer 1, FIFOs, layer 0 and bus,
 //! against fake nodes.
 
-use crate::common::Rig;
+use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::Command;
 use wheeleg_master::config::WheelDrive;
@@ -14,9 +14,9 @@ use wheeleg_master::setpoint::Phase;
 use wheeleg_protocol::{Address, LinkLossAction, NodeMode};
 use wheeleg_units::PositionMm;
 
-fn rig() -> Rig {
+fn rig() -> TestRig {
     // The trapezoid comes from the master: the fake wheels make none.
-    let mut rig = Rig::new(MasterConfig {
+    let mut rig = TestRig::new(MasterConfig {
         wheel_drive: WheelDrive::Stream,
         ..MasterConfig::default()
     });
@@ -100,7 +100,7 @@ fn three_steps_cover_three_strokes() {
 
 #[test]
 fn profile_drive_sends_the_end_of_the_push() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
     rig.submit(Command::StartGait);
     let wheel = Address::wheel(8).unwrap();
@@ -132,9 +132,9 @@ fn streamed_wheels_are_told_the_velocity_of_the_push() {
 
 #[test]
 fn commands_out_of_place_are_refused_with_the_reason() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
-    let refused = |rig: &mut Rig, command| {
+    let refused = |rig: &mut TestRig, command| {
         let ticket = rig.submit(command);
         rig.run(1);
         rig.refusal(ticket)
@@ -262,7 +262,7 @@ fn a_motion_of_layer_one_ends_the_users_references() {
 
 #[test]
 fn a_wheel_that_stays_behind_does_not_shift_the_next_move() {
-    let mut rig = Rig::new(MasterConfig::default());
+    let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     let start = rig.node(7).position;
     let travel_mm = PositionMm::from_int(100);

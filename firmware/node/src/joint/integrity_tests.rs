@@ -8,10 +8,10 @@ use super::precharge::Precharge;
 use super::reference::Target;
 use crate::NodeIdentity;
 use crate::board::Application;
+use crate::checksum::Checksum;
 use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, ValveBank};
 use crate::mode::{Event, Mode};
 use crate::parameters::JointParameters;
-use crate::seal::Seal;
 use wheeleg_control::joint::{Correction, JointConfig, JointGains};
 use wheeleg_control::pwm::PwmTiming;
 use wheeleg_control::valve::ValveMode;
@@ -331,9 +331,9 @@ fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
         node.core.supervisor.apply(event, Micros(121_000)).unwrap();
         node.tick(Micros(121_000));
         assert_eq!(node.mode(), Mode::Idle);
-        let before = Seal::of(&node.state.motion);
+        let before = Checksum::of(&node.state.motion);
         let fresh = |node: &Node| {
-            Seal::of(&MotionWatch::new(
+            Checksum::of(&MotionWatch::new(
                 &node.settings.motion,
                 node.state.measured,
             ))
@@ -342,7 +342,7 @@ fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
         let id = param.id();
         let command = Message::ParamSet(ParamSet { id, value });
         node.request(&command, Micros(121_500)).unwrap();
-        let after = Seal::of(&node.state.motion);
+        let after = Checksum::of(&node.state.motion);
         assert!(after == before || after == fresh(&node));
         after != before
     };

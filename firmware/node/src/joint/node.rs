@@ -7,11 +7,11 @@ use super::precharge::Precharge;
 use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
+use crate::checksum::{Checksum, PartChecksums};
 use crate::debounce::Debounce;
 use crate::hardware::{ParameterStore, PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::JointParameters;
-use crate::seal::{PartSeals, Seal};
 use crate::sensor::{Reading, Rejection, SensorMonitor};
 use crate::snapshot::{JointSnapshot, TickReport};
 use crate::transmission::Transmission;
@@ -68,9 +68,9 @@ pub struct JointNode<V, S, W> {
     pub(super) target: Target,
     pub(super) state: TickState,
     /// Seals of what only a request changes.
-    fixed_seals: PartSeals<PARTS>,
-    /// Seal of what a tick changes.
-    seal: Seal,
+    fixed_seals: PartChecksums<PARTS>,
+    /// Checksum of what a tick changes.
+    seal: Checksum,
     pub(super) snapshot: JointSnapshot,
     pub(super) switches: Debounce<SWITCH_TICKS>,
     pub(super) valves: V,
@@ -133,8 +133,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 precharge: Precharge::default(),
                 boot_ticks: Ticks::ZERO,
             },
-            fixed_seals: PartSeals::new(),
-            seal: Seal::default(),
+            fixed_seals: PartChecksums::new(),
+            seal: Checksum::default(),
             snapshot: JointSnapshot::at_boot(),
             switches: Debounce::new(),
             parameters,
@@ -342,14 +342,14 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    /// Seal of one part of what shapes the outputs and is changed by requests alone.
+    /// Checksum of one part of what shapes the outputs and is changed by requests alone.
     #[inline(never)]
-    fn fixed(&self, part: usize) -> Seal {
+    fn fixed(&self, part: usize) -> Checksum {
         let Some(part) = part.checked_sub(PARAMETER_PARTS) else {
             let values = self.parameters.part::<PARAMETER_PARTS>(part);
-            return Seal::made(|sum| sum.words(values));
+            return Checksum::made(|sum| sum.words(values));
         };
-        Seal::made(|sum| {
+        Checksum::made(|sum| {
             self.controller.config().hash_part(part, sum);
             // With each part of the configuration another part of the rest.
             match part {
@@ -363,10 +363,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         })
     }
 
-    /// Seal of what shapes the outputs of the next tick and is changed by every tick.
+    /// Checksum of what shapes the outputs of the next tick and is changed by every tick.
     #[inline(never)]
-    fn moving(&self) -> Seal {
-        Seal::made(|sum| {
+    fn moving(&self) -> Checksum {
+        Checksum::made(|sum| {
             self.state.hash(sum);
             self.monitor.hash(sum);
             self.target.hash(sum);

@@ -6,11 +6,11 @@ use super::encoder::EncoderWatch;
 use super::motion::{Target, tune_profile};
 use super::settings::WheelSettings;
 use crate::board::{BoardCore, NodeIdentity, receive};
+use crate::checksum::{Checksum, PartChecksums};
 use crate::debounce::Debounce;
 use crate::hardware::{DumpValve, Encoder, MotorDrive, ParameterStore, SwitchBank};
 use crate::mode::{Event, Mode, ModeRules};
 use crate::parameters::WheelParameters;
-use crate::seal::{PartSeals, Seal};
 use crate::snapshot::{TickReport, WheelSnapshot};
 use crate::transmission::Transmission;
 use crate::{ConfigError, SWITCH_TICKS};
@@ -59,9 +59,9 @@ pub struct WheelNode<M, E, P, D> {
     /// back once it is damaged.
     pub(super) counts: [WheelCount; 2],
     /// Seals of what only a request changes.
-    fixed_seals: PartSeals<PARTS>,
-    /// Seal of what a sample changes.
-    seal: Seal,
+    fixed_seals: PartChecksums<PARTS>,
+    /// Checksum of what a sample changes.
+    seal: Checksum,
     pub(super) snapshot: WheelSnapshot,
     switches: Debounce<SWITCH_TICKS>,
     pub(super) motor: M,
@@ -99,8 +99,8 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             target: Target::default(),
             state: TickState::default(),
             counts: [WheelCount::ZERO; 2],
-            fixed_seals: PartSeals::new(),
-            seal: Seal::default(),
+            fixed_seals: PartChecksums::new(),
+            seal: Checksum::default(),
             snapshot: WheelSnapshot::at_boot(),
             switches: Debounce::new(),
             motor,
@@ -309,14 +309,14 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         tune_profile(&mut self.controller, settings);
     }
 
-    /// Seal of one part of what shapes the outputs and is changed by requests alone.
+    /// Checksum of one part of what shapes the outputs and is changed by requests alone.
     #[inline]
-    fn fixed(&self, part: usize) -> Seal {
+    fn fixed(&self, part: usize) -> Checksum {
         match part {
-            0 => Seal::made(|sum| sum.words(self.parameters.part::<2>(0))),
-            1 | 2 => Seal::made(|sum| self.settings.hash_half(part == 2, sum)),
+            0 => Checksum::made(|sum| sum.words(self.parameters.part::<2>(0))),
+            1 | 2 => Checksum::made(|sum| self.settings.hash_half(part == 2, sum)),
             // With the few that are left of the parameters.
-            _ => Seal::made(|sum| {
+            _ => Checksum::made(|sum| {
                 sum.words(self.parameters.part::<2>(1));
                 (&self.core.times, self.control_mode).hash(sum);
             }),
@@ -355,7 +355,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
 
     #[inline]
     fn reseal(&mut self) {
-        let seal = Seal::of(&self.moving());
+        let seal = Checksum::of(&self.moving());
         self.seal = seal;
     }
 

@@ -261,21 +261,23 @@ impl FaultKind {
     }
 }
 
-const ETHERNET: &str = "there is no Ethernet user interface yet";
+const CONSOLE: &str =
+    "the operator's connection is not simulated; the tests of the console break it";
 const UPDATE: &str = "there is no firmware update over the bus yet";
-const SOFT: &str = "there is no soft terrain yet";
+const SOFT: &str =
+    "the ground does not change in mid-run; a scenario chooses its soil by [[terrain]]";
 
 /// Faults that cannot be injected yet, and why. They are refused by name.
 pub const NOT_IMPLEMENTED: &[(&str, &str)] = &[
     ("foot-sinks", SOFT),
     ("brown-out/update", UPDATE),
-    ("ui-link-lost", ETHERNET),
-    ("ui-half-open", ETHERNET),
-    ("ui-slow", ETHERNET),
-    ("ui-reconnects", ETHERNET),
-    ("ui-second-client", ETHERNET),
-    ("ui-bad-mac", ETHERNET),
-    ("ui-replay", ETHERNET),
+    ("ui-link-lost", CONSOLE),
+    ("ui-half-open", CONSOLE),
+    ("ui-slow", CONSOLE),
+    ("ui-reconnects", CONSOLE),
+    ("ui-second-client", CONSOLE),
+    ("ui-bad-mac", CONSOLE),
+    ("ui-replay", CONSOLE),
 ];
 
 #[cfg(test)]

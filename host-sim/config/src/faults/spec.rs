@@ -391,8 +391,14 @@ mod tests {
                 "the time is missing, as in `bit-errors@3.2s`",
             ),
             ("pot-open:joint9", "joint9"),
-            ("ui-replay@1s", "not implemented: there is no Ethernet"),
-            ("foot-sinks@1s", "not implemented: there is no soft terrain"),
+            (
+                "ui-replay@1s",
+                "not implemented: the operator's connection is not simulated",
+            ),
+            (
+                "foot-sinks@1s",
+                "not implemented: the ground does not change in mid-run",
+            ),
             (
                 "brown-out/update:joint3@1s",
                 "not implemented: there is no firmware update",

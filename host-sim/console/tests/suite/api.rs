@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use wheeleg_console::client::http;
 
-use crate::common::{Rig, done, look};
+use crate::common::{TestRig, done, look};
 
 /// The schema of an answer, with all that it refers to.
 fn schema(document: &Value, path: &str, method: &str, status: u16) -> jsonschema::Validator {
@@ -16,7 +16,7 @@ fn schema(document: &Value, path: &str, method: &str, status: u16) -> jsonschema
 
 #[test]
 fn every_answer_is_as_the_document_says() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let document: Value = serde_json::from_str(include_str!("../../openapi.json")).expect("JSON");
     let paths = document["paths"].as_object().expect("paths");
     // A robot that is driven, has a fault, and is recorded has most to tell.

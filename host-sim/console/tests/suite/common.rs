@@ -8,14 +8,14 @@ use wheeleg_console::keys::Keys;
 use wheeleg_console::{Live, Options, Server};
 
 /// A server, its keys and where it listens.
-pub(crate) struct Rig {
+pub(crate) struct TestRig {
     pub(crate) server: Server,
     pub(crate) keys: Keys,
     pub(crate) url: Url,
     pub(crate) home: tempfile::TempDir,
 }
 
-impl Rig {
+impl TestRig {
     pub(crate) fn new() -> Self {
         Self::paced(Some(1.0))
     }

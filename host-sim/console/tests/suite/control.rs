@@ -7,10 +7,10 @@ use wheeleg_console::client::{Client, Incoming, Outcome, http};
 use wheeleg_protocol::NodeMode;
 use wheeleg_telemetry::{JointSample, Sample as _};
 
-use crate::common::{Rig, closed, done, look, refusal};
+use crate::common::{TestRig, closed, done, look, refusal};
 
 /// Master time between the newest thing that the holder can have seen and the HOLD, µs.
-fn held_after(rig: &Rig, seen_us: u64) -> u64 {
+fn held_after(rig: &TestRig, seen_us: u64) -> u64 {
     let state = rig.until("held", |state| !state["hold"].is_null());
     assert_eq!(state["hold"], "operator_lost", "{state}");
     let at_us = rig.event("hold")["t_ns"].as_u64().expect("a time") / 1_000;
@@ -19,7 +19,7 @@ fn held_after(rig: &Rig, seen_us: u64) -> u64 {
 
 #[test]
 fn take_arm_move_release() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     done(&mut driver, "ReleaseControl");
     let state = rig.until("free", |state| state["control"].is_null());
@@ -47,7 +47,7 @@ fn first(client: &mut Client, wanted: impl Fn(&[u8]) -> bool) -> u64 {
 
 #[test]
 fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     let mut viewer = rig.view();
     let all = json!({ "op": "subscribe", "channels": ["/joint/3"], "hz": "all" });
@@ -79,7 +79,7 @@ fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
 
 #[test]
 fn a_killed_client_is_noticed_by_the_master() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     done(&mut driver, "Stand");
     let walk = driver.give("StartGait", &json!({}), 500).expect("sent");
@@ -111,7 +111,7 @@ fn a_killed_client_is_noticed_by_the_master() {
 
 #[test]
 fn beats_that_show_nothing_new_keep_nothing() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("frozen");
     driver.keep_control(false);
     let seen_us = driver.seen_us();
@@ -127,7 +127,7 @@ fn beats_that_show_nothing_new_keep_nothing() {
 
 #[test]
 fn a_server_that_hangs_is_noticed_by_the_master() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     look(&mut driver, "state");
     let seen_us = driver.seen_us();
@@ -143,7 +143,7 @@ fn a_server_that_hangs_is_noticed_by_the_master() {
 
 #[test]
 fn a_second_client_is_refused_by_name_and_may_stop() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut first = rig.driver("first");
     let mut second = rig.control("second");
     look(&mut second, "state");
@@ -170,7 +170,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
 
 #[test]
 fn a_viewer_may_look_and_stop_and_nothing_else() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut viewer = rig.view();
     look(&mut viewer, "state");
     for command in ["TakeControl", "Arm", "Pause"] {
@@ -187,7 +187,7 @@ fn a_viewer_may_look_and_stop_and_nothing_else() {
 
 #[test]
 fn commands_about_the_past_or_the_future_are_refused() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     for _ in 0..60 {
         let _ = driver.read();
@@ -210,7 +210,7 @@ fn commands_about_the_past_or_the_future_are_refused() {
 
 #[test]
 fn a_thousand_late_commands_are_each_refused() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     for _ in 0..60 {
         let _ = driver.read();
@@ -244,7 +244,7 @@ fn a_thousand_late_commands_are_each_refused() {
 
 #[test]
 fn a_paused_robot_takes_a_stop_and_nothing_else() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     done(&mut driver, "Pause");
     let paused = rig.until("paused", |state| state["pace"]["paused"] == true);
@@ -261,7 +261,7 @@ fn a_paused_robot_takes_a_stop_and_nothing_else() {
 
 #[test]
 fn pace_and_faults_are_host_commands() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     let speed = json!({ "speed": 4.0 });
     assert_eq!(refusal(&mut driver, "Speed", &speed), "too_fast");
@@ -286,10 +286,10 @@ fn pace_and_faults_are_host_commands() {
 
 #[test]
 fn a_server_that_ends_says_so() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut viewer = rig.view();
     look(&mut viewer, "state");
-    let Rig { server, .. } = rig;
+    let TestRig { server, .. } = rig;
     drop(server);
     assert_eq!(closed(&mut viewer), 4006);
 }

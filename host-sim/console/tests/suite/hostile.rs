@@ -8,9 +8,9 @@ use serde_json::json;
 use wheeleg_console::Key;
 use wheeleg_console::client::{Client, Outcome, http};
 
-use crate::common::{Rig, closed, done, look};
+use crate::common::{TestRig, closed, done, look};
 
-fn raw(rig: &Rig, request: &str) -> String {
+fn raw(rig: &TestRig, request: &str) -> String {
     let mut stream = TcpStream::connect(rig.server.address()).expect("connected");
     stream
         .set_read_timeout(Some(Duration::from_secs(6)))
@@ -21,7 +21,7 @@ fn raw(rig: &Rig, request: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-fn get(rig: &Rig, path: &str, headers: &str) -> String {
+fn get(rig: &TestRig, path: &str, headers: &str) -> String {
     let host = rig.server.address();
     raw(
         rig,
@@ -31,7 +31,7 @@ fn get(rig: &Rig, path: &str, headers: &str) -> String {
 
 #[test]
 fn wrong_keys_open_nothing_and_a_right_one_is_never_locked_out() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let wrong = [Key::new([0; 32]), Key::new([9; 32]), rig.keys.view.clone()];
     for key in &wrong {
         let error = Client::connect(&rig.url, "control", "thief", key)
@@ -66,7 +66,7 @@ fn wrong_keys_open_nothing_and_a_right_one_is_never_locked_out() {
 
 #[test]
 fn foreign_hosts_and_origins_are_refused_everywhere() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let address = rig.server.address();
     for path in ["/", "/ws", "/api/v1/state"] {
         for (host, origin) in [
@@ -90,7 +90,7 @@ fn foreign_hosts_and_origins_are_refused_everywhere() {
 
 #[test]
 fn the_page_comes_with_its_policy_and_no_name_leads_out_of_it() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let page = get(&rig, "/", "");
     assert!(page.starts_with("HTTP/1.1 200"), "{page}");
     for header in [
@@ -119,7 +119,7 @@ fn the_page_comes_with_its_policy_and_no_name_leads_out_of_it() {
 
 #[test]
 fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let stop = br#"{"n":1,"op":"stop"}"#;
     let mut frames: Vec<Vec<u8>> = vec![
         Vec::new(),
@@ -157,7 +157,7 @@ fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
 
 #[test]
 fn a_flood_is_answered_busy_and_beats_and_stops_are_not() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("flooder");
     let mut busy = 0;
     for _ in 0..400 {
@@ -180,7 +180,7 @@ fn a_flood_is_answered_busy_and_beats_and_stops_are_not() {
 
 #[test]
 fn half_requests_and_half_handshakes_lose_their_place() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let address = rig.server.address();
     let upgrade = format!(
         "GET /ws HTTP/1.1\r\nHost: {address}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: wheeleg.console.v1\r\n\r\n"
@@ -209,7 +209,7 @@ fn half_requests_and_half_handshakes_lose_their_place() {
 
 #[test]
 fn rubbish_of_any_kind_ends_the_connection_and_nothing_else() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut seed = 1_u64;
     let mut random = || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -233,7 +233,7 @@ fn rubbish_of_any_kind_ends_the_connection_and_nothing_else() {
 
 #[test]
 fn an_address_of_the_network_and_one_in_use_are_refused_with_a_remedy() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     for (listen, word) in [
         ("0.0.0.0:0", "ssh -L"),
         (&rig.server.address().to_string(), "--listen"),

@@ -6,7 +6,7 @@ use serde_json::json;
 use wheeleg_console::client::{Client, Incoming, http};
 use wheeleg_telemetry::{Wire, channels};
 
-use crate::common::{Rig, done, look};
+use crate::common::{TestRig, done, look};
 
 /// Bytes of the sample at the begin of `body`, by the list of channels alone.
 fn length(channel: u16, body: &[u8]) -> usize {
@@ -23,7 +23,7 @@ fn length(channel: u16, body: &[u8]) -> usize {
 
 #[test]
 fn every_sample_of_every_channel_comes_once_and_in_order() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut viewer = rig.view();
     let topics: Vec<&str> = channels().iter().map(|c| c.topic).collect();
     let all = json!({ "op": "subscribe", "channels": topics, "hz": "all" });
@@ -61,7 +61,7 @@ fn every_sample_of_every_channel_comes_once_and_in_order() {
 
 #[test]
 fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let subscribe = |client: &mut Client| {
         let topics = ["/joint/1", "/joint/2", "/body", "/master"];
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": 50 });
@@ -86,7 +86,7 @@ fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
 
 #[test]
 fn clients_that_never_read_cost_the_holder_nothing() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     let topics: Vec<&str> = channels().iter().map(|c| c.topic).collect();
     let mut idle = Vec::new();
@@ -127,7 +127,7 @@ fn clients_that_never_read_cost_the_holder_nothing() {
 
 #[test]
 fn the_lists_are_those_of_the_hashes() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let get = |path| {
         let (status, body) = http(&rig.url, "GET", path, &rig.keys.view).expect("an answer");
         assert_eq!(status, 200, "{path}");

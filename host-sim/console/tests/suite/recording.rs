@@ -11,9 +11,9 @@ use wheeleg_console::client::http;
 use wheeleg_console::replay::{Replayed, replay};
 use wheeleg_telemetry::first_difference;
 
-use crate::common::{Rig, done, refusal};
+use crate::common::{TestRig, done, refusal};
 
-fn folder(rig: &Rig, id: &str) -> PathBuf {
+fn folder(rig: &TestRig, id: &str) -> PathBuf {
     rig.home.path().join("recordings").join(id)
 }
 
@@ -36,7 +36,7 @@ fn copied(folder: &Path) -> tempfile::TempDir {
 }
 
 /// An operator arms, moves, tries a fault, stops, and is gone.
-fn drive(rig: &Rig) {
+fn drive(rig: &TestRig) {
     let mut driver = rig.driver("driver");
     let args = json!({ "joint": 3, "stroke": 120.3 });
     driver
@@ -57,10 +57,10 @@ fn drive(rig: &Rig) {
 
 #[test]
 fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
-    let rig = Rig::recorded(1.0);
+    let rig = TestRig::recorded(1.0);
     drive(&rig);
     let folder = folder(&rig, "0001");
-    let Rig { server, home, .. } = rig;
+    let TestRig { server, home, .. } = rig;
     drop(server);
     let log = home.path().join("again.mcap");
     let told = replay(&folder, Some(&log), &mut |_, _| ControlFlow::Continue(()));
@@ -107,7 +107,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
 
 #[test]
 fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     assert_eq!(refusal(&mut driver, "RecordStop", &json!({})), "recording");
     done(&mut driver, "RecordStart");
@@ -149,7 +149,7 @@ fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
 
 #[test]
 fn a_folder_that_cannot_be_made_is_told_and_the_robot_goes_on() {
-    let rig = Rig::new();
+    let rig = TestRig::new();
     fs::write(rig.home.path().join("recordings"), "a file").expect("written");
     let mut driver = rig.driver("driver");
     assert_eq!(refusal(&mut driver, "RecordStart", &json!({})), "recording");
@@ -168,7 +168,7 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
     let nothing = tempfile::tempdir().expect("a folder");
     assert!(error(nothing.path()).contains("recording.json"));
     let folder = {
-        let rig = Rig::recorded(2.0);
+        let rig = TestRig::recorded(2.0);
         rig.until("ready", |state| state["ready"] == true);
         let folder = folder(&rig, "0001");
         drop(rig.server);

@@ -109,7 +109,7 @@ impl World {
                     let down = &mut self.board_mut(raw).down;
                     let cause = match *down {
                         Down::Starting { cause, .. } => cause,
-                        // Struck once more while it started.
+                        // Hit once more while it started.
                         _ => ResetCause::PowerUp,
                     };
                     *down = Down::Starting { until_ns, cause };

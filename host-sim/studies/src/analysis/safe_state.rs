@@ -1,4 +1,4 @@
-//! Safe states after the loss of the master or an E-stop (ARCHITECTURE.md, "Safe states").
+//! Safe states after the loss of the master or an E-stop (`docs/decisions/0010-safe-states.md`).
 
 use super::{Extremes, Target, within};
 use wheeleg_telemetry::{JointSample, Row, SupplySample, WheelSample};

@@ -85,7 +85,8 @@ fn targets(robot: &RobotConfig, b5_track: &Track, b6_track: &Track) -> Vec<Targe
             Some(200.0),
         ),
     ];
-    for (name, track) in [("b5", b5_track), ("b6", b6_track)] {
+    // With the axis of the paper's plot of the speed, mm/s.
+    for (name, track, axis) in [("b5", b5_track, 10.0), ("b6", b6_track, 40.0)] {
         let rms = (track.squares / track.samples.max(1) as f64).sqrt();
         let peak = track.peak_mm;
         let measured = track.samples > 0;
@@ -111,7 +112,6 @@ fn targets(robot: &RobotConfig, b5_track: &Track, b6_track: &Track) -> Vec<Targe
             )
             .info(),
         );
-        let axis = if name == "b5" { 10.0 } else { 40.0 };
         let speed = track.speed_mm_s.0.map(|r| r.1);
         targets.push(
             Target::new(

@@ -10,8 +10,8 @@ use wheeleg_protocol::FaultBits;
 
 use super::moves::{CONTACT_S, Move, Played, RECOVERY_S};
 use super::variation::{UnknownVariation, Variation};
-use crate::bench::suite::{BenchError, StartUp, TestRig};
-use crate::bench::{Delays, Kind, Metrics, Trace, design, design_with, identify};
+use crate::axis_sim::suite::{AxisSimError, StartUp, TestRig};
+use crate::axis_sim::{Delays, Kind, Metrics, Trace, design, design_with, identify};
 
 /// Smallest static margin of a feasible case: a quarter more force than the load.
 pub const MARGIN: f64 = 1.25;
@@ -93,7 +93,7 @@ impl FromStr for CaseId {
 /// A plant that differs from its sheet, and what a board finds out of it at
 /// start-up: common to all controllers and moves.
 #[derive(Debug, Clone)]
-pub struct Scene {
+pub struct Case {
     /// Name of the axis.
     pub axis: String,
     /// Its data sheet.
@@ -107,17 +107,17 @@ pub struct Scene {
     delays: Option<Delays>,
 }
 
-impl Scene {
-    /// The scene; looks for the valves' delays where the variation says so.
+impl Case {
+    /// The case; looks for the valves' delays where the variation says so.
     ///
     /// # Errors
-    /// [`BenchError`] if the plant refuses its parameters.
+    /// [`AxisSimError`] if the plant refuses its parameters.
     pub fn new(
         axis: &str,
         sheet: &AxisParams,
         variation: Variation,
         seed: u64,
-    ) -> Result<Self, BenchError> {
+    ) -> Result<Self, AxisSimError> {
         let factors = variation.factors(sheet);
         let plant = factors.plant(sheet);
         let margin = factors.static_margin(sheet);
@@ -160,11 +160,11 @@ impl Scene {
         }
     }
 
-    /// Plays one case. `None` if the scene is not feasible.
+    /// Plays one case. `None` if the case is not feasible.
     ///
     /// # Errors
-    /// [`BenchError`].
-    pub fn play(&self, kind: Kind, motion: Move) -> Result<Option<Played>, BenchError> {
+    /// [`AxisSimError`].
+    pub fn play(&self, kind: Kind, motion: Move) -> Result<Option<Played>, AxisSimError> {
         if !self.is_feasible() {
             return Ok(None);
         }
@@ -198,7 +198,7 @@ impl Scene {
             axis: self.axis.clone(),
             controller: kind,
             motion,
-            variation: self.variation.to_string(),
+            variation: self.variation,
             seed: self.seed,
             load_n: plant.load_n,
             mass_kg: plant.moving_mass_kg,
@@ -252,7 +252,8 @@ pub struct CaseFacts {
     #[serde(rename = "move")]
     pub motion: Move,
     /// What differs from the sheet.
-    pub variation: String,
+    #[schemars(with = "String")]
+    pub variation: Variation,
     /// Seed.
     pub seed: u64,
     /// Force on the rod at the start, positive extends \[N\].

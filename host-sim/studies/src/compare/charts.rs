@@ -3,8 +3,8 @@
 use wheeleg_report::plot::Colour;
 
 use super::single::range;
-use super::{ComparedAxis, Comparison, Move, Row};
-use crate::bench::Kind;
+use super::{ComparedAxis, Comparison, Move, Row, Variation};
+use crate::axis_sim::Kind;
 use wheeleg_report::plot::{Bars, Column, Content, Figure, Panel, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;
@@ -47,7 +47,10 @@ impl Comparison {
     ) -> impl Iterator<Item = &'a Row> {
         self.rows.iter().filter(move |r| {
             let c = &r.case;
-            c.axis == axis && c.controller == kind && c.motion == motion && c.variation == "nominal"
+            c.axis == axis
+                && c.controller == kind
+                && c.motion == motion
+                && c.variation == Variation::Nominal
         })
     }
 
@@ -63,7 +66,7 @@ impl Comparison {
                 && c.controller == kind
                 && c.motion == Move::Step100
                 && c.feasible
-                && c.variation.starts_with("combination=")
+                && matches!(c.variation, Variation::Combination(_))
         })
     }
 
@@ -294,7 +297,7 @@ fn contact(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
             let mut p = panel(title, "[mm]", 1.5, series, None, &[]);
             // From the start of the motion, as the overlays are.
             p.marks = super::CONTACT_S
-                .map(|t| t - crate::bench::suite::LEAD_S)
+                .map(|t| t - crate::axis_sim::suite::LEAD_S)
                 .to_vec();
             panels.push(p);
         }

@@ -2,7 +2,7 @@
 //!
 //! A case is a controller, an axis, a move, what differs from the axis's data
 //! sheet, and a seed. It is played from power-up by the joint board's whole
-//! application ([`crate::bench::Node`]) with gains that the builder derives from the
+//! application ([`crate::axis_sim::Node`]) with gains that the builder derives from the
 //! sheet. Cases know nothing of each other, so they run on any number of threads
 //! with the same result, and each can be played alone by its name.
 
@@ -19,16 +19,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
-pub use case::{BadCaseId, CaseFacts, CaseId, Figures, MARGIN, Row, Scene};
+pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row};
 pub(crate) use charts::panel;
 pub use moves::{CONTACT_S, Move, Played, RECOVERY_S, REST_S, STEP_S, Sizes};
 pub use single::{Single, play};
 pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 
 use crate::StudyError;
-use crate::bench::suite::{BenchError, TestRig};
-use crate::bench::{Kind, design, optimal};
-use crate::study::{self, Ended, Finished, Job, Progress, Settings, Stopped};
+use crate::axis_sim::suite::{AxisSimError, TestRig};
+use crate::axis_sim::{Kind, design, optimal};
+use crate::study::{self, Ended, Finished, Job, Progress, STACK, Settings, Stopped};
 use wheeleg_config::AxisConfig;
 
 /// What is compared.
@@ -106,7 +106,7 @@ impl study::Summary for Cases<'_> {
 }
 
 /// An axis that cannot be compared: names the file, field, value and range.
-pub(crate) fn axis_error(file: &str, e: &BenchError) -> StudyError {
+pub(crate) fn axis_error(file: &str, e: &AxisSimError) -> StudyError {
     StudyError::refused(
         format!("the axis `{file}` cannot be used: {e}"),
         "change the axis file to data within these limits",
@@ -166,6 +166,7 @@ impl Comparison {
     ) -> Result<Self, StudyError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(options.threads)
+            .stack_size(STACK)
             .build()
             .map_err(|e| {
                 StudyError::refused(format!("cannot start threads: {e}"), "try --threads 1")
@@ -202,7 +203,7 @@ impl Comparison {
 
         progress.begin("cases", of as u64);
         let played = progress.map(&planned, |&(i, variation, seed)| {
-            play_scene(options, &axes[i], variation, seed, progress)
+            play_case(options, &axes[i], variation, seed, progress)
         })?;
         let played = played.into_iter().flatten().flatten();
         let (rows, overlays): (Vec<Row>, Vec<Option<Overlay>>) = played.unzip();
@@ -229,19 +230,19 @@ impl Comparison {
     }
 }
 
-/// Plays the cases of a scene, as far as the comparison is not stopped. One is played after
-/// its start-up rather than after those of all scenes, so that there are rows from the
+/// Plays the cases of a case, as far as the comparison is not stopped. One is played after
+/// its start-up rather than after those of all cases, so that there are rows from the
 /// beginning on.
-fn play_scene(
+fn play_case(
     options: &Options,
     axis: &ComparedAxis,
     variation: Variation,
     seed: u64,
     progress: &Progress,
 ) -> Result<Vec<(Row, Option<Overlay>)>, StudyError> {
-    let failed = |e: BenchError| axis_error(&axis.config.name, &e);
-    let scene = Scene::new(&axis.config.name, &axis.config.axis, variation, seed);
-    let scene = scene.map_err(failed)?;
+    let failed = |e: AxisSimError| axis_error(&axis.config.name, &e);
+    let case = Case::new(&axis.config.name, &axis.config.axis, variation, seed);
+    let case = case.map_err(failed)?;
     let moves = moves_of(options, variation);
     let cases: Vec<(Kind, Move)> = options
         .kinds
@@ -250,17 +251,17 @@ fn play_scene(
         .collect();
     let nominal = variation == Variation::Nominal;
     let rows = progress.map(&cases, |&(kind, motion)| {
-        let played = scene.play(kind, motion).map_err(failed)?;
+        let played = case.play(kind, motion).map_err(failed)?;
         let bound_s = match motion {
             Move::Step100 if nominal => axis.bound_s[0],
             Move::Step20 if nominal => axis.bound_s[1],
             _ => None,
         };
-        let row = scene.row(kind, motion, played.as_ref(), bound_s);
+        let row = case.row(kind, motion, played.as_ref(), bound_s);
         let shown = nominal && seed == options.seed;
         let overlay = played
             .filter(|_| shown)
-            .map(|p| Overlay::of(&scene, kind, motion, &p));
+            .map(|p| Overlay::of(&case, kind, motion, &p));
         progress.step();
         Ok::<_, StudyError>((row, overlay))
     })?;
@@ -268,7 +269,7 @@ fn play_scene(
 }
 
 impl Overlay {
-    fn of(scene: &Scene, kind: Kind, motion: Move, played: &Played) -> Self {
+    fn of(case: &Case, kind: Kind, motion: Move, played: &Played) -> Self {
         let trace = &played.measured[played.measured.len() - 1];
         let start_s = trace.motion.start_s();
         let points = trace.rows.iter().enumerate().map(|(k, r)| {
@@ -279,7 +280,7 @@ impl Overlay {
             ]
         });
         Self {
-            axis: scene.axis.clone(),
+            axis: case.axis.clone(),
             kind,
             motion,
             points: points.collect(),
@@ -287,7 +288,7 @@ impl Overlay {
     }
 }
 
-/// Scenes in their order: as on the sheet for all seeds, then factors, then
+/// Cases in their order: as on the sheet for all seeds, then factors, then
 /// combinations.
 fn plan(options: &Options, axes: &[AxisConfig]) -> Vec<(usize, Variation, u64)> {
     let mut list = Vec::new();
@@ -320,7 +321,7 @@ fn bounds(
     sheet: &AxisParams,
     runs: u32,
     progress: &Progress,
-) -> Result<[Option<[f64; 2]>; 2], BenchError> {
+) -> Result<[Option<[f64; 2]>; 2], AxisSimError> {
     let go_on = || !progress.is_stopped();
     let sizes = Sizes::of(sheet);
     let [low_m, high_m] = sizes.large_m;
@@ -329,7 +330,7 @@ fn bounds(
     for (bound_s, [from_m, to_m]) in found.iter_mut().zip(pairs) {
         let mut rig = TestRig::new(sheet, &design(sheet, Kind::Predictive), 1)?;
         rig.step(to_m, STEP_S)?;
-        let mut fastest = |target_m: f64| -> Result<f64, BenchError> {
+        let mut fastest = |target_m: f64| -> Result<f64, AxisSimError> {
             let bench = rig.bench();
             let bound =
                 optimal::fastest_while(bench.axis(), &bench.state, target_m, 1, runs, &go_on)?;

@@ -2,8 +2,8 @@
 
 use wheeleg_plant::axis::AxisParams;
 
-use crate::bench::suite::{BenchError, LEAD_S, TestRig, force_left_n};
-use crate::bench::{LoadEvent, Motion, Trace};
+use crate::axis_sim::suite::{AxisSimError, LEAD_S, TestRig, force_left_n};
+use crate::axis_sim::{LoadEvent, Motion, Trace};
 
 /// What a case asks of the axis.
 #[derive(
@@ -145,16 +145,16 @@ impl Move {
     /// whose load is `load_n`.
     ///
     /// # Errors
-    /// [`BenchError`].
+    /// [`AxisSimError`].
     pub fn play(
         self,
         rig: &mut TestRig,
         sheet: &AxisParams,
         load_n: f64,
-    ) -> Result<Played, BenchError> {
+    ) -> Result<Played, AxisSimError> {
         let sizes = Sizes::of(sheet);
         let [low_m, high_m] = sizes.large_m;
-        let mut steps = |list: &[f64]| -> Result<Vec<Trace>, BenchError> {
+        let mut steps = |list: &[f64]| -> Result<Vec<Trace>, AxisSimError> {
             list.iter().map(|to_m| rig.step(*to_m, STEP_S)).collect()
         };
         let (mut moves, measured) = match self {

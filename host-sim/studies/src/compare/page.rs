@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::case::MARGIN;
 use super::{Comparison, Move, Row, Variation};
 use crate::StudyError;
-use crate::bench::Kind;
+use crate::axis_sim::Kind;
 use wheeleg_report::number::{DASH, or_dash, signed};
 use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 
@@ -50,7 +50,7 @@ impl Comparison {
                 let cycles = self.rows.iter().filter(|r| {
                     r.case.axis == axis
                         && r.case.controller == *kind
-                        && r.case.variation == "nominal"
+                        && r.case.variation == Variation::Nominal
                         && r.figures.limit_cycle == Some(true)
                 });
                 let large = Move::Step100;
@@ -84,14 +84,14 @@ impl Comparison {
         self.rows.iter().filter(|r| !r.figures.faults.is_empty())
     }
 
-    /// Scenes that are not feasible, each once: variation and margin.
+    /// Cases beyond the force available, each once: variation and margin.
     #[must_use]
-    pub fn infeasible(&self) -> Vec<(&str, &str, f64)> {
-        let mut list: Vec<(&str, &str, f64)> = Vec::new();
+    pub fn beyond_force(&self) -> Vec<(&str, Variation, f64)> {
+        let mut list: Vec<(&str, Variation, f64)> = Vec::new();
         for row in self.rows.iter().filter(|r| !r.case.feasible) {
             let entry = (
                 row.case.axis.as_str(),
-                row.case.variation.as_str(),
+                row.case.variation,
                 row.case.static_margin,
             );
             if !list.contains(&entry) {
@@ -136,7 +136,7 @@ struct Page<'a> {
     cases: usize,
     played: usize,
     alarms: Vec<Alarm<'a>>,
-    infeasible: Vec<Infeasible<'a>>,
+    beyond_force: Vec<BeyondForce<'a>>,
     margin: f64,
     seed: u64,
     last_seed: u64,
@@ -162,9 +162,9 @@ struct Alarm<'a> {
 }
 
 #[derive(Serialize)]
-struct Infeasible<'a> {
+struct BeyondForce<'a> {
     axis: &'a str,
-    variation: &'a str,
+    variation: Variation,
     margin: f64,
 }
 
@@ -206,7 +206,7 @@ fn cell(row: Option<&Row>, motion: Move) -> Cell {
     };
     let f = &row.figures;
     if !row.case.feasible {
-        return cell("infeasible", "info");
+        return cell("beyond_force", "info");
     }
     let cycle = f.limit_cycle == Some(true) || f.stopped == Some(true);
     let note = match (f.stopped, f.limit_cycle) {
@@ -259,8 +259,8 @@ pub(super) fn render(
         id: &r.case.id,
         faults: &r.figures.faults,
     });
-    let infeasible = comparison.infeasible().into_iter();
-    let infeasible = infeasible.map(|(axis, variation, margin)| Infeasible {
+    let beyond_force = comparison.beyond_force().into_iter();
+    let beyond_force = beyond_force.map(|(axis, variation, margin)| BeyondForce {
         axis,
         variation,
         margin,
@@ -277,7 +277,7 @@ pub(super) fn render(
         cases: comparison.rows.len(),
         played,
         alarms: alarms.collect(),
-        infeasible: infeasible.collect(),
+        beyond_force: beyond_force.collect(),
         margin: MARGIN,
         seed: options.seed,
         last_seed: options.seed + options.seeds - 1,
@@ -304,13 +304,13 @@ fn hash(axis: &super::ComparedAxis) -> String {
 
 /// One line per factor and move that was played, one cell per controller.
 fn factors(comparison: &Comparison, axis: &str) -> Vec<Factor> {
-    let mut lines: Vec<(&str, Move)> = Vec::new();
+    let mut lines: Vec<(Variation, Move)> = Vec::new();
     for row in comparison.rows.iter().filter(|r| r.case.axis == axis) {
         let c = &row.case;
         let shown = matches!(c.motion, Move::Step100 | Move::Step20 | Move::SCurve);
-        let varied = !c.variation.starts_with("combination=") && c.variation != "nominal";
-        if shown && varied && !lines.contains(&(c.variation.as_str(), c.motion)) {
-            lines.push((c.variation.as_str(), c.motion));
+        let varied = !matches!(c.variation, Variation::Nominal | Variation::Combination(_));
+        if shown && varied && !lines.contains(&(c.variation, c.motion)) {
+            lines.push((c.variation, c.motion));
         }
     }
     lines.sort_by_key(|(_, motion)| *motion);
@@ -336,16 +336,16 @@ fn factors(comparison: &Comparison, axis: &str) -> Vec<Factor> {
         .collect()
 }
 
-fn with_unit(variation: &str) -> String {
-    match variation.parse() {
-        Ok(Variation::Load(x)) => format!("load {} %", signed(100.0 * x, 0)),
-        Ok(Variation::Mass(x)) => format!("mass {x} kg"),
-        Ok(Variation::Supply(x)) => format!("supply {x} bar"),
-        Ok(Variation::Friction(x)) => format!("friction × {x}"),
-        Ok(Variation::Delay(x)) => format!("valve delay × {x}"),
-        Ok(Variation::Spread(x)) => format!("valves ± {:.0} %", 100.0 * x),
-        Ok(Variation::Noise(x)) => format!("noise × {x}"),
-        _ => variation.to_owned(),
+fn with_unit(variation: Variation) -> String {
+    match variation {
+        Variation::Load(x) => format!("load {} %", signed(100.0 * x, 0)),
+        Variation::Mass(x) => format!("mass {x} kg"),
+        Variation::Supply(x) => format!("supply {x} bar"),
+        Variation::Friction(x) => format!("friction × {x}"),
+        Variation::Delay(x) => format!("valve delay × {x}"),
+        Variation::Spread(x) => format!("valves ± {:.0} %", 100.0 * x),
+        Variation::Noise(x) => format!("noise × {x}"),
+        Variation::Nominal | Variation::Combination(_) => variation.to_string(),
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::case::{CaseId, Row, Scene};
+use super::case::{Case, CaseId, Row};
 use super::moves::Played;
 use super::{Cases, axis_error, load};
 use crate::StudyError;
-use crate::bench::Trace;
+use crate::axis_sim::Trace;
 use crate::study::{Job, Settings};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
 
@@ -30,10 +30,10 @@ pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
         let config = load(file, &[id.kind])?;
         if config.name == id.axis {
             let failed = |e| axis_error(file, &e);
-            let scene =
-                Scene::new(&config.name, &config.axis, id.variation, id.seed).map_err(failed)?;
-            let played = scene.play(id.kind, id.motion).map_err(failed)?;
-            let row = scene.row(id.kind, id.motion, played.as_ref(), None);
+            let case =
+                Case::new(&config.name, &config.axis, id.variation, id.seed).map_err(failed)?;
+            let played = case.play(id.kind, id.motion).map_err(failed)?;
+            let row = case.row(id.kind, id.motion, played.as_ref(), None);
             return Ok(Single { row, played });
         }
         known.push(config.name);
@@ -113,7 +113,7 @@ type Points = Vec<(f64, f64)>;
 pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
     let time = |k: usize| k as f64 * 1e-3;
     let end = time(trace.rows.len());
-    let of = |f: &dyn Fn(&crate::bench::Row) -> f64| -> Points {
+    let of = |f: &dyn Fn(&crate::axis_sim::Row) -> f64| -> Points {
         let rows = trace.rows.iter().enumerate();
         rows.map(|(k, r)| (time(k), f(r))).collect()
     };

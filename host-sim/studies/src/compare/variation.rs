@@ -3,9 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Serialize, Serializer};
 use wheeleg_plant::axis::AxisParams;
 
-use crate::bench::suite::{Factors, StartUp};
+use crate::axis_sim::suite::{Factors, StartUp};
 
 /// One factor, or a seeded combination of five.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,6 +116,13 @@ impl Variation {
             Self::Nominal => StartUp::Sheet,
             _ => StartUp::Identified,
         }
+    }
+}
+
+/// As the word that can be typed.
+impl Serialize for Variation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

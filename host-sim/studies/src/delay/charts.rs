@@ -102,8 +102,8 @@ fn home(study: &Study) -> Figure {
         ("default law, 0.4 s notice", &study.preview.home),
     ];
     let time = ("time since the command [s]", (-0.45, 0.8));
-    let points = |o: &Outcome, y: &dyn Fn(&crate::bench::Row) -> f64| -> Points {
-        let at = |(k, r): (usize, &crate::bench::Row)| (k as f64 * 1e-3 - LEAD_S, y(r));
+    let points = |o: &Outcome, y: &dyn Fn(&crate::axis_sim::Row) -> f64| -> Points {
+        let at = |(k, r): (usize, &crate::axis_sim::Row)| (k as f64 * 1e-3 - LEAD_S, y(r));
         o.rows.iter().enumerate().map(at).collect()
     };
     let strokes = runs

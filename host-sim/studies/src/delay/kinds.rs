@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::bench;
+use crate::axis_sim;
 
 /// Which law drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -28,10 +28,10 @@ impl Law {
         }
     }
 
-    pub(super) const fn kind(self) -> bench::Kind {
+    pub(super) const fn kind(self) -> axis_sim::Kind {
         match self {
-            Self::Paper => bench::Kind::FuzzyPd,
-            Self::Default => bench::Kind::Predictive,
+            Self::Paper => axis_sim::Kind::FuzzyPd,
+            Self::Default => axis_sim::Kind::Predictive,
         }
     }
 }

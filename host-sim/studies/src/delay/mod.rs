@@ -2,7 +2,7 @@
 //!
 //! The paper reports that model and robot agree but for a delay of 0.25 s, and
 //! leaves the cause to "a more accurate model of the pneumatic circuit" (section 9).
-//! Here the robot's own vertical cylinder stands on a bench ([`crate::bench`]), driven
+//! Here the robot's own vertical cylinder stands on a bench ([`crate::axis_sim`]), driven
 //! by the firmware's own law, and
 //!
 //! * [`starts`] measures how long a move takes to start, per kind of move;

@@ -15,8 +15,8 @@ use wheeleg_units::{Duty, PositionMm};
 
 pub use super::kinds::{Law, Start};
 use super::valve_override::ValveOverride;
-use crate::bench::suite::BenchError;
-use crate::bench::{AxisSim, Design, Firmware, Motion, Row, design};
+use crate::axis_sim::suite::AxisSimError;
+use crate::axis_sim::{AxisSim, Design, Firmware, Motion, Row, design};
 
 /// A start counts from here: the first motion of this much from where the piston turned \[m\].
 pub const STARTED_M: f64 = 1e-3;
@@ -186,8 +186,8 @@ impl Trial {
     /// Runs it.
     ///
     /// # Errors
-    /// [`BenchError`].
-    pub fn run(&self) -> Result<Outcome, BenchError> {
+    /// [`AxisSimError`].
+    pub fn run(&self) -> Result<Outcome, AxisSimError> {
         let draw = Draw::new(self.seed);
         let stroke_m = self.axis.cylinder.stroke_m;
         let beyond_m = if self.start.held() { BEYOND_M } else { 0.0 };
@@ -205,7 +205,7 @@ impl Trial {
         params.cylinder.initial_pressure_a_pa = atmosphere_pa;
         params.cylinder.initial_pressure_b_pa = atmosphere_pa;
         let board = ValveOverride {
-            firmware: Firmware::new(&self.design()).map_err(BenchError::Design)?,
+            firmware: Firmware::new(&self.design()).map_err(AxisSimError::Design)?,
             forced: None,
             then: None,
             under_way: VecDeque::new(),
@@ -252,7 +252,7 @@ impl Trial {
         bench: &mut AxisSim<ValveOverride>,
         begin_m: f64,
         from_m: f64,
-    ) -> Result<(), BenchError> {
+    ) -> Result<(), AxisSimError> {
         let mut at_m = begin_m;
         let stroke_m = self.axis.cylinder.stroke_m;
         let inside = matches!(self.start, Start::MidExtend | Start::MidRetract);
@@ -285,7 +285,11 @@ impl Trial {
     }
 
     /// Valves opened by hand before the command.
-    fn overridden(&self, bench: &mut AxisSim<ValveOverride>, at_m: f64) -> Result<(), BenchError> {
+    fn overridden(
+        &self,
+        bench: &mut AxisSim<ValveOverride>,
+        at_m: f64,
+    ) -> Result<(), AxisSimError> {
         if self.before == Before::Nothing {
             return Ok(());
         }
@@ -331,7 +335,7 @@ impl Trial {
         &self,
         bench: &mut AxisSim<ValveOverride>,
         draw: &Draw,
-    ) -> Result<Vec<Row>, BenchError> {
+    ) -> Result<Vec<Row>, AxisSimError> {
         let stroke_m = self.axis.cylinder.stroke_m;
         let (low_m, high_m) = (0.15 * stroke_m, 0.85 * stroke_m);
         let out = Motion::Step {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use wheeleg_control::pwm::OnTimes;
 
-use crate::bench::{Action, Board, Firmware, Sample};
+use crate::axis_sim::{Action, Board, Firmware, Sample};
 
 /// The board with hands on its valves, at the end of a bus.
 pub(super) struct ValveOverride {

@@ -284,7 +284,7 @@ fn leg(
     };
     let [b1, b2, b3, b4, b5, b6] = &body.leg_bodies;
     let (bore, rod) = (plant.cylinders[first].bore_m, plant.cylinders[first].rod_m);
-    // RemoteBoards of the tube: a wall of a tenth of the bore, so that barrel and rod can be told apart.
+    // Outside of the tube: a wall of a tenth of the bore, so that barrel and rod can be told apart.
     let tube = 0.6 * bore;
     let along = |from: f64, to: f64, radius: f64, material| Shape {
         solid: Solid::Cylinder {

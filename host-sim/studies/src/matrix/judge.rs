@@ -6,10 +6,9 @@ use super::ran::Ran;
 use super::row::{Expect, Row, Stop};
 use wheeleg_config::RobotConfig;
 use wheeleg_config::faults::FaultKind;
+use wheeleg_protocol::NodeMode;
+use wheeleg_sim::SimError;
 use wheeleg_telemetry::event::{Cause, ServiceOutcome};
-
-/// Mode of a board that is disarmed.
-const IDLE: u8 = 1;
 
 /// Wheels must stand within this after their ramp may begin at the latest, ms.
 const WHEEL_STOP_MS: f64 = 440.0;
@@ -260,8 +259,9 @@ fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
     f.check(!m.drives, || "an axis drives".to_owned());
     let rows = ran.recording.joints.get(usize::from(board) - 1);
     let last = rows.and_then(|rows| rows.last()).map(|row| row.v.mode);
-    f.check(last == Some(IDLE), || {
-        let last = last.map_or("unknown".to_owned(), |mode| mode.to_string());
+    f.check(last == Some(NodeMode::Idle.code()), || {
+        let last = last.and_then(NodeMode::from_code);
+        let last = last.map_or("unknown", NodeMode::name);
         format!("the board ends in mode {last}, not disarmed")
     });
     if let Some(ms) = m.detected_ms {
@@ -272,7 +272,11 @@ fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
 }
 
 fn no_arming(f: &mut Failures, ran: &Ran) {
-    f.check(ran.error.is_some(), || "the robot gets ready".to_owned());
+    match &ran.error {
+        Some(SimError::NotReady { .. }) => {}
+        Some(other) => f.0.push(format!("the run ended early: {other}")),
+        None => f.0.push("the robot gets ready".to_owned()),
+    }
     let outputs = ran.outputs;
     f.check(outputs.ticks > 0, || {
         "no board got to its first tick".to_owned()
@@ -391,5 +395,32 @@ mod tests {
         ] {
             assert!(stopped.contains(what), "{what}: {stopped}");
         }
+    }
+
+    #[test]
+    fn a_run_that_fails_for_another_reason_is_no_refusal_to_arm() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["version-mismatch/joint".to_owned()]).expect("a row")[0];
+        let ended = |error| {
+            let outputs = Outputs {
+                ticks: 100,
+                driven: 0,
+            };
+            let ran = Ran {
+                error,
+                outputs,
+                ..empty_run()
+            };
+            judge(*row, &robot, &ran, Measured::default()).failures
+        };
+        let by_name = |failures: &[String], what: &str| failures.iter().any(|f| f.contains(what));
+        let not_ready = ended(Some(SimError::NotReady {
+            what: "a board differs".into(),
+            help: String::new(),
+        }));
+        assert!(!by_name(&not_ready, "gets ready") && !by_name(&not_ready, "ended early"));
+        let other = ended(Some(SimError::simulation("the plant left its range", "")));
+        assert!(by_name(&other, "the plant left its range"), "{other:?}");
+        assert!(by_name(&ended(None), "the robot gets ready"));
     }
 }

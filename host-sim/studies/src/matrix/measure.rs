@@ -8,12 +8,13 @@ use super::ran::Ran;
 use super::row::{Expect, Row, Since};
 use crate::analysis::{commanded_open, window};
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
+use wheeleg_protocol::NodeMode;
 use wheeleg_telemetry::{Event, EventKind, JointSample, Recording, Row as Sample};
 
 const TICK_S: f64 = 1e-3;
-/// Armed and tracking.
-const DRIVING: [u8; 2] = [2, 3];
-const EXHAUST: u8 = 5;
+/// Modes of a board in which its closed loop may drive, as logged.
+const DRIVING: [u8; 2] = [NodeMode::Armed.code(), NodeMode::Tracking.code()];
+const EXHAUST: u8 = NodeMode::Exhaust.code();
 /// The tick in which a staged exhaust is ended, and the time in which its outlets shut: samples.
 const OUTLETS_SHUT: usize = 10;
 /// A rim slower than this stands, mm/s.
@@ -75,7 +76,7 @@ pub struct Measured {
     pub reads: Vec<String>,
 }
 
-/// A affected axis, 0 to 7, and what cannot be seen of it.
+/// An affected axis, 0 to 7, and what cannot be seen of it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Blind {
     /// Boards without power or program: their telemetry stands still.
@@ -361,7 +362,11 @@ pub(super) fn lost_messages(recording: &Recording) -> Option<String> {
 fn reads(ran: &Ran) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let lost = lost_messages(&ran.recording);
-    for line in messages(ran).map(line).chain(lost).chain(ran.error.clone()) {
+    for line in messages(ran)
+        .map(line)
+        .chain(lost)
+        .chain(ran.error.as_ref().map(ToString::to_string))
+    {
         if !lines.contains(&line) {
             lines.push(line);
         }
@@ -381,7 +386,10 @@ mod tests {
                 t_ns: ms * 1_000_000,
                 v: JointSample {
                     fill_a_us: if energised(ms) { 500 } else { 0 },
-                    mode: if energised(ms) { 3 } else { 4 },
+                    mode: match energised(ms) {
+                        true => NodeMode::Tracking.code(),
+                        false => NodeMode::Hold.code(),
+                    },
                     ..JointSample::default()
                 },
             })

@@ -1,7 +1,7 @@
 //! What a run of a row leaves for measuring and judging.
 
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_sim::LineAudit;
+use wheeleg_sim::{LineAudit, SimError};
 use wheeleg_telemetry::Recording;
 
 /// E-stop after the instant, s.
@@ -18,7 +18,7 @@ pub(super) struct Ran {
     /// From power-up on.
     pub(super) outputs: Outputs,
     /// The run ended before its time, and why.
-    pub(super) error: Option<String>,
+    pub(super) error: Option<SimError>,
 }
 
 /// What the joint boards had on their outputs from power-up on, in the time of the start-up, too.

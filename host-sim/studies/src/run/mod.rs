@@ -325,7 +325,7 @@ mod tests {
         let finished = run(&options, &Stop::default()).expect("a run with results");
         let failure = finished.result.failure.expect("it does not get ready");
         assert!(
-            failure.to_string().contains("did not get ready"),
+            matches!(failure, wheeleg_sim::SimError::NotReady { .. }),
             "{failure}"
         );
         let summary = std::fs::read_to_string(folder.join("summary.json")).expect("written");

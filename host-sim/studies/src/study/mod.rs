@@ -20,6 +20,7 @@ use wheeleg_report::output::Folder;
 use wheeleg_report::plot::Figure;
 use wheeleg_report::{page, subfolder};
 
+pub(crate) use progress::STACK;
 pub use progress::{Ended, Progress};
 pub use schema::Summary;
 pub use stop::{Signal, Stop};
@@ -176,6 +177,7 @@ impl Job {
     pub fn draw(&self, figures: Vec<Figure>) -> Result<Vec<(Figure, String)>, StudyError> {
         self.subfolder("figures")?;
         self.progress.begin("drawing", figures.len() as u64);
+        progress::workers();
         figures
             .into_par_iter()
             .map(|figure| {

@@ -1,10 +1,28 @@
 //! How far a study is, and whether it is to stop.
 
+use std::sync::Once;
+
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::{Stop, Stopped};
 use crate::StudyError;
+
+/// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests.
+pub(crate) const STACK: usize = 8 << 20;
+
+/// Lets the workers that all studies share begin, with room for a simulated robot. A pool of its own
+/// that calls this keeps its own workers.
+pub(super) fn workers() {
+    static BEGUN: Once = Once::new();
+    if rayon::current_thread_index().is_none() {
+        BEGUN.call_once(|| {
+            let workers = rayon::ThreadPoolBuilder::new().stack_size(STACK);
+            // Fails if somebody else has begun them: then they are theirs.
+            let _ = workers.build_global();
+        });
+    }
+}
 
 /// Shows how far a study is, on standard error and only if that is a terminal, and knows
 /// whether it is to stop.
@@ -119,6 +137,7 @@ impl Progress {
         items: &[T],
         work: impl Fn(&T) -> Result<R, E> + Sync,
     ) -> Result<Vec<Option<R>>, E> {
+        workers();
         items
             .par_iter()
             .map(|item| match self.is_stopped() {
@@ -166,6 +185,17 @@ impl Progress {
 mod tests {
     use super::*;
     use crate::study::Signal;
+
+    /// A simulated robot is built on the stack, in more than the 2 MB that a thread has by default.
+    #[test]
+    fn workers_have_room_for_a_simulated_robot() {
+        let items = [1_u8; 4];
+        let done = Progress::silent().map(&items, |item| {
+            let room = std::hint::black_box([*item; STACK / 2]);
+            Ok::<_, ()>(usize::from(room[room.len() - 1]))
+        });
+        assert_eq!(done, Ok(vec![Some(1); 4]));
+    }
 
     #[test]
     fn what_was_done_before_the_stop_is_kept_in_its_place() {

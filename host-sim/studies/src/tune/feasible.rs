@@ -3,8 +3,8 @@
 use wheeleg_plant::axis::AxisParams;
 
 use crate::StudyError;
-use crate::bench::longest_stroke_m;
-use crate::bench::suite::force_left_n;
+use crate::axis_sim::longest_stroke_m;
+use crate::axis_sim::suite::force_left_n;
 use crate::compare::MARGIN;
 
 /// Refuses an axis that cannot do what its own file asks.

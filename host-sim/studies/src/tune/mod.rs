@@ -18,9 +18,9 @@ use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 
 use crate::StudyError;
-use crate::bench::commission::{commission, toml_lines, value};
-use crate::bench::suite::{Factors, TestRig};
-use crate::bench::{
+use crate::axis_sim::commission::{commission, toml_lines, value};
+use crate::axis_sim::suite::{Factors, TestRig};
+use crate::axis_sim::{
     Delays, Design, Kind, Supervision, ValveResolution, design, design_with, identify,
 };
 use crate::compare::{Figures, MARGIN, Move, Played, axis_error};
@@ -110,7 +110,7 @@ pub struct Tuned {
     /// Force left over the load, at most 1000.
     pub margin: f64,
     /// How fine its valves are.
-    pub grain: ValveResolution,
+    pub valve_resolution: ValveResolution,
     /// Delays found; `None` if the piston did not answer.
     pub delays: Option<Delays>,
     /// All tests.
@@ -137,7 +137,7 @@ pub struct Summary<'a> {
     /// Least margin of an axis that can be tuned.
     least_margin: f64,
     /// How fine its valves are.
-    valve_grain: ValveResolution,
+    valve_resolution: ValveResolution,
     /// What would make the valves finer, where they are coarse.
     advice: Option<String>,
     /// Opening delay of the data sheet \[ms\].
@@ -159,7 +159,7 @@ pub struct Summary<'a> {
 }
 
 impl study::Summary for Summary<'_> {
-    const SCHEMA: &'static str = "wheeleg.tune/1";
+    const SCHEMA: &'static str = "wheeleg.tune/2";
 }
 
 /// File of the tuned parameters, below the folder of the results. A tuning that was stopped
@@ -261,7 +261,7 @@ impl Tuned {
         Ok(Self {
             seed,
             margin: Factors::NONE.static_margin(plant).min(1e3),
-            grain: ValveResolution::of(plant),
+            valve_resolution: ValveResolution::of(plant),
             delays,
             worse: judge::worse(&tests),
             tests,
@@ -318,8 +318,8 @@ impl Tuned {
             seed: self.seed,
             static_margin: self.margin,
             least_margin: MARGIN,
-            valve_grain: self.grain,
-            advice: self.grain.advice(),
+            valve_resolution: self.valve_resolution,
+            advice: self.valve_resolution.advice(),
             sheet_t_on_ms: ms(valve.t_on_s),
             sheet_t_off_ms: ms(valve.t_off_s),
             found_t_on_ms: self.delays.map(|d| ms(d.t_on_s)),

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::{Parameter, Test, Tuned, Worse};
 use crate::StudyError;
-use crate::bench::Delays;
-use crate::bench::Trace;
+use crate::axis_sim::Delays;
+use crate::axis_sim::Trace;
 use crate::compare::{Figures, MARGIN, Move, panel};
 use wheeleg_report::number::or_dash;
 use wheeleg_report::plot::{Figure, Series, colour, line};
@@ -14,19 +14,18 @@ use wheeleg_report::{Picture, page, pictures};
 const TEMPLATE: &str = include_str!("page.html");
 
 /// Points of a recording over the time from the start of its motion.
-fn points(trace: &Trace, value: impl Fn(&crate::bench::Row) -> f64) -> Vec<(f64, f64)> {
+fn points(trace: &Trace, value: impl Fn(&crate::axis_sim::Row) -> f64) -> Vec<(f64, f64)> {
     let start_s = trace.motion.start_s();
     let rows = trace.rows.iter().enumerate();
     rows.map(|(k, r)| (k as f64 * 1e-3 - start_s, value(r)))
         .collect()
 }
 
-/// Stroke, or stroke less reference, before and after, with the first move after
-/// power-up thin beside it where it is of the same kind.
+/// Stroke, or stroke less reference, before and after.
 fn series(
     test: &Test,
     index: usize,
-    value: impl Fn(&crate::bench::Row) -> f64 + Copy,
+    value: impl Fn(&crate::axis_sim::Row) -> f64 + Copy,
 ) -> Vec<Series> {
     let points = |played: &super::Played| points(&played.measured[index], value);
     let [before, after] = &test.played;
@@ -38,8 +37,8 @@ fn series(
 
 /// Figures before and after.
 pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
-    let stroke = |r: &crate::bench::Row| r.stroke_m * 1e3;
-    let error = |r: &crate::bench::Row| (r.stroke_m - r.reference_m) * 1e3;
+    let stroke = |r: &crate::axis_sim::Row| r.stroke_m * 1e3;
+    let error = |r: &crate::axis_sim::Row| (r.stroke_m - r.reference_m) * 1e3;
     let end = |test: &Test, index: usize| {
         let trace = &test.played[0].measured[index];
         trace.rows.len() as f64 * 1e-3 - trace.motion.start_s()
@@ -80,22 +79,56 @@ pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
 
 type Cell = fn(&Figures) -> Option<f64>;
 
-/// Figures of a test that have a value, before and after.
-const LINES: [(&str, usize, Cell); 12] = [
-    ("error at rest [mm]", 2, |f| f.steady_error_mm.map(f64::abs)),
-    ("overshoot [mm]", 2, |f| f.overshoot_mm),
-    ("rise [s]", 3, |f| f.rise_s),
-    ("settled within ±1 mm [s]", 3, |f| f.settle_s),
-    ("worst error [mm]", 2, |f| f.worst_mm),
-    ("RMS error [mm]", 2, |f| f.rms_mm),
-    ("switches per s", 0, |f| f.switches_per_s),
-    ("switches in 10 s at rest", 0, |f| {
-        f.rest_switches.map(|n| n as f64)
+/// Whether a move has a figure.
+type Of = fn(Move) -> bool;
+
+fn any(_: Move) -> bool {
+    true
+}
+
+/// A move that is to settle at its target.
+fn settles(motion: Move) -> bool {
+    matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact()
+}
+
+/// Figures of a test, the moves that have them, and their digits.
+const LINES: [(&str, Of, usize, Cell); 12] = [
+    ("error at rest [mm]", any, 2, |f| {
+        f.steady_error_mm.map(f64::abs)
     }),
-    ("air per move [l ANR]", 2, |f| f.air_nl),
-    ("recovery after contact [s]", 2, |f| f.recovery_s),
-    ("first move: overshoot [mm]", 2, |f| f.first_overshoot_mm),
-    ("first move: settled [s]", 3, |f| f.first_settle_s),
+    (
+        "overshoot [mm]",
+        |m| !matches!(m, Move::Hold | Move::Sine),
+        2,
+        |f| f.overshoot_mm,
+    ),
+    ("rise [s]", settles, 3, |f| f.rise_s),
+    ("settled within ±1 mm [s]", settles, 3, |f| f.settle_s),
+    ("worst error [mm]", |m| !settles(m), 2, |f| f.worst_mm),
+    ("RMS error [mm]", |m| !settles(m), 2, |f| f.rms_mm),
+    ("switches per s", any, 0, |f| f.switches_per_s),
+    (
+        "switches in 10 s at rest",
+        |m| m == Move::Hold,
+        0,
+        |f| f.rest_switches.map(|n| n as f64),
+    ),
+    ("air per move [l ANR]", any, 2, |f| f.air_nl),
+    ("recovery after contact [s]", Move::loses_contact, 2, |f| {
+        f.recovery_s
+    }),
+    (
+        "first move: overshoot [mm]",
+        |m| m == Move::Step100,
+        2,
+        |f| f.first_overshoot_mm,
+    ),
+    (
+        "first move: settled [s]",
+        |m| m == Move::Step100,
+        3,
+        |f| f.first_settle_s,
+    ),
 ];
 
 /// What the template shows.
@@ -109,7 +142,7 @@ struct Page<'a> {
     description: &'a str,
     seed: u64,
     /// Force of the shortest opening over what friction holds, and what is coarse.
-    grain: f64,
+    valve_resolution: f64,
     coarse: f64,
     advice: Option<String>,
     /// None without a load.
@@ -149,16 +182,6 @@ struct Described<'a> {
 }
 
 fn lines(test: &Test) -> Vec<Line> {
-    let step = matches!(test.motion, Move::Step20 | Move::Step100) || test.motion.loses_contact();
-    let shown = |name: &str| match name {
-        "settled within ±1 mm [s]" | "rise [s]" => step,
-        "worst error [mm]" | "RMS error [mm]" => !step,
-        "recovery after contact [s]" => test.motion.loses_contact(),
-        "switches in 10 s at rest" => test.motion == Move::Hold,
-        "overshoot [mm]" => test.motion != Move::Hold && test.motion != Move::Sine,
-        name if name.starts_with("first") => test.motion == Move::Step100,
-        _ => true,
-    };
     let note = |f: &Figures| match (f.stopped, f.limit_cycle) {
         (Some(true), _) => "stopped by supervision",
         (_, Some(true)) => "limit cycle",
@@ -166,8 +189,8 @@ fn lines(test: &Test) -> Vec<Line> {
     };
     let mut list: Vec<Line> = LINES
         .iter()
-        .filter(|(name, ..)| shown(name))
-        .map(|(name, digits, value)| {
+        .filter(|(_, of, ..)| of(test.motion))
+        .map(|(name, _, digits, value)| {
             let shown = |figures| or_dash(value(figures), *digits);
             Line {
                 name,
@@ -220,9 +243,9 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
         name: &tuned.config.name,
         description: &tuned.config.description,
         seed: tuned.seed,
-        grain: tuned.grain.ratio,
-        coarse: crate::bench::valve_resolution::COARSE,
-        advice: tuned.grain.advice(),
+        valve_resolution: tuned.valve_resolution.ratio,
+        coarse: crate::axis_sim::valve_resolution::COARSE,
+        advice: tuned.valve_resolution.advice(),
         margin: (tuned.margin < 1e3).then_some(tuned.margin),
         least: MARGIN,
         sheet_on_s: valve.t_on_s,

@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use wheeleg_config::Drawing;
-use wheeleg_telemetry::{Logged, Read, Scalar, channels, read};
+use wheeleg_protocol::Address;
+use wheeleg_telemetry::{EventKind, Logged, Read, Scalar, channels, read};
 
 use super::signals::{self, Signal, foot, joint, signal};
 use super::thin::Thin;
@@ -35,7 +36,8 @@ pub(super) struct Span {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LoggedEvent {
     pub(super) t_ns: u64,
-    pub(super) kind: String,
+    /// None of a later version.
+    pub(super) kind: Option<EventKind>,
     /// What makes it alike another: code, detail, fault.
     alike: (String, String, u64),
     /// Whom it is about.
@@ -240,15 +242,22 @@ impl Content {
             }
             return;
         }
-        let board = logged.number("board").unwrap_or_default();
+        let board = Address::new(logged.number("board").unwrap_or_default() as u8);
         let fault = logged.number("fault").unwrap_or_default() as u64;
-        let (who, what) = match text.split_once(": ") {
-            Some((who, what)) if board > 0.0 => (vec![who.to_owned()], what.to_owned()),
-            _ => (Vec::new(), text),
+        // A text that begins with the board whose event it is, is the same for all boards behind it.
+        let named = board.filter(|board| board.is_node());
+        let named = named.map(|board| board.to_string());
+        let rest = named.as_ref().and_then(|who| {
+            let rest = text.strip_prefix(who.as_str())?.strip_prefix(": ")?;
+            Some(rest.to_owned())
+        });
+        let (who, what) = match rest {
+            Some(rest) => (named.into_iter().collect(), rest),
+            None => (Vec::new(), text),
         };
         let event = LoggedEvent {
             t_ns: logged.t_ns,
-            kind,
+            kind: EventKind::of_name(&kind),
             alike: (code, detail, fault),
             who,
             what,
@@ -289,7 +298,9 @@ impl Content {
 
     /// Faults.
     pub(super) fn faults(&self) -> impl Iterator<Item = &LoggedEvent> {
-        self.events.iter().filter(|event| event.kind == "fault")
+        self.events
+            .iter()
+            .filter(|event| event.kind == Some(EventKind::Fault))
     }
 
     /// The robot for the page's player.

@@ -4,6 +4,7 @@ use serde::Serialize;
 use wheeleg_config::Drawing;
 use wheeleg_report::plot::{Content as Drawn, Figure, Panel, line};
 use wheeleg_report::{Picture, json, page, pictures};
+use wheeleg_telemetry::EventKind;
 
 use super::Named;
 use super::difference::Difference;
@@ -19,7 +20,8 @@ const MARGIN: f64 = 0.05;
 #[derive(Serialize)]
 struct Line {
     t: f64,
-    kind: String,
+    kind: &'static str,
+    fault: bool,
     text: String,
     log: usize,
 }
@@ -206,7 +208,8 @@ pub(super) fn make(
     for (i, log) in logs.iter().enumerate() {
         events.extend(log.content.events.iter().map(|event| Line {
             t: event.t_ns as f64 * 1e-9,
-            kind: event.kind.clone(),
+            kind: event.kind.map_or("", EventKind::name),
+            fault: event.kind == Some(EventKind::Fault),
             text: event.text(),
             log: i + 1,
         }));

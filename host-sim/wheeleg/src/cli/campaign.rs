@@ -15,24 +15,16 @@ use wheeleg_config::plan::Plan;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Signal;
 
-use super::{TARGETS_MISSED, print, stop_on_signals, tell, whole};
-
-/// Exit code where cases have no row yet.
-const INCOMPLETE: u8 = 3;
-/// Exit code of a process that was asked to stop, and is to be started again.
-const TRY_AGAIN: u8 = 75;
+use super::exit::{self, INCOMPLETE, TARGETS_MISSED, TRY_AGAIN};
+use super::{print, stop_on_signals, tell, whole};
 
 /// Arguments of `wheeleg campaign`.
 #[derive(Debug, Args)]
-#[command(after_help = EXIT_CODES)]
+#[command(after_help = exit::help(exit::CAMPAIGN))]
 pub(super) struct CampaignArgs {
     #[command(subcommand)]
     command: Command,
 }
-
-const EXIT_CODES: &str = "Exit codes: 0 every case (of this shard) has a row; 1 a required target \
-is missed (--strict only); 2 error; 3 incomplete; 74 a file cannot be written; 75 stopped with \
-SIGTERM or by a hang-up, try again; 130 stopped with Ctrl-C.";
 
 #[derive(Debug, Subcommand)]
 enum Command {

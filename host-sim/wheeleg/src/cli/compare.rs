@@ -9,7 +9,7 @@ use clap::Args;
 use super::{Drawing, end, print, settings, whole};
 use wheeleg_config::axis::AXES;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::bench::{Kind, ValveResolution};
+use wheeleg_studies::axis_sim::{Kind, ValveResolution};
 use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
 
 /// So many false alarms are named; all of them are in the report.
@@ -169,10 +169,10 @@ fn text(comparison: &Comparison, report: &Path) -> String {
     if alarms > ALARMS_TOLD {
         let _ = writeln!(told, "  and {} more, in the report", alarms - ALARMS_TOLD);
     }
-    let infeasible = comparison.infeasible().len();
+    let beyond_force = comparison.beyond_force().len();
     let _ = writeln!(
         out,
-        "cases       {}, false alarms {alarms}, infeasible corners {infeasible}\n{told}report      {}",
+        "cases       {}, false alarms {alarms}, beyond the force available {beyond_force}\n{told}report      {}",
         comparison.rows.len(),
         report.display()
     );

@@ -13,21 +13,16 @@ use wheeleg_console::{ADDRESS, Key};
 use wheeleg_studies::StudyError;
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
+use super::exit::{self, LOST, REFUSED};
 use super::serve::refused;
 use super::{print, tell, whole};
 
-/// Exit code of what is refused.
-const REFUSED: u8 = 1;
-/// Exit code of a connection that ended, or of a stop that nobody confirms.
-const LOST: u8 = 3;
 /// How long a command of this program may be under way, ms.
 const VALID_MS: u32 = 1_000;
 
 /// Arguments of `wheeleg ctl`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Exit codes: 0 done; 1 refused; 2 error; 3 the connection ended, or nobody confirms."
-)]
+#[command(after_help = exit::help(exit::CTL))]
 pub(super) struct CtlArgs {
     /// Address of the server.
     #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
@@ -207,7 +202,7 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
         let n = client.send(frame).map_err(refused)?;
         if let end @ (Outcome::Refused { .. } | Outcome::Lost) = client.outcome(n) {
-            return Ok(told(args, &end));
+            return Ok(print_outcome(args, &end));
         }
     }
     loop {
@@ -328,7 +323,7 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
     };
     let taken = give("TakeControl", &json!({}))?;
     if taken != Outcome::Done {
-        return Ok(told(args, &taken));
+        return Ok(print_outcome(args, &taken));
     }
     let end = give(name, &arguments)?;
     if end != Outcome::Lost {
@@ -337,7 +332,7 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
             tell("the control is not released: the robot will hold");
         }
     }
-    Ok(told(args, &end))
+    Ok(print_outcome(args, &end))
 }
 
 fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, StudyError> {
@@ -346,11 +341,11 @@ fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, Study
     let end = client
         .carry_out(name, arguments, VALID_MS)
         .map_err(refused)?;
-    Ok(told(args, &end))
+    Ok(print_outcome(args, &end))
 }
 
 /// Prints how a request ended; its exit code.
-fn told(args: &CtlArgs, end: &Outcome) -> ExitCode {
+fn print_outcome(args: &CtlArgs, end: &Outcome) -> ExitCode {
     let (status, code, reason, text) = match end {
         Outcome::Done => ("done", 0, "", ""),
         Outcome::Refused { reason, text } => ("refused", REFUSED, reason.as_str(), text.as_str()),

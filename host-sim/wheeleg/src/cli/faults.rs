@@ -125,7 +125,7 @@ fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
     let count = |verdict| matrix::count(outcomes, verdict);
     let _ = writeln!(
         out,
-        "\n{} rows as they must be, {} not, {} not implemented\nreport  {}",
+        "\n{} rows passed, {} failed, {} not implemented\nreport  {}",
         count(Verdict::Pass),
         count(Verdict::Fail),
         count(Verdict::NotImplemented),

@@ -8,8 +8,10 @@ mod commission;
 mod compare;
 mod ctl;
 mod delay;
+mod exit;
 mod export;
 mod faults;
+mod field;
 mod figures;
 mod interface;
 mod list;
@@ -35,26 +37,19 @@ use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
-/// Exit code when `--strict` is given and a required target is not met.
-const TARGETS_MISSED: u8 = 1;
-/// Exit code of any error (wrong input, unwritable output, failed simulation).
-const FAILED: u8 = 2;
+use exit::{FAILED, TARGETS_MISSED};
 
 /// Simulator and control stack of the hybrid robot Wheeleg.
 ///
 /// Without a command, runs the three-step test of the 2003 paper, with the options of `run`.
 #[derive(Debug, Parser)]
-#[command(name = "wheeleg", version, about, after_help = EXIT_CODES, args_conflicts_with_subcommands = true)]
+#[command(name = "wheeleg", version, about, after_help = exit::help(exit::PROGRAM), args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     options: run::RunOptions,
 }
-
-const EXIT_CODES: &str = "Exit codes: 0 done (with --strict: and all required targets met); \
-1 a required target is not met (--strict only), or a checked quantity beyond tolerance; 2 error; \
-130 stopped with Ctrl-C, 143 with SIGTERM, 129 by a hang-up: the files hold what was done until then.";
 
 /// Parses a whole number from `low` to `high`, and says so of any other.
 fn whole<N>(low: N, high: N) -> impl Fn(&str) -> Result<N, String> + Clone + Send + Sync
@@ -83,7 +78,7 @@ enum Command {
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
     Params(params::ParamsArgs),
-    /// Faults that can be injected, what they strike and which are not implemented yet.
+    /// Faults that can be injected, what they affect and which are not implemented yet.
     Faults(faults::FaultsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
@@ -95,6 +90,8 @@ enum Command {
     Commission(commission::CommissionArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
+    /// Try the walks over terrain on several seeds, beside what the paper claims.
+    Field(field::FieldArgs),
     /// Measure and explain the start delay of a pneumatic joint; writes a report.
     Delay(delay::DelayArgs),
     /// Compare controllers on one or more axes; writes report, figures and tables.
@@ -133,6 +130,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Export(args)) => export::command(&args),
         Some(Command::Commission(args)) => commission::command(&args),
         Some(Command::Figures(args)) => figures::command(&args),
+        Some(Command::Field(args)) => field::command(&args),
         Some(Command::Delay(args)) => delay::command(&args),
         Some(Command::Compare(args)) => compare::command(&args),
         Some(Command::Tune(args)) => tune::command(&args),

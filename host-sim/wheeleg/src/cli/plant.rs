@@ -8,8 +8,8 @@ use clap::{Args, Subcommand};
 use super::print;
 use wheeleg_config::{AxisConfig, brief};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::bench::export;
-use wheeleg_studies::bench::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
+use wheeleg_studies::axis_sim::export;
+use wheeleg_studies::axis_sim::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
 
 /// Exit code of a check beyond its limit.
 const BEYOND: u8 = 1;

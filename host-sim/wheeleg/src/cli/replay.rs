@@ -10,14 +10,13 @@ use wheeleg_console::replay::{Replayed, replay};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Progress;
 
+use super::exit::{self, TARGETS_MISSED};
 use super::serve::refused;
-use super::{TARGETS_MISSED, print, stop_on_signals, tell};
+use super::{print, stop_on_signals, tell};
 
 /// Arguments of `wheeleg replay`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Exit codes: 0 the robot did the same to the bit; 1 it did not, or there is nothing to compare with; 2 error."
-)]
+#[command(after_help = exit::help(exit::REPLAY))]
 pub(super) struct ReplayArgs {
     /// Folder of a recording, such as runs/live/0001.
     folder: PathBuf,

@@ -10,7 +10,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use super::{Drawing, end, stop_on_signals};
 use wheeleg_report::number::or_dash;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::bench::valve_resolution::COARSE;
+use wheeleg_studies::axis_sim::valve_resolution::COARSE;
 use wheeleg_studies::study::Settings;
 use wheeleg_studies::tune::{self, PARAMETERS, Section, Tuned};
 
@@ -101,7 +101,7 @@ fn text(tuned: &Tuned, report: &Path) -> String {
             let _ = writeln!(text, "stopped by supervision {when}: {}", names.join(", "));
         }
     }
-    if let Some(advice) = tuned.grain.advice() {
+    if let Some(advice) = tuned.valve_resolution.advice() {
         let _ = writeln!(text, "{advice}");
     }
     let valve = &tuned.config.axis.cylinder.fill_valve;
@@ -111,9 +111,9 @@ fn text(tuned: &Tuned, report: &Path) -> String {
     );
     let _ = writeln!(
         text,
-        "opening delay  {found} (sheet {:.2} ms)\nvalve grain    {:.2} (force of the shortest opening over what friction holds; coarse above {COARSE})",
+        "opening delay  {found} (sheet {:.2} ms)\nresolution     {:.2} (of the valves: force of the shortest opening over what friction holds; coarse above {COARSE})",
         valve.t_on_s * 1e3,
-        tuned.grain.ratio,
+        tuned.valve_resolution.ratio,
     );
     let parameters = report.with_file_name(PARAMETERS);
     for worse in &tuned.worse {

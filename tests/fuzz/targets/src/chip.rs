@@ -99,7 +99,7 @@ impl Chip {
     }
 
     /// Whether what was given has happened.
-    pub(crate) const fn struck(&self) -> bool {
+    pub(crate) const fn mishap_over(&self) -> bool {
         self.mishap.is_none()
     }
 

@@ -18,7 +18,7 @@ use wheeleg_protocol::{
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use crate::fakes::{CYCLE_US, Rig, decode, emit};
+use crate::fakes::{CYCLE_US, TestRig, decode, emit};
 use crate::frames::AnyFrame;
 use crate::observer::parse;
 use crate::reference;
@@ -203,7 +203,7 @@ fn any_shape(u: &mut Unstructured<'_>) -> arbitrary::Result<FootShape> {
 }
 
 struct Play {
-    rig: Rig,
+    rig: TestRig,
     /// Line of a node's reply and of the answers in the next cycle.
     bad_line: Option<(usize, Line, Line)>,
     /// Bytes that come in the next cycle.
@@ -239,7 +239,7 @@ pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let start = u.arbitrary::<u8>().unwrap_or_default() % 4;
     let mut play = Play {
-        rig: Rig::new(MasterConfig::default()),
+        rig: TestRig::new(MasterConfig::default()),
         bad_line: None,
         late: Vec::new(),
         unfinished: Vec::new(),

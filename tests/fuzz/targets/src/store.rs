@@ -155,8 +155,8 @@ impl Play {
         let unsteady = self.pages.iter().any(|page| page.unsteady);
         self.chip.power(mishap);
         let saved = Store::new(Port(&mut self.chip)).save(&set);
-        let struck = mishap.filter(|_| self.chip.struck());
-        let unsteady_now = struck.is_some_and(|m| matches!(m.torn, Torn::Unsteady(_)));
+        let mishap = mishap.filter(|_| self.chip.mishap_over());
+        let unsteady_now = mishap.is_some_and(|m| matches!(m.torn, Torn::Unsteady(_)));
         let erasures = |chip: &Chip| chip.erased.iter().sum::<u32>();
         let begun = erasures(&self.chip) - erased.iter().sum::<u32>();
         assert!(
@@ -171,7 +171,7 @@ impl Play {
                 );
                 self.damaged(page);
                 self.pages[page].unsteady |= unsteady_now;
-                if struck.is_none() {
+                if mishap.is_none() {
                     self.pages[page] = Page::default();
                 }
             }
@@ -204,7 +204,7 @@ impl Play {
             Ok(_) => assert_eq!(self.loaded().as_ref(), Some(&set), "saved, it says"),
             Err(error) => {
                 assert_eq!(error, SaveError::Flash);
-                assert!(struck.is_some() || unsteady, "failed for no reason");
+                assert!(mishap.is_some() || unsteady, "failed for no reason");
             }
         }
     }

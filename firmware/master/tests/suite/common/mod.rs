@@ -237,7 +237,7 @@ impl FakeNode {
 }
 
 /// Master and nodes; time advances by whole cycles.
-pub(crate) struct Rig {
+pub(crate) struct TestRig {
     pub(crate) master: Master,
     pub(crate) nodes: Vec<FakeNode>,
     pub(crate) now_us: u64,
@@ -268,7 +268,7 @@ pub(crate) fn emit(message: &Message, from: Address, sequence: u16) -> Vec<u8> {
     message.emit(envelope, &mut out).unwrap().to_vec()
 }
 
-impl Rig {
+impl TestRig {
     pub(crate) fn new(config: MasterConfig) -> Self {
         Self {
             master: Master::new(config).unwrap(),

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::JOINT_TICK;
-use crate::seal::Seal;
+use crate::checksum::Checksum;
 use wheeleg_control::axis::AxisData;
 
 const MIDDLE: PositionMm = PositionMm::from_int(90);
@@ -245,7 +245,7 @@ fn every_flipped_bit_of_the_account_changes_its_seal() {
     let mut air = Air::unknown(&model, MIDDLE);
     for (p, vented) in [(0, 0), (0x7_5A5A, 0xA5A5)] {
         (air.a.p, air.a.vented) = (p, vented);
-        let sound = Seal::of(&air);
+        let sound = Checksum::of(&air);
         for bit in 0..32 {
             let mut damaged = [air; 5];
             damaged[0].a.p ^= 1 << bit;
@@ -254,7 +254,7 @@ fn every_flipped_bit_of_the_account_changes_its_seal() {
             damaged[3].a.vented ^= 1 << (bit % 16);
             damaged[4].b.p ^= 1 << bit;
             for (field, damaged) in damaged.iter().enumerate() {
-                assert_ne!(Seal::of(damaged), sound, "{field} {bit}");
+                assert_ne!(Checksum::of(damaged), sound, "{field} {bit}");
             }
         }
     }

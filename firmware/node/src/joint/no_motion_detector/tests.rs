@@ -1,7 +1,7 @@
 //! Tests of the watch for motion that does not come.
 
 use super::*;
-use crate::seal::Seal;
+use crate::checksum::Checksum;
 use wheeleg_control::axis::AxisData;
 
 /// A tick under control that sends `on`.
@@ -263,7 +263,7 @@ fn every_flipped_bit_of_what_the_watch_keeps_changes_its_seal() {
     // A word of many bits and one of none: whatever joins two fields must keep both.
     for (slid, doubt) in [(0, 0), (0x55AA, 0xA55A)] {
         (watch.slid, watch.doubt) = (slid, doubt);
-        let sound = Seal::of(&watch);
+        let sound = Checksum::of(&watch);
         for bit in 0..32 {
             let mut damaged = [watch; 5];
             damaged[0].from ^= 1 << bit;
@@ -272,7 +272,7 @@ fn every_flipped_bit_of_what_the_watch_keeps_changes_its_seal() {
             damaged[3].doubt ^= 1 << (bit % 16);
             damaged[4].stands ^= 1 << (bit % 16);
             for (field, damaged) in damaged.iter().enumerate() {
-                assert_ne!(Seal::of(damaged), sound, "{field} {bit}");
+                assert_ne!(Checksum::of(damaged), sound, "{field} {bit}");
             }
         }
     }

@@ -6,7 +6,7 @@ use wheeleg_plant::PlantError;
 
 /// An experiment could not be made.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
-pub enum BenchError {
+pub enum AxisSimError {
     /// The plant refused its parameters or left its range.
     #[error("the plant of the axis: {0}")]
     #[diagnostic(

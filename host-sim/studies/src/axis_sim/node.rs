@@ -20,7 +20,7 @@ use wheeleg_protocol::{
 use wheeleg_units::Micros;
 
 use super::commission::commission;
-use super::error::BenchError;
+use super::error::AxisSimError;
 use super::firmware::{Design, TICK};
 use super::run::{Action, Board, Sample};
 use wheeleg_sim::{JointBoard, identity};
@@ -55,9 +55,9 @@ impl Node {
     /// A board, switched off, commissioned with a design.
     ///
     /// # Errors
-    /// [`BenchError`] if a value of the design is outside the board's parameter
+    /// [`AxisSimError`] if a value of the design is outside the board's parameter
     /// table, or the board refuses the set.
-    pub fn new(design: &Design) -> Result<Self, BenchError> {
+    pub fn new(design: &Design) -> Result<Self, AxisSimError> {
         Self::with(design, &[])
     }
 
@@ -65,18 +65,18 @@ impl Node {
     ///
     /// # Errors
     /// As [`Node::new`].
-    pub fn with(design: &Design, others: &[(JointParam, i32)]) -> Result<Self, BenchError> {
+    pub fn with(design: &Design, others: &[(JointParam, i32)]) -> Result<Self, AxisSimError> {
         let address = Address::joint(JOINT).unwrap_or(Address::MASTER);
         // First what its parameter table does not hold: that has a name and limits.
         let commissioned = commission(design)?;
-        JointConfig::new(&design.gains, TICK).map_err(BenchError::Design)?;
+        JointConfig::new(&design.gains, TICK).map_err(AxisSimError::Design)?;
         let stored: Vec<(u16, i32)> = commissioned
             .into_iter()
             .chain(others.iter().copied())
             .map(|(parameter, raw)| (parameter.id(), raw))
             .collect();
         let board = JointBoard::new(identity(address), Some(&stored), ResetCause::PowerUp)
-            .map_err(|e| BenchError::Board(e.to_string()))?;
+            .map_err(|e| AxisSimError::Board(e.to_string()))?;
         Ok(Self {
             board,
             address,

@@ -2,12 +2,12 @@
 
 use serde_json::{Value, json};
 use wheeleg_master::dispatcher::Reject;
-use wheeleg_master::setpoint::Phase;
 use wheeleg_telemetry::EventSample;
 use wheeleg_telemetry::event::reject_name;
 use wheeleg_telemetry::messages::reject;
 
 use crate::live::Answer;
+use crate::reason::Reason;
 
 pub(crate) fn event_json(t_ns: u64, event: &EventSample) -> Value {
     json!({
@@ -27,48 +27,30 @@ pub(crate) fn done(n: u64, now_us: u64) -> Value {
     json!({ "op": "answer", "n": n, "status": "done", "master_us": now_us })
 }
 
-pub(crate) fn refused(n: u64, reason: &str, text: &str) -> Value {
-    json!({ "op": "answer", "n": n, "status": "refused", "reason": reason, "text": text })
+pub(crate) fn refused(n: u64, reason: Reason, text: &str) -> Value {
+    json!({ "op": "answer", "n": n, "status": "refused", "reason": reason.name(), "text": text })
 }
 
 pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
-    let rejected = |why: &Reject| refused(n, reject_name(why), &reject(why));
+    let rejected = |why: &Reject| refused(n, Reason::Master(reject_name(why)), &reject(why));
     match answer {
         Answer::Accepted | Answer::Done => done(n, time_us),
         Answer::Rejected(why) => rejected(why),
         Answer::Refused(why) => rejected(&Reject::Refused(*why)),
-        Answer::Paused => refused(n, "paused", "the clock stands: resume first"),
+        Answer::Paused => refused(n, Reason::Paused, "the clock stands: resume first"),
         Answer::SeenInFuture => refused(
             n,
-            "seen_in_future",
+            Reason::SeenInFuture,
             "`seen_us` is ahead of the master's time",
         ),
-        Answer::NoMaster => refused(n, "no_master", "the master does not answer"),
+        Answer::NoMaster => refused(n, Reason::NoMaster, "the master does not answer"),
         Answer::TooFast => refused(
             n,
-            "too_fast",
+            Reason::TooFast,
             "above twice real time nobody can be in control: slow down, or release the control",
         ),
-        Answer::Simulation(why) => refused(n, "simulation", &why.to_string()),
-        Answer::NotRecorded(why) => refused(n, "recording", why),
-    }
-}
-
-pub(crate) const fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "idle",
-        Phase::Homing => "homing",
-        Phase::Ready => "ready",
-        Phase::Unload => "unload",
-        Phase::Lift => "lift",
-        Phase::Reach => "reach",
-        Phase::Lower => "lower",
-        Phase::Push => "push",
-        Phase::Rest => "rest",
-        Phase::Done => "done",
-        Phase::Trajectory => "trajectory",
-        Phase::Hold => "hold",
-        Phase::Walk => "walk",
+        Answer::Simulation(why) => refused(n, Reason::Simulation, &why.to_string()),
+        Answer::NotRecorded(why) => refused(n, Reason::Recording, why),
     }
 }
 

@@ -120,15 +120,15 @@ mod tests {
     #[test]
     fn the_step_is_that_of_choked_flow_into_the_chamber() {
         let axis = AxisConfig::load("bench-vq110u").expect("built in").axis;
-        let grain = ValveResolution::of(&axis);
+        let resolution = ValveResolution::of(&axis);
         let data = axis_data(&axis);
         let volume_mm3 = data.dead_a.to_f64() * 1e3 + 314.159 * 90.0;
         let flow_mm3_s = data.conductance.to_num::<f64>() * 997_162.0;
-        let bar = 7.01325 * 1.2 * flow_mm3_s * grain.shortest_opening_ms * 1e-3 / volume_mm3;
+        let bar = 7.01325 * 1.2 * flow_mm3_s * resolution.shortest_opening_ms * 1e-3 / volume_mm3;
         // A bar on 314 mm² are 31.4 N.
         assert!(
-            (grain.force_step_n / (bar * 31.4159) - 1.0).abs() < 0.02,
-            "{grain:?}"
+            (resolution.force_step_n / (bar * 31.4159) - 1.0).abs() < 0.02,
+            "{resolution:?}"
         );
     }
 }

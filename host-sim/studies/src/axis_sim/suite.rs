@@ -11,7 +11,7 @@ use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
-pub use super::error::BenchError;
+pub use super::error::AxisSimError;
 use super::{AxisSim, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
 
@@ -134,14 +134,14 @@ pub enum StartUp {
 /// after [`StartUp::Identified`], the valves' delays.
 ///
 /// # Errors
-/// [`BenchError`].
+/// [`AxisSimError`].
 pub fn designed(
     sheet: &AxisParams,
     plant: &AxisParams,
     kind: Kind,
     start: StartUp,
     seed: u64,
-) -> Result<Design, BenchError> {
+) -> Result<Design, AxisSimError> {
     Ok(match start {
         StartUp::Sheet => design(sheet, kind),
         StartUp::Identified => design_with(sheet, identify(plant, sheet, seed)?, kind),
@@ -158,8 +158,8 @@ impl TestRig {
     /// Power-up of a board with a design on a plant at rest.
     ///
     /// # Errors
-    /// [`BenchError`].
-    pub fn new(plant: &AxisParams, design: &Design, seed: u64) -> Result<Self, BenchError> {
+    /// [`AxisSimError`].
+    pub fn new(plant: &AxisParams, design: &Design, seed: u64) -> Result<Self, AxisSimError> {
         Ok(Self {
             bench: AxisSim::new(plant, seed, Node::new(design)?)?,
             at_m: plant.initial_stroke_m,
@@ -181,21 +181,21 @@ impl TestRig {
     /// A step of the reference, recorded from 0.05 s before it.
     ///
     /// # Errors
-    /// [`BenchError`].
-    pub fn step(&mut self, to_m: f64, seconds: f64) -> Result<Trace, BenchError> {
+    /// [`AxisSimError`].
+    pub fn step(&mut self, to_m: f64, seconds: f64) -> Result<Trace, AxisSimError> {
         self.step_with(to_m, &[], seconds)
     }
 
     /// A step with loads that change.
     ///
     /// # Errors
-    /// [`BenchError`].
+    /// [`AxisSimError`].
     pub fn step_with(
         &mut self,
         to_m: f64,
         loads: &[LoadEvent],
         seconds: f64,
-    ) -> Result<Trace, BenchError> {
+    ) -> Result<Trace, AxisSimError> {
         let motion = Motion::Step {
             at_s: LEAD_S,
             from_m: self.at_m,
@@ -207,13 +207,13 @@ impl TestRig {
     /// Any motion; it must begin where the reference stands.
     ///
     /// # Errors
-    /// [`BenchError`].
+    /// [`AxisSimError`].
     pub fn run(
         &mut self,
         motion: &Motion,
         loads: &[LoadEvent],
         seconds: f64,
-    ) -> Result<Trace, BenchError> {
+    ) -> Result<Trace, AxisSimError> {
         self.at_m = motion.to_m();
         Ok(self.bench.run(motion, loads, seconds)?)
     }
@@ -226,7 +226,7 @@ pub const LEAD_S: f64 = 0.05;
 /// move.
 ///
 /// # Errors
-/// [`BenchError`].
+/// [`AxisSimError`].
 pub fn steps(
     sheet: &AxisParams,
     factors: &Factors,
@@ -235,7 +235,7 @@ pub fn steps(
     seed: u64,
     targets_m: &[f64],
     seconds: f64,
-) -> Result<Vec<Trace>, BenchError> {
+) -> Result<Vec<Trace>, AxisSimError> {
     let plant = factors.plant(sheet);
     let design = designed(sheet, &plant, kind, start, seed)?;
     let mut rig = TestRig::new(&plant, &design, seed)?;
@@ -251,14 +251,14 @@ pub fn steps(
 /// move the board is told of it.
 ///
 /// # Errors
-/// [`BenchError`].
+/// [`AxisSimError`].
 pub fn home_retract(
     plant: &AxisParams,
     design: &Design,
     seed: u64,
     preview_s: f64,
-) -> Result<Trace, BenchError> {
-    let board = Firmware::new(design).map_err(BenchError::Design)?;
+) -> Result<Trace, AxisSimError> {
+    let board = Firmware::new(design).map_err(AxisSimError::Design)?;
     let mut start = plant.clone();
     let stroke_m = plant.cylinder.stroke_m;
     start.initial_stroke_m = 0.9 * stroke_m;

@@ -8,15 +8,15 @@ use wheeleg_control::joint::{Correction, Law};
 use wheeleg_protocol::param::{Format, JointParam, ParamInfo};
 use wheeleg_units::PositionMm;
 
-use super::error::BenchError;
+use super::error::AxisSimError;
 use super::firmware::Design;
 
 /// Every parameter that a design sets, raw, in ascending order of number. What
 /// the axis says nothing about (watchdog, staged exhaust) keeps its default.
 ///
 /// # Errors
-/// [`BenchError::Parameter`] names a value outside the board's table.
-pub fn commission(design: &Design) -> Result<Vec<(JointParam, i32)>, BenchError> {
+/// [`AxisSimError::Parameter`] names a value outside the board's table.
+pub fn commission(design: &Design) -> Result<Vec<(JointParam, i32)>, AxisSimError> {
     let mut list: Vec<(JointParam, i32)> = JointParam::ALL
         .iter()
         .filter_map(|p| Some((*p, raw(design, *p)?)))
@@ -25,7 +25,7 @@ pub fn commission(design: &Design) -> Result<Vec<(JointParam, i32)>, BenchError>
     for (parameter, raw) in &list {
         let row = parameter.info();
         if !row.permits(*raw) {
-            return Err(BenchError::Parameter {
+            return Err(AxisSimError::Parameter {
                 name: row.name,
                 value: value(row, *raw),
                 min: value(row, row.min),

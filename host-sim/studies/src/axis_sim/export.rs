@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_plant::chamber::GasModel;
 
-use super::suite::BenchError;
+use super::suite::AxisSimError;
 use super::{AxisSim, Firmware, Kind, Motion, Trace, design};
 
 /// Length of each sequence \[ms\].
@@ -20,8 +20,8 @@ const LAWS: [Kind; 4] = [Kind::Predictive, Kind::FuzzyPd, Kind::PwmPid, Kind::On
 /// pressures \[Pa\] at every tick's start.
 ///
 /// # Errors
-/// [`BenchError`].
-pub fn sequences(name: &str, params: &AxisParams) -> Result<Value, BenchError> {
+/// [`AxisSimError`].
+pub fn sequences(name: &str, params: &AxisParams) -> Result<Value, AxisSimError> {
     let full = with_every_choice(params);
     let plants = [
         plant("as it is", params, 1..=4, &LAWS)?,
@@ -49,7 +49,7 @@ fn plant(
     params: &AxisParams,
     seeds: std::ops::RangeInclusive<u64>,
     laws: &[Kind],
-) -> Result<Value, BenchError> {
+) -> Result<Value, AxisSimError> {
     let mut cases = Vec::new();
     for seed in seeds {
         cases.push(open_loop(params, seed)?);
@@ -61,7 +61,7 @@ fn plant(
 }
 
 /// Random modes of 10 to 60 ms, from a third of the stroke.
-fn open_loop(params: &AxisParams, seed: u64) -> Result<Value, BenchError> {
+fn open_loop(params: &AxisParams, seed: u64) -> Result<Value, AxisSimError> {
     let mut p = params.clone();
     p.initial_stroke_m = 0.4 * p.cylinder.stroke_m;
     p.cylinder.initial_pressure_a_pa = 4e5;
@@ -94,11 +94,11 @@ fn open_loop(params: &AxisParams, seed: u64) -> Result<Value, BenchError> {
     }))
 }
 
-fn closed_loop(params: &AxisParams, kind: Kind) -> Result<Value, BenchError> {
+fn closed_loop(params: &AxisParams, kind: Kind) -> Result<Value, AxisSimError> {
     let stroke_m = params.cylinder.stroke_m;
     let mut p = params.clone();
     p.initial_stroke_m = 0.25 * stroke_m;
-    let board = Firmware::new(&design(&p, kind)).map_err(BenchError::Design)?;
+    let board = Firmware::new(&design(&p, kind)).map_err(AxisSimError::Design)?;
     let mut bench = AxisSim::new(&p, 5, board)?;
     let step = Motion::Step {
         at_s: 0.02,

@@ -20,18 +20,18 @@ impl WordSum {
     pub(crate) fn words(&mut self, words: &[i32]) {
         let (fours, rest) = words.as_chunks::<4>();
         for [a, b, c, d] in fours {
-            self.mix(a.cast_unsigned());
-            self.mix(b.cast_unsigned());
-            self.mix(c.cast_unsigned());
-            self.mix(d.cast_unsigned());
+            self.checksum_step(a.cast_unsigned());
+            self.checksum_step(b.cast_unsigned());
+            self.checksum_step(c.cast_unsigned());
+            self.checksum_step(d.cast_unsigned());
         }
         for word in rest {
-            self.mix(word.cast_unsigned());
+            self.checksum_step(word.cast_unsigned());
         }
     }
 
     #[inline(always)]
-    fn mix(&mut self, word: u32) {
+    fn checksum_step(&mut self, word: u32) {
         // Odd multiplier (Knuth, 2^32 / golden ratio): a bijection.
         self.0 = self.0.wrapping_mul(0x9E37_79B1).wrapping_add(word);
     }
@@ -45,45 +45,45 @@ impl Hasher for WordSum {
         let (words, rest) = bytes.as_chunks::<4>();
         let (fours, words) = words.as_chunks::<4>();
         for [a, b, c, d] in fours {
-            self.mix(u32::from_ne_bytes(*a));
-            self.mix(u32::from_ne_bytes(*b));
-            self.mix(u32::from_ne_bytes(*c));
-            self.mix(u32::from_ne_bytes(*d));
+            self.checksum_step(u32::from_ne_bytes(*a));
+            self.checksum_step(u32::from_ne_bytes(*b));
+            self.checksum_step(u32::from_ne_bytes(*c));
+            self.checksum_step(u32::from_ne_bytes(*d));
         }
         for word in words {
-            self.mix(u32::from_ne_bytes(*word));
+            self.checksum_step(u32::from_ne_bytes(*word));
         }
         for byte in rest {
-            self.mix(u32::from(*byte));
+            self.checksum_step(u32::from(*byte));
         }
     }
 
     #[inline(always)]
     fn write_u8(&mut self, word: u8) {
-        self.mix(u32::from(word));
+        self.checksum_step(u32::from(word));
     }
 
     #[inline(always)]
     fn write_u16(&mut self, word: u16) {
-        self.mix(u32::from(word));
+        self.checksum_step(u32::from(word));
     }
 
     #[inline(always)]
     fn write_u32(&mut self, word: u32) {
-        self.mix(word);
+        self.checksum_step(word);
     }
 
     #[inline(always)]
     fn write_u64(&mut self, word: u64) {
         // Low and high halves, both whole.
-        self.mix((word & 0xFFFF_FFFF) as u32);
-        self.mix(word.wrapping_shr(32) as u32);
+        self.checksum_step((word & 0xFFFF_FFFF) as u32);
+        self.checksum_step(word.wrapping_shr(32) as u32);
     }
 
     #[inline(always)]
     fn write_usize(&mut self, word: usize) {
         // Lengths and discriminants: equal on 32 and 64 bit machines.
-        self.mix((word & 0xFFFF_FFFF) as u32);
+        self.checksum_step((word & 0xFFFF_FFFF) as u32);
     }
 
     fn finish(&self) -> u64 {
@@ -93,18 +93,18 @@ impl Hasher for WordSum {
 
 /// The sum of sealed state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Seal {
+pub struct Checksum {
     sum: u32,
 }
 
-impl Seal {
-    /// Seal of `state`.
+impl Checksum {
+    /// Checksum of `state`.
     #[inline(always)]
     pub fn of<T: Hash + ?Sized>(state: &T) -> Self {
         Self::made(|sum| state.hash(sum))
     }
 
-    /// Seal of what `write` puts into the sum.
+    /// Checksum of what `write` puts into the sum.
     #[inline(always)]
     pub(crate) fn made(write: impl FnOnce(&mut WordSum)) -> Self {
         let mut sum = WordSum(0);
@@ -122,16 +122,16 @@ impl Seal {
 /// Seals of what only a request changes, part by part. A tick looks at one of
 /// them, so a flipped bit is found within as many ticks as there are parts.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PartSeals<const PARTS: usize> {
-    seals: [Seal; PARTS],
+pub(crate) struct PartChecksums<const PARTS: usize> {
+    seals: [Checksum; PARTS],
     turn: u8,
 }
 
-impl<const PARTS: usize> PartSeals<PARTS> {
+impl<const PARTS: usize> PartChecksums<PARTS> {
     /// Nothing sealed yet.
     pub(crate) const fn new() -> Self {
         Self {
-            seals: [Seal { sum: 0 }; PARTS],
+            seals: [Checksum { sum: 0 }; PARTS],
             turn: 0,
         }
     }
@@ -147,18 +147,18 @@ impl<const PARTS: usize> PartSeals<PARTS> {
 
     /// Whether a part is as it was. One that does not exist is damage, too.
     #[inline]
-    pub(crate) fn holds(&self, part: usize, now: Seal) -> bool {
+    pub(crate) fn holds(&self, part: usize, now: Checksum) -> bool {
         self.seals.get(part) == Some(&now)
     }
 
     /// Whether all parts are as they were.
-    pub(crate) fn all_hold(&self, now: impl Fn(usize) -> Seal) -> bool {
+    pub(crate) fn all_hold(&self, now: impl Fn(usize) -> Checksum) -> bool {
         let mut parts = self.seals.iter().zip(0..);
         parts.all(|(seal, part)| *seal == now(part))
     }
 
     /// Seals all parts.
-    pub(crate) fn set(&mut self, seals: [Seal; PARTS]) {
+    pub(crate) fn set(&mut self, seals: [Checksum; PARTS]) {
         self.seals = seals;
     }
 }
@@ -169,26 +169,26 @@ mod tests {
 
     #[test]
     fn every_part_has_its_turn_and_a_damaged_turn_is_damage() {
-        let mut seals = PartSeals::<3>::new();
+        let mut seals = PartChecksums::<3>::new();
         let state = [1_u32, 2, 3];
-        seals.set(core::array::from_fn(|part| Seal::of(&state[part])));
+        seals.set(core::array::from_fn(|part| Checksum::of(&state[part])));
         for part in [0, 1, 2, 0, 1, 2] {
             assert_eq!(seals.next(), part);
-            assert!(seals.holds(part, Seal::of(&state[part])));
-            assert!(!seals.holds(part, Seal::of(&0_u32)));
+            assert!(seals.holds(part, Checksum::of(&state[part])));
+            assert!(!seals.holds(part, Checksum::of(&0_u32)));
         }
-        assert!(seals.all_hold(|part| Seal::of(&state[part])));
-        assert!(!seals.all_hold(|part| Seal::of(&(state[part] ^ u32::from(part == 2)))));
+        assert!(seals.all_hold(|part| Checksum::of(&state[part])));
+        assert!(!seals.all_hold(|part| Checksum::of(&(state[part] ^ u32::from(part == 2)))));
         seals.turn = 0x80;
         let part = seals.next();
-        assert!(!seals.holds(part, Seal::default()));
+        assert!(!seals.holds(part, Checksum::default()));
         assert_eq!(seals.next(), 0, "back in the round");
     }
 
     #[test]
     fn every_single_bit_flip_is_detected() {
         let state = [0_i32, -1, 0x1234_5678, i32::MIN, 7];
-        let seal = Seal::of(&state);
+        let seal = Checksum::of(&state);
         assert!(seal.holds(&state));
         for word in 0..state.len() {
             for bit in 0..32 {
@@ -204,7 +204,7 @@ mod tests {
         const WORDS: usize = 24;
         let state: [u32; WORDS] =
             core::array::from_fn(|i| (i as u32 + 1).wrapping_mul(0x85EB_CA6B) >> (i % 20));
-        let seal = Seal::of(&state);
+        let seal = Checksum::of(&state);
         let (mut pairs, mut missed) = (0_u32, 0_u32);
         for first in 0..WORDS * 32 {
             for second in 0..first {
@@ -223,14 +223,15 @@ mod tests {
 
     #[test]
     fn every_integer_is_taken_as_its_words() {
-        let of =
-            |words: &[u32]| Seal::made(|sum| words.iter().for_each(|word| sum.write_u32(*word)));
-        assert_eq!(Seal::of(&(0x12_u8, 0x3456_u16)), of(&[0x12, 0x3456]));
+        let of = |words: &[u32]| {
+            Checksum::made(|sum| words.iter().for_each(|word| sum.write_u32(*word)))
+        };
+        assert_eq!(Checksum::of(&(0x12_u8, 0x3456_u16)), of(&[0x12, 0x3456]));
         assert_eq!(
-            Seal::of(&0x1234_5678_9ABC_DEF0_u64),
+            Checksum::of(&0x1234_5678_9ABC_DEF0_u64),
             of(&[0x9ABC_DEF0, 0x1234_5678])
         );
-        assert_eq!(Seal::of(&0x1234_5678_usize), of(&[0x1234_5678]));
+        assert_eq!(Checksum::of(&0x1234_5678_usize), of(&[0x1234_5678]));
         let mut sum = WordSum(0);
         0x1234_u16.hash(&mut sum);
         assert_eq!(sum.finish(), 0x1234);
@@ -238,7 +239,7 @@ mod tests {
 
     #[test]
     fn exchanged_words_are_detected() {
-        assert!(!Seal::of(&[1_u32, 2]).holds(&[2_u32, 1]));
-        assert!(!Seal::of(&(1_u64, 0_u8)).holds(&(1_u64 << 32, 0_u8)));
+        assert!(!Checksum::of(&[1_u32, 2]).holds(&[2_u32, 1]));
+        assert!(!Checksum::of(&(1_u64, 0_u8)).holds(&(1_u64 << 32, 0_u8)));
     }
 }

@@ -299,7 +299,7 @@ fn sensor(axis: &AxisParams) -> SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::{Delays, Node, design_with};
+    use crate::axis_sim::{Delays, Node, design_with};
     use wheeleg_config::AxisConfig;
 
     /// Valves of a few milliseconds and of forty: every controller's design is one that a

@@ -8,7 +8,7 @@
 //! seed, motion and loads; a second of it takes about 2 ms.
 //!
 //! ```
-//! use wheeleg_studies::bench::{AxisSim, Firmware, Kind, Metrics, Motion, design};
+//! use wheeleg_studies::axis_sim::{AxisSim, Firmware, Kind, Metrics, Motion, design};
 //! use wheeleg_config::AxisConfig;
 //!
 //! let axis = AxisConfig::load("bench-vq110u")?.axis;

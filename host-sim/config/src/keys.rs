@@ -1,0 +1,139 @@
+//! Keys of scenario files: what the reader takes, and what the reference says of it. One table.
+
+/// A key.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// As in the file.
+    pub key: &'static str,
+    /// What may be written.
+    pub value: &'static str,
+    /// Meaning.
+    pub what: &'static str,
+}
+
+const fn key(key: &'static str, value: &'static str, what: &'static str) -> Key {
+    Key { key, value, what }
+}
+
+/// The names alone, for the reader.
+pub(crate) const fn names<const N: usize>(keys: &[Key; N]) -> [&'static str; N] {
+    let mut names = [""; N];
+    let mut i = 0;
+    while i < N {
+        names[i] = keys[i].key;
+        i += 1;
+    }
+    names
+}
+
+/// Before the first section, and the names of the sections.
+pub const TOP: [Key; 12] = [
+    key("name", "text", "part of the output folder; free"),
+    key("description", "text", "one line"),
+    key(
+        "robot",
+        "text",
+        "a built-in robot, or the path of a robot file, counted from the scenario's folder",
+    ),
+    key(
+        "duration",
+        "time",
+        "simulated after the start pose is reached",
+    ),
+    key("seed", "whole number", "of all noise; `--seed` replaces it"),
+    key(
+        "targets",
+        "one of the sets below",
+        "what the run is judged by",
+    ),
+    key("motion", "section", "what the robot does"),
+    key(
+        "behaviours",
+        "section",
+        "`off`: a list of behaviours of a walk that do not act; may be left out",
+    ),
+    key("events", "sections", "what happens to it; may be left out"),
+    key(
+        "terrain",
+        "sections",
+        "what it stands on; a level floor where left out",
+    ),
+    key(
+        "faults",
+        "list of texts",
+        "faults to inject, as `--fault` takes them; may be left out",
+    ),
+    key(
+        "bars",
+        "sections",
+        "what its way over the ground must keep to; may be left out",
+    ),
+];
+
+const KIND: Key = key("kind", "text", "the motion");
+const LEG: Key = key("leg", "\"left\" or \"right\"", "the leg that moves");
+
+/// `[motion]` with `kind = "stand"`.
+pub const STAND: [Key; 1] = [KIND];
+/// With `kind = "square-wave"`.
+pub const SQUARE_WAVE: [Key; 2] = [KIND, LEG];
+/// With `kind = "sinusoid"`.
+pub const SINUSOID: [Key; 5] = [
+    KIND,
+    LEG,
+    key(
+        "length",
+        "length",
+        "way of the foot over the whole arch: `forward` of the command `FootTrajectory`",
+    ),
+    key("height", "length", "of the arch, as of that command"),
+    key(
+        "rate",
+        "angular rate",
+        "of the sine's argument, as of that command",
+    ),
+];
+/// With `kind = "walk"`.
+pub const WALK: [Key; 6] = [
+    KIND,
+    key("speed", "velocity", "as of the command `Walk`"),
+    key("turn", "angular rate", "as of that command"),
+    key("pattern", "text", "as of that command"),
+    key("lift", "length", "as of that command"),
+    key("nose", "length", "as of that command"),
+];
+
+/// Kinds of motion.
+pub const MOTIONS: [(&str, &[Key]); 4] = [
+    ("stand", &STAND),
+    ("square-wave", &SQUARE_WAVE),
+    ("sinusoid", &SINUSOID),
+    ("walk", &WALK),
+];
+
+/// `[[events]]`, beside the arguments of a command.
+pub const EVENT: [Key; 3] = [
+    key(
+        "at",
+        "time",
+        "from the begin of the motion, within `duration`",
+    ),
+    key(
+        "action",
+        "text",
+        "`kill-master`, `e-stop`, `clear-fault` or `command`",
+    ),
+    key(
+        "command",
+        "text",
+        "with `action = \"command\"`: a command of the master, its arguments beside it",
+    ),
+];
+
+/// `[[bars]]`.
+pub const BAR: [Key; 4] = [
+    key("measure", "one of the measures below", "what is measured"),
+    key("min", "in the unit of the measure", "smallest allowed"),
+    key("max", "in the unit of the measure", "largest allowed"),
+    key("info", "0 or 1", "1: it informs only; 0 where left out"),
+];

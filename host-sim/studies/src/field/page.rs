@@ -1,0 +1,179 @@
+//! The page: the paper's claims on top, then each scenario over its seeds.
+
+use serde::Serialize;
+
+use super::{Measured, Met, Summary};
+use crate::StudyError;
+use crate::study::Stopped;
+use wheeleg_report::number::fixed;
+use wheeleg_report::{Picture, page, pictures, plot::Figure};
+
+const TEMPLATE: &str = include_str!("page.html");
+
+/// What is assumed wherever a number of this page stands.
+const ASSUMED: &[&str] = &[
+    "Soil: \"volcanic-sand\" was chosen where 20 degrees are near its limit, so climbing them there would be consistency, not evidence.",
+    "Wheels: radius 0.15 m; for sand 0.10 m wide with lugs of 15 mm.",
+    "Feet: soles of 120 mm with six nails of 60 mm for sand, plain ones on rock.",
+    "Chassis: belly 0.12 m above the ground; centre of gravity 0.09 m ahead of the axle and 0.20 m high.",
+    "Rocks do not move; wheels leave no ruts and push no sand; the paper names no soil, no duration and no number of rocks.",
+];
+
+/// What the template shows.
+#[derive(Serialize)]
+struct Page<'a> {
+    version: &'static str,
+    verdict: String,
+    stopped: Option<String>,
+    summary: &'a Summary,
+    claims: Vec<ClaimRow<'a>>,
+    scenarios: Vec<ScenarioRow<'a>>,
+    failures: Vec<Failure<'a>>,
+    figures: Vec<Picture<'a>>,
+    assumed: &'static [&'static str],
+}
+
+#[derive(Serialize)]
+struct ClaimRow<'a> {
+    claim: &'a super::claims::Judged,
+    class: &'static str,
+    word: &'static str,
+    value: String,
+    interval: String,
+}
+
+#[derive(Serialize)]
+struct ScenarioRow<'a> {
+    tried: &'a super::Tried,
+    all: bool,
+    interval: String,
+    measured: Vec<MeasuredRow<'a>>,
+}
+
+#[derive(Serialize)]
+struct MeasuredRow<'a> {
+    measured: &'a Measured,
+    class: &'static str,
+    bar: String,
+    value: String,
+}
+
+#[derive(Serialize)]
+struct Failure<'a> {
+    run: &'a super::Run,
+    why: String,
+}
+
+/// A mean with its range, at a useful number of digits.
+fn value(m: &Measured) -> String {
+    let Some((mean, low, high)) = m
+        .mean
+        .zip(m.lowest)
+        .zip(m.highest)
+        .map(|((a, b), c)| (a, b, c))
+    else {
+        return "not measured".to_owned();
+    };
+    let digits = match high.abs().max(low.abs()) {
+        large if large >= 100.0 => 0,
+        middle if middle >= 10.0 => 1,
+        _ => 3,
+    };
+    format!(
+        "{} ({} to {}) {}",
+        fixed(mean, digits),
+        fixed(low, digits),
+        fixed(high, digits),
+        unit(m)
+    )
+    .trim_end()
+    .to_owned()
+}
+
+/// A pure number has none.
+fn unit(m: &Measured) -> &str {
+    if m.unit == "1" { "" } else { m.unit }
+}
+
+fn bar(m: &Measured) -> String {
+    let band = match (m.min, m.max) {
+        (Some(min), Some(max)) => format!("{min} to {max}"),
+        (Some(min), None) => format!("at least {min}"),
+        (None, Some(max)) => format!("at most {max}"),
+        (None, None) => return String::new(),
+    };
+    format!("{band} {}", unit(m)).trim_end().to_owned()
+}
+
+fn interval([low, high]: [f64; 2]) -> String {
+    format!("{} to {} %", fixed(1e2 * low, 0), fixed(1e2 * high, 0))
+}
+
+/// The page's first sentence.
+fn verdict(summary: &Summary) -> String {
+    let met = summary.claims.iter().filter(|c| c.met == Met::Met).count();
+    let passed = summary.runs.iter().filter(|run| run.passed).count();
+    format!(
+        "{met} of {} claims of the paper are met on the assumed ground; {passed} of {} runs pass.",
+        summary.claims.len(),
+        summary.runs.len()
+    )
+}
+
+pub(super) fn render(
+    summary: &Summary,
+    stopped: Option<&Stopped>,
+    figures: &[(Figure, String)],
+) -> Result<String, StudyError> {
+    let claims = summary.claims.iter().map(|claim| ClaimRow {
+        claim,
+        class: match claim.met {
+            Met::Met => "pass",
+            Met::InPart => "info",
+            Met::NotMet => "fail",
+        },
+        word: claim.met.word(),
+        value: value(&claim.measured),
+        interval: interval(claim.interval),
+    });
+    let scenarios = summary.scenarios.iter().map(|tried| ScenarioRow {
+        tried,
+        all: tried.passed == tried.runs,
+        interval: interval(tried.interval),
+        measured: tried
+            .measured
+            .iter()
+            .map(|measured| MeasuredRow {
+                measured,
+                class: match (measured.met == tried.runs, measured.required) {
+                    (true, _) => "pass",
+                    (false, true) => "fail",
+                    (false, false) => "info",
+                },
+                bar: bar(measured),
+                value: value(measured),
+            })
+            .collect(),
+    });
+    let failures = summary.runs.iter().filter(|run| !run.passed).map(|run| {
+        let missed = run.bars.iter().filter(|b| b.required && !b.pass);
+        let missed = missed.map(|b| format!("{} {}", b.id, b.value_text()));
+        let why: Vec<String> = run.error.iter().cloned().chain(missed).collect();
+        Failure {
+            run,
+            why: why.join("; "),
+        }
+    });
+    let values = Page {
+        version: env!("CARGO_PKG_VERSION"),
+        verdict: verdict(summary),
+        stopped: stopped.map(ToString::to_string),
+        summary,
+        claims: claims.collect(),
+        scenarios: scenarios.collect(),
+        failures: failures.collect(),
+        figures: pictures(figures),
+        assumed: ASSUMED,
+    };
+    Ok(page(TEMPLATE, values)?)
+}

@@ -1,0 +1,115 @@
+//! Exit codes: one table for each command that has its own. Helps are printed from them, and the
+//! page of the reference from the helps.
+
+use std::fmt::Write as _;
+
+use wheeleg_studies::study::Signal;
+
+/// Exit code when `--strict` is given and a required target is not met, or a check fails.
+pub(super) const TARGETS_MISSED: u8 = 1;
+/// Exit code of what is refused.
+pub(super) const REFUSED: u8 = 1;
+/// Exit code of any error (wrong input, unwritable output, failed simulation).
+pub(super) const FAILED: u8 = 2;
+/// Exit code where cases have no row yet.
+pub(super) const INCOMPLETE: u8 = 3;
+/// Exit code of a connection that ended, or of a stop that nobody confirms.
+pub(super) const LOST: u8 = 3;
+/// Exit code of a campaign that cannot write: that of sysexits.h for input and output.
+const CANNOT_WRITE: u8 = 74;
+/// Exit code of a process that was asked to stop, and is to be started again.
+pub(super) const TRY_AGAIN: u8 = 75;
+
+/// A code and when it comes.
+type Table = [(u8, &'static str)];
+
+/// Of every command without a table of its own.
+pub(super) const PROGRAM: &Table = &[
+    (0, "done (with --strict: and all required targets met)"),
+    (
+        TARGETS_MISSED,
+        "a required target is not met (--strict only), or a checked quantity beyond tolerance",
+    ),
+    (FAILED, "error"),
+    (
+        Signal::HangUp.exit_code(),
+        "stopped by a hang-up; the files hold what was done until then",
+    ),
+    (
+        Signal::Interrupt.exit_code(),
+        "stopped with Ctrl-C; the same",
+    ),
+    (
+        Signal::Terminate.exit_code(),
+        "stopped with SIGTERM; the same",
+    ),
+];
+
+/// Of `wheeleg campaign`.
+pub(super) const CAMPAIGN: &Table = &[
+    (0, "every case (of this shard) has a row"),
+    (
+        TARGETS_MISSED,
+        "a required target is missed (--strict only)",
+    ),
+    (FAILED, "error"),
+    (INCOMPLETE, "incomplete: cases have no row yet"),
+    (CANNOT_WRITE, "a file cannot be written"),
+    (
+        TRY_AGAIN,
+        "stopped with SIGTERM or by a hang-up; run it again",
+    ),
+    (Signal::Interrupt.exit_code(), "stopped with Ctrl-C"),
+];
+
+/// Of `wheeleg ctl`.
+pub(super) const CTL: &Table = &[
+    (0, "done"),
+    (REFUSED, "refused"),
+    (FAILED, "error"),
+    (LOST, "the connection ended, or nobody confirms"),
+];
+
+/// Of `wheeleg replay`.
+pub(super) const REPLAY: &Table = &[
+    (0, "the robot did the same to the bit"),
+    (
+        TARGETS_MISSED,
+        "it did not, or there is nothing to compare with",
+    ),
+    (FAILED, "error"),
+];
+
+/// The end of a command's help.
+pub(super) fn help(table: &Table) -> String {
+    let mut text = String::from("Exit codes:\n");
+    for (code, when) in table {
+        let _ = writeln!(text, "  {code:<3}  {when}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_campaign::CampaignError;
+
+    #[test]
+    fn codes_are_told_apart_and_in_order() {
+        for table in [PROGRAM, CAMPAIGN, CTL, REPLAY] {
+            assert!(table.windows(2).all(|pair| pair[0].0 < pair[1].0));
+            assert_eq!(table[0].0, 0);
+        }
+    }
+
+    /// The library of campaigns has codes, too: they are those of the table.
+    #[test]
+    fn errors_of_campaigns_end_with_the_codes_of_their_table() {
+        let full = CampaignError::Output {
+            action: "write",
+            path: "here".into(),
+            reason: std::io::Error::from(std::io::ErrorKind::StorageFull),
+        };
+        assert_eq!(full.exit_code(), CANNOT_WRITE);
+    }
+}

@@ -1,0 +1,84 @@
+//! `wheeleg field`: the walks over terrain, on several seeds, beside what the paper claims.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use wheeleg_studies::StudyError;
+use wheeleg_studies::field::{self, Options, SCENARIOS, Summary};
+
+use super::{end, settings, whole};
+
+/// Arguments of `wheeleg field`.
+#[derive(Debug, Args)]
+pub(super) struct FieldArgs {
+    /// Scenarios to try [default: all]
+    #[arg(value_parser = PossibleValuesParser::new(SCENARIOS), value_name = "SCENARIO")]
+    scenarios: Vec<String>,
+    /// All scenarios, as without a name.
+    #[arg(long, conflicts_with = "scenarios")]
+    all: bool,
+    /// Seeds of each scenario, 1 to 1000: of the noise and, on rocks, of the field.
+    #[arg(long, default_value_t = 5, value_parser = whole(1_u32, 1000))]
+    seeds: u32,
+    /// Folder for page, pictures and summary. Results of an earlier run in it
+    /// move to its folder `previous`.
+    #[arg(long, value_name = "DIR", default_value = "runs/field")]
+    out: PathBuf,
+    /// Write the pictures as PNG, too, beside the SVG ones.
+    #[arg(long)]
+    png: bool,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+    /// Exit with code 1 if a run misses a required bar.
+    #[arg(long)]
+    strict: bool,
+}
+
+/// Runs and writes everything.
+pub(super) fn command(args: &FieldArgs) -> Result<ExitCode, StudyError> {
+    let wanted = |name: &str| args.scenarios.is_empty() || args.scenarios.iter().any(|s| s == name);
+    let options = Options {
+        scenarios: SCENARIOS
+            .iter()
+            .copied()
+            .filter(|name| wanted(name))
+            .collect(),
+        seeds: args.seeds,
+    };
+    let finished = field::write(&options, &settings(&args.out, args.png)?)?;
+    let text = |summary: &Summary| {
+        let mut out = text(summary);
+        let _ = writeln!(out, "report     {}", finished.report.display());
+        out
+    };
+    let passed = !args.strict || finished.result.passed();
+    end(&finished, args.json, text, passed)
+}
+
+fn text(summary: &Summary) -> String {
+    let mut out = String::new();
+    for c in &summary.claims {
+        let mean = c
+            .measured
+            .mean
+            .map_or_else(|| "-".to_owned(), |m| format!("{m:.2}"));
+        let _ = writeln!(
+            out,
+            "{:12} {:32} {} {mean} {}, {} of {} runs pass",
+            c.met.word(),
+            c.paper,
+            c.measured.measure,
+            c.measured.unit,
+            c.passed,
+            c.runs
+        );
+    }
+    for s in &summary.scenarios {
+        let _ = writeln!(out, "{:16} {} of {} pass", s.scenario, s.passed, s.runs);
+    }
+    out
+}
