@@ -123,7 +123,7 @@ pub(super) const PAIRS: &[Pair] = &[
         robot: "wheeleg",
         metric: "stalled swings and swings that a board took for a fault",
         less: true,
-        bar: 0.2,
+        bar: 0.6,
         required: true,
         duration_s: 15.0,
         walk: LOW,
