@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use wheeleg_identity::sources;
 
 /// Whatever this crate is built from.
-const NAMES: [&str; 19] = [
+const NAMES: [&str; 20] = [
     "Cargo.toml",
     "Cargo.lock",
     "protocol",
@@ -25,6 +25,7 @@ const NAMES: [&str; 19] = [
     "host-sim/report",
     "host-sim/sim",
     "host-sim/studies",
+    "host-sim/scene",
     "host-sim/telemetry",
     "host-sim/campaign",
 ];

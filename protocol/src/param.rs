@@ -356,7 +356,7 @@ parameters! {
             "Largest valid code.";
         SensorMin = 0x011E, "sensor_min", "mm", I16F16, "-50" ..= "500", default "-5", disarmed,
             "Stroke below which the axis is over its travel.";
-        SensorMax = 0x011F, "sensor_max", "mm", I16F16, "-50" ..= "500", default "185", disarmed,
+        SensorMax = 0x011F, "sensor_max", "mm", I16F16, "-50" ..= "525", default "185", disarmed,
             "Stroke above which the axis is over its travel.";
         SensorRate = 0x0120, "sensor_rate", "mm/s", I16F16, "100" ..= "20000", default "3000", disarmed,
             "Largest credible speed; faster is a sensor fault.";

@@ -6,7 +6,8 @@ Every channel must have a topic, a schema (name, encoding `jsonschema`, one
 property per field, each with a type and a unit) and at least one message; only a
 channel that is written on change may be empty, but for those of events.
 Every message must be JSON that fits its schema, and the time of a channel must
-never run backwards. Ends with 0 if all of that holds, with 1 and one line per defect if
+never run backwards. A channel whose schema is one of Foxglove's has no units; its
+messages are held against that schema with all that it says. Ends with 0 if all of that holds, with 1 and one line per defect if
 not, with 2 if there is no log to check.
 """
 
@@ -15,11 +16,15 @@ import math
 import sys
 from pathlib import Path
 
+import jsonschema
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
 # Defects shown per log; a broken writer makes the same one a thousand times.
 SHOWN = 40
+
+# Schemas that others publish.
+FOREIGN = "foxglove."
 
 # Written on change, and never empty.
 EVENTS = ("/events", "/run")
@@ -61,6 +66,8 @@ def check_schema(channel, schema, defect):
         return {}
     if root.get("type") != "object":
         defect(f"{topic}: schema type {root.get('type')!r}, not 'object'")
+    if schema.name.startswith(FOREIGN):
+        return {}
     for name, field in properties.items():
         unit = field.get("unit")
         if not isinstance(unit, str) or not unit.strip():
@@ -95,6 +102,18 @@ def check_message(topic, properties, data, defect):
             defect(f"{topic}.{name}: {value[name]!r} is no {field.get('type')}")
 
 
+def check_foreign(topic, validator, data, defect):
+    """Check one message against a schema that others publish."""
+    try:
+        value = json.loads(data)
+    except ValueError as error:
+        defect(f"{topic}: message is not JSON: {error}")
+        return
+    error = next(validator.iter_errors(value), None)
+    if error is not None:
+        defect(f"{topic}: {error.json_path}: {error.message}")
+
+
 def check(path):
     """All defects of the log at `path`, and a table of (topic, schema, messages)."""
     defects = []
@@ -116,6 +135,12 @@ def check(path):
             if channel.topic in topics:
                 defects.append(f"{channel.topic}: two channels of this name")
             topics[channel.topic] = channel.id
+        foreign = {
+            channel.id: jsonschema.Draft202012Validator(json.loads(summary.schemas[channel.schema_id].data))
+            for channel in summary.channels.values()
+            if channel.schema_id in summary.schemas
+            and summary.schemas[channel.schema_id].name.startswith(FOREIGN)
+        }
         last = {}
         try:
             # In the order of the file: within a channel it must be the order of time.
@@ -124,7 +149,9 @@ def check(path):
                     defects.append(f"{channel.topic}: time runs backwards at {message.log_time} ns")
                 last[channel.id] = message.log_time
                 counts[channel.id] += 1
-                if properties[channel.id]:
+                if channel.id in foreign:
+                    check_foreign(channel.topic, foreign[channel.id], message.data, defects.append)
+                elif properties[channel.id]:
                     check_message(channel.topic, properties[channel.id], message.data, defects.append)
                 if len(defects) > SHOWN:
                     break

@@ -52,6 +52,17 @@ class CheckMcap(unittest.TestCase):
         self.assertEqual(self.defects(metadata={"unit.position_mm": "mm"}), [])
         self.refused("another in the metadata", metadata={"unit.position_mm": "m"})
 
+    def test_foreign(self):
+        schema = {
+            "type": "object",
+            "properties": {"level": {"oneOf": [{"const": 2}, {"const": 4}]}},
+            "required": ["level"],
+        }
+        log = {"name": "foxglove.Log", "schema": schema}
+        self.assertEqual(self.defects(messages=((0, {"level": 2}),), **log), [])
+        self.refused("level", messages=((0, {"level": 3}),), **log)
+        self.refused("required", messages=((0, {}),), **log)
+
     def test_description(self):
         self.refused("no topic", topic=" ")
         self.refused("schema without a name", name="")

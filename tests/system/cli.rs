@@ -108,7 +108,7 @@ fn json_is_one_object_with_every_key() {
     ] {
         assert!(object.contains_key(key), "no `{key}` in {json}");
     }
-    assert_eq!(json["seed"], 3);
+    assert_eq!(json["seed"], "3");
     let recorded = json["recorded_s"].as_f64().expect("a number");
     assert!((recorded - 0.5).abs() < 1e-6, "{recorded}");
     // The start-up is simulated too.
@@ -551,4 +551,87 @@ fn a_board_of_another_interface_is_answered_with_what_to_do_about_it() {
         .assert()
         .failure()
         .stderr(contains("build and flash this board").and(contains("supply").not()));
+}
+
+/// A program that nobody listens to works as one that somebody does.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_error_ends_nothing() {
+    let dir = folder();
+    let out = dir.path().join("out");
+    let full = || {
+        let file = fs::OpenOptions::new().write(true).open("/dev/full");
+        std::process::Stdio::from(file.expect("/dev/full"))
+    };
+    let run = |scenario: &Path| {
+        std::process::Command::new(program::path())
+            .args(["run", "--out"])
+            .args([&out, scenario])
+            .stderr(full())
+            .stdout(std::process::Stdio::null())
+            .status()
+            .expect("start")
+    };
+    let scenario = scenario_file(dir.path(), 0.2);
+    // The second sets the results of the first aside, and would tell so.
+    for _ in 0..2 {
+        assert!(run(&scenario).success());
+    }
+    assert!(out.join("previous/log.mcap").exists());
+    assert_eq!(run(&dir.path().join("none.toml")).code(), Some(2));
+}
+
+/// What a file says of itself stands in pages, logs, tables and other files as it is.
+#[test]
+fn texts_of_a_file_are_quoted_wherever_they_go() {
+    const HOSTILE: &str = "</script><b onload='x'>\"a\", &amp; ;\u{202e}\tend";
+    let dir = folder();
+    let out = dir.path().join("out");
+    let quoted = format!("{:?}", HOSTILE)
+        .replace("\\u{202e}", "\\u202e")
+        .replace("\\'", "'");
+    let text = source("robots/wheeleg-2003.toml");
+    let text = with_line(&text, "description", &format!("description = {quoted}"));
+    let text = text.replace("\"ASSUMED: RS-485, not in the paper\"", &quoted);
+    assert_eq!(
+        text.matches("onload").count(),
+        2,
+        "description and a source"
+    );
+    let robot = write(dir.path(), "robot.toml", &text);
+    let scenario = fs::read_to_string(scenario_file(dir.path(), 0.2)).expect("written");
+    let scenario = with_line(&scenario, "description", &format!("description = {quoted}"));
+    let scenario = write(dir.path(), "hostile.toml", &scenario);
+    wheeleg()
+        .args(["run", "--robot"])
+        .arg(&robot)
+        .arg("--out")
+        .args([&out, &scenario])
+        .assert()
+        .success();
+    let page = fs::read_to_string(out.join("report.html")).expect("a page");
+    assert!(!page.contains("<b onload") && !page.contains("</script><b"));
+    assert!(page.contains("&lt;b onload"), "it is shown");
+    // A log page, a listing as JSON and an export read the same texts.
+    wheeleg()
+        .arg("view")
+        .arg(out.join("log.mcap"))
+        .assert()
+        .success();
+    let page = fs::read_to_string(out.join("log.html")).expect("a page");
+    assert!(!page.contains("<b onload"));
+    let listed = wheeleg()
+        .args(["params", "--json"])
+        .arg(&robot)
+        .assert()
+        .success();
+    let listed: Value = serde_json::from_slice(&listed.get_output().stdout).expect("JSON");
+    assert!(listed.to_string().contains("onload"));
+    let urdf = wheeleg()
+        .args(["export", "urdf"])
+        .arg(&robot)
+        .assert()
+        .success();
+    let urdf = String::from_utf8_lossy(&urdf.get_output().stdout).into_owned();
+    assert!(!urdf.contains("<b onload"));
 }

@@ -88,7 +88,9 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
             (0.5 * sheet.cylinder.stroke_m).min(0.1),
         );
         let (far, near) = (middle + 0.5 * span, middle - 0.5 * span);
-        let resolution = ValveResolution::of(&sheet).ratio;
+        let resolution = ValveResolution::of(&sheet)
+            .ratio
+            .expect("there is friction");
         let [runs, misses, alarms] = &mut tally[usize::from(resolution > COARSE)];
         for case in 0..COMBINATIONS {
             let seed = which * COMBINATIONS + case;

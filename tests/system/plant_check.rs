@@ -1,5 +1,6 @@
 //! `wheeleg plant check`, calibrated: what is sound passes, what is planted is found.
 
+use crate::axis_text::changed;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
@@ -65,22 +66,7 @@ fn text(seed: u64) -> String {
         ),
         ("sensor.potentiometer.offset", 0.05 * stroke_mm, "mm"),
     ];
-    let mut text = BENCH.to_owned();
-    for (path, value, unit) in changes {
-        let (section, key) = path.rsplit_once('.').expect("a section and a key");
-        let begin = text.find(&format!("[{section}]\n")).expect("the section");
-        let is_key = |line: &&str| line.split('=').next().is_some_and(|k| k.trim() == key);
-        let line = text[begin..]
-            .lines()
-            .find(is_key)
-            .expect("the key")
-            .to_owned();
-        let at = begin + text[begin..].find(&line).expect("it stands there");
-        let new =
-            format!("{key} = {{ value = {value:.6}, unit = \"{unit}\", source = \"ASSUMED\" }}");
-        text.replace_range(at..at + line.len(), &new);
-    }
-    text
+    changed(BENCH, &changes)
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::program;
 use wheeleg_config::faults::{KINDS, NOT_IMPLEMENTED};
 use wheeleg_config::keys::{self, Key};
 use wheeleg_config::{Measure, TARGETS, builtin};
-use wheeleg_telemetry::channels;
+use wheeleg_telemetry::{channels, derived};
 
 /// Compares a page with the committed one, or writes it.
 fn page(name: &str, title: &str, intro: &str, body: &str) {
@@ -45,13 +45,18 @@ fn channels_page() {
     let mut body = String::new();
     let mut schemas: Vec<&str> = Vec::new();
     head(&mut body, &["channel", "rate", "schema", "what"]);
-    for channel in channels() {
-        let rate = match channel.rate_hz {
+    let ours = channels()
+        .iter()
+        .map(|c| (c.topic, c.rate_hz, c.schema, c.doc));
+    let others = derived()
+        .iter()
+        .map(|c| (c.topic, c.rate_hz, c.schema, c.doc));
+    for (topic, rate_hz, schema, doc) in ours.chain(others) {
+        let rate = match rate_hz {
             0 => "on change".to_owned(),
             hz => format!("{hz} Hz"),
         };
-        let topic = format!("`{}`", channel.topic);
-        row(&mut body, &[&topic, &rate, channel.schema, channel.doc]);
+        row(&mut body, &[&format!("`{topic}`"), &rate, schema, doc]);
     }
     for channel in channels() {
         if schemas.contains(&channel.schema) {

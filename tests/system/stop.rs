@@ -177,7 +177,6 @@ fn a_run_that_is_terminated_or_hung_up_leaves_log_summary_and_report() {
     }
 }
 
-/// Both signals reach the program at once, before it could have ended by itself.
 /// Twenty instants of a run, from its first to its last milliseconds: what was begun is whole.
 #[test]
 fn a_run_can_be_terminated_at_any_time() {
@@ -212,6 +211,110 @@ fn a_run_can_be_terminated_at_any_time() {
     assert!(stopped > 0, "at least one was stopped on its way");
 }
 
+/// Every command that computes for long, each signal, twenty instants: the program ends soon, with
+/// the code of the signal or because it was done; what is there is whole, and nothing else is.
+#[test]
+fn every_long_command_can_be_stopped_at_any_time() {
+    use std::os::unix::process::ExitStatusExt as _;
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let log = dir.path().join("run/log.mcap");
+    let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
+    assert!(end(run).status.success());
+    let log = log.to_string_lossy();
+    let commands: [&[&str]; 8] = [
+        &["compare", "--axis", "bench-vq110u", "--quick"],
+        &["delay"],
+        &["faults", "run", "--all"],
+        &["tune", "bench-vq110u"],
+        &["figures"],
+        &["view", &log],
+        &["log", "recover", &log],
+        &["campaign", "run", "three-step-spread"],
+    ];
+    let signals = [("TERM", 143), ("HUP", 129), ("INT", 130)];
+    let mut stopped = 0;
+    for instant in 0..20 {
+        let arguments = commands[instant % commands.len()];
+        let (name, code) = signals[instant % signals.len()];
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let out = folder.path().join("out");
+        let mut child = start(&out, arguments, Stdio::piped);
+        std::thread::sleep(Duration::from_millis(30 + 70 * instant as u64));
+        let over = child.try_wait().expect("status").is_some();
+        if !over {
+            signal(&child, name);
+        }
+        let output = end(child);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let told = format!("{instant} {arguments:?} {name}: {stderr}");
+        let left = files_below(folder.path());
+        if output.status.signal().is_some() {
+            // Before it had begun.
+            assert_eq!(left, [""; 0], "{told}");
+            continue;
+        }
+        let campaign = arguments[0] == "campaign";
+        // A campaign that is told to end may be started again at once, which is code 75.
+        let expected = if campaign && name != "INT" { 75 } else { code };
+        let ended = output.status.code().expect("a code");
+        assert!(ended == expected || ended == 0, "{ended}, {told}");
+        assert!(
+            over || ended == 0 || !stderr.is_empty(),
+            "no message, {told}"
+        );
+        assert!(!stderr.contains("panicked"), "{told}");
+        stopped += u32::from(ended == expected);
+        let half = |file: &&String| file.contains(".tmp") || file.contains("recovered");
+        let half: Vec<&String> = left.iter().filter(half).collect();
+        assert!(half.is_empty() || ended == 0, "{half:?}, {told}");
+        if !campaign && out.is_dir() {
+            assert_valid(&summary(&out), arguments[0]);
+            assert!(out.join("report.html").exists(), "{told}");
+        }
+    }
+    assert!(stopped >= 8, "{stopped} of 20 were stopped on their way");
+}
+
+/// Paths of all files below a folder, from it.
+fn files_below(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let path = path.strip_prefix(folder).expect("below it");
+                found.push(path.to_string_lossy().into_owned());
+            }
+        }
+    }
+    found
+}
+
+/// The folder of a run goes while it is under way: the verdict is told all the same.
+#[test]
+fn a_folder_that_vanishes_costs_no_verdict() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let out = dir.path().join("out");
+    let mut child = start(&out, &["run", "three-step"], Stdio::piped);
+    let log = out.join("log.mcap");
+    wait_until(&mut child, "the log", || {
+        fs::metadata(&log).is_ok_and(|log| log.len() > 50_000)
+    });
+    fs::remove_dir_all(&out).expect("removed");
+    let output = end(child);
+    let [told, said] = [&output.stdout, &output.stderr].map(|t| String::from_utf8_lossy(t));
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(told.contains("required targets met"), "{told}");
+    assert!(
+        said.contains("summary.json") && !said.contains("panicked"),
+        "{said}"
+    );
+}
+
+/// Both signals reach the program at once, before it could have ended by itself.
 #[test]
 fn a_second_signal_ends_the_program_at_once() {
     use std::os::unix::process::ExitStatusExt as _;

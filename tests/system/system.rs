@@ -5,6 +5,7 @@
 mod program;
 mod sil;
 
+mod axis_text;
 mod behaviours;
 mod bus_budget;
 mod check_vectors;
@@ -14,14 +15,18 @@ mod compare;
 mod control_bars;
 mod cylinders;
 mod delay;
+mod errors;
+mod explosion;
 mod fault_matrix;
 mod field;
 mod figures;
 mod foot_sides;
 mod long_runs;
 mod moving_mass;
+mod mutated_files;
 mod off_data;
 mod plant_check;
+mod practice;
 mod precharge;
 mod predictive_robot;
 #[cfg(unix)]

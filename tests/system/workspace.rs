@@ -14,7 +14,7 @@ mod documents;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 28] = [
+const ARROWS: [(&str, &[&str]); 29] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -92,6 +92,16 @@ const ARROWS: [(&str, &[&str]); 28] = [
             "wheeleg-remote-link",
         ],
     ),
+    (
+        "wheeleg-scene",
+        &[
+            "wheeleg-config",
+            "wheeleg-kinematics",
+            "wheeleg-plant",
+            "wheeleg-protocol",
+            "wheeleg-telemetry",
+        ],
+    ),
     ("wheeleg-sim", &SIM),
     ("wheeleg-report", &[]),
     (
@@ -101,6 +111,7 @@ const ARROWS: [(&str, &[&str]); 28] = [
             "wheeleg-identity",
             "wheeleg-remote-host",
             "wheeleg-report",
+            "wheeleg-scene",
             "wheeleg-sim",
             "wheeleg-studies",
             "wheeleg-telemetry",
@@ -112,6 +123,7 @@ const ARROWS: [(&str, &[&str]); 28] = [
             "wheeleg-config",
             "wheeleg-master",
             "wheeleg-protocol",
+            "wheeleg-scene",
             "wheeleg-sim",
             "wheeleg-telemetry",
         ],
@@ -160,7 +172,7 @@ const SIM: [&str; 10] = [
     "wheeleg-units",
 ];
 
-const STUDIES: [&str; 13] = [
+const STUDIES: [&str; 14] = [
     "wheeleg-config",
     "wheeleg-control",
     "wheeleg-interface",
@@ -171,12 +183,13 @@ const STUDIES: [&str; 13] = [
     "wheeleg-protocol",
     "wheeleg-remote-host",
     "wheeleg-report",
+    "wheeleg-scene",
     "wheeleg-sim",
     "wheeleg-telemetry",
     "wheeleg-units",
 ];
 
-const PROGRAM: [&str; 12] = [
+const PROGRAM: [&str; 13] = [
     "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-console",
@@ -186,12 +199,14 @@ const PROGRAM: [&str; 12] = [
     "wheeleg-protocol",
     "wheeleg-remote-host",
     "wheeleg-report",
+    "wheeleg-scene",
     "wheeleg-sim",
     "wheeleg-studies",
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 17] = [
+const TESTED: [&str; 18] = [
+    "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-control",
     "wheeleg-identity",

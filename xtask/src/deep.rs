@@ -77,6 +77,12 @@ const CHECKS: [Check; 14] = [
         long_run,
     ),
     Check(
+        "practice",
+        "400 built-in files with mistakes in them, run or refused in words",
+        10,
+        practice,
+    ),
+    Check(
         "state-flips",
         "flipped bits in the state of emulated boards, 20 times as many as in the suite",
         10,
@@ -224,6 +230,12 @@ fn long_run() -> StepResult<String> {
         ("WHEELEG_LONG_RUN_S", 7_200),
         " s simulated in ",
     )
+}
+
+fn practice() -> StepResult<String> {
+    let test = "mutated_files::each_is_run_or_refused_in_words";
+    let amount = ("WHEELEG_MUTATED_FILES", 400);
+    measured(["system", test], amount, " mutated files from number ")
 }
 
 fn fuzzing() -> StepResult<String> {

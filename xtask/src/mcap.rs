@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::anyhow;
 
 use crate::process::{command, run, target_dir};
-use crate::report::Report;
+use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
 /// First the checker is checked (it must refuse broken logs), then the run's log.
@@ -28,6 +28,10 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             .arg("tests/python/check_mcap.py")
             .arg(run_dir))?;
         Ok(())
+    });
+    report.step("MCAP log and its exports in programs of others", || {
+        let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
+        viewers(&std::path::absolute(run_dir)?)
     });
     report.step(
         "MCAP log that was cut off, recovered, in the Python reader",
@@ -54,4 +58,39 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             Ok(())
         },
     );
+}
+
+/// Frames, joints, scene, tables and bag of a run, by the readers of those who made the formats.
+fn viewers(run_dir: &Path) -> StepResult<()> {
+    let folder = target_dir().join("xtask").join("exports");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    fs::create_dir_all(&folder)?;
+    rust::build(&["--bin", "wheeleg"])?;
+    let wheeleg = target_dir().join("release").join("wheeleg");
+    let summary: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(run_dir.join("summary.json"))?)?;
+    let robot = summary["robot"].as_str().unwrap_or("wheeleg-2003");
+    let (urdf, tables, bag) = (
+        folder.join("robot.urdf"),
+        folder.join("parquet"),
+        folder.join("ros2"),
+    );
+    run(command(&wheeleg)
+        .args(["export", "urdf", robot, "--out"])
+        .arg(&urdf))?;
+    for (format, out) in [("parquet", &tables), ("ros2", &bag)] {
+        let mut export = command(&wheeleg);
+        run(export
+            .args(["export", format])
+            .arg(run_dir)
+            .arg("--out")
+            .arg(out))?;
+    }
+    run(command(tools::python()?)
+        .arg("tests/python/check_viewers.py")
+        .args([run_dir, &urdf, &tables, &bag])
+        .arg("docs/guide/log.sql"))?;
+    Ok(())
 }

@@ -3,7 +3,9 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use wheeleg_scene::Scene;
 use wheeleg_sim::Boards;
+use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
 use wheeleg_studies::run::{self, Simulated};
 use wheeleg_studies::study::Stop;
@@ -61,7 +63,12 @@ pub(crate) fn log(
     let failed = |e: std::io::Error| CampaignError::output("write", path, e);
     let temporary = path.with_extension(format!("{}.tmp", crate::host::unique()));
     let made = || {
-        let file = LogFile::create(&temporary).map_err(wheeleg_studies::StudyError::from)?;
+        let mut file = LogFile::create(&temporary).map_err(StudyError::from)?;
+        // A case that cannot be built has a row that says so.
+        if let Ok((scenario, robot)) = &case.setup {
+            let scene = Scene::new(robot, scenario).map_err(StudyError::from)?;
+            file = file.with(scene).map_err(StudyError::from)?;
+        }
         let recorder = Recorder::new(Keep::nothing()).with(file);
         let outcome = recorded(case, recorder, limit_s, stop);
         if outcome.is_some() {

@@ -1,5 +1,6 @@
 //! Robots and scenarios that are part of the program, and files beside it.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
@@ -159,6 +160,28 @@ pub(crate) fn is_path(name_or_path: &str) -> bool {
             .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
+/// Largest file, bytes: a hundred thousand events or parts of the ground have a sixth of it.
+const LARGEST: u64 = 64 << 20;
+
+/// The text of a file; or why there is none, and what can be done.
+fn text_of(path: &str) -> Result<String, (String, &'static str)> {
+    let help = "give the path of a TOML file, in UTF-8, that this user may read";
+    let unreadable = |e: std::io::Error| (e.to_string(), help);
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut text = String::new();
+    // One byte more tells a file that is too large; some, such as devices, have no end.
+    let mut part = file.take(LARGEST + 1);
+    let read = part.read_to_string(&mut text);
+    if read.as_ref().is_ok_and(|bytes| *bytes as u64 > LARGEST) || part.limit() == 0 {
+        let why = format!("it has more than {} MiB", LARGEST >> 20);
+        return Err((
+            why,
+            "parts of a scenario's ground can stand in a height map",
+        ));
+    }
+    read.map(|_| text).map_err(unreadable)
+}
+
 /// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
 /// holds a path separator is a path.
 pub(super) fn find(
@@ -170,13 +193,13 @@ pub(super) fn find(
         return Ok(((*file).to_owned(), (*text).to_owned()));
     }
     if is_path(name_or_path) {
-        return std::fs::read_to_string(name_or_path)
+        return text_of(name_or_path)
             .map(|text| (name_or_path.to_owned(), text))
-            .map_err(|e| {
-                let message = format!("cannot read the {kind} file: {e}");
+            .map_err(|(why, help)| {
+                let message = format!("cannot read the {kind} file: {why}");
                 ConfigError::new(
                     format!("the {kind} file {name_or_path} is not usable"),
-                    vec![Problem::whole(name_or_path, message, None)],
+                    vec![Problem::whole(name_or_path, message, Some(help.to_owned()))],
                 )
             });
     }

@@ -8,6 +8,22 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
 /// Problems of a file that are printed; of more there is the number.
 const SHOWN: usize = 20;
+/// Longest line of a file that is shown, bytes.
+const LONGEST_LINE: usize = 2000;
+/// Longest message, characters: values are quoted as they stand in the file.
+const LONGEST_MESSAGE: usize = 1500;
+
+/// A message without the middle that is too much.
+fn shortened(message: String) -> String {
+    let count = message.chars().count();
+    if count <= LONGEST_MESSAGE {
+        return message;
+    }
+    let half = LONGEST_MESSAGE / 2;
+    let begin: String = message.chars().take(half).collect();
+    let end: String = message.chars().skip(count - half).collect();
+    format!("{begin} … {end}")
+}
 
 /// Where the lines of a file begin.
 pub(crate) struct Lines(Vec<usize>);
@@ -45,13 +61,17 @@ impl Problem {
         label: impl Into<String>,
         help: Option<String>,
     ) -> Self {
+        // Of a line that nobody wrote by hand the number is enough.
+        let begin = text[..span.start].rfind('\n').map_or(0, |at| at + 1);
+        let length = text[begin..].find('\n').unwrap_or(text.len() - begin);
+        let shown = length <= LONGEST_LINE;
         Self {
-            source: Some(NamedSource::new(file, text.clone()).with_language("TOML")),
+            source: shown.then(|| NamedSource::new(file, text.clone()).with_language("TOML")),
             file: file.to_owned(),
             line: Some(lines.of_byte(span.start)),
-            message,
+            message: shortened(message),
             label: label.into(),
-            span: Some(span),
+            span: shown.then_some(span),
             help,
         }
     }

@@ -5,8 +5,8 @@ use wheeleg_master::argument;
 use wheeleg_master::config::UniqueId;
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{GaitParams as MasterGait, Pattern};
-use wheeleg_plant::PlantParams;
 use wheeleg_plant::dynamics::floating::FloatingParams;
+use wheeleg_plant::{Plant, PlantParams};
 use wheeleg_protocol::link::{BAUD, CYCLE_US};
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -266,6 +266,10 @@ impl RobotConfig {
         let plant = plant::read(&mut r);
         if let Some((plant, spatial)) = &plant {
             check_bodies(&mut r, plant, spatial);
+            // What these relations name, the plant would name less well.
+            if r.is_clean() {
+                relations::check_plant(&mut r, Plant::new(plant).map(drop));
+            }
         }
         let node = node::read(&mut r);
         let commissioned = commissioned::read(&mut r);

@@ -191,7 +191,7 @@ fn read(r: &mut Reader, files: &Files) -> Option<Scenario> {
         ),
     );
     let seed = match top.get("seed") {
-        Some(_) => r.whole(&top, "seed", 0..=i64::MAX as u64),
+        Some(_) => r.whole(&top, "seed", 0..=u64::MAX),
         None => {
             r.problem(
                 None,

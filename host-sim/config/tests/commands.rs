@@ -266,6 +266,9 @@ fn quantities_may_be_written_as_text() {
         "\"90 mm\"",
         "\"9 cm\"",
         "\" 0.09   m \"",
+        "\"90mm\"",
+        "\"9e1mm\"",
+        "\"+.9e-1m\"",
         "{ value = 90, unit = \"mm\" }",
         "{ value = 0.09, unit = \"m\", source = \"tried\" }",
     ] {
@@ -274,6 +277,10 @@ fn quantities_may_be_written_as_text() {
     for (text, told) in [
         ("90", "`events[0].stroke` has no unit; accepted: \"m\""),
         ("\"90\"", "`events[0].stroke` has no unit; accepted: \"m\""),
+        (
+            "\"90e\"",
+            "`events[0].stroke` (value 90) is in \"e\"; accepted: \"m\"",
+        ),
         (
             "\"90 s\"",
             "`events[0].stroke` (value 90) is in \"s\"; accepted: \"m\"",

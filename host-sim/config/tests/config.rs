@@ -612,6 +612,18 @@ fn gait_times_that_contradict_each_other() {
             &format!("`push_speed` in line {}", line(speed)),
         ],
     );
+    // Beside a flag that is missing, too.
+    let flag = ROBOT
+        .lines()
+        .find(|line| line.starts_with("touchdown_reflex"));
+    let text = told(&[
+        (value, "period            = { value = 1.0"),
+        (flag.expect("present"), ""),
+    ]);
+    assert_all(
+        &text,
+        &["[gait] lacks touchdown_reflex", "`gait.push` contradict"],
+    );
     // All that is wrong at once.
     let text = told(&[
         (
@@ -683,4 +695,67 @@ fn of_very_many_problems_the_first_twenty_are_shown() {
         .expect("problems")
         .count();
     assert_eq!(shown, 20);
+}
+
+/// Every seed that the command line takes; TOML has numbers for half of them.
+#[test]
+fn seeds_reach_as_far_as_those_of_the_command_line() {
+    let seed = |seed: &str| {
+        let line = SCENARIO.lines().find(|line| line.starts_with("seed = "));
+        let text = SCENARIO.replacen(line.expect("a seed"), &format!("seed = {seed}"), 1);
+        Scenario::parse("my.toml", &text).map(|scenario| scenario.seed)
+    };
+    for (text, wanted) in [
+        ("0", 0),
+        ("9007199254740993", (1 << 53) + 1),
+        ("9223372036854775807", i64::MAX as u64),
+        ("\"9223372036854775808\"", 1 << 63),
+        ("\"18446744073709551615\"", u64::MAX),
+    ] {
+        assert_eq!(seed(text).ok(), Some(wanted), "{text}");
+    }
+    for (bad, told) in [
+        (
+            "18446744073709551615",
+            "write \"18446744073709551615\" in quotes",
+        ),
+        ("\"18446744073709551616\"", "from 0 to 18446744073709551615"),
+        ("-1", "from 0 to 18446744073709551615"),
+        ("1.0", "from 0 to 18446744073709551615"),
+        ("\"one\"", "from 0 to 18446744073709551615"),
+    ] {
+        let said = report(&seed(bad).expect_err(bad));
+        assert_all(&said, &["my.toml:", told]);
+    }
+}
+
+/// A file that no person wrote makes no page of an error.
+#[test]
+fn a_long_line_is_named_and_not_shown() {
+    let long = "x".repeat(1_000_000);
+    let text = SCENARIO.replacen("targets = \"", &format!("targets = \"{long}"), 1);
+    let error = Scenario::parse("my.toml", &text).expect_err("must be rejected");
+    let said = report(&error);
+    assert_all(&said, &["my.toml:", "`targets` = ", "three-step"]);
+    assert!(said.len() < 3000, "{} bytes", said.len());
+    let shown = format!("{:?}", miette::Report::new(error));
+    assert!(shown.len() < 6000, "{} bytes", shown.len());
+}
+
+/// A path that leads to no file of this kind: a folder, a device without end, other bytes.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_no_text_is_told() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let bytes = folder.path().join("bytes.toml");
+    std::fs::write(&bytes, [0xff, 0xfe, 0x00, 0xd8]).expect("written");
+    for (path, told) in [
+        ("/", "Is a directory"),
+        ("/dev/zero", "it has more than 64 MiB"),
+        (&*bytes.to_string_lossy(), "UTF-8"),
+        ("/dev/null", "`name` is missing"),
+    ] {
+        let said = report(&builtin::scenario(path).expect_err(path));
+        assert_all(&said, &[path, told]);
+    }
 }

@@ -138,6 +138,7 @@ fn relations_between_fields_are_answered_like_single_fields() {
         &text,
         &[&fields[..], &["no body has these inertias"]].concat(),
     );
+    assert_eq!(text.lines().count(), 1, "told once: {text}");
     let text = robot(&[(
         "link.yaw_barrel.inertia",
         &quantity("[1.0, 1e-6, 1e-6]", "kg m2"),

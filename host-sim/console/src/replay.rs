@@ -11,6 +11,7 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Request;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
+use wheeleg_scene::Scene;
 use wheeleg_sim::{Boards, Session, provenance};
 use wheeleg_telemetry::{Keep, LogFile, Recorder};
 
@@ -84,14 +85,15 @@ pub fn replay(
         Some(end_us) => end_us.div_ceil(1_000),
         None => Lines::open(&folder.join(INPUTS))?.last_ms()?,
     };
-    let mut recorder = Recorder::new(Keep::nothing());
-    if let Some(path) = log {
-        let file = LogFile::create(path).map_err(|e| unusable(e.to_string()))?;
-        recorder = recorder.with(file);
-    }
     let Live {
         scenario, robot, ..
     } = &live;
+    let mut recorder = Recorder::new(Keep::nothing());
+    if let Some(path) = log {
+        let scene = Scene::new(robot, scenario).map_err(|e| unusable(e.to_string()))?;
+        let file = LogFile::create(path).and_then(|file| file.with(scene));
+        recorder = recorder.with(file.map_err(|e| unusable(e.to_string()))?);
+    }
     let mut robot = Repeated {
         session: Session::live(Boards::default(), scenario, robot, scenario.seed)?,
         recorder: {

@@ -124,7 +124,7 @@ impl Server {
             &live.robot_toml,
             &live.scenario,
             &live.scenario_toml,
-        );
+        )?;
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
         let (hub, robot) = Hub::new(live::start(live, feed)?, name, shared);

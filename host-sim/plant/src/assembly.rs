@@ -234,8 +234,9 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
     pub fn check(&self, state: &AssemblyState<M::State>) -> Result<(), PlantError> {
         self.mechanics.check(&state.motion)?;
         let strokes = self.mechanics.strokes_m(&state.motion);
+        let most_pa = self.supply.most_pa();
         for (i, (model, stroke)) in self.cylinders.iter().zip(strokes).enumerate() {
-            model.check(&state.cylinders[i], i, stroke)?;
+            model.check(&state.cylinders[i], i, stroke, most_pa)?;
         }
         self.supply.check(&state.supply)
     }

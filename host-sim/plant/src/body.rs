@@ -6,6 +6,7 @@
 
 mod bound;
 mod contacts;
+mod points;
 mod soft;
 mod stand;
 mod sum;
@@ -25,6 +26,7 @@ pub use contacts::{
     ChassisContact, ContactStates, FootContact, Grip, Grips, RobotContacts, Rut, Ruts, Step, Steps,
     WheelContact,
 };
+pub use points::{ContactPoint, Toucher};
 pub use touching::{FootLoad, Loads, Touching, WheelLoad};
 
 impl From<DynamicsError> for PlantError {
@@ -156,6 +158,16 @@ impl BodyMechanics {
         let mut contacts = motion.contacts;
         let loads = self.touching.loads(&kin, rate, rate, 0.0, &mut contacts);
         Ok(Scene { kin, loads })
+    }
+
+    /// The contacts with the ground one by one.
+    ///
+    /// # Errors
+    /// As [`Self::scene`].
+    pub fn contact_points(&self, motion: &BodyMotion) -> Result<Vec<ContactPoint>, PlantError> {
+        let kin = self.dynamics.prepare(&motion.state, &self.gravity_m_s2)?;
+        let rate = &motion.state.velocity;
+        Ok(self.touching.points(&kin, rate, &motion.contacts))
     }
 
     /// Mechanical power with the state as it is and these forces of the pistons \[N\].

@@ -112,7 +112,7 @@ impl ContactLaw {
 
     /// Static and kinetic friction on a material: of two the smaller.
     #[inline]
-    fn friction_on(&self, material: &Material) -> [f64; 2] {
+    pub(crate) fn friction_on(&self, material: &Material) -> [f64; 2] {
         [
             self.mu_static.min(material.mu_static),
             self.mu_kinetic.min(material.mu_kinetic),

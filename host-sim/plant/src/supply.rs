@@ -20,6 +20,12 @@ use crate::flow::{GasParams, Iso6358, Restrictor};
 use crate::hash::StateHasher;
 use crate::valve::{ValveParams, ValveState, ValveTiming};
 
+/// A heavy piston that runs against trapped air raises it above its supply: of sound axes the most
+/// was 2.1 times the source (the combinations of the control bars). Beyond this the numbers are wrong.
+const COMPRESSION: f64 = 4.0;
+/// The same for any supply \[Pa\].
+const MOST_PA: f64 = 1e7;
+
 /// The supply.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SupplyParams {
@@ -242,6 +248,15 @@ impl SupplyModel {
                 .source_switch
                 .is_none_or(|switch| switch.closed(source, state.source_pressure_pa)),
         ];
+    }
+
+    /// The largest pressure that a chamber can have \[Pa\]: [`COMPRESSION`] times the highest of the
+    /// supply, and [`MOST_PA`].
+    #[must_use]
+    pub fn most_pa(&self) -> f64 {
+        let p = &self.params;
+        let highest_pa = p.source_pressure_pa.max(p.set_pressure_pa);
+        (COMPRESSION * highest_pa.max(p.initial_pressure_pa)).min(MOST_PA)
     }
 
     /// Refuses a state that is not finite or has left the model's range.

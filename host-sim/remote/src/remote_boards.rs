@@ -7,6 +7,7 @@
 
 use std::cmp::Reverse;
 use std::collections::VecDeque;
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use wheeleg_remote_link::{
@@ -416,7 +417,7 @@ impl RemoteBoards {
         if let (Some(first), false) = (&self.comparison.first, self.told) {
             self.told = true;
             // Told at once: the run may end before its summary.
-            eprintln!("a board differs from the host: {first}");
+            let _ = writeln!(std::io::stderr(), "a board differs from the host: {first}");
         }
         Ok(())
     }

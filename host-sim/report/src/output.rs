@@ -151,7 +151,9 @@ fn set_aside(folder: &Path) -> Result<(), ReportError> {
                 .map_err(|e| ReportError::output("set aside", path, e))?;
         }
     }
-    eprintln!(
+    // Standard error may be closed or full.
+    let _ = writeln!(
+        std::io::stderr(),
         "earlier results in {} moved to {}",
         folder.display(),
         previous.display()

@@ -8,8 +8,7 @@ use wheeleg_telemetry::LogError;
 /// Why a simulation could not be built or continued.
 #[derive(Debug, Error, Diagnostic)]
 pub enum SimError {
-    /// A part refuses its parameters, the plant leaves the range of its model, or a fault cannot
-    /// be injected.
+    /// A part refuses its parameters, or a fault cannot be injected.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::simulation), help("{help}"))]
     Simulation {
@@ -26,6 +25,16 @@ pub enum SimError {
         /// How far it got, and what it reported.
         what: String,
         /// What the user can do.
+        help: String,
+    },
+
+    /// The plant has left the range of its model: the run ends at once.
+    #[error("{what}")]
+    #[diagnostic(code(wheeleg::unphysical), help("{help}"))]
+    Unphysical {
+        /// When, which part, and what was last known of it.
+        what: String,
+        /// The parameters that most likely did it.
         help: String,
     },
 

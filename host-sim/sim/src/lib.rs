@@ -34,6 +34,7 @@ mod provenance;
 mod rogue_nodes;
 mod session;
 mod setup;
+mod unphysical;
 mod world;
 
 use std::ops::ControlFlow;
@@ -235,6 +236,9 @@ pub fn run_on(
 ) -> Result<RunOutcome, SimError> {
     let mut session = Session::new(boards, scenario, robot, seed)?;
     let driven = drive(&mut session, recorder, &mut observers);
+    if let Err(error) = &driven {
+        session.fail(error, recorder);
+    }
     let stopped = !session.is_over();
     let outcome = session.finish(stopped, recorder);
     Ok(RunOutcome {

@@ -6,6 +6,7 @@ use wheeleg_master::contact::Side;
 use wheeleg_master::setpoint::{LegPlan, Phase};
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
+use wheeleg_plant::body::{ContactPoint, Toucher};
 use wheeleg_plant::robot::Outputs;
 use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality};
 
@@ -14,8 +15,8 @@ use super::world::World;
 use wheeleg_telemetry::event::{BoardChange, Cause};
 use wheeleg_telemetry::phase;
 use wheeleg_telemetry::{
-    BehaviourSample, BodySample, BusSample, FootSample, JointSample, MasterSample, Recorder,
-    SupplySample, WheelSample,
+    BehaviourSample, BodySample, BusSample, Contact, ContactBody, FootSample, JointSample,
+    MasterSample, Recorder, SupplySample, WheelSample,
 };
 
 const PA_PER_BAR: f64 = 1e5;
@@ -51,6 +52,45 @@ fn switch_bits(inputs: u8) -> u8 {
         ]
         .map(|bit| inputs & bit.raw() != 0),
     )
+}
+
+/// A contact of the plant, with names.
+fn contact(point: &ContactPoint) -> Contact {
+    const SOLE: [&str; 5] = ["centre", "front", "left", "back", "right"];
+    const WHEEL: [&str; 3] = ["left", "middle", "right"];
+    // As `ChassisContact::points_m` has them.
+    const CHASSIS: [&str; 12] = [
+        "lower rear right",
+        "lower front right",
+        "lower rear left",
+        "lower front left",
+        "upper rear right",
+        "upper front right",
+        "upper rear left",
+        "upper front left",
+        "lower right",
+        "lower left",
+        "lower rear",
+        "lower front",
+    ];
+    let (body, place) = match point.toucher {
+        Toucher::Foot(0, k) => (ContactBody::LeftFoot, SOLE[k]),
+        Toucher::Foot(_, k) => (ContactBody::RightFoot, SOLE[k]),
+        Toucher::Wheel(0, k) => (ContactBody::LeftWheel, WHEEL[k]),
+        Toucher::Wheel(_, k) => (ContactBody::RightWheel, WHEEL[k]),
+        Toucher::Chassis(k) => (ContactBody::Chassis, CHASSIS[k]),
+    };
+    Contact {
+        body,
+        place,
+        point_m: point.point_m.into(),
+        normal: point.normal.into(),
+        force_n: point.force_n.into(),
+        depth_m: point.depth_m,
+        slip_m_s: point.slip_m_s,
+        friction: point.friction,
+        part: point.part,
+    }
 }
 
 impl Observer {
@@ -101,6 +141,11 @@ impl Observer {
                 pressure_switch: left_wheel.is_some_and(|board| board.snapshot().supply_present),
             },
         );
+        if recorder.wants_contacts(t_ns) {
+            let points = world.contact_points();
+            let contacts: Vec<Contact> = points.iter().map(contact).collect();
+            recorder.contacts(t_ns, &contacts);
+        }
         if recorder.wants_state(t_ns) {
             recorder.state(
                 t_ns,

@@ -367,6 +367,16 @@ impl Session {
         self.submit(command, recorder);
     }
 
+    /// What ended the session goes into the record. Of a plant that has left its range the last
+    /// sound values are there, too, also if that was in the start-up, which has no samples else.
+    pub(crate) fn fail(&mut self, error: &SimError, recorder: &mut Recorder) {
+        if matches!(error, SimError::Unphysical { .. }) && self.start_ns.is_none() {
+            self.observer.tick(&self.world, 0, recorder);
+        }
+        let t_ns = self.scenario_ns().unwrap_or(0);
+        recorder.event(t_ns, Cause::Failed(error.to_string()));
+    }
+
     /// Ends the session; `stopped` says that its driver wanted that before the scenario's end.
     pub fn finish(mut self, stopped: bool, recorder: &mut Recorder) -> RunOutcome {
         let now_ns = self.now_ns();

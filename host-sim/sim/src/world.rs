@@ -15,6 +15,7 @@ use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_plant::PlantError;
+use wheeleg_plant::body::ContactPoint;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
 use wheeleg_protocol::Address;
 use wheeleg_remote_link as link;
@@ -30,6 +31,7 @@ use super::downtime::DownTimes;
 use super::rogue_nodes::RogueNodes;
 use crate::SimError;
 use crate::faults::Injector;
+use crate::unphysical;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
@@ -253,7 +255,7 @@ impl World {
     fn advance_plant(&mut self) -> Result<(), SimError> {
         self.plant
             .advance_to(&mut self.state, self.now_ns)
-            .map_err(|e| unphysical(self.now_ns, &e))
+            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))
     }
 
     /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
@@ -298,7 +300,7 @@ impl World {
         self.inputs.dump = self.active_outputs(7).dump;
         self.plant
             .apply(&mut self.state, &self.inputs)
-            .map_err(|e| unphysical(self.now_ns, &e))?;
+            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))?;
         self.outputs = self.plant.outputs(&self.state);
         let sensed = match sensed {
             Some(sensed) => sensed,
@@ -448,6 +450,13 @@ impl World {
         &self.outputs
     }
 
+    /// Every contact with the ground; none where the pose cannot be evaluated.
+    pub(super) fn contact_points(&self) -> Vec<ContactPoint> {
+        let mechanics = &self.plant.assembly.mechanics;
+        let points = mechanics.contact_points(&self.state.core.motion);
+        points.unwrap_or_default()
+    }
+
     /// BLAKE3 of the plant's state.
     pub(super) fn state_hash(&self) -> [u8; 32] {
         self.plant.state_hash(&self.state)
@@ -487,16 +496,6 @@ impl World {
     pub(super) fn plant(&self) -> &Plant {
         &self.plant
     }
-}
-
-fn unphysical(now_ns: u64, error: &wheeleg_plant::PlantError) -> SimError {
-    SimError::simulation(
-        format!(
-            "the plant left its range at {:.4} s after power-up: {error}",
-            now_ns as f64 * 1e-9
-        ),
-        "what was logged up to here is complete; check the robot's parameters",
-    )
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use thiserror::Error;
 use wheeleg_config::ConfigError;
 use wheeleg_remote_host::RemoteError;
 use wheeleg_report::ReportError;
+use wheeleg_scene::SceneError;
 use wheeleg_sim::SimError;
 use wheeleg_telemetry::LogError;
 
@@ -34,6 +35,11 @@ pub enum StudyError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Log(#[from] LogError),
+
+    /// The robot has no tree of links.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(#[from] SceneError),
 
     /// A board elsewhere failed.
     #[error(transparent)]

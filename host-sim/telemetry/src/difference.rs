@@ -5,6 +5,7 @@ use std::path::Path;
 use mcap::MessageStream;
 use serde_json::{Map, Value};
 
+use super::derived::Derived;
 use super::samples::channels;
 use crate::LogError;
 
@@ -15,10 +16,12 @@ struct Logged {
     payload: Vec<u8>,
 }
 
-/// The messages of a log in the order in which they were written.
+/// The messages of a log in the order in which they were written, without what follows from others.
 fn messages(bytes: &[u8]) -> Result<impl Iterator<Item = Result<Logged, LogError>>, LogError> {
     let stream = MessageStream::new(bytes)?;
-    Ok(stream.map(|message| {
+    let derived = |topic: &str| Derived::of_topic(topic).is_some();
+    let own = stream.filter(move |m| !m.as_ref().is_ok_and(|m| derived(&m.channel.topic)));
+    Ok(own.map(|message| {
         let message = message?;
         Ok(Logged {
             topic: message.channel.topic.clone(),

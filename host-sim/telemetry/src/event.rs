@@ -73,6 +73,8 @@ pub enum Cause {
     },
     /// The master has heard broken frames: its counts at the end of the run.
     LineErrors(LinkQuality),
+    /// What ended the run before its end, in words.
+    Failed(String),
 }
 
 /// How a board changes.
@@ -258,6 +260,7 @@ impl Cause {
             Self::Command { .. } | Self::Flood { .. } | Self::Service { .. } => EventKind::Command,
             Self::Scenario(_) => EventKind::Scenario,
             Self::LineErrors(_) => EventKind::Info,
+            Self::Failed(_) => EventKind::Fault,
         }
     }
 
@@ -295,6 +298,7 @@ impl Cause {
                 ServiceOutcome::NotGiven => "service_not_given",
             },
             Self::LineErrors(_) => "line_errors",
+            Self::Failed(_) => "run_failed",
         }
     }
 
@@ -325,7 +329,7 @@ impl Cause {
             Self::Service {
                 board, parameter, ..
             } => parameter_name(board.raw(), *parameter),
-            Self::LineErrors(_) => String::new(),
+            Self::LineErrors(_) | Self::Failed(_) => String::new(),
         }
     }
 

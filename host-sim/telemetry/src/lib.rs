@@ -17,9 +17,13 @@
 //! * **event**: something that happened, with cause and time
 //! * **sink**: a place where samples go
 //! * **provenance**: what went into a run: program, robot, scenario, seed
+//! * **derived channel**: one of the log that follows from others, in the words of other programs
 //! * **hash**: BLAKE3 over channel, time and value of all samples at full rate
 
+mod attachments;
+mod contact;
 mod csv_out;
+mod derived;
 mod difference;
 mod encode;
 mod error;
@@ -38,7 +42,10 @@ mod ring;
 pub mod samples;
 mod sink;
 
+pub use attachments::attachments;
+pub use contact::{Contact, ContactBody};
 pub use csv_out::Tables;
+pub use derived::{Attached, CONTACTS_HZ, DERIVED_HZ, Derive, Derived, DerivedDef, Put, derived};
 pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use error::LogError;
@@ -47,7 +54,7 @@ pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use log_file::LogFile;
 pub use memory::{Keep, Memory, Recording, Row};
-pub use read::{Logged, Read, Scalar, read, read_from};
+pub use read::{Logged, Read, Scalar, TakeDerived, read, read_derived, read_from};
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, json_schema};

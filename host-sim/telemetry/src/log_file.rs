@@ -8,6 +8,8 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use mcap::{Compression, MAGIC};
 
+use super::contact::Contact;
+use super::derived::{Derive, derived};
 use super::registry::{ChannelDef, json_schema};
 use super::samples::channels;
 use super::sink::{Sink, Taken};
@@ -48,11 +50,17 @@ pub(crate) fn begins_as_log(source: &mut impl Read, path: &Path) -> Result<(), L
 
 /// Writes an MCAP log in compressed chunks.
 pub struct LogFile {
+    file: OpenLog,
+    derive: Option<Box<dyn Derive + Send>>,
+    payload: Vec<u8>,
+}
+
+/// The file and what it takes to write into it.
+struct OpenLog {
     /// `None` once it has failed.
     log: Option<mcap::Writer<BufWriter<File>>>,
     failed: Option<LogError>,
     headers: Vec<MessageHeader>,
-    payload: Vec<u8>,
     flushed_ns: u64,
 }
 
@@ -68,27 +76,78 @@ impl LogFile {
         let mut log = options().create(BufWriter::new(file))?;
         let mut headers = Vec::new();
         for def in channels() {
-            headers.push(MessageHeader {
-                channel_id: add_channel(&mut log, def)?,
-                sequence: 0,
-                log_time: 0,
-                publish_time: 0,
-            });
+            let schema = json_schema(def.schema, def.fields);
+            let id = add_channel(&mut log, def.topic, (def.schema, &schema), metadata(def))?;
+            headers.push(header(id));
         }
         log.flush()?;
-        Ok(Self {
+        let file = OpenLog {
             log: Some(log),
             failed: None,
             headers,
-            payload: Vec::with_capacity(1024),
             flushed_ns: 0,
+        };
+        Ok(Self {
+            file,
+            derive: None,
+            payload: Vec::with_capacity(1024),
         })
+    }
+
+    /// The same with derived channels and the files that belong to them.
+    ///
+    /// # Errors
+    /// [`LogError::Log`] if they cannot be written.
+    pub fn with(mut self, derive: impl Derive + Send + 'static) -> Result<Self, LogError> {
+        let Some(log) = self.file.log.as_mut() else {
+            return Ok(self);
+        };
+        for def in derived() {
+            let metadata = BTreeMap::from([
+                ("description".into(), def.doc.into()),
+                ("rate_hz".into(), rate(def.rate_hz)),
+            ]);
+            let id = add_channel(log, def.topic, (def.schema, def.json_schema), metadata)?;
+            self.file.headers.push(header(id));
+        }
+        for file in derive.attached() {
+            log.attach(&mcap::Attachment {
+                log_time: 0,
+                create_time: 0,
+                name: file.name,
+                media_type: file.media_type,
+                data: file.data.into(),
+            })?;
+        }
+        log.flush()?;
+        self.derive = Some(Box::new(derive));
+        Ok(self)
     }
 
     /// Why nothing more is written, as soon as that is so.
     #[must_use]
     pub fn failure(&self) -> Option<&LogError> {
-        self.failed.as_ref()
+        self.file.failed.as_ref()
+    }
+}
+
+impl OpenLog {
+    fn write(&mut self, channel: usize, t_ns: u64, payload: &[u8], lost: bool) {
+        let header = &mut self.headers[channel];
+        header.sequence += 1;
+        let Some(log) = self.log.as_mut().filter(|_| !lost) else {
+            return;
+        };
+        (header.log_time, header.publish_time) = (t_ns, t_ns);
+        let mut result = log.write_to_known_channel(header, payload);
+        if t_ns >= self.flushed_ns + FLUSH_PERIOD_NS {
+            self.flushed_ns = t_ns;
+            result = result.and_then(|()| log.flush());
+        }
+        if let Err(e) = result {
+            self.failed = Some(LogError::Log(e));
+            self.log = None;
+        }
     }
 }
 
@@ -97,30 +156,42 @@ impl Sink for LogFile {
         if !taken.due {
             return;
         }
-        let header = &mut self.headers[taken.channel];
-        header.sequence += 1;
-        let Some(log) = self.log.as_mut().filter(|_| !taken.lost) else {
-            return;
-        };
-        (header.log_time, header.publish_time) = (taken.t_ns, taken.t_ns);
+        let file = &mut self.file;
         self.payload.clear();
-        taken.sample.encode_json(&mut self.payload);
-        let mut result = log.write_to_known_channel(header, &self.payload);
-        if taken.t_ns >= self.flushed_ns + FLUSH_PERIOD_NS {
-            self.flushed_ns = taken.t_ns;
-            result = result.and_then(|()| log.flush());
+        if file.log.is_some() && !taken.lost {
+            taken.sample.encode_json(&mut self.payload);
         }
-        if let Err(e) = result {
-            self.failed = Some(LogError::Log(e));
-            self.log = None;
+        file.write(taken.channel, taken.t_ns, &self.payload, taken.lost);
+        if let Some(derive) = &mut self.derive {
+            derive.sample(taken, &mut |channel, t_ns, payload| {
+                file.write(
+                    channels().len() + channel as usize,
+                    t_ns,
+                    payload,
+                    taken.lost,
+                );
+            });
+        }
+    }
+
+    fn wants_contacts(&self) -> bool {
+        self.derive.is_some()
+    }
+
+    fn contacts(&mut self, t_ns: u64, contacts: &[Contact], lost: bool) {
+        let file = &mut self.file;
+        if let Some(derive) = &mut self.derive {
+            derive.contacts(t_ns, contacts, &mut |channel, t_ns, payload| {
+                file.write(channels().len() + channel as usize, t_ns, payload, lost);
+            });
         }
     }
 
     fn finish(&mut self) -> Result<(), LogError> {
-        if let Some(error) = self.failed.take() {
+        if let Some(error) = self.file.failed.take() {
             return Err(error);
         }
-        if let Some(mut log) = self.log.take() {
+        if let Some(mut log) = self.file.log.take() {
             log.finish()?;
             log.into_inner().flush().map_err(mcap::McapError::Io)?;
         }
@@ -128,13 +199,31 @@ impl Sink for LogFile {
     }
 }
 
+fn header(channel_id: u16) -> MessageHeader {
+    MessageHeader {
+        channel_id,
+        sequence: 0,
+        log_time: 0,
+        publish_time: 0,
+    }
+}
+
 fn add_channel<W: Write + Seek>(
     log: &mut mcap::Writer<W>,
-    def: &ChannelDef,
+    topic: &str,
+    (name, schema): (&str, &str),
+    metadata: BTreeMap<String, String>,
 ) -> Result<u16, LogError> {
-    let schema = json_schema(def.schema, def.fields);
-    let schema_id = log.add_schema(def.schema, "jsonschema", schema.as_bytes())?;
-    Ok(log.add_channel(schema_id, def.topic, "json", &metadata(def))?)
+    let schema_id = log.add_schema(name, "jsonschema", schema.as_bytes())?;
+    Ok(log.add_channel(schema_id, topic, "json", &metadata)?)
+}
+
+/// Rate of a channel in words.
+fn rate(rate_hz: u32) -> String {
+    match rate_hz {
+        0 => "on change".to_owned(),
+        rate => rate.to_string(),
+    }
 }
 
 /// Channel metadata: the units at a glance and per field, rate and meaning.
@@ -150,10 +239,6 @@ fn metadata(def: &ChannelDef) -> BTreeMap<String, String> {
         metadata.insert(format!("unit.{}", f.name), f.unit.into());
     }
     metadata.insert("description".into(), def.doc.into());
-    let rate = match def.rate_hz {
-        0 => "on change".to_owned(),
-        rate => rate.to_string(),
-    };
-    metadata.insert("rate_hz".into(), rate);
+    metadata.insert("rate_hz".into(), rate(def.rate_hz));
     metadata
 }

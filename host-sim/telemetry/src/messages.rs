@@ -70,6 +70,7 @@ impl fmt::Display for Cause {
                 write!(f, "service: {}", service(*board, &name, outcome))
             }
             Self::LineErrors(link) => write!(f, "master: {}", line_errors(link)),
+            Self::Failed(why) => f.write_str(why),
         }
     }
 }

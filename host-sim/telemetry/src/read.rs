@@ -13,6 +13,7 @@ use mcap::sans_io::LinearReaderOptions;
 use mcap::{MAGIC, McapError};
 use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
 
+use super::derived::{Derived, derived};
 use super::log_file::begins_as_log;
 use super::samples::channels;
 use crate::LogError;
@@ -67,50 +68,80 @@ pub fn read_from(
     path: &Path,
     take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
 ) -> Result<Read, LogError> {
-    let unreadable = |e| LogError::output("read the log", path, e);
-    begins_as_log(&mut source, path)?;
+    let places: BTreeMap<&str, usize> = channels().iter().map(|c| c.topic).zip(0..).collect();
+    let (mut messages, mut others) = (0, 0);
+    let whole = each(&mut source, path, &mut |message| {
+        let topic = message.channel.topic.as_str();
+        // What follows from the others.
+        if derived().iter().any(|def| def.topic == topic) {
+            return ControlFlow::Continue(());
+        }
+        let channel = places.get(topic);
+        let Some(channel) = channel.filter(|_| message.data.len() <= MAX_MESSAGE) else {
+            others += 1;
+            return ControlFlow::Continue(());
+        };
+        messages += 1;
+        take(Logged {
+            channel: *channel,
+            t_ns: message.log_time,
+            payload: &message.data,
+        })
+    })?;
+    match (messages, others) {
+        (1.., _) => Ok(Read {
+            messages,
+            others,
+            whole,
+        }),
+        (_, 1..) => Err(LogError::Foreign { path: path.into() }),
+        _ => Err(LogError::Empty { path: path.into() }),
+    }
+}
+
+/// Takes a message of a derived channel: time in ns and JSON.
+pub type TakeDerived<'a> = dyn FnMut(Derived, u64, &[u8]) -> ControlFlow<()> + 'a;
+
+/// Reads the derived channels of `path` and gives their messages in their order, until `take`
+/// breaks. True: the log has its end.
+///
+/// # Errors
+/// [`LogError::Output`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log.
+pub fn read_derived(path: &Path, take: &mut TakeDerived<'_>) -> Result<bool, LogError> {
+    let file = File::open(path).map_err(|e| LogError::output("read the log", path, e))?;
+    each(
+        &mut BufReader::new(file),
+        path,
+        &mut |message| match Derived::of_topic(&message.channel.topic) {
+            Some(channel) => take(channel, message.log_time, &message.data),
+            None => ControlFlow::Continue(()),
+        },
+    )
+}
+
+/// Gives every message until `take` breaks, or to the place where the log breaks off: false then.
+fn each(
+    source: &mut dyn std::io::Read,
+    path: &Path,
+    take: &mut dyn FnMut(&mcap::Message<'_>) -> ControlFlow<()>,
+) -> Result<bool, LogError> {
+    begins_as_log(&mut &mut *source, path)?;
     let source = MAGIC.chain(source);
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(MAX_RECORD);
-    let places: BTreeMap<&str, usize> = channels().iter().map(|c| c.topic).zip(0..).collect();
-    let mut end = Read {
-        messages: 0,
-        others: 0,
-        whole: true,
-    };
     for message in MessageReader::new_with_options(source, options) {
-        let message = match message {
-            Ok(message) => message,
+        match message {
+            Ok(message) if take(&message).is_break() => break,
+            Ok(_) => {}
             Err(McapError::Io(e)) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
-                return Err(unreadable(e));
+                return Err(LogError::output("read the log", path, e));
             }
             // The place where it breaks off.
-            Err(_) => {
-                end.whole = false;
-                break;
-            }
-        };
-        let channel = places.get(message.channel.topic.as_str());
-        let Some(channel) = channel.filter(|_| message.data.len() <= MAX_MESSAGE) else {
-            end.others += 1;
-            continue;
-        };
-        end.messages += 1;
-        let logged = Logged {
-            channel: *channel,
-            t_ns: message.log_time,
-            payload: &message.data,
-        };
-        if take(logged).is_break() {
-            break;
+            Err(_) => return Ok(false),
         }
     }
-    match end {
-        Read { messages: 1.., .. } => Ok(end),
-        Read { others: 1.., .. } => Err(LogError::Foreign { path: path.into() }),
-        _ => Err(LogError::Empty { path: path.into() }),
-    }
+    Ok(true)
 }
 
 /// A value of a message.

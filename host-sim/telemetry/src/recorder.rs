@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use super::contact::Contact;
+use super::derived::CONTACTS_PERIOD_NS;
 use super::filter::LowPass2;
 use super::hash::TelemetryHash;
 use super::log_file::LogFile;
@@ -44,6 +46,7 @@ pub struct Recorder<'a> {
     dropped: u64,
     filters: [JointFilters; 6],
     disk_full: bool,
+    next_contacts_ns: u64,
 }
 
 #[derive(Clone)]
@@ -94,6 +97,7 @@ impl<'a> Recorder<'a> {
             messages: 0,
             dropped: 0,
             disk_full: false,
+            next_contacts_ns: 0,
             filters: std::array::from_fn(|_| filters.clone()),
         }
     }
@@ -185,6 +189,21 @@ impl<'a> Recorder<'a> {
             plant: plant_hash_hex,
         };
         self.put(index::STATE, 0, t_ns, &sample);
+    }
+
+    /// True when somebody wants the contacts at `t_ns`; finding them costs time, so ask first.
+    #[must_use]
+    pub fn wants_contacts(&self, t_ns: u64) -> bool {
+        t_ns >= self.next_contacts_ns && self.sinks.iter().any(|sink| sink.wants_contacts())
+    }
+
+    /// Shows all contacts with the ground to the sinks that draw them: no samples, and no part of
+    /// the hash.
+    pub fn contacts(&mut self, t_ns: u64, contacts: &[Contact]) {
+        self.next_contacts_ns = (t_ns / CONTACTS_PERIOD_NS + 1) * CONTACTS_PERIOD_NS;
+        for sink in self.sinks.iter_mut().filter(|sink| sink.wants_contacts()) {
+            sink.contacts(t_ns, contacts, self.disk_full);
+        }
     }
 
     /// Records what a board has heard; `node` is 0 to 7 for addresses 1 to 8.

@@ -8,6 +8,7 @@ use mcap::McapError;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
+use super::attachments::attachments;
 use super::log_file::{begins_as_log, options};
 use crate::LogError;
 
@@ -34,7 +35,8 @@ fn checked() -> LinearReaderOptions {
 
 /// Writes everything that can be read in `from`, a log that has no end because its writer was
 /// killed or its disk was full, to the new file `to`, and reads that once more with all checks.
-/// Memory is bounded by a chunk.
+/// Memory is bounded by a chunk. `None` if `stop` said so before the end; `to` is not left behind
+/// then, either.
 ///
 /// # Errors
 /// [`LogError::Output`] if `from` cannot be read, or `to` exists or cannot be written;
@@ -42,17 +44,24 @@ fn checked() -> LinearReaderOptions {
 /// [`LogError::Log`] if the new file cannot be written, [`LogError::Unreadable`] and
 /// [`LogError::Unsound`] if it cannot be read back. `to` is not
 /// left behind then, and `from` is never changed.
-pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
+pub fn recover(
+    from: &Path,
+    to: &Path,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Recovered>, LogError> {
     let unreadable = |e| LogError::output("read the log", from, e);
     let mut source = File::open(from).map_err(unreadable)?;
     begins_as_log(&mut source, from)?;
     source.rewind().map_err(unreadable)?;
     let target =
         File::create_new(to).map_err(|e| LogError::output("create the recovered log", to, e))?;
-    let recovered = copy(source, target, from).and_then(|recovered| {
+    let recovered = copy(source, target, from, stop).and_then(|recovered| {
+        let Some(recovered) = recovered else {
+            return Ok(None);
+        };
         let found = count(to)?;
         if found == recovered.messages {
-            Ok(recovered)
+            Ok(Some(recovered))
         } else {
             Err(LogError::Unsound {
                 path: to.into(),
@@ -61,14 +70,28 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
             })
         }
     });
-    if recovered.is_err() {
+    if !matches!(recovered, Ok(Some(_))) {
         let _ = fs::remove_file(to);
     }
     recovered
 }
 
-fn copy(source: File, target: File, from: &Path) -> Result<Recovered, LogError> {
+fn copy(
+    source: File,
+    target: File,
+    from: &Path,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Recovered>, LogError> {
     let mut log = options().create(BufWriter::new(target))?;
+    for file in attachments(from)? {
+        log.attach(&mcap::Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: file.name,
+            media_type: file.media_type,
+            data: file.data.into(),
+        })?;
+    }
     let mut recovered = Recovered {
         messages: 0,
         last_ns: 0,
@@ -80,6 +103,9 @@ fn copy(source: File, target: File, from: &Path) -> Result<Recovered, LogError> 
                 log.write(&message)?;
                 recovered.messages += 1;
                 recovered.last_ns = recovered.last_ns.max(message.log_time);
+                if stop() {
+                    return Ok(None);
+                }
             }
             Err(McapError::Io(e)) => return Err(LogError::output("read the log", from, e)),
             // The place where it breaks off.
@@ -95,7 +121,7 @@ fn copy(source: File, target: File, from: &Path) -> Result<Recovered, LogError> 
         .into_inner()
         .map_err(|e| McapError::Io(e.into_error()))?;
     file.sync_all().map_err(McapError::Io)?;
-    Ok(recovered)
+    Ok(Some(recovered))
 }
 
 /// Messages of a whole log; a log with any defect is an error.

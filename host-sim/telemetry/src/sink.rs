@@ -1,5 +1,6 @@
 //! Where samples go.
 
+use super::contact::Contact;
 use super::registry::Sample;
 use super::samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
@@ -120,6 +121,15 @@ pub trait Sink {
     /// Takes one sample.
     fn take(&mut self, taken: &Taken<'_>);
 
+    /// Whether [`contacts`](Self::contacts) are of use to it.
+    fn wants_contacts(&self) -> bool {
+        false
+    }
+
+    /// Takes all contacts with the ground at one instant. They are no samples: no part of the hash.
+    /// `lost`: kept from the log by a fault of the run.
+    fn contacts(&mut self, _t_ns: u64, _contacts: &[Contact], _lost: bool) {}
+
     /// The run is over.
     ///
     /// # Errors
@@ -132,6 +142,14 @@ pub trait Sink {
 impl<S: Sink + ?Sized> Sink for &mut S {
     fn take(&mut self, taken: &Taken<'_>) {
         (**self).take(taken);
+    }
+
+    fn wants_contacts(&self) -> bool {
+        (**self).wants_contacts()
+    }
+
+    fn contacts(&mut self, t_ns: u64, contacts: &[Contact], lost: bool) {
+        (**self).contacts(t_ns, contacts, lost);
     }
 
     fn finish(&mut self) -> Result<(), LogError> {

@@ -1,13 +1,15 @@
 //! The log: readable by others, complete up to a cut, and hashed reproducibly.
 
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use mcap::read::Options;
 use wheeleg_master::contact::Side;
 use wheeleg_telemetry::{
-    BodySample, BusSample, Cause, FootSample, JointSample, LinkSample, LogFile, MasterSample,
-    Recorder, Recording, SupplySample, Tables, WheelSample, channels, recover,
+    Attached, BodySample, BusSample, CONTACTS_HZ, Cause, Contact, Derive, Derived, FootSample,
+    JointSample, LinkSample, LogFile, MasterSample, Put, Recorder, Recording, SampleRef,
+    SupplySample, Tables, Taken, WheelSample, attachments, channels, read, read_derived, recover,
 };
 
 /// Three seconds of made-up but lively samples on every channel.
@@ -182,7 +184,10 @@ fn a_cut_log_is_recovered_as_a_whole_one() {
         let cut = (bytes.len() * tenth / 10 + 17 * tenth).min(bytes.len());
         let (from, to) = (path("cut.mcap"), path(&format!("{tenth}.mcap")));
         std::fs::write(&from, &bytes[..cut]).expect("written");
-        let recovered = recover(&from, &to).expect("a log");
+        let stopped = recover(&from, &to, &|| true).expect("a log");
+        assert!(stopped.is_none() && !to.exists());
+        let recovered = recover(&from, &to, &|| false).expect("a log");
+        let recovered = recovered.expect("to the end");
         assert_eq!(recovered.was_whole, tenth == 10);
         let read = std::fs::read(&to).expect("written");
         let strict = mcap::MessageStream::new(&read).expect("an MCAP file");
@@ -202,7 +207,7 @@ fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
     log_to(&path("log.mcap"), 10.0);
     let bytes = std::fs::read(path("log.mcap")).expect("written");
     let text = |from: &str, to: &str| {
-        let error = recover(&path(from), &path(to)).expect_err("refused");
+        let error = recover(&path(from), &path(to), &|| false).expect_err("refused");
         error.to_string()
     };
     std::fs::write(path("notes.txt"), "notes").expect("written");
@@ -294,4 +299,87 @@ fn csv_has_units_in_its_header_and_the_recorded_values() {
         ),
         "{events}"
     );
+}
+
+/// Writes a message of `/log` for each event, and one of `/scene/contacts` for all contacts.
+struct Echo;
+
+impl Derive for Echo {
+    fn attached(&self) -> Vec<Attached> {
+        vec![Attached {
+            name: "robot.urdf".to_owned(),
+            media_type: "application/xml".to_owned(),
+            data: b"<robot/>".to_vec(),
+        }]
+    }
+
+    fn sample(&mut self, taken: &Taken<'_>, put: Put<'_>) {
+        if let SampleRef::Event(_) = taken.sample {
+            put(Derived::Log, taken.t_ns, b"{}");
+        }
+    }
+
+    fn contacts(&mut self, t_ns: u64, contacts: &[Contact], put: Put<'_>) {
+        put(
+            Derived::Contacts,
+            t_ns,
+            format!("{}", contacts.len()).as_bytes(),
+        );
+    }
+}
+
+/// What follows from a log changes neither its hash nor what is read of it, survives a cut, and
+/// shares a full disk.
+#[test]
+fn derived_channels_stand_beside_and_change_nothing() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let plain = log_to(&path("plain.mcap"), 10.0);
+    let log = LogFile::create(&path("log.mcap")).expect("writable");
+    let log = log.with(Echo).expect("writable");
+    let mut recorder = Recorder::in_memory().with(log);
+    let mut asked = 0;
+    for ms in 0..1_000_u64 {
+        let t_ns = ms * 1_000_000;
+        if recorder.wants_contacts(t_ns) {
+            asked += 1;
+            recorder.set_disk_full(asked > 20);
+            recorder.contacts(t_ns, &[]);
+            recorder.set_disk_full(false);
+        }
+    }
+    assert_eq!(asked, CONTACTS_HZ);
+    assert!(!Recorder::in_memory().wants_contacts(0), "nobody draws");
+    fill(&mut recorder, 10.0);
+    let recording = recorder.finish().expect("no I/O error");
+    assert_eq!(recording.hash, plain.hash);
+    assert_eq!(recording.messages, plain.messages);
+    let end = read(&path("log.mcap"), &mut |_| ControlFlow::Continue(())).expect("a log");
+    assert_eq!(
+        (end.messages, end.others, end.whole),
+        (plain.messages, 0, true)
+    );
+
+    let bytes = std::fs::read(path("log.mcap")).expect("written");
+    std::fs::write(path("cut.mcap"), &bytes[..bytes.len() * 4 / 5]).expect("written");
+    recover(&path("cut.mcap"), &path("whole.mcap")).expect("a log");
+    for (name, is_whole) in [
+        ("log.mcap", true),
+        ("cut.mcap", false),
+        ("whole.mcap", true),
+    ] {
+        let files = attachments(&path(name)).expect("a log");
+        assert_eq!(files, Echo.attached(), "{name}");
+        let (mut events, mut contacts) = (0, 0);
+        let whole = read_derived(&path(name), &mut |channel, _, _| {
+            match channel {
+                Derived::Log => events += 1,
+                Derived::Contacts => contacts += 1,
+                other => panic!("{other:?}"),
+            }
+            ControlFlow::Continue(())
+        });
+        assert_eq!(whole.expect("a log"), is_whole, "{name}");
+        assert_eq!((events, contacts), (1, 20), "{name}");
+    }
 }

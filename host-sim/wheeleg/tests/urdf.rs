@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{JointType, Robot};
 use wheeleg_config::{RobotConfig, builtin};
-use wheeleg_studies::export::urdf;
+use wheeleg_scene::urdf;
 use wheeleg_telemetry::channels;
 
 const FILE: &str = include_str!("../../robots/wheeleg-2003.toml");

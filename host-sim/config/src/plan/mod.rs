@@ -172,7 +172,7 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         None => Some(None),
     };
     let root = match top.get("root") {
-        Some(_) => r.whole(&top, "root", 0..=i64::MAX as u64),
+        Some(_) => r.whole(&top, "root", 0..=u64::MAX),
         None => {
             r.problem(
                 None,

@@ -265,7 +265,10 @@ fn robot_json(robot: &RobotConfig) -> serde_json::Value {
     })
 }
 
-/// A scenario's text as JSON, all numbers as floats.
+/// Largest whole number up to which all are exact as floats.
+const EXACT: u64 = 1 << f64::MANTISSA_DIGITS;
+
+/// A scenario's text as JSON, all numbers as floats that can be, the others as text.
 fn without_notes(document: &DocumentMut) -> serde_json::Value {
     let mut json = item_json(document.as_item());
     if let Some(top) = json.as_object_mut() {
@@ -295,6 +298,8 @@ fn item_json(item: &Item) -> serde_json::Value {
     }
     match (item.as_float(), item.as_integer(), item.as_str()) {
         (Some(number), ..) => json!(number),
+        // Beyond it two neighbours, such as seeds, are one float.
+        (_, Some(number), _) if number.unsigned_abs() > EXACT => json!(number.to_string()),
         (_, Some(number), _) => json!(number as f64),
         (.., text) => json!(text),
     }

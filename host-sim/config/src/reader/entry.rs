@@ -80,6 +80,25 @@ pub(super) fn number(value: Option<&Value>) -> Option<f64> {
     }
 }
 
+/// The number that a text begins with, and what follows it.
+fn split_number(text: &str) -> Option<(Value, &str)> {
+    let number = |text: &str| match text.parse::<i64>() {
+        Ok(whole) => Some(Value::from(whole)),
+        Err(_) => text.parse::<f64>().ok().map(Value::from),
+    };
+    let (word, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    if let Some(value) = number(word) {
+        return Some((value, rest));
+    }
+    // Without a space. A unit may begin with what could be part of a number.
+    let is_part = |c: char| c.is_ascii_digit() || "+-._eE".contains(c);
+    let longest = text.find(|c| !is_part(c)).unwrap_or(text.len());
+    (1..=longest).rev().find_map(|end| {
+        let (begin, unit) = text.split_at_checked(end)?;
+        Some((number(begin)?, unit))
+    })
+}
+
 /// The fields of a quantity that is written short, `"10 s"` or `true`: its value, and its
 /// unit if it has one. `None` if there is no number in it.
 pub(super) fn short(item: &Item, span: &Range<usize>) -> Option<Vec<Field>> {
@@ -87,13 +106,8 @@ pub(super) fn short(item: &Item, span: &Range<usize>) -> Option<Vec<Field>> {
     if let Some(flag) = item.as_bool() {
         return Some(vec![field("value", value(flag))]);
     }
-    let text = item.as_str()?.trim();
-    let (number, unit) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-    let number = match number.parse::<i64>() {
-        Ok(whole) => value(whole),
-        Err(_) => value(number.parse::<f64>().ok()?),
-    };
-    let mut fields = vec![field("value", number)];
+    let (number, unit) = split_number(item.as_str()?.trim())?;
+    let mut fields = vec![field("value", value(number))];
     if !unit.trim().is_empty() {
         fields.push(field("unit", value(unit.trim())));
     }

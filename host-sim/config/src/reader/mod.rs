@@ -11,7 +11,7 @@ use toml_edit::{Document, Item};
 
 use super::error::{ConfigError, Lines, Problem};
 use super::params::{FieldSpec, ParameterInfo, Params};
-use super::quantity::suffix;
+use super::quantity::{Dimension, suffix};
 use super::suggest::closest;
 
 pub(crate) use entry::Entry;
@@ -28,6 +28,12 @@ pub(crate) struct Reader {
     parameters: Vec<ParameterInfo>,
     /// Whether every quantity must name its source.
     source_required: bool,
+}
+
+/// Whether a text is a whole number, and one that TOML cannot hold.
+fn is_long_number(text: &str) -> bool {
+    let digits = text.chars().all(|c| c.is_ascii_digit());
+    digits && !text.is_empty() && text.parse::<i64>().is_err()
 }
 
 impl Reader {
@@ -53,7 +59,16 @@ impl Reader {
             Err(e) => {
                 let span = e.span().unwrap_or(0..0);
                 let message = format!("not valid TOML: {}", e.message());
-                let problem = Problem::at((file, &shared, &lines), span, message, "here", None);
+                let help = match text.get(span.clone()) {
+                    Some(number) if is_long_number(number) => {
+                        format!("TOML has no number so large; write \"{number}\" in quotes")
+                    }
+                    _ => "a field is `name = value`, below the [section] that it belongs to; \
+                          https://toml.io describes the rest"
+                        .to_owned(),
+                };
+                let place = (file, &shared, &lines);
+                let problem = Problem::at(place, span, message, "here", Some(help));
                 Err(ConfigError::new(what, vec![problem]))
             }
         }
@@ -272,10 +287,11 @@ impl Reader {
         }
         let values: Vec<Option<Vec<f64>>> = T::FIELDS
             .iter()
-            .map(|spec| {
-                entry
-                    .get(spec.key)
-                    .and_then(|_| self.quantity(&entry, spec))
+            .map(|spec| match entry.get(spec.key) {
+                Some(_) => self.quantity(&entry, spec),
+                // That it is missing is told above. What the other fields must be to each other
+                // does not depend on a flag, and is told at the same time.
+                None => (spec.dimension == Dimension::Flag).then(|| vec![0.0]),
             })
             .collect();
         let complete: Vec<Vec<f64>> = values.into_iter().collect::<Option<_>>()?;

@@ -8,6 +8,9 @@ use crate::suggest::closest;
 /// Longest name, in characters.
 const NAME_LENGTH: usize = 64;
 
+/// Largest whole number that TOML can write.
+const LARGEST_OF_TOML: u64 = i64::MAX as u64;
+
 /// Whether a name can stand in a path, in TOML and in a page as it is.
 fn is_name(text: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
@@ -154,7 +157,8 @@ impl Reader {
         value
     }
 
-    /// Reads a whole number without unit, such as a seed.
+    /// Reads a whole number without unit, such as a seed. Those that TOML has no numbers for, above
+    /// 2⁶³ − 1, are written as text.
     pub(crate) fn whole(
         &mut self,
         entry: &Entry,
@@ -162,8 +166,10 @@ impl Reader {
         allowed: RangeInclusive<u64>,
     ) -> Option<u64> {
         let (key_span, item) = entry.get(key)?;
+        let long = *allowed.end() > LARGEST_OF_TOML;
         let value = item.as_integer().and_then(|v| u64::try_from(v).ok());
-        match value {
+        let text = item.as_str().filter(|_| long);
+        match value.or_else(|| text?.parse().ok()) {
             Some(v) if allowed.contains(&v) => Some(v),
             _ => {
                 let message = format!(
@@ -173,7 +179,9 @@ impl Reader {
                     allowed.start(),
                     allowed.end()
                 );
-                self.problem(item.span().or(Some(key_span)), message, "not allowed", None);
+                let help = format!("above {LARGEST_OF_TOML}, write it in quotes");
+                let help = long.then_some(help);
+                self.problem(item.span().or(Some(key_span)), message, "not allowed", help);
                 None
             }
         }

@@ -37,7 +37,7 @@ pub(super) fn rocks(
     );
     let x = fields.range(r, &X);
     let y = fields.range(r, &Y);
-    let seed = fields.whole(r, "seed", 0..=i64::MAX as u64);
+    let seed = fields.whole(r, "seed", 0..=u64::MAX);
     let cover = fields.required(r, &cover);
     let size = fields.ordered(r, &size);
     let exposed = fields.or(r, &exposed, 1.0 / 3.0);

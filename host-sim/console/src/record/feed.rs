@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use wheeleg_telemetry::{SampleRef, Sink, Taken};
+use wheeleg_telemetry::{Contact, SampleRef, Sink, Taken};
 
-use super::{Given, Note, Shared};
+use super::{Given, Note, Shared, Touching};
 use crate::live::Moving;
 
 /// Places of the ring that samples leave for inputs, begin and end.
@@ -94,6 +94,14 @@ impl Feed {
         }
     }
 
+    /// Something for the log, if there is room.
+    fn note(&mut self, note: Note) {
+        if self.to.slots() < RESERVE || self.to.push(note).is_err() {
+            self.dropped += 1;
+            self.shared.dropped.store(self.dropped, Ordering::Relaxed);
+        }
+    }
+
     /// The robot was given something when it had been simulated up to `ms`.
     pub(crate) fn given(&mut self, ms: u64, given: Given) {
         if self.to.push(Note::Input { ms, given }).is_err() {
@@ -119,15 +127,20 @@ impl Sink for FeedSink {
             t_ns: taken.t_ns,
             sample: taken.sample.to_owned(),
         };
-        let full = feed.to.slots() < RESERVE;
-        if full
-            || feed
-                .to
-                .push(Note::Sample(Box::new(moving), taken.lost))
-                .is_err()
-        {
-            feed.dropped += 1;
-            feed.shared.dropped.store(feed.dropped, Ordering::Relaxed);
-        }
+        feed.note(Note::Sample(Box::new(moving), taken.lost));
+    }
+
+    fn wants_contacts(&self) -> bool {
+        self.0.borrow().running
+    }
+
+    fn contacts(&mut self, t_ns: u64, contacts: &[Contact], lost: bool) {
+        let touching = Touching {
+            t_ns,
+            contacts: contacts.to_vec(),
+            lost,
+        };
+        let mut feed = self.0.borrow_mut();
+        feed.note(Note::Contacts(Box::new(touching)));
     }
 }

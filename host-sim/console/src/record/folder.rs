@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use wheeleg_telemetry::{LogFile, OwnedSample, Sink as _, Taken};
 
-use super::About;
 use super::inputs::Line;
+use super::{About, Touching};
 use crate::live::Moving;
 
 /// The log.
@@ -105,7 +105,8 @@ impl Folder {
         }
         let file = path.join(INPUTS);
         let inputs = File::create_new(&file).map_err(|e| said(&file, &e))?;
-        let log = LogFile::create(&path.join(LOG)).map_err(|e| e.to_string())?;
+        let log = LogFile::create(&path.join(LOG)).and_then(|log| log.with(about.scene.clone()));
+        let log = log.map_err(|e| e.to_string())?;
         let mut folder = Self {
             log,
             inputs: BufWriter::new(inputs),
@@ -139,6 +140,19 @@ impl Folder {
     /// Adds a sample to the log.
     pub(super) fn sample(&mut self, moving: &Moving, lost: bool) -> Result<(), String> {
         self.put(moving.channel, moving.t_ns, &moving.sample, lost);
+        self.log
+            .failure()
+            .map_or(Ok(()), |why| Err(why.to_string()))
+    }
+
+    /// Draws the contacts into the log.
+    pub(super) fn contacts(&mut self, touching: &Touching) -> Result<(), String> {
+        let Touching {
+            t_ns,
+            contacts,
+            lost,
+        } = touching;
+        self.log.contacts(*t_ns, contacts, *lost);
         self.log
             .failure()
             .map_or(Ok(()), |why| Err(why.to_string()))

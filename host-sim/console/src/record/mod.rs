@@ -18,6 +18,8 @@ use std::thread::JoinHandle;
 
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_scene::Scene;
+use wheeleg_telemetry::Contact;
 
 use crate::error::ConsoleError;
 use crate::live::Moving;
@@ -45,6 +47,8 @@ pub(crate) struct About {
     pub(crate) robot_toml: String,
     /// Text of the scenario's file.
     pub(crate) scenario_toml: String,
+    /// Picture of the robot on its ground, at rest.
+    pub(crate) scene: Scene,
 }
 
 impl About {
@@ -53,14 +57,16 @@ impl About {
         robot_toml: &str,
         scenario: &Scenario,
         scenario_toml: &str,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, ConsoleError> {
+        let scene = Scene::new(robot, scenario);
+        Ok(Self {
             robot: robot.name.clone(),
             scenario: scenario.name.clone(),
             seed: scenario.seed,
             robot_toml: robot_toml.to_owned(),
             scenario_toml: scenario_toml.to_owned(),
-        }
+            scene: scene.map_err(|e| ConsoleError::other(e.to_string(), "choose another robot"))?,
+        })
     }
 }
 
@@ -96,6 +102,16 @@ enum Note {
     },
     /// Something for the log.
     Sample(Box<Moving>, bool),
+    /// The contacts with the ground, for the log.
+    Contacts(Box<Touching>),
+}
+
+/// All contacts with the ground at one instant.
+#[derive(Debug)]
+struct Touching {
+    t_ns: u64,
+    contacts: Vec<Contact>,
+    lost: bool,
 }
 
 /// What a robot is given.

@@ -135,6 +135,10 @@ impl Writer {
                     .map(|r| r.folder.sample(&moving, lost));
                 self.check(written);
             }
+            Note::Contacts(touching) => {
+                let written = self.running.as_mut().map(|r| r.folder.contacts(&touching));
+                self.check(written);
+            }
         }
     }
 

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use wheeleg_console::client::http;
 use wheeleg_console::replay::{Replayed, replay};
-use wheeleg_telemetry::first_difference;
+use wheeleg_telemetry::{Derived, attachments, first_difference, read_derived};
 
 use crate::common::{TestRig, done, refusal};
 
@@ -140,6 +140,20 @@ fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
     let first = repeated(&folder(&rig, "0001"));
     assert!(first.is_same(), "{first:?}");
     assert!(first.summary.begin_us > 0 && first.inputs > 2);
+    // A viewer finds robot, ground and forces in a log that begins in the middle of a life.
+    let log = folder(&rig, "0001").join("log.mcap");
+    assert_eq!(attachments(&log).expect("a log")[0].name, "robot.urdf");
+    let mut counts = [0; 5];
+    let whole = read_derived(&log, &mut |channel, _, _| {
+        counts[channel as usize] += 1;
+        ControlFlow::Continue(())
+    });
+    assert!(whole.expect("a log"));
+    let count = |channel| counts[channel as usize];
+    assert_eq!(count(Derived::Scene), 1);
+    assert!(count(Derived::Tf) > 5 && count(Derived::Tf) == count(Derived::JointStates));
+    let (frames, forces) = (count(Derived::Tf), count(Derived::Contacts));
+    assert!(forces * 2 + 4 > frames && forces < frames, "{counts:?}");
     let second = repeated(&folder(&rig, "0002"));
     assert!(
         second.is_same() && second.end_ms > first.end_ms,

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::contacts::{DISCS, RobotContacts, Ruts, SOFT_SLOTS, SPHERES, Step, Steps};
-use super::sum::{Sum, velocity};
+use super::sum::{Noted, Sum, across, velocity};
 use crate::soil::Soil;
 use crate::soil::rolling::{Motion, Rolled, RollingLaw};
 use crate::soil::sole::{SoleLaw, Stepped};
@@ -114,7 +114,7 @@ impl Soft {
     #[inline]
     pub(super) fn sole(
         &self,
-        sum: &mut Sum,
+        sum: &mut Sum<'_>,
         steps: &mut Steps,
         touched: &mut [bool; SOFT_SLOTS],
         (part, near, radius_m): (u32, &Near, f64),
@@ -152,6 +152,14 @@ impl Soft {
         let force = law.force(&mut steps[slot].print, &touch);
         *normal_n += force.normal_n;
         sum.add(force.normal_n, &near.normal, &force.force_n, &arm);
+        sum.note(&force.force_n, &arm, || Noted {
+            number: part,
+            normal: &near.normal,
+            depth_m: depth_m.max(0.0),
+            slip_m_s: across(&touch.velocity_m_s, &near.normal),
+            friction: laws.soil.friction(),
+            soft: true,
+        });
         true
     }
 
@@ -187,7 +195,7 @@ impl Soft {
     /// A whole wheel with the patches of its discs; returns its deepest sinkage \[m\].
     pub(super) fn wheel(
         &self,
-        sum: &mut Sum,
+        sum: &mut Sum<'_>,
         ruts: &mut Ruts,
         patches: &Patches,
         axis: &Vector3<f64>,
@@ -242,6 +250,14 @@ impl Soft {
             let beside = arm.dot(axis) * axis;
             sum.add(0.0, &normal, &pull, &beside);
             sum.wrench.moment_n_m -= share * force.torque_n_m * axis;
+            sum.note(&(push + pull), &arm, || Noted {
+                number: patch.part,
+                normal: &normal,
+                depth_m,
+                slip_m_s: (touch.speed.tread - touch.speed.travel).hypot(touch.speed.left),
+                friction: laws.soil.friction(),
+                soft: true,
+            });
         }
         deepest
     }

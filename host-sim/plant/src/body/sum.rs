@@ -3,12 +3,13 @@
 use nalgebra::Vector3;
 
 use super::contacts::{Grip, Grips, SLOTS};
+use super::points::{ContactPoint, Notes, Toucher};
 use crate::contact::{ContactLaw, Touch};
 use crate::dynamics::floating::Wrench;
 use crate::terrain::{Material, Near};
 
 /// The forces of one body's contacts, as they are found.
-pub(super) struct Sum {
+pub(super) struct Sum<'n> {
     /// Point about which the body's twists are \[m\].
     pub(super) reference_m: Vector3<f64>,
     /// Twist now.
@@ -21,6 +22,28 @@ pub(super) struct Sum {
     pub(super) normal_n: f64,
     /// Sum of the normal forces as vectors.
     pub(super) support_n: Vector3<f64>,
+    /// What touches, for the notes.
+    pub(super) toucher: Toucher,
+    pub(super) notes: Notes<'n>,
+}
+
+/// What of a contact is not in its force.
+pub(super) struct Noted<'a> {
+    /// Number of the part, from 1.
+    pub(super) number: u32,
+    pub(super) normal: &'a Vector3<f64>,
+    pub(super) depth_m: f64,
+    pub(super) slip_m_s: f64,
+    pub(super) friction: f64,
+    pub(super) soft: bool,
+}
+
+/// Number of the second contact of a wheel with one part.
+pub(super) const SECOND: u32 = 1 << 31;
+
+/// Speed of a velocity along a surface \[m/s\].
+pub(super) fn across(velocity_m_s: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+    (velocity_m_s - velocity_m_s.dot(normal) * normal).norm()
 }
 
 /// Velocity of a point at `arm` from the reference of a twist.
@@ -29,7 +52,7 @@ pub(super) fn velocity(twist: &[Vector3<f64>; 2], arm: &Vector3<f64>) -> Vector3
     twist[1] + twist[0].cross(arm)
 }
 
-impl Sum {
+impl Sum<'_> {
     /// Adds a force that acts at `arm` from the reference.
     #[inline]
     pub(super) fn add(
@@ -44,11 +67,34 @@ impl Sum {
         self.wrench.force_n += force_n;
         self.wrench.moment_n_m += arm.cross(force_n);
     }
+
+    /// Notes a contact at `arm` from the reference, if somebody looks.
+    #[inline]
+    pub(super) fn note<'a>(
+        &self,
+        force_n: &Vector3<f64>,
+        arm: &Vector3<f64>,
+        noted: impl FnOnce() -> Noted<'a>,
+    ) {
+        let Some(notes) = self.notes else { return };
+        let noted = noted();
+        notes.borrow_mut().push(ContactPoint {
+            toucher: self.toucher,
+            point_m: self.reference_m + arm,
+            normal: *noted.normal,
+            force_n: *force_n,
+            depth_m: noted.depth_m,
+            slip_m_s: noted.slip_m_s,
+            friction: noted.friction,
+            part: (noted.number & !SECOND) as usize - 1,
+            soft: noted.soft,
+        });
+    }
 }
 
 /// One sphere, disc or point against the hard parts near it.
-pub(super) struct Pressing<'a> {
-    pub(super) sum: &'a mut Sum,
+pub(super) struct Pressing<'a, 'n> {
+    pub(super) sum: &'a mut Sum<'n>,
     law: &'a ContactLaw,
     grips: &'a mut Grips,
     radius_m: f64,
@@ -57,10 +103,10 @@ pub(super) struct Pressing<'a> {
     deepest_m: f64,
 }
 
-impl<'a> Pressing<'a> {
+impl<'a, 'n> Pressing<'a, 'n> {
     #[inline]
     pub(super) fn new(
-        sum: &'a mut Sum,
+        sum: &'a mut Sum<'n>,
         law: &'a ContactLaw,
         grips: &'a mut Grips,
         radius_m: f64,
@@ -107,6 +153,14 @@ impl<'a> Pressing<'a> {
         };
         let force = law.force(&mut grips[slot].stretch_m, &touch);
         sum.add(force.normal_n, &near.normal, &force.force_n, &arm);
+        sum.note(&force.force_n, &arm, || Noted {
+            number,
+            normal: &near.normal,
+            depth_m,
+            slip_m_s: across(&touch.velocity_m_s, &near.normal),
+            friction: law.friction_on(&material)[0],
+            soft: false,
+        });
     }
 
     /// Lets go of what is not touched; gives the deepest penetration \[m\].

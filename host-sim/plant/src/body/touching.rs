@@ -1,12 +1,15 @@
 //! The robot against the terrain: forces of all contacts at one instant.
 
+use std::cell::RefCell;
+
 use nalgebra::Vector3;
 
 use super::contacts::{
     ContactStates, DISCS, Grip, Grips, POINTS, RING, RobotContacts, SOFT_SLOTS, SOLE, SPHERES, Step,
 };
+use super::points::{ContactPoint, Notes, Toucher};
 use super::soft::{Patches, Soft};
-use super::sum::{Pressing, Sum};
+use super::sum::{Pressing, SECOND, Sum};
 use crate::contact::ContactLaw;
 use crate::dynamics::floating::{Contacts, FloatingKin, Velocity, Wrench};
 use crate::terrain::{Disc, Index, Near, Rim, Shape, Surface, Terrain};
@@ -89,9 +92,6 @@ pub struct Touching {
     sunk_under_feet_m: f64,
 }
 
-/// Number of the second contact of a wheel with one part.
-const SECOND: u32 = 1 << 31;
-
 /// Nothing touches any more.
 #[inline]
 fn release(all: &mut [Grips]) {
@@ -115,12 +115,13 @@ struct Moving<'a> {
     now: &'a Velocity,
     during: &'a Velocity,
     step_s: f64,
+    notes: Notes<'a>,
 }
 
-impl Moving<'_> {
+impl<'a> Moving<'a> {
     /// Nothing pushes a body yet; its point is at `reference_m`.
     #[inline]
-    fn sum(&self, body: usize, reference_m: Vector3<f64>) -> Sum {
+    fn sum(&self, body: usize, reference_m: Vector3<f64>) -> Sum<'a> {
         Sum {
             reference_m,
             now: self.kin.twist(body, self.now),
@@ -129,6 +130,12 @@ impl Moving<'_> {
             wrench: Wrench::ZERO,
             normal_n: 0.0,
             support_n: Vector3::zeros(),
+            toucher: match body {
+                0 | 1 => Toucher::Foot(body, 0),
+                2 | 3 => Toucher::Wheel(body - 2, 1),
+                _ => Toucher::Chassis(0),
+            },
+            notes: self.notes,
         }
     }
 }
@@ -200,10 +207,10 @@ impl Touching {
     #[inline]
     fn press_point(
         &self,
-        mut pressing: Pressing<'_>,
+        mut pressing: Pressing<'_, '_>,
         centre: &Vector3<f64>,
         reach_m: f64,
-        mut soft: impl FnMut(&mut Sum, u32, &Near) -> bool,
+        mut soft: impl FnMut(&mut Sum<'_>, u32, &Near) -> bool,
     ) -> f64 {
         self.index.near(centre, reach_m, |number| {
             let part = &self.terrain.parts[number as usize];
@@ -219,7 +226,7 @@ impl Touching {
     #[inline]
     fn press_disc(
         &self,
-        mut pressing: Pressing<'_>,
+        mut pressing: Pressing<'_, '_>,
         patches: &mut Patches,
         rim: &mut Rim,
         disc: &Disc,
@@ -302,17 +309,44 @@ impl Touching {
             now,
             during,
             step_s,
+            notes: None,
         };
+        self.all(&moving, states)
+    }
+
+    /// The contacts one by one, `kin` being the robot as it is, `now` its velocity.
+    #[must_use]
+    pub fn points(
+        &self,
+        kin: &FloatingKin,
+        now: &Velocity,
+        states: &ContactStates,
+    ) -> Vec<ContactPoint> {
+        let points = RefCell::new(Vec::new());
+        let moving = Moving {
+            kin,
+            now,
+            during: now,
+            step_s: 0.0,
+            notes: Some(&points),
+        };
+        // A step of 0 changes the bristles of a copy by rounding alone.
+        let _ = self.all(&moving, &mut states.clone());
+        points.into_inner()
+    }
+
+    fn all(&self, moving: &Moving<'_>, states: &mut ContactStates) -> Loads {
+        let kin = moving.kin;
         let points = kin.points_m();
         let mut loads = Loads::default();
         for (leg, load) in loads.feet.iter_mut().enumerate() {
-            loads.contacts.feet[leg] = self.foot(&moving, leg, &points[leg], states, load);
+            loads.contacts.feet[leg] = self.foot(moving, leg, &points[leg], states, load);
         }
         for (wheel, load) in loads.wheels.iter_mut().enumerate() {
             let centre = &points[2 + wheel];
-            loads.contacts.wheels[wheel] = self.wheel(&moving, wheel, centre, states, load);
+            loads.contacts.wheels[wheel] = self.wheel(moving, wheel, centre, states, load);
         }
-        loads.contacts.chassis = self.chassis(&moving, &points[4], states, &mut loads.chassis_n);
+        loads.contacts.chassis = self.chassis(moving, &points[4], states, &mut loads.chassis_n);
         loads
     }
 
@@ -343,11 +377,12 @@ impl Touching {
         let axes = moving.kin.foot_axes(leg);
         for (k, direction) in SOLE.into_iter().enumerate() {
             let centre = self.sphere_m(sole, &axes, direction);
+            sum.toucher = Toucher::Foot(leg, k);
             let radius_m = foot.sphere_radius_m;
             let mut touched = [false; SOFT_SLOTS];
             let mut soil_n = 0.0;
             let pressing = Pressing::new(&mut sum, &self.laws[0], &mut grips[k], radius_m);
-            let soft = |sum: &mut Sum, part: u32, near: &Near| {
+            let soft = |sum: &mut Sum<'_>, part: u32, near: &Near| {
                 let at = (part, near, radius_m);
                 self.soft
                     .sole(sum, &mut steps[k], &mut touched, at, &mut soil_n)
@@ -383,7 +418,8 @@ impl Touching {
     ) -> Wrench {
         let (grips, rims) = (&mut states.wheels[wheel], &mut states.rims[wheel]);
         let ruts = &mut states.ruts[wheel];
-        let (wheel, body) = (&self.params.wheel, 2 + wheel);
+        let (side, body) = (wheel, 2 + wheel);
+        let wheel = &self.params.wheel;
         let r = self.wheel_radius_m;
         let rotation = moving.kin.rotation();
         let axis = rotation.column(1).into_owned();
@@ -394,7 +430,8 @@ impl Touching {
             release(grips);
         } else {
             let discs = grips.iter_mut().zip(rims).zip([1.0, 0.0, -1.0]);
-            for ((grips, rim), across) in discs {
+            for (k, ((grips, rim), across)) in discs.enumerate() {
+                sum.toucher = Toucher::Wheel(side, k);
                 let disc = Disc {
                     centre_m: centre + across * wheel.width_m / DISCS as f64 * axis,
                     axis,
@@ -405,6 +442,7 @@ impl Touching {
             }
         }
         let hard_n = sum.normal_n;
+        sum.toucher = Toucher::Wheel(side, 1);
         load.sinkage_m = self.soft.wheel(&mut sum, ruts, &patches, &axis);
         let spin = sum.now[0].dot(&axis);
         let forward = if sum.normal_n > 0.0 {
@@ -442,7 +480,8 @@ impl Touching {
             return Wrench::ZERO;
         }
         let mut sum = moving.sum(4, *origin);
-        for (grips, point) in states.chassis.iter_mut().zip(&self.points_m) {
+        for (k, (grips, point)) in states.chassis.iter_mut().zip(&self.points_m).enumerate() {
+            sum.toucher = Toucher::Chassis(k);
             let place = origin + rotation * point;
             let pressing = Pressing::new(&mut sum, &self.laws[2], grips, 0.0);
             // To the chassis every ground is hard.

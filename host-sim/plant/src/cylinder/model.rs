@@ -356,7 +356,8 @@ impl CylinderModel {
         out
     }
 
-    /// Refuses a state that is not finite or has left the model's range.
+    /// Refuses a state that is not finite or has left the model's range; `most_pa` is the largest
+    /// pressure that a chamber can have.
     ///
     /// # Errors
     /// [`PlantError::NonFinite`] or [`PlantError::OutOfBounds`] with the name.
@@ -365,6 +366,7 @@ impl CylinderModel {
         state: &CylinderState,
         index: usize,
         stroke_m: f64,
+        most_pa: f64,
     ) -> Result<(), PlantError> {
         // A tenth of the stroke past a stop means the stop did not hold.
         let margin = 0.1 * self.params.stroke_m;
@@ -376,8 +378,8 @@ impl CylinderModel {
             self.params.stroke_m + margin,
         )?;
         let [a, b] = self.pressures_pa(state, stroke_m);
-        check_state("pressure_a_pa", index, a, 1e3, 1e7)?;
-        check_state("pressure_b_pa", index, b, 1e3, 1e7)?;
+        check_state("pressure_a_pa", index, a, 1e3, most_pa)?;
+        check_state("pressure_b_pa", index, b, 1e3, most_pa)?;
         // The polytropic law has one temperature and an exponent of its own, so
         // its pV is not m R T: the mass is a sum of flows, which many cycles of
         // filling and venting carry away from pV and may take below zero.

@@ -114,6 +114,23 @@ impl Solid {
         })
     }
 
+    /// Its corners \[m\]: four of the foot, in turn as [`outline_m`](Self::outline_m), then those above
+    /// them.
+    #[must_use]
+    pub fn corners_m(&self) -> [[f64; 3]; 8] {
+        let (top, foot) = (&self.faces[0], &self.faces[5]);
+        let outline = self.outline_m();
+        std::array::from_fn(|k| {
+            let [x, y] = outline[k % 4];
+            let z = if k < 4 {
+                -foot.offset_m
+            } else {
+                (top.offset_m - top.normal.x * x - top.normal.y * y) / top.normal.z
+            };
+            [x, y, z]
+        })
+    }
+
     fn holds(&self, point: &Vector3<f64>) -> bool {
         self.faces
             .iter()

@@ -1,6 +1,7 @@
 //! The whole robot on soil.
 
 use nalgebra::Vector3;
+use wheeleg_plant::body::Toucher;
 use wheeleg_plant::soil::Soil;
 use wheeleg_plant::soil::wheel::Wheel;
 use wheeleg_plant::terrain::{Material, Part, Plane, Shape};
@@ -164,4 +165,58 @@ fn soil_carries_no_state_of_a_foot_in_the_air() {
     let contacts = &state.core.motion.contacts;
     assert!(contacts.steps[0].iter().flatten().all(|s| s.part == 0));
     assert_ne!(plant.state_hash(&state), hash);
+}
+
+/// The contacts one by one are the same ground as their sums, hard or soft, at rest and driving.
+#[test]
+fn single_contacts_add_up_to_the_loads() {
+    let floor = Material::ROUGH;
+    for material in [Material::soft(Soil::VOLCANIC_SAND), floor] {
+        let (mut plant, mut state) = on(Soil::VOLCANIC_SAND, 5.0, wheeleg_field());
+        if material == floor {
+            let mut params = plant.params().clone();
+            params.terrain.parts[0].material = floor;
+            plant = Plant::new(&params).unwrap();
+            state = plant.initial_state(1).unwrap();
+        }
+        let inputs = Inputs {
+            bridge_duty: [0.3; 2],
+            bridge_enabled: [true; 2],
+            ..Inputs::default()
+        };
+        for tick in 0..400 {
+            plant.tick(&mut state, &inputs).unwrap();
+            if tick % 40 > 0 {
+                continue;
+            }
+            let mechanics = &plant.assembly.mechanics;
+            let motion = &state.core.motion;
+            let points = mechanics.contact_points(motion).unwrap();
+            let loads = mechanics.scene(motion).unwrap().loads;
+            let sum = |touches: &dyn Fn(&Toucher) -> bool| -> Vector3<f64> {
+                let those = points.iter().filter(|p| touches(&p.toucher));
+                those.map(|p| p.force_n).sum()
+            };
+            for side in 0..2 {
+                let foot = sum(&|t| matches!(t, Toucher::Foot(s, _) if *s == side));
+                assert!((foot - loads.feet[side].force_n).norm() < 1e-9);
+                let wheel = sum(&|t| matches!(t, Toucher::Wheel(s, _) if *s == side));
+                assert!((wheel - loads.contacts.wheels[side].force_n).norm() < 1e-9);
+                assert!(wheel.norm() > 20.0, "{wheel}");
+            }
+            assert!(points.len() >= 4 && points.iter().all(|p| p.part == 0));
+            for p in &points {
+                let steep = p.normal.angle(&Vector3::z()).to_degrees();
+                assert!((steep - 5.0).abs() < 1e-6, "{steep}");
+                // Where things touch is in the ground; nails hold a sole that is over it, too.
+                let above = p.point_m.dot(&p.normal);
+                assert!(p.depth_m >= 0.0 && above.abs() < 0.06, "{p:?}");
+                assert!(p.soft || above < 1e-9, "{p:?}");
+                let normal_n = p.force_n.dot(&p.normal);
+                let along = (p.force_n - normal_n * p.normal).norm();
+                assert!(p.soft || along <= 0.8 * normal_n + 1e-9, "{p:?}");
+                assert_eq!(p.soft, material != floor);
+            }
+        }
+    }
 }

@@ -17,6 +17,8 @@ use super::design::axis_data;
 /// friction and delay: up to it 2.8 % of 1,688 missed their bars, none by a fault; above it 18 %
 /// of 232, 17 by a fault.
 pub const COARSE: f64 = 0.5;
+/// Friction that holds less than this holds nothing \[N\].
+const LEAST_N: f64 = 1e-3;
 
 /// Smallest step of force, against what friction holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -27,10 +29,11 @@ pub struct ValveResolution {
     pub force_step_n: f64,
     /// Range of forces in which friction holds the piston: twice the break-away force \[N\].
     pub friction_holds_n: f64,
-    /// The first of these forces over the second.
-    pub ratio: f64,
-    /// Conductance of valve and line with which the ratio would be [`COARSE`] \[dm³/(s bar)\].
-    pub conductance_for_half_dm3_s_bar: f64,
+    /// The first of these forces over the second; null where friction holds nothing.
+    pub ratio: Option<f64>,
+    /// Conductance of valve and line with which the ratio would be [`COARSE`] \[dm³/(s bar)\]; null
+    /// where friction holds nothing.
+    pub conductance_for_half_dm3_s_bar: Option<f64>,
 }
 
 impl ValveResolution {
@@ -56,22 +59,30 @@ impl ValveResolution {
         let step_pa = exponent * axis.supply.set_pressure_pa * flow_m3_s * opening_s / volume_m3;
         let force_step_n = step_pa * area_m2;
         let friction_holds_n = 2.0 * c.friction.static_n;
-        let ratio = force_step_n / friction_holds_n.max(1e-9);
+        let ratio = (friction_holds_n >= LEAST_N).then(|| force_step_n / friction_holds_n);
         Self {
             shortest_opening_ms: opening_s * 1e3,
             force_step_n,
             friction_holds_n,
             ratio,
-            conductance_for_half_dm3_s_bar: conductance * COARSE / ratio.max(1e-9),
+            conductance_for_half_dm3_s_bar: ratio
+                .map(|ratio| conductance * COARSE / ratio.max(1e-9)),
         }
     }
 
     /// What to do about valves that are too coarse; `None` if they are not.
     #[must_use]
     pub fn advice(&self) -> Option<String> {
-        (self.ratio > COARSE).then(|| {
+        let Some((ratio, conductance)) = self.ratio.zip(self.conductance_for_half_dm3_s_bar) else {
+            return Some(
+                "without break-away friction (`friction.static`) no valve is fine enough: the piston \
+rests where its forces balance, and swings about it"
+                    .to_owned(),
+            );
+        };
+        (ratio > COARSE).then(|| {
             // Rounded down: what is printed must be enough.
-            let throttled = (self.conductance_for_half_dm3_s_bar * 1e3).floor() * 1e-3;
+            let throttled = (conductance * 1e3).floor() * 1e-3;
             format!(
                 "coarse valves: their shortest opening ({:.1} ms) changes the force by {:.0} N, and friction \
 holds no more than {:.0} N: rest beside the target, swinging or fault 34 (following_error) may be met \
@@ -95,25 +106,42 @@ mod tests {
         for name in ["bench-vq110u", "small-12x50", "long-16x400", "heavy-40x250"] {
             let mut axis = AxisConfig::load(name).expect("built in").axis;
             let fine = ValveResolution::of(&axis);
-            assert!((0.01..COARSE).contains(&fine.ratio), "{name}: {fine:?}");
+            let share = fine.ratio.expect("there is friction");
+            assert!((0.01..COARSE).contains(&share), "{name}: {fine:?}");
             assert_eq!(fine.advice(), None);
             // Valves so wide that the advice is needed; what it says mends it.
             let c = &mut axis.cylinder;
             c.line_flow = None;
             for valve in [&mut c.fill_valve, &mut c.vent_valve] {
-                valve.flow.conductance_m3_s_pa *= 1.5 / fine.ratio;
+                valve.flow.conductance_m3_s_pa *= 1.5 / share;
             }
             let coarse = ValveResolution::of(&axis);
-            assert!(coarse.ratio > 1.0, "{name}: {coarse:?}");
+            assert!(coarse.ratio > Some(1.0), "{name}: {coarse:?}");
+            let half = coarse.conductance_for_half_dm3_s_bar.expect("as well");
             let text = coarse.advice().expect("advice");
             assert!(text.contains("coarse valves"), "{text}");
             let c = &mut axis.cylinder;
             for valve in [&mut c.fill_valve, &mut c.vent_valve] {
-                valve.flow.conductance_m3_s_pa = coarse.conductance_for_half_dm3_s_bar * 1e-8;
+                valve.flow.conductance_m3_s_pa = half * 1e-8;
             }
             let mended = ValveResolution::of(&axis);
-            assert!((mended.ratio - COARSE).abs() < 1e-3, "{name}: {mended:?}");
+            let ratio = mended.ratio.expect("there is friction");
+            assert!((ratio - COARSE).abs() < 1e-3, "{name}: {mended:?}");
         }
+    }
+
+    /// Nothing is divided by it.
+    #[test]
+    fn without_friction_there_is_no_ratio() {
+        let mut axis = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        axis.cylinder.friction.static_n = 0.0;
+        let resolution = ValveResolution::of(&axis);
+        assert_eq!(
+            (resolution.ratio, resolution.conductance_for_half_dm3_s_bar),
+            (None, None)
+        );
+        let advice = resolution.advice().expect("advice");
+        assert!(advice.contains("`friction.static`"), "{advice}");
     }
 
     /// By hand: 6 bar gauge, bore 20 × 180 mm, 3 cm³ beside the piston.

@@ -1,5 +1,6 @@
 //! One exported file; what stands in its place is kept.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::StudyError;
@@ -36,12 +37,23 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), StudyError> {
         std::fs::create_dir_all(folder)
             .map_err(|e| StudyError::output("create the folder", folder, e))?;
     }
+    // A device or a pipe is written to, not moved away.
+    if path.exists() && !path.is_file() {
+        return std::fs::write(path, text)
+            .map_err(|e| StudyError::output("write the file", path, e));
+    }
     if path.exists() {
         let previous = free_place(path);
         std::fs::rename(path, &previous).map_err(|e| StudyError::output("set aside", path, e))?;
-        eprintln!("earlier {} moved to {}", path.display(), previous.display());
+        let told = format!("earlier {} moved to {}", path.display(), previous.display());
+        // Standard error may be closed or full.
+        let _ = writeln!(std::io::stderr(), "{told}");
     }
-    std::fs::write(path, text).map_err(|e| StudyError::output("write the file", path, e))
+    std::fs::write(path, text).map_err(|e| {
+        // A part of a file would be taken for the whole.
+        let _ = std::fs::remove_file(path);
+        StudyError::output("write the file", path, e)
+    })
 }
 
 #[cfg(test)]
@@ -62,6 +74,13 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).expect("new"), "three");
         assert_eq!(fs::read_to_string(previous("")).expect("kept"), "one");
         assert_eq!(fs::read_to_string(previous("-2")).expect("kept"), "two");
+        #[cfg(target_os = "linux")]
+        {
+            write_new(Path::new("/dev/null"), "x").expect("a device takes it");
+            let full = write_new(Path::new("/dev/full"), "x").expect_err("full");
+            assert!(full.to_string().contains("/dev/full"), "{full}");
+            assert!(Path::new("/dev/full").exists() && !Path::new("/dev/null.previous").exists());
+        }
         let error = write_new(temporary.path(), "x").expect_err("a folder");
         assert!(error.to_string().contains("cannot write"), "{error}");
     }

@@ -1,8 +1,10 @@
-//! The robot for other programs.
+//! The robot and its logs for other programs.
 
 mod file;
-mod geometry;
-mod tree;
-pub mod urdf;
+mod folder;
+pub mod layout;
+pub mod parquet;
+pub mod ros2;
 
 pub use file::write_new;
+pub use folder::log_of;

@@ -24,6 +24,7 @@ use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, LawChoice, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
+use wheeleg_scene::Scene;
 use wheeleg_sim::faults;
 use wheeleg_sim::{Boards, DownTimes, SimError};
 use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
@@ -67,7 +68,7 @@ pub struct Run {
 /// Samples per second in the CSV files; 500 per second are in the MCAP log.
 const CSV_RATE_HZ: u32 = 100;
 /// Measured on the three-step test and rounded up: log, bytes per simulated second.
-const LOG_BYTES_PER_S: f64 = 250e3;
+const LOG_BYTES_PER_S: f64 = 330e3;
 /// The same of the tables.
 const TABLE_BYTES_PER_S: f64 = 110e3;
 /// From this duration on the program says how much disk a run takes, s.
@@ -169,8 +170,9 @@ fn run_with(
     let job = Job::begin(&scenario.name, settings)?;
     announce(scenario.duration_s);
     let reserve = reserve(job.folder());
+    let scene = Scene::new(robot, scenario)?;
     let recorder = Recorder::new(keep(scenario))
-        .with(LogFile::create(&job.folder().join("log.mcap"))?)
+        .with(LogFile::create(&job.folder().join("log.mcap"))?.with(scene)?)
         .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?);
     let duration_ms = (scenario.duration_s * 1e3).round() as u64;
     job.progress.begin(
@@ -253,9 +255,11 @@ fn announce(duration_s: f64) {
     if duration_s > LONG_S {
         let bytes = |per_s: f64| per_s * duration_s * 1e-9;
         let (log, tables) = (bytes(LOG_BYTES_PER_S), bytes(TABLE_BYTES_PER_S));
-        eprintln!(
+        let told = format!(
             "{duration_s:.0} s to simulate: about {log:.2} GB of log and {tables:.2} GB of tables"
         );
+        // Standard error may be closed or full.
+        let _ = writeln!(std::io::stderr(), "{told}");
     }
 }
 

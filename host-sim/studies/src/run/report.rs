@@ -290,7 +290,7 @@ mod tests {
         let text = std::fs::read_to_string(folder.path().join("summary.json")).expect("written");
         let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
         assert_eq!(value["scenario"], "three-step");
-        assert_eq!(value["seed"], 7);
+        assert_eq!(value["seed"], "7");
         assert_eq!(value["hash"], summary.hash.as_str());
         assert_eq!(value["simulated_s"], 10.0);
         assert_eq!(value["wall_s"], 0.25);

@@ -45,8 +45,8 @@ pub struct Summary {
     pub robot_hash: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Seed used.
-    pub seed: u64,
+    /// Seed used, a whole number as text: a number of JSON is exact up to 2^53 alone.
+    pub seed: String,
     /// Faults injected, of the scenario and of the command line.
     pub faults: Vec<String>,
     /// What went wrong and what to do about it, and commands that were not carried out, in order
@@ -169,7 +169,7 @@ impl Summary {
             robot: robot.name.clone(),
             robot_hash: robot.fingerprint(),
             version: env!("CARGO_PKG_VERSION"),
-            seed: info.seed,
+            seed: info.seed.to_string(),
             faults: scenario.faults.iter().map(ToString::to_string).collect(),
             messages: messages(recording),
             hash: recording.hash.clone(),

@@ -10,19 +10,29 @@ use crate::compare::MARGIN;
 /// Refuses an axis that cannot do what its own file asks.
 ///
 /// # Errors
-/// [`StudyError::Refused`] names file, field, value and allowed range.
+/// [`StudyError::Refused`] names file, field, value and allowed range of all that is wrong.
 pub(super) fn check(file: &str, p: &AxisParams) -> Result<(), StudyError> {
-    let refuse = |field: &str, value: String, allowed: String, why: String| {
-        Err(StudyError::refused(
-            format!("{file}: `{field}` = {value} is out of range for this axis: allowed {allowed}"),
-            why,
-        ))
+    let wrong = wrong(file, p);
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    let (whats, whys): (Vec<String>, Vec<String>) = wrong.into_iter().unzip();
+    Err(StudyError::refused(whats.join("\n"), whys.join(";\n")))
+}
+
+/// All that is wrong, each with why it is.
+fn wrong(file: &str, p: &AxisParams) -> Vec<(String, String)> {
+    let mut wrong = Vec::new();
+    let mut refuse = |field: &str, value: String, allowed: String, why: String| {
+        let what =
+            format!("{file}: `{field}` = {value} is out of range for this axis: allowed {allowed}");
+        wrong.push((what, why));
     };
     let (c, pot) = (&p.cylinder, &p.potentiometer);
     let gauge_pa = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
     let left_n = force_left_n(p);
     if left_n <= 0.0 {
-        return refuse(
+        refuse(
             "friction.static",
             format!("{:.1} N", c.friction.static_n),
             format!("less than {:.1} N", left_n + c.friction.static_n),
@@ -34,8 +44,9 @@ pub(super) fn check(file: &str, p: &AxisParams) -> Result<(), StudyError> {
         );
     }
     let most_n = left_n / MARGIN;
-    if p.load_n.abs() > most_n * (1.0 + 1e-9) {
-        return refuse(
+    // Without force left there is none for a load.
+    if left_n > 0.0 && p.load_n.abs() > most_n * (1.0 + 1e-9) {
+        refuse(
             "moving.load",
             format!("{:.1} N", p.load_n),
             format!("−{most_n:.1} to {most_n:.1} N"),
@@ -49,18 +60,17 @@ friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take
     }
     let longest_m = longest_stroke_m();
     if c.stroke_m > longest_m {
-        return refuse(
+        refuse(
             "cylinder.stroke",
             format!("{:.1} mm", c.stroke_m * 1e3),
             format!("up to {:.1} mm", longest_m * 1e3),
-            "a joint board measures a piston up to 500 mm, a margin beyond its stops included"
-                .into(),
+            "a joint board measures a piston a margin beyond its stops, too: up to its `sensor_max`".into(),
         );
     }
     // Where the wiper stands with the rod out.
     let reach_m = pot.offset_m + c.stroke_m * pot.gain;
     if reach_m > 0.99 * pot.electrical_stroke_m {
-        return refuse(
+        refuse(
             "sensor.potentiometer.electrical_stroke",
             format!("{:.1} mm", pot.electrical_stroke_m * 1e3),
             format!("at least {:.1} mm", reach_m / 0.99 * 1e3),
@@ -68,7 +78,7 @@ friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take
         );
     }
     if pot.offset_m < 0.01 * pot.electrical_stroke_m {
-        return refuse(
+        refuse(
             "sensor.potentiometer.offset",
             format!("{:.1} mm", pot.offset_m * 1e3),
             format!("at least {:.1} mm", 0.01 * pot.electrical_stroke_m * 1e3),
@@ -76,14 +86,14 @@ friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take
         );
     }
     if p.initial_stroke_m > c.stroke_m {
-        return refuse(
+        refuse(
             "start.stroke",
             format!("{:.1} mm", p.initial_stroke_m * 1e3),
             format!("0 to {:.1} mm", c.stroke_m * 1e3),
             "the piston must start within cylinder.stroke".into(),
         );
     }
-    Ok(())
+    wrong
 }
 
 #[cfg(test)]
@@ -118,9 +128,23 @@ mod tests {
             text.contains("electrical_stroke") && text.contains("at least 191.9 mm"),
             "{text}"
         );
-        let text = message(|p| p.cylinder.stroke_m = 0.5);
+        // A standard stroke is one that a board can be told, if the sensor is long enough.
+        let long = |stroke_m: f64| {
+            message(|p| {
+                p.cylinder.stroke_m = stroke_m;
+                p.potentiometer.electrical_stroke_m = stroke_m + 0.03;
+            })
+        };
+        assert_eq!(long(0.5), "");
+        let text = long(0.51);
         assert!(
-            text.contains("`cylinder.stroke` = 500.0 mm") && text.contains("up to 485.3 mm"),
+            text.contains("`cylinder.stroke` = 510.0 mm") && text.contains("up to 509.8 mm"),
+            "{text}"
+        );
+        // All at once.
+        let text = message(|p| p.cylinder.stroke_m = 0.6);
+        assert!(
+            text.contains("`cylinder.stroke`") && text.contains("electrical_stroke"),
             "{text}"
         );
         let text = message(|p| p.potentiometer.offset_m = 0.001);

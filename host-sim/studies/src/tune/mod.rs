@@ -130,8 +130,9 @@ pub struct Tuned {
 pub struct Summary<'a> {
     /// Name of the axis.
     axis: &'a str,
-    /// Seed of the converter's noise.
-    seed: u64,
+    /// Seed of the converter's noise, a whole number as text: a number of JSON is exact up to 2^53
+    /// alone.
+    seed: String,
     /// Force left over the load, at most 1000 for no load.
     static_margin: f64,
     /// Least margin of an axis that can be tuned.
@@ -315,7 +316,7 @@ impl Tuned {
         let ms = |s: f64| (s * 1e6).round() * 1e-3;
         Summary {
             axis: &self.config.name,
-            seed: self.seed,
+            seed: self.seed.to_string(),
             static_margin: self.margin,
             least_margin: MARGIN,
             valve_resolution: self.valve_resolution,

@@ -141,8 +141,8 @@ struct Page<'a> {
     name: &'a str,
     description: &'a str,
     seed: u64,
-    /// Force of the shortest opening over what friction holds, and what is coarse.
-    valve_resolution: f64,
+    /// Force of the shortest opening over what friction holds, if it does, and what is coarse.
+    valve_resolution: Option<f64>,
     coarse: f64,
     advice: Option<String>,
     /// None without a load.

@@ -101,7 +101,20 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
     let (geometry, drawn_as) = geometry(options, &logs[0].content)?;
     let text = page::make(&logs, &groups, &differences, geometry, drawn_as.as_deref())?;
     let page = options.out.clone().unwrap_or_else(|| beside(&options.logs));
-    std::fs::write(&page, text).map_err(|e| StudyError::output("write", &page, e))?;
+    let is_log = |log: &PathBuf| same_file(log, &page);
+    if let Some(log) = options.logs.iter().find(|log| is_log(log)) {
+        return Err(StudyError::refused(
+            format!("the page would take the place of the log {}", log.display()),
+            "give another file with --out FILE",
+        ));
+    }
+    std::fs::write(&page, text).map_err(|e| {
+        // A part of a page would be taken for the whole.
+        if page.is_file() {
+            let _ = std::fs::remove_file(&page);
+        }
+        StudyError::output("write", &page, e)
+    })?;
     progress.clear();
     let broken_off = options.logs.iter().zip(&logs);
     let broken_off = broken_off.filter(|(_, log)| !log.content.end.whole);
@@ -110,6 +123,12 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         verdict: page::verdict(&logs, &differences),
         broken_off: broken_off.map(|(path, _)| path.clone()).collect(),
     }))
+}
+
+/// Whether two paths lead to one file.
+fn same_file(one: &Path, other: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    real(one).is_some_and(|one| real(other) == Some(one))
 }
 
 /// The part that is looked at.
@@ -260,6 +279,13 @@ mod tests {
             ),
             (options(&[&folder.path().join("none.mcap")]), "none.mcap"),
             (options(&[folder.path()]), "read the log"),
+            (
+                Options {
+                    out: Some(folder.path().join("./log.mcap")),
+                    ..part(0.0, 1.0)
+                },
+                "take the place of the log",
+            ),
         ] {
             let told = viewed(&options).expect_err("refused").to_string();
             assert!(told.contains(word), "{told}");

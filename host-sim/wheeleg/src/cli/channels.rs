@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::print;
 use wheeleg_studies::StudyError;
-use wheeleg_telemetry::channels;
+use wheeleg_telemetry::{channels, derived};
 
 /// Arguments of `wheeleg channels`.
 #[derive(Debug, Args)]
@@ -50,15 +50,28 @@ pub(super) fn text(json: bool) -> String {
                 })
             })
             .collect();
-        return format!("{:#}\n", serde_json::json!({ "channels": list }));
+        let derived: Vec<serde_json::Value> = derived()
+            .iter()
+            .map(|d| {
+                serde_json::json!({
+                    "topic": d.topic,
+                    "schema": d.schema,
+                    "rate_hz": d.rate_hz,
+                    "description": d.doc,
+                })
+            })
+            .collect();
+        let all = serde_json::json!({ "channels": list, "derived": derived });
+        return format!("{all:#}\n");
     }
     let mut out = String::new();
     let mut described: Vec<&str> = Vec::new();
+    let rate = |rate_hz| match rate_hz {
+        0 => "on change".to_owned(),
+        r => format!("{r} Hz"),
+    };
     for c in channels() {
-        let rate = match c.rate_hz {
-            0 => "on change".to_owned(),
-            r => format!("{r} Hz"),
-        };
+        let rate = rate(c.rate_hz);
         let _ = writeln!(out, "{:13} {rate:10} {:16} {}", c.topic, c.schema, c.doc);
         if described.contains(&c.schema) {
             continue;
@@ -75,6 +88,11 @@ pub(super) fn text(json: bool) -> String {
                 f.doc
             );
         }
+    }
+    // For viewers; their fields are those of Foxglove's schemas.
+    for d in derived() {
+        let rate = rate(d.rate_hz);
+        let _ = writeln!(out, "{:16} {rate:10} {:24} {}", d.topic, d.schema, d.doc);
     }
     out
 }

@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::print;
+use super::{FAILED, print, stop_on_signals, tell};
 use wheeleg_studies::StudyError;
+use wheeleg_studies::study::Signal;
 use wheeleg_telemetry::recover;
 
 /// Arguments of `wheeleg log`.
@@ -32,7 +33,13 @@ enum Action {
 pub(super) fn command(args: &LogArgs) -> Result<ExitCode, StudyError> {
     let Action::Recover { log, out } = &args.action;
     let out = out.clone().unwrap_or_else(|| beside(log));
-    let recovered = recover(log, &out)?;
+    let stop = stop_on_signals()?;
+    let recovered = recover(log, &out, &|| stop.is_asked())?;
+    let Some(recovered) = recovered else {
+        tell("stopped; no recovered log is left, and the log stays as it is");
+        let code = stop.signal().map_or(FAILED, Signal::exit_code);
+        return Ok(ExitCode::from(code));
+    };
     let note = if recovered.was_whole {
         "; the log was whole already"
     } else {

@@ -141,7 +141,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Interface(args)) => interface::command(&args),
     };
     result.unwrap_or_else(|error| {
-        eprintln!("{:?}", miette::Report::new(error));
+        tell(&format!("{:?}", miette::Report::new(error)));
         ExitCode::from(FAILED)
     })
 }

@@ -10,6 +10,7 @@ use wheeleg_config::{AxisConfig, brief};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::export;
 use wheeleg_studies::axis_sim::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
+use wheeleg_studies::export::write_new;
 
 /// Exit code of a check beyond its limit.
 const BEYOND: u8 = 1;
@@ -46,7 +47,7 @@ struct ExportArgs {
     /// Built-in axis or path of an axis file.
     #[arg(default_value = "bench-vq110u")]
     axis: String,
-    /// File to write.
+    /// File to write. A file of that name moves to `FILE.previous`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
@@ -59,8 +60,7 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, StudyError> {
             let config = AxisConfig::load(&args.axis)?;
             let value = export::sequences(&config.name, &config.axis)
                 .map_err(|e| plant_error(&args.axis, e))?;
-            std::fs::write(&args.out, format!("{value}\n"))
-                .map_err(|e| StudyError::output("write", &args.out, e))?;
+            write_new(&args.out, &format!("{value}\n"))?;
             Ok(ExitCode::SUCCESS)
         }
     }

@@ -109,11 +109,13 @@ fn text(tuned: &Tuned, report: &Path) -> String {
         || "not found".to_owned(),
         |d| format!("{:.2} ms", d.t_on_s * 1e3),
     );
+    let resolution = tuned.valve_resolution.ratio;
+    let resolution = resolution.map_or_else(|| "n/a".to_owned(), |ratio| format!("{ratio:.2}"));
     let _ = writeln!(
         text,
-        "opening delay  {found} (sheet {:.2} ms)\nresolution     {:.2} (of the valves: force of the shortest opening over what friction holds; coarse above {COARSE})",
+        "opening delay  {found} (sheet {:.2} ms)\nresolution     {} (of the valves: force of the shortest opening over what friction holds; coarse above {COARSE})",
         valve.t_on_s * 1e3,
-        tuned.valve_resolution.ratio,
+        resolution,
     );
     let parameters = report.with_file_name(PARAMETERS);
     for worse in &tuned.worse {

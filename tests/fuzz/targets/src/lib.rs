@@ -38,6 +38,8 @@ pub mod remote;
 pub mod scenario;
 pub mod store;
 pub mod wheel;
+#[cfg(feature = "sim")]
+pub mod written;
 
 #[path = "../../../../firmware/node/tests/suite/common/mod.rs"]
 mod boards;
@@ -97,5 +99,10 @@ pub const TARGETS: &[Target] = &[
     Target {
         name: "files",
         run: files::run,
+    },
+    #[cfg(feature = "sim")]
+    Target {
+        name: "written",
+        run: written::run,
     },
 ];

@@ -38,4 +38,5 @@ engine! {
 engine! {
     scenario: 2_000, 4_000;
     files: 2_000, 4_000;
+    written: 500, 2_000;
 }

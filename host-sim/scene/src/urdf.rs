@@ -13,7 +13,7 @@ use quick_xml::events::{BytesDecl, BytesText, Event};
 
 use super::geometry::{Joint, Link, MATERIALS, Motion, Shape, Solid, Tree};
 use super::tree;
-use crate::StudyError;
+use crate::SceneError;
 use wheeleg_config::RobotConfig;
 
 type Xml = Writer<Vec<u8>>;
@@ -21,12 +21,11 @@ type Xml = Writer<Vec<u8>>;
 /// The robot as URDF text.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the robot's loop does not close over its stroke.
-pub fn write(robot: &RobotConfig) -> Result<String, StudyError> {
+/// [`SceneError::Leg`] if the robot's loop does not close over its stroke.
+pub fn write(robot: &RobotConfig) -> Result<String, SceneError> {
     let tree = tree::build(robot)?;
-    let failed = |e: String| StudyError::refused(e, "this is a defect of the program");
-    let bytes = document(robot, &tree).map_err(|e| failed(e.to_string()))?;
-    let mut text = String::from_utf8(bytes).map_err(|e| failed(e.to_string()))?;
+    let bytes = document(robot, &tree).map_err(|e| SceneError::Xml(e.to_string()))?;
+    let mut text = String::from_utf8(bytes).map_err(|e| SceneError::Xml(e.to_string()))?;
     text.push('\n');
     Ok(text)
 }

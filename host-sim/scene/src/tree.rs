@@ -23,8 +23,8 @@ use wheeleg_kinematics::{KinematicsError, LegGeometry, LegLengths, LegPosture};
 use wheeleg_plant::dynamics::BodyParams;
 use wheeleg_protocol::param::JOINT_PARAMS;
 
-use super::geometry::{Joint, Link, Motion, Shape, Solid, Tree};
-use crate::StudyError;
+use super::geometry::{Joint, Link, Motion, Shape, Solid, Source, Tree};
+use crate::SceneError;
 use wheeleg_config::RobotConfig;
 use wheeleg_telemetry::channels;
 
@@ -40,8 +40,30 @@ fn topics(prefix: &str) -> impl Iterator<Item = &'static str> {
         .filter(move |topic| topic.starts_with(prefix))
 }
 
+/// Geometry of the left (0) or right (1) leg.
+pub(super) fn geometry_of(
+    robot: &RobotConfig,
+    leg: usize,
+) -> Result<LegGeometry<f64>, KinematicsError<f64>> {
+    let plant = &robot.plant;
+    LegGeometry::new(wheeleg_kinematics::LegParameters {
+        stroke_zero_m: [0, 1, 2].map(|k| plant.stroke_zero_m[3 * leg + k]),
+        stroke_m: [0, 1, 2].map(|k| plant.cylinders[3 * leg + k].stroke_m),
+        ..plant.body.leg_parameters()
+    })
+}
+
+/// Turn of the joints `theta1`, `theta4` and `theta3` over the length of the yaw cylinder \[rad/m\].
+pub(super) fn yaw_rates(leg: &LegPosture<f64>) -> [f64; 3] {
+    [
+        leg.theta1_prime,
+        leg.phi_prime,
+        leg.phi_prime - leg.theta1_prime,
+    ]
+}
+
 /// Yaw of the barrel and of the carriage, and of the crank against the barrel (rad).
-fn yaws(leg: &LegPosture<f64>) -> [f64; 3] {
+pub(super) fn yaws(leg: &LegPosture<f64>) -> [f64; 3] {
     let x = leg.joints();
     let (barrel, carriage) = (x.theta1_rad - FRAC_PI_2, x.theta4_rad - FRAC_PI_2);
     [barrel, carriage, x.theta3.rad() - FRAC_PI_2]
@@ -67,8 +89,8 @@ fn inertial(
 /// Builds the tree.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the leg's loop does not close over the whole stroke.
-pub(super) fn build(robot: &RobotConfig) -> Result<Tree, StudyError> {
+/// [`SceneError::Leg`] if the leg's loop does not close over the whole stroke.
+pub(super) fn build(robot: &RobotConfig) -> Result<Tree, SceneError> {
     let mut tree = Tree::default();
     chassis(robot, &mut tree);
     let wheels = topics("/wheel/").zip(SIDES).enumerate();
@@ -118,6 +140,7 @@ fn chassis(robot: &RobotConfig, tree: &mut Tree) {
         yaw: 0.0,
         axis: [0.0, 0.0, 1.0],
         motion: Motion::Fixed,
+        source: Source::Fixed,
     });
 }
 
@@ -157,6 +180,7 @@ fn wheel(robot: &RobotConfig, tree: &mut Tree, topic: &str, side: &str, i: usize
             velocity: motor.supply_v / reduced,
             damping: robot.floating_params().wheel_viscous_n_m_s(),
         },
+        source: Source::Wheel(i),
     });
 }
 
@@ -204,11 +228,7 @@ fn swing(
     for b2 in points {
         let leg = geometry.posture(&LegLengths::new(b2, 0.1, 0.1))?;
         let now = yaws(&leg);
-        let rates = [
-            leg.theta1_prime,
-            leg.phi_prime,
-            leg.phi_prime - leg.theta1_prime,
-        ];
+        let rates = yaw_rates(&leg);
         for k in 0..3 {
             let angle = now[k] - zero[k];
             range[k] = (range[k].0.min(angle), range[k].1.max(angle));
@@ -226,26 +246,19 @@ fn leg(
     robot: &RobotConfig,
     tree: &mut Tree,
     topics: &[&str],
-    side: &str,
+    side: &'static str,
     i: usize,
-) -> Result<(), StudyError> {
+) -> Result<(), SceneError> {
     let plant = &robot.plant;
     let body = &plant.body;
     let s = sign(i);
     let first = 3 * i;
     let zero = [0, 1, 2].map(|k| plant.stroke_zero_m[first + k]);
-    let refused = |e: KinematicsError<f64>| {
-        StudyError::refused(
-            format!("the {side} leg cannot be exported: {e}"),
-            "check `crank`, `p4`, `stroke_zero` and the stroke of the yaw cylinder in the robot file",
-        )
+    let refused = |e: KinematicsError<f64>| SceneError::Leg {
+        side,
+        reason: e.to_string(),
     };
-    let geometry = LegGeometry::new(wheeleg_kinematics::LegParameters {
-        stroke_zero_m: zero,
-        stroke_m: [0, 1, 2].map(|k| plant.cylinders[first + k].stroke_m),
-        ..body.leg_parameters()
-    })
-    .map_err(refused)?;
+    let geometry = geometry_of(robot, i).map_err(refused)?;
     let retracted = geometry
         .posture(&LegLengths::new(zero[0], zero[1], zero[2]))
         .map_err(refused)?;
@@ -269,19 +282,21 @@ fn leg(
     let turn_axis = [0.0, 0.0, s];
     let ahead = [1.0, 0.0, 0.0];
     let link = |name: &str| format!("{side}_{name}");
-    let joint = |name: String, parent: &str, child: &str, xyz, yaw: f64, axis, motion| Joint {
-        name,
-        parent: if parent == "chassis" {
-            parent.to_owned()
-        } else {
-            link(parent)
-        },
-        child: link(child),
-        xyz,
-        yaw: s * yaw,
-        axis,
-        motion,
-    };
+    let joint =
+        |name: String, [parent, child]: [&str; 2], xyz, yaw: f64, axis, motion, source| Joint {
+            name,
+            parent: if parent == "chassis" {
+                parent.to_owned()
+            } else {
+                link(parent)
+            },
+            child: link(child),
+            xyz,
+            yaw: s * yaw,
+            axis,
+            motion,
+            source,
+        };
     let [b1, b2, b3, b4, b5, b6] = &body.leg_bodies;
     let (bore, rod) = (plant.cylinders[first].bore_m, plant.cylinders[first].rod_m);
     // Outside of the tube: a wall of a tenth of the bore, so that barrel and rod can be told apart.
@@ -382,75 +397,75 @@ fn leg(
     tree.joints.extend([
         joint(
             passive("theta1"),
-            "chassis",
-            "yaw_barrel",
+            ["chassis", "yaw_barrel"],
             o1,
             yaw[0],
             turn_axis,
             barrel_turn,
+            Source::Yaw(i, 0),
         ),
         joint(
             yaw_drive,
-            "yaw_barrel",
-            "yaw_rod",
+            ["yaw_barrel", "yaw_rod"],
             [zero[0], 0.0, 0.0],
             0.0,
             ahead,
             drives[0],
+            Source::Cylinder(first),
         ),
         joint(
             passive("theta3"),
-            "yaw_rod",
-            "crank",
+            ["yaw_rod", "crank"],
             [0.0; 3],
             yaw[2],
             turn_axis,
             crank_turn,
+            Source::Yaw(i, 2),
         ),
         joint(
             passive("crank_to_end"),
-            "crank",
-            "crank_end",
+            ["crank", "crank_end"],
             [body.crank_m, 0.0, 0.0],
             0.0,
             ahead,
             Motion::Fixed,
+            Source::Fixed,
         ),
         joint(
             passive("theta4"),
-            "chassis",
-            "yaw_carriage",
+            ["chassis", "yaw_carriage"],
             o4,
             yaw[1],
             turn_axis,
             carriage_turn,
+            Source::Yaw(i, 1),
         ),
         joint(
             horizontal,
-            "yaw_carriage",
-            "horizontal_carriage",
+            ["yaw_carriage", "horizontal_carriage"],
             [zero[1], 0.0, 0.0],
             0.0,
             ahead,
             drives[1],
+            Source::Cylinder(first + 1),
         ),
         joint(
             vertical,
-            "horizontal_carriage",
-            "vertical_rod",
+            ["horizontal_carriage", "vertical_rod"],
             [0.0, 0.0, -zero[2]],
             0.0,
             [0.0, 0.0, -1.0],
             drives[2],
+            Source::Cylinder(first + 2),
         ),
         joint(
             passive("rod_to_foot"),
-            "vertical_rod",
-            "foot",
+            ["vertical_rod", "foot"],
             [0.0, 0.0, -body.foot_pad_m],
             0.0,
             ahead,
             Motion::Fixed,
+            Source::Fixed,
         ),
     ]);
     Ok(())

@@ -84,6 +84,19 @@ pub(super) enum Motion {
     },
 }
 
+/// What moves a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// Nothing.
+    Fixed,
+    /// A cylinder, 0 to 5.
+    Cylinder(usize),
+    /// A wheel, 0 left, 1 right.
+    Wheel(usize),
+    /// The yaw mechanism of a leg, 0 left, 1 right: θ1, θ4 or θ3 as in [`yaws`](super::tree::yaws).
+    Yaw(usize, usize),
+}
+
 /// A joint between two links.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Joint {
@@ -96,6 +109,7 @@ pub(super) struct Joint {
     pub(super) yaw: f64,
     pub(super) axis: [f64; 3],
     pub(super) motion: Motion,
+    pub(super) source: Source,
 }
 
 /// All links and joints, parents first.

@@ -1,0 +1,60 @@
+//! Large files: what is read and checked grows as the file does, not with its square.
+
+use std::time::Instant;
+
+use wheeleg_config::Scenario;
+
+const HEAD: &str = "name = \"large\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+    seed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n";
+
+fn events(count: usize) -> String {
+    let event = |i: usize| {
+        let at_s = i as f64 / count as f64;
+        format!("[[events]]\nat = \"{at_s:.9} s\"\naction = \"clear-fault\"\n")
+    };
+    // The last first: they are put in order.
+    HEAD.to_owned() + &(0..count).rev().map(event).collect::<String>()
+}
+
+fn blocks(count: usize) -> String {
+    let block = |i: usize| {
+        let (x_m, y_m) = (2.0 + (i % 1000) as f64 * 0.01, (i / 1000) as f64 * 0.02);
+        format!(
+            "[[terrain]]\nkind = \"block\"\nx = {{ value = [{x_m:.3}, {:.3}], unit = \"m\" }}\n\
+             y = {{ value = [{y_m:.3}, {:.3}], unit = \"m\" }}\nheight = \"5 mm\"\n",
+            x_m + 0.005,
+            y_m + 0.01
+        )
+    };
+    HEAD.to_owned() + &(0..count).map(block).collect::<String>()
+}
+
+/// Seconds to read a text; what is read goes to `check`.
+fn seconds(text: &str, check: &dyn Fn(&Scenario)) -> f64 {
+    let begun = Instant::now();
+    let scenario = Scenario::parse("large.toml", text).expect("accepted");
+    let seconds = begun.elapsed().as_secs_f64();
+    check(&scenario);
+    seconds
+}
+
+#[test]
+fn a_hundred_thousand_events_and_blocks_are_read_in_time_that_grows_as_they_do() {
+    const LARGE: usize = 100_000;
+    const SMALL: usize = LARGE / 8;
+    for (make, count) in [
+        (
+            events as fn(usize) -> String,
+            (|s| s.events.len()) as fn(&Scenario) -> usize,
+        ),
+        (blocks, |s| s.ground.parts.len()),
+    ] {
+        let small = seconds(&make(SMALL), &|s| assert_eq!(count(s), SMALL));
+        let large = seconds(&make(LARGE), &|s| assert_eq!(count(s), LARGE));
+        println!("{SMALL} in {small:.2} s, {LARGE} in {large:.2} s");
+        // 8 times as many: 64 times as long if each looked at all others.
+        assert!(large < 24.0 * small, "{small:.2} s, then {large:.2} s");
+    }
+    let scenario = Scenario::parse("large.toml", &events(1000)).expect("accepted");
+    assert!(scenario.events.is_sorted_by(|a, b| a.at_s <= b.at_s));
+}

@@ -1,0 +1,106 @@
+//! `/tf`, `/joint_states`, `/log`.
+
+use wheeleg_telemetry::{EventSample, push_fixed};
+
+use super::frames::{Frames, Pose};
+use super::json::{put, put_quaternion, put_text, put_time, put_vector};
+
+/// The frame that does not move: X ahead at the start, Y left, Z up.
+pub(super) const WORLD: &str = "world";
+/// Root of the URDF: middle of the wheel axle.
+const BASE: &str = "base_link";
+/// Digits of lengths: five frames one on another err by less than 0.3 µm.
+const LENGTH: u8 = 7;
+/// Digits of quaternions: 10 nm at a metre.
+const TURN: u8 = 8;
+
+/// `foxglove.FrameTransforms` of the pose that was followed last.
+pub(super) fn transforms(out: &mut Vec<u8>, t_ns: u64, frames: &Frames, pose: &Pose) {
+    let others = frames.states(pose).map(|(frame, state)| {
+        let names = (frame.parent.as_str(), frame.child.as_str());
+        (names, frame.transform(state.position))
+    });
+    put(out, "{\"transforms\":[");
+    for (i, ((parent, child), at)) in [((WORLD, BASE), pose.base)]
+        .into_iter()
+        .chain(others)
+        .enumerate()
+    {
+        put(out, if i > 0 { ",{" } else { "{" });
+        put_time(out, t_ns);
+        put(out, ",\"parent_frame_id\":");
+        put_text(out, parent);
+        put(out, ",\"child_frame_id\":");
+        put_text(out, child);
+        put(out, ",");
+        put_vector(out, "translation", &at.translation.vector, LENGTH);
+        put(out, ",");
+        put_quaternion(out, "rotation", at.rotation.quaternion(), TURN);
+        put(out, "}");
+    }
+    put(out, "]}");
+}
+
+/// `foxglove.JointStates` of the pose that was followed last.
+pub(super) fn joint_states(out: &mut Vec<u8>, t_ns: u64, frames: &Frames, pose: &Pose) {
+    put(out, "{");
+    put_time(out, t_ns);
+    put(out, ",\"joints\":[");
+    let moving = frames.states(pose).filter(|(frame, _)| frame.moves());
+    for (i, (frame, state)) in moving.enumerate() {
+        put(out, if i > 0 { ",{\"name\":" } else { "{\"name\":" });
+        put_text(out, &frame.joint);
+        put(out, ",\"position\":");
+        push_fixed(out, state.position, LENGTH);
+        put(out, ",\"velocity\":");
+        push_fixed(out, state.velocity, 6);
+        if let Some(effort) = state.effort {
+            put(out, ",\"effort\":");
+            push_fixed(out, effort, 3);
+        }
+        put(out, "}");
+    }
+    put(out, "]}");
+}
+
+/// Levels of `foxglove.Log`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Level {
+    Info = 2,
+    Warning = 3,
+    Error = 4,
+}
+
+/// How much an event matters: a fault is an error, what was refused or begins to go wrong a warning.
+pub(super) fn level(event: &EventSample) -> Level {
+    match (event.kind.as_str(), event.code.as_str()) {
+        (_, "faults_cleared") => Level::Info,
+        ("fault", "foot_switch" | "finding" | "log") => Level::Warning,
+        ("fault", _) => Level::Error,
+        ("scenario", "e_stop_pressed" | "master_killed" | "fault_begins") => Level::Warning,
+        (_, code) if code.ends_with("refused") || code.ends_with("rejected") => Level::Warning,
+        (_, "command_unanswered" | "log_lost" | "stuck" | "tip_guard" | "line_errors") => {
+            Level::Warning
+        }
+        _ => Level::Info,
+    }
+}
+
+/// `foxglove.Log` of an event.
+pub(super) fn log(out: &mut Vec<u8>, t_ns: u64, event: &EventSample) {
+    put(out, "{");
+    put_time(out, t_ns);
+    put(
+        out,
+        &format!(",\"level\":{},\"message\":", level(event) as u8),
+    );
+    put_text(out, &event.text);
+    put(out, ",\"name\":");
+    let name = match event.board {
+        0 => event.kind.clone(),
+        board @ 1..=6 => format!("joint {board}"),
+        board => format!("wheel {board}"),
+    };
+    put_text(out, &name);
+    put(out, ",\"file\":\"\",\"line\":0}");
+}

@@ -1,0 +1,337 @@
+//! Built-in files with mistakes in them: scenarios, robots, axes and plans of campaigns, with units,
+//! signs and magnitudes wrong, lines swapped, sections pasted from other files. Each is run or
+//! refused in words; none panics, hangs, leaves its folder, or leaves physics without a word.
+//!
+//! A few here; `cargo xtask deep practice` takes many, with numbers of their own.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
+use std::{fmt, fs, thread};
+
+use miette::Diagnostic;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use wheeleg_campaign::Cases;
+use wheeleg_config::{AxisConfig, axis, builtin, plan::Plan};
+use wheeleg_remote_host::Nodes;
+use wheeleg_studies::axis_sim::plant_check;
+use wheeleg_studies::run::{Options, run};
+use wheeleg_studies::study::{Signal, Stop};
+use wheeleg_studies::{StudyError, compare};
+
+mod mutate;
+
+use mutate::mutate;
+
+/// How many files, and the number of the first.
+const FILES_VARIABLE: &str = "WHEELEG_MUTATED_FILES";
+const FIRST_VARIABLE: &str = "WHEELEG_MUTATED_FIRST";
+const FILES: u64 = 60;
+/// A run that is not over is stopped with Ctrl-C then; a mistake may have made it a long one.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// One that goes on after that hangs. It may share its processor with others.
+const HUNG: Duration = Duration::from_secs(120);
+/// Simulated time of a run that has not got another by mistake, s.
+const DURATION_S: f64 = 0.3;
+
+/// What a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Scenario,
+    Robot,
+    Axis,
+    Plan,
+}
+
+/// Kinds as often as they are taken.
+const KINDS: [Kind; 7] = [
+    Kind::Scenario,
+    Kind::Scenario,
+    Kind::Scenario,
+    Kind::Robot,
+    Kind::Robot,
+    Kind::Axis,
+    Kind::Plan,
+];
+
+/// What came of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Fate {
+    /// It was run to its end, or until it was stopped.
+    Ran,
+    /// Its run ended early, and the user is told why.
+    Ended(String),
+    /// It was refused, and the user is told why.
+    Refused(String),
+}
+
+/// Every built-in file. Scenarios are short, and what happens in them happens early.
+fn files() -> Vec<(Kind, String)> {
+    let scenarios = builtin::SCENARIOS.iter().map(|(.., text)| {
+        let lines = text.lines().map(|line| {
+            if line.starts_with("duration = ") {
+                format!("duration = {{ value = {DURATION_S}, unit = \"s\" }}\n")
+            } else if line.starts_with("at = ") {
+                "at = { value = 0.1, unit = \"s\" }\n".to_owned()
+            } else {
+                format!("{line}\n")
+            }
+        });
+        (Kind::Scenario, lines.collect())
+    });
+    let of = |kind, list: &'static [(&str, &str, &str)]| {
+        list.iter()
+            .map(move |(.., text)| (kind, (*text).to_owned()))
+    };
+    scenarios
+        .chain(of(Kind::Robot, builtin::ROBOTS))
+        .chain(of(Kind::Axis, axis::AXES))
+        .chain(of(Kind::Plan, builtin::PLANS))
+        .collect()
+}
+
+/// A robot that stands, for robots.
+const STAND: &str = "name = \"stand\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
+    duration = \"0.3 s\"\nseed = 1\ntargets = \"stand\"\n[motion]\nkind = \"stand\"\n";
+
+/// Says what a user is told, and that it is told in words: what, where or what about it, and no
+/// value as a program prints it for itself.
+fn told(error: &dyn Diagnostic) -> String {
+    let mut text = error.to_string();
+    let mut remedy = error.help().is_some() || error.related().is_some();
+    for problem in error.related().into_iter().flatten() {
+        text += &format!("\n{problem}");
+        remedy |= problem.help().is_some();
+    }
+    assert!(error.code().is_some(), "no code: {text}");
+    assert!(remedy, "no remedy: {text}");
+    assert!(text.len() < 20_000, "too long: {} bytes", text.len());
+    ensure_words(&text);
+    text
+}
+
+fn ensure_words(text: &str) {
+    for debug in [
+        "Some(",
+        "None",
+        "Err(",
+        "Ok(",
+        "::",
+        " { ",
+        "PlantError",
+        "NaN",
+    ] {
+        // A value of the file is quoted as it stands there.
+        let quoted = text.contains("= {") || text.contains("nan") || text.contains("not TOML");
+        assert!(quoted || !text.contains(debug), "`{debug}` in: {text}");
+    }
+}
+
+fn options(scenario: &Path, robot: Option<&Path>, out: &Path) -> Options {
+    let text = |path: &Path| path.to_string_lossy().into_owned();
+    Options {
+        scenario: text(scenario),
+        robot: robot.map(text),
+        law: None,
+        seed: None,
+        nodes: Nodes::default(),
+        faults: Vec::new(),
+        out: Some(out.to_owned()),
+        png: false,
+        compared: false,
+    }
+}
+
+/// Runs and judges; its log must have numbers of this world.
+fn played(options: &Options, stop: &Stop) -> Result<Fate, StudyError> {
+    let finished = run(options, stop)?;
+    let out = finished.report.parent().expect("a folder");
+    assert!(out.join("summary.json").exists(), "no summary");
+    assert!(finished.result.unwritten.is_empty());
+    let mut worst = [0.0_f64; 2];
+    let read = wheeleg_telemetry::read(&out.join("log.mcap"), &mut |logged| {
+        for name in ["pressure_a_bar", "pressure_b_bar"] {
+            worst[0] = worst[0].max(logged.number(name).unwrap_or(0.0));
+        }
+        for name in ["velocity_mm_s", "speed_mm_s"] {
+            worst[1] = worst[1].max(logged.number(name).unwrap_or(0.0).abs());
+        }
+        ControlFlow::Continue(())
+    });
+    assert!(read.expect("a log").whole, "the log breaks off");
+    assert!(worst[0] < 100.1, "{} bar, and nobody said so", worst[0]);
+    assert!(worst[1] < 1e5, "{} mm/s, and nobody said so", worst[1]);
+    Ok(match finished.result.failure {
+        Some(failure) => Fate::Ended(told(&failure)),
+        None => Fate::Ran,
+    })
+}
+
+fn refused(error: &dyn Diagnostic) -> Fate {
+    Fate::Refused(told(error))
+}
+
+/// What the program makes of a file of a kind.
+fn fate(kind: Kind, file: &Path, stop: &Stop) -> Fate {
+    let folder = file.parent().expect("a folder");
+    let out = folder.join("out");
+    match kind {
+        Kind::Scenario => played(&options(file, None, &out), stop).unwrap_or_else(|e| refused(&e)),
+        Kind::Robot => {
+            let stand = folder.join("stand.toml");
+            played(&options(&stand, Some(file), &out), stop).unwrap_or_else(|e| refused(&e))
+        }
+        Kind::Axis => axis_fate(file),
+        Kind::Plan => plan_fate(file, stop).unwrap_or_else(|e| refused(&e)),
+    }
+}
+
+fn axis_fate(file: &Path) -> Fate {
+    let config = match AxisConfig::from_path(file) {
+        Ok(config) => config,
+        Err(error) => return refused(&error),
+    };
+    match plant_check::check(&config.axis) {
+        Ok(check) => {
+            let finite = |f: &plant_check::Finding| f.value.is_finite();
+            assert!(check.findings.iter().all(finite), "{:#?}", check.findings);
+        }
+        // The command's own words are tested with it.
+        Err(error) => {
+            ensure_words(&error.to_string());
+            return Fate::Ended(error.to_string());
+        }
+    }
+    let id = format!("{}/predictive/step-100/nominal/1", config.name);
+    let id = id.parse().expect("a case");
+    match compare::play(&id, &[file.to_string_lossy().into_owned()]) {
+        Ok(_) => Fate::Ran,
+        Err(error) => refused(&error),
+    }
+}
+
+fn plan_fate(file: &Path, stop: &Stop) -> Result<Fate, wheeleg_campaign::CampaignError> {
+    let plan = Plan::load(&file.to_string_lossy())?;
+    let cases = Cases::new(&plan)?;
+    cases.ensure_possible()?;
+    let limit_s = Some(plan.limit_s.unwrap_or(DURATION_S).min(DURATION_S));
+    for index in [0, plan.cases() - 1] {
+        if let Some(error) = wheeleg_campaign::simulate(&cases.case(index), limit_s, stop)
+            .and_then(|outcome| outcome.error)
+        {
+            ensure_words(&error);
+        }
+    }
+    Ok(Fate::Ran)
+}
+
+/// What comes of a file, in a thread of its own; the message of a panic, or that it hangs.
+fn judged(kind: Kind, file: PathBuf) -> Result<Fate, String> {
+    let (sender, receiver) = mpsc::channel();
+    let stop = Stop::default();
+    let of_thread = stop.clone();
+    thread::Builder::new()
+        .stack_size(16 << 20)
+        .spawn(move || {
+            let fate = catch_unwind(AssertUnwindSafe(|| fate(kind, &file, &of_thread)));
+            let _ = sender.send(fate.map_err(|panic| {
+                let text = panic.downcast_ref::<String>().cloned();
+                text.unwrap_or_else(|| format!("{:?}", panic.downcast_ref::<&str>()))
+            }));
+        })
+        .expect("a thread");
+    if let Ok(fate) = receiver.recv_timeout(PATIENCE) {
+        return fate;
+    }
+    stop.ask(Signal::Interrupt);
+    let late = receiver.recv_timeout(HUNG);
+    late.unwrap_or_else(|_| Err(format!("still at work {HUNG:?} after Ctrl-C")))
+}
+
+/// A file in a folder of its own, with what it may need beside it; its path.
+fn laid_down(folder: &Path, text: &str) -> PathBuf {
+    let data = builtin::DATA.iter();
+    data.for_each(|(name, bytes)| fs::write(folder.join(name), bytes).expect("written"));
+    fs::write(folder.join("stand.toml"), STAND).expect("written");
+    let file = folder.join("mutant.toml");
+    fs::write(&file, text).expect("written");
+    file
+}
+
+/// Names of all that is in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder").flatten();
+    let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|name| name != "out").collect();
+    names.sort();
+    names
+}
+
+fn variable(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |n| n.parse().expect("a number"))
+}
+
+/// How often each came.
+#[derive(Default)]
+struct Tally {
+    ran: u64,
+    ended: u64,
+    refused: u64,
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            ran,
+            ended,
+            refused,
+        } = self;
+        write!(f, "{ran} run, {ended} ended early, {refused} refused")
+    }
+}
+
+#[test]
+fn each_is_run_or_refused_in_words() {
+    let files = files();
+    let first = variable(FIRST_VARIABLE, 1);
+    let count = variable(FILES_VARIABLE, FILES);
+    let mut tally = Tally::default();
+    let mut wrong = Vec::new();
+    for number in first..first + count {
+        let mut rng = Pcg64Mcg::seed_from_u64(number);
+        let wanted = KINDS[rng.random_range(0..KINDS.len())];
+        let of_kind: Vec<_> = files.iter().filter(|(kind, _)| *kind == wanted).collect();
+        let (kind, text) = of_kind[rng.random_range(0..of_kind.len())];
+        let (_, other) = &files[rng.random_range(0..files.len())];
+        let mutant = mutate(&mut rng, text, other);
+        // What leaves its folder lands in the one around it.
+        let around = tempfile::tempdir().expect("temporary folder");
+        let folder = around.path().join("its-own");
+        fs::create_dir(&folder).expect("created");
+        let file = laid_down(&folder, &mutant.text);
+        let before = names(&folder);
+        let fate = judged(*kind, file);
+        let left = names(&folder) != before || names(around.path()) != ["its-own"];
+        match &fate {
+            Ok(Fate::Ran) => tally.ran += 1,
+            Ok(Fate::Ended(_)) => tally.ended += 1,
+            Ok(Fate::Refused(_)) => tally.refused += 1,
+            Err(_) => {}
+        }
+        println!("{number} {kind:?}{}: {fate:?}", mutant.what);
+        if fate.is_err() || left {
+            wrong.push(format!(
+                "{number} {kind:?}{}: {fate:?}, left its folder: {left}",
+                mutant.what
+            ));
+        }
+    }
+    println!("{count} mutated files from number {first}: {tally}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // Mistakes of all kinds: some matter, some do not.
+    let few = count / 10;
+    assert!(tally.ran > few && tally.refused > few, "{tally}");
+}

@@ -1,0 +1,240 @@
+//! Inputs from practice: axes of catalogue cylinders and valves, and files made after reports of
+//! users. What came of all that was tried is in docs/records/practice-inputs.md.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use crate::axis_text::changed;
+use crate::program;
+
+const BENCH: &str = include_str!("../../host-sim/axes/bench-vq110u.toml");
+const SMALL: &str = include_str!("../../host-sim/axes/small-12x50.toml");
+const HEAVY: &str = include_str!("../../host-sim/axes/heavy-40x250.toml");
+
+/// Changes of an axis file.
+type Changes = Vec<(&'static str, f64, &'static str)>;
+
+fn wheeleg(arguments: &[&str], path: &Path) -> Output {
+    let mut command = Command::new(program::path());
+    command.env("NO_COLOR", "1").args(arguments).arg(path);
+    command.output().expect("start")
+}
+
+/// An axis file in a folder.
+fn axis(folder: &Path, base: &str, changes: &Changes) -> PathBuf {
+    let path = folder.join("axis.toml");
+    fs::write(&path, changed(base, changes)).expect("written");
+    path
+}
+
+/// Both valves of a kind: conductance in dm3/(s bar), critical ratio, delays in ms.
+fn valves(conductance: f64, ratio: f64, on_ms: f64, off_ms: f64) -> Changes {
+    let flow = "dm3/(s bar)";
+    vec![
+        ("fill_valve.conductance", conductance, flow),
+        ("fill_valve.critical_ratio", ratio, "1"),
+        ("fill_valve.t_on", on_ms, "ms"),
+        ("fill_valve.t_off", off_ms, "ms"),
+        ("vent_valve.conductance", conductance, flow),
+        ("vent_valve.critical_ratio", ratio, "1"),
+        ("vent_valve.t_on", on_ms, "ms"),
+        ("vent_valve.t_off", off_ms, "ms"),
+    ]
+}
+
+/// A cylinder: bore, rod, stroke in mm, dead volumes in cm3, friction in N, mass in kg, track of the
+/// potentiometer and its offset in mm.
+fn cylinder(
+    mm: [f64; 3],
+    dead_cm3: f64,
+    friction_n: [f64; 2],
+    kg: f64,
+    track: [f64; 2],
+) -> Changes {
+    vec![
+        ("cylinder.bore", mm[0], "mm"),
+        ("cylinder.rod", mm[1], "mm"),
+        ("cylinder.stroke", mm[2], "mm"),
+        ("cylinder.dead_volume_a", dead_cm3, "cm3"),
+        ("cylinder.dead_volume_b", dead_cm3, "cm3"),
+        ("friction.coulomb", friction_n[0], "N"),
+        ("friction.static", friction_n[1], "N"),
+        ("moving.mass", kg, "kg"),
+        ("start.stroke", 0.2 * mm[2], "mm"),
+        ("sensor.potentiometer.electrical_stroke", track[0], "mm"),
+        ("sensor.potentiometer.offset", track[1], "mm"),
+    ]
+}
+
+/// Bore 80 x 200 mm with slow valves; `dead_cm3` is what may be too little.
+fn wide(dead_cm3: f64) -> Changes {
+    let mut all = valves(4.0, 0.35, 31.0, 40.0);
+    let size = [80.0, 25.0, 200.0];
+    all.extend(cylinder(size, dead_cm3, [80.0, 120.0], 40.0, [220.0, 10.0]));
+    all
+}
+
+/// Bore 25 mm without a rod.
+fn rodless(stroke_mm: f64) -> Changes {
+    let mut all = valves(0.71, 0.35, 2.0, 2.0);
+    let size = [25.0, 0.0, stroke_mm];
+    all.extend(cylinder(size, 3.0, [30.0, 45.0], 3.0, [512.0, 6.0]));
+    all
+}
+
+/// Tunes an axis. Either it is at least as good as before and its parameters are written, or it is
+/// refused with what became worse, without them. The exit code.
+fn tuned(base: &str, changes: &Changes) -> i32 {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let path = axis(folder.path(), base, changes);
+    let told = wheeleg(&["tune", "--json", "--out", &out.to_string_lossy()], &path);
+    let stderr = String::from_utf8_lossy(&told.stderr);
+    let summary: Value =
+        serde_json::from_slice(&told.stdout).unwrap_or_else(|_| panic!("{stderr}"));
+    let written = out.join("node-parameters.toml").exists();
+    let worse = summary["worse"].as_array().expect("a list").len();
+    let code = told.status.code().expect("a code");
+    assert_eq!((written, worse == 0), (code == 0, code == 0), "{summary}");
+    assert_eq!(summary["accepted"], code == 0);
+    code
+}
+
+#[test]
+fn tuning_never_makes_an_axis_worse() {
+    let light = vec![
+        ("friction.viscous", 50.0, "N s/m"),
+        ("moving.mass", 0.1, "kg"),
+    ];
+    assert_eq!(tuned(SMALL, &light), 1, "viscous and light");
+    let mut dsnu = valves(0.05, 0.3, 4.0, 4.0);
+    let size = [8.0, 4.0, 20.0];
+    dsnu.extend(cylinder(size, 0.2, [2.5, 4.0], 0.1, [27.6, 3.8]));
+    let line = [
+        ("line.volume", 0.3, "cm3"),
+        ("line.conductance", 0.5, "dm3/(s bar)"),
+    ];
+    dsnu.extend(line);
+    dsnu.push(("end_stop.cushion_length", 0.0, "mm"));
+    assert_eq!(tuned(HEAVY, &dsnu), 1, "8 x 20 mm");
+    let mut slow = valves(0.71, 0.35, 20.0, 20.0);
+    let size = [32.0, 16.0, 50.0];
+    slow.extend(cylinder(size, 6.0, [25.0, 40.0], 5.0, [60.0, 5.0]));
+    assert_eq!(tuned(HEAVY, &slow), 1, "slow valves");
+    // These may come out either way, but never worse.
+    tuned(HEAVY, &wide(30.0));
+    tuned(
+        BENCH,
+        &vec![("moving.mass", 0.08, "kg"), ("numerics.step", 50.0, "us")],
+    );
+}
+
+/// A standard stroke works; of a longer one all that is wrong is told at once, each with its own
+/// range.
+#[test]
+fn the_longest_standard_stroke_is_tuned() {
+    tuned(HEAVY, &rodless(500.0));
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let path = axis(folder.path(), HEAVY, &rodless(600.0));
+    let told = wheeleg(&["tune", "--out", &out.to_string_lossy()], &path);
+    assert_eq!(told.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&told.stderr);
+    for word in [
+        "`cylinder.stroke` = 600.0",
+        "up to 509.8",
+        "electrical_stroke`",
+        "at least 612",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    assert!(!out.exists());
+}
+
+/// What `plant check` says of an axis: its exit code and its text.
+fn checked(base: &str, changes: &Changes) -> (Option<i32>, String) {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = axis(folder.path(), base, changes);
+    let told = wheeleg(&["plant", "check"], &path);
+    let text = [told.stdout, told.stderr].concat();
+    (
+        told.status.code(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
+}
+
+#[test]
+fn an_axis_that_the_step_cannot_follow_is_refused_by_its_fields() {
+    let mass = |kg: f64| vec![("moving.mass", kg, "kg")];
+    for (base, changes, words) in [
+        (
+            SMALL,
+            mass(0.02),
+            vec![
+                "`friction.bristle_damping`",
+                "`moving.mass` = 0.02",
+                "`numerics.step`",
+            ],
+        ),
+        (
+            HEAVY,
+            wide(6.0),
+            vec![
+                "`cylinder.dead_volume_a` = 6",
+                "`cylinder.bore` = 80",
+                "`end_stop.stiffness`",
+            ],
+        ),
+    ] {
+        let (code, said) = checked(base, &changes);
+        // Messages are wrapped to the width of a terminal.
+        let said = said.replace("\n  │ ", " ");
+        assert_eq!(code, Some(2), "{said}");
+        for word in words.iter().chain(&["axis.toml:", "help: "]) {
+            assert!(said.contains(word), "{word}: {said}");
+        }
+    }
+}
+
+#[test]
+fn sound_axes_near_rounding_pass() {
+    let (code, said) = checked(BENCH, &vec![("moving.mass", 0.2, "kg")]);
+    assert_eq!(code, Some(0), "{said}");
+    let mut cj2 = valves(0.037, 0.11, 5.0, 4.0);
+    let size = [10.0, 4.0, 45.0];
+    cj2.extend(cylinder(size, 0.3, [3.0, 4.7], 0.2, [55.0, 5.0]));
+    let (code, said) = checked(SMALL, &cj2);
+    assert_eq!(code, Some(0), "{said}");
+}
+
+#[test]
+fn names_of_axes_are_checked_before_anything_is_played() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    for name in ["../../x", &"x".repeat(300), ""] {
+        let path = folder.path().join("axis.toml");
+        let line = BENCH.lines().find(|line| line.starts_with("name = "));
+        let named = format!("name = {name:?}");
+        fs::write(&path, BENCH.replacen(line.expect("a name"), &named, 1)).expect("written");
+        let arguments = [
+            "compare",
+            "--quick",
+            "--out",
+            &out.to_string_lossy(),
+            "--axis",
+        ];
+        let told = wheeleg(&arguments, &path);
+        // Messages are wrapped to the width of a terminal.
+        let said = String::from_utf8_lossy(&told.stderr).replace("\n  │ ", " ");
+        assert_eq!(told.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains("is not a name") && said.contains("1 to 64"),
+            "{said}"
+        );
+        assert!(!out.exists());
+    }
+}
