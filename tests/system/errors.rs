@@ -13,9 +13,10 @@ use wheeleg_control::joint::{ConfigError, JointParameter};
 use wheeleg_plant::PlantError;
 use wheeleg_remote_host::RemoteError;
 use wheeleg_report::ReportError;
+use wheeleg_scene::SceneError;
 use wheeleg_sim::SimError;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::axis_sim::suite::BenchError;
+use wheeleg_studies::axis_sim::suite::AxisSimError;
 use wheeleg_studies::check::vectors::{VectorsError, check_text};
 use wheeleg_telemetry::LogError;
 
@@ -133,6 +134,21 @@ fn driven() -> Vec<Driven> {
     );
     let simulation = || SimError::simulation("it", "do that");
     add("SimError::Simulation", Box::new(simulation()), vec![]);
+    let leg = || SceneError::Leg {
+        side: "left",
+        reason: text(),
+    };
+    add("SceneError::Leg", Box::new(leg()), vec!["left leg"]);
+    add(
+        "SceneError::Xml",
+        Box::new(SceneError::Xml(text())),
+        vec!["URDF"],
+    );
+    add(
+        "StudyError::Scene",
+        Box::new(StudyError::from(leg())),
+        vec!["left leg"],
+    );
     let unphysical = SimError::Unphysical {
         what: text(),
         help: text(),
@@ -170,17 +186,17 @@ fn driven() -> Vec<Driven> {
     );
 
     add(
-        "BenchError::Plant",
-        Box::new(BenchError::Plant(bore())),
+        "AxisSimError::Plant",
+        Box::new(AxisSimError::Plant(bore())),
         vec!["bore_m", "9"],
     );
     let design = ConfigError::OutOfRange(JointParameter::Stroke);
     add(
-        "BenchError::Design",
-        Box::new(BenchError::Design(design)),
+        "AxisSimError::Design",
+        Box::new(AxisSimError::Design(design)),
         vec!["`stroke_min`"],
     );
-    let parameter = BenchError::Parameter {
+    let parameter = AxisSimError::Parameter {
         name: "stroke_max",
         value: 3.0,
         min: 0.0,
@@ -188,13 +204,13 @@ fn driven() -> Vec<Driven> {
         unit: "m",
     };
     add(
-        "BenchError::Parameter",
+        "AxisSimError::Parameter",
         Box::new(parameter),
         vec!["stroke_max", "3 m", "0 to 2 m"],
     );
     add(
-        "BenchError::Board",
-        Box::new(BenchError::Board(text())),
+        "AxisSimError::Board",
+        Box::new(AxisSimError::Board(text())),
         vec![],
     );
 

@@ -205,7 +205,7 @@ const PROGRAM: [&str; 13] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 18] = [
+const TESTED: [&str; 19] = [
     "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-control",
@@ -224,6 +224,7 @@ const TESTED: [&str; 18] = [
     "wheeleg-studies",
     "wheeleg-telemetry",
     "wheeleg-units",
+    "wheeleg-scene",
 ];
 
 /// Folders in which `unsafe` may stand: board glue.

@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 14] = [
+const CHECKS: [Check; 15] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -53,16 +53,16 @@ const CHECKS: [Check; 14] = [
         cylinders,
     ),
     Check(
-        "behaviours",
-        "each behaviour of a walk with and without, 20 seeds and a sign test",
-        20,
-        behaviours,
-    ),
-    Check(
         "field",
         "the paper's claims on 100 seeds each, with intervals",
         60,
         field,
+    ),
+    Check(
+        "behaviours",
+        "each behaviour of a walk with and without, 20 seeds and a sign test",
+        20,
+        behaviours,
     ),
     Check(
         "campaign",

@@ -50,7 +50,7 @@ pub const TOP: [Key; 12] = [
     key(
         "behaviours",
         "section",
-        "`off`: a list of behaviours of a walk that do not act; may be left out",
+        "which behaviours of a walk are off; all are on where left out",
     ),
     key("events", "sections", "what happens to it; may be left out"),
     key(

@@ -362,7 +362,7 @@ fn derived_channels_stand_beside_and_change_nothing() {
 
     let bytes = std::fs::read(path("log.mcap")).expect("written");
     std::fs::write(path("cut.mcap"), &bytes[..bytes.len() * 4 / 5]).expect("written");
-    recover(&path("cut.mcap"), &path("whole.mcap")).expect("a log");
+    recover(&path("cut.mcap"), &path("whole.mcap"), &|| false).expect("a log");
     for (name, is_whole) in [
         ("log.mcap", true),
         ("cut.mcap", false),

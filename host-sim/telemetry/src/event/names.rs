@@ -1,6 +1,6 @@
 //! Names and kinds of events as the log has them. They stay the same from version to version.
 
-use wheeleg_master::behaviour::Act;
+use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
@@ -44,20 +44,20 @@ pub(super) const fn master_kind(event: &MasterEvent) -> EventKind {
 }
 
 /// Name of an act of a behaviour, in snake case.
-const fn act_name(act: Act) -> &'static str {
+const fn act_name(act: Behaves) -> &'static str {
     match act {
-        Act::Overload { .. } => "overload",
-        Act::TipGuard => "tip_guard",
-        Act::EarlyGround(_) => "early_ground",
-        Act::LateGround(_) => "late_ground",
-        Act::NoGround(_) => "no_ground",
-        Act::Bump(_) => "bump",
-        Act::LostGround(_) => "lost_ground",
-        Act::Slip => "slip",
-        Act::BackOff => "back_off",
-        Act::Stuck => "stuck",
-        Act::LoadShare => "load_share",
-        Act::Governor => "governor",
+        Behaves::Overload { .. } => "overload",
+        Behaves::TipGuard => "tip_guard",
+        Behaves::EarlyGround(_) => "early_ground",
+        Behaves::LateGround(_) => "late_ground",
+        Behaves::NoGround(_) => "no_ground",
+        Behaves::Bump(_) => "bump",
+        Behaves::LostGround(_) => "lost_ground",
+        Behaves::Slip => "slip",
+        Behaves::BackOff => "back_off",
+        Behaves::Stuck => "stuck",
+        Behaves::LoadShare => "load_share",
+        Behaves::Governor => "governor",
     }
 }
 
@@ -131,7 +131,7 @@ pub(super) const fn master_board(event: &MasterEvent) -> Option<u8> {
         | MasterEvent::HomingFailed { joint: node }
         | MasterEvent::Position { joint: node, .. } => Some(node),
         MasterEvent::Found { node, .. } => node,
-        MasterEvent::Behaviour(Act::Overload { node }) => Some(node),
+        MasterEvent::Behaviour(Behaves::Overload { node }) => Some(node),
         MasterEvent::Refused { reason, .. } => refusing_board(&reason),
         MasterEvent::Hold(reason) => match reason {
             HoldReason::NodeLost(node)
