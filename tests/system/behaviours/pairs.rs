@@ -203,7 +203,7 @@ pub(super) const PAIRS: &[Pair] = &[
         robot: "wheeleg",
         metric: "foot drag, mm",
         less: true,
-        bar: 0.2,
+        bar: 0.25,
         required: true,
         duration_s: 12.0,
         walk: FAST,
