@@ -7,9 +7,10 @@ use std::path::Path;
 use mcap::read::Options;
 use wheeleg_master::contact::Side;
 use wheeleg_telemetry::{
-    Attached, BodySample, BusSample, CONTACTS_HZ, Cause, Contact, Derive, Derived, FootSample,
-    JointSample, LinkSample, LogFile, MasterSample, Put, Recorder, Recording, SampleRef,
-    SupplySample, Tables, Taken, WheelSample, attachments, channels, read, read_derived, recover,
+    Attached, BehaviourSample, BodySample, BusSample, CONTACTS_HZ, Cause, Contact, Derive, Derived,
+    FootSample, JointSample, LinkSample, LogFile, MasterSample, Put, Recorder, Recording,
+    SampleRef, SupplySample, Tables, Taken, WheelSample, attachments, channels, read, read_derived,
+    recover,
 };
 
 /// Three seconds of made-up but lively samples on every channel.
@@ -39,6 +40,7 @@ fn fill(recorder: &mut Recorder<'_>, amplitude: f64) {
         if ms % 10 == 0 {
             recorder.bus(t_ns, BusSample::default());
             recorder.master(t_ns, MasterSample::default());
+            recorder.behaviours(t_ns, BehaviourSample::default());
         }
         if recorder.wants_state(t_ns) {
             recorder.state(t_ns, format!("{ms:064x}"));

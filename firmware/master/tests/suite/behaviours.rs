@@ -357,11 +357,11 @@ fn b6_a_foot_follows_lost_ground_by_20_mm_at_half_the_speed() {
     assert!(!robot.acts().lost[0]);
 }
 
-/// A robot whose wheels go and whose legs follow with this slip, for a second; λ and pace act.
-fn slipping(slip: f64, enabled: Behaviours) -> Robot {
+/// A robot whose wheels go and whose legs follow with this slip, for so many cycles; λ and pace act.
+fn slipping(slip: f64, cycles: u32, enabled: Behaviours) -> Robot {
     let mut robot = Robot::new(STAND, enabled);
     let (mut wheels, mut stroke) = (0.0, 170.0);
-    for _ in 0..100 {
+    for _ in 0..cycles {
         wheels += 1.0;
         stroke -= 1.0 - slip;
         robot.senses.wheels = [WheelSense {
@@ -379,18 +379,22 @@ fn slipping(slip: f64, enabled: Behaviours) -> Robot {
 #[test]
 fn b7_wheels_that_slip_slow_down_and_the_legs_pull() {
     let b5 = |robot: &Robot| robot.reference(B5, 100.0);
-    let robot = slipping(0.13, Behaviours::ALL);
+    let robot = slipping(0.13, 160, Behaviours::ALL);
     assert_eq!((robot.told.len(), b5(&robot)), (0, 100.0));
     // The legs pull, by 30 mm at most; the wheels are at their best.
     for slip in [0.17, 0.73] {
-        let robot = slipping(slip, Behaviours::ALL);
+        let robot = slipping(slip, 160, Behaviours::ALL);
         assert_eq!(robot.told, [Act::Slip]);
         assert_eq!((b5(&robot), robot.acts().pace.to_num()), (70.0, 1.0));
     }
-    let robot = slipping(0.77, Behaviours::ALL);
+    let robot = slipping(0.77, 160, Behaviours::ALL);
     assert_eq!(robot.told, [Act::Slip]);
     assert!(robot.acts().pace < 1);
-    let robot = slipping(0.77, Behaviours::ALL.without(Behaviour::Slip));
+    // A leg counts from 0.3 s of its stance on, and the slip has to last as long.
+    for (cycles, told) in [(55, 0), (70, 1)] {
+        assert_eq!(slipping(0.5, cycles, Behaviours::ALL).told.len(), told);
+    }
+    let robot = slipping(0.77, 160, Behaviours::ALL.without(Behaviour::Slip));
     assert_eq!((robot.told.len(), b5(&robot)), (0, 100.0));
 }
 

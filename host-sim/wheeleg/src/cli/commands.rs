@@ -71,10 +71,14 @@ mod tests {
             let arguments = shown["arguments"].as_array().expect("a list");
             assert_eq!(arguments.len(), row.arguments.len());
         }
-        let rate = &commands[25]["arguments"][4];
+        let named = |name: &str| {
+            let found = commands.iter().find(|c| c["name"] == name);
+            found.expect("listed")
+        };
+        let rate = &named("FootTrajectory")["arguments"][4];
         let limits = (&rate["min"], &rate["max"], &rate["unit"]);
         assert_eq!(limits, (&json!(0.05), &json!(2.0), &json!("rad/s")));
-        let period = &commands[24]["arguments"][1];
+        let period = &named("SetGait")["arguments"][1];
         assert_eq!(
             (&period["min"], &period["max"]),
             (&json!(0.5), &json!(60.0))

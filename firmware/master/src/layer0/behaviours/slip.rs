@@ -19,8 +19,11 @@ const LEAST_UM: i64 = 6_000;
 /// A leg counts when it has stood for so many cycles (0.3 s): before, its b5 still follows from where
 /// it landed.
 const STOOD: u16 = 30;
-/// Slip above which the legs pull, and below which they have pulled enough.
+/// Slip above which for so many cycles (0.3 s) the legs pull, and below which they have pulled
+/// enough. A foot that settles in sand looks like slip for a shorter time: told at once, it was 12
+/// false alarms in 60 s on the level.
 const SLIPS: I16F16 = I16F16::lit("0.15");
+const LASTS: u16 = 30;
 const HOLDS: I16F16 = I16F16::lit("0.10");
 /// Slip at which wheels pull most in the soils that we have: more of it only digs them in, and they
 /// slow down. Below it the slip follows from the pull that is asked for, not from the speed.
@@ -48,6 +51,8 @@ pub(super) struct Slip {
     /// Slip; `None`: the wheels hardly turn.
     slip: Option<I16F16>,
     backward: bool,
+    /// Cycles for which the slip has been above [`SLIPS`].
+    above: u16,
     slips: bool,
     pace: I16F16,
     lead_mm: [PositionMm; WHEELS],
@@ -63,6 +68,7 @@ impl Default for Slip {
             wheels_um: None,
             slip: None,
             backward: false,
+            above: 0,
             slips: false,
             pace: I16F16::ONE,
             lead_mm: [PositionMm::ZERO; WHEELS],
@@ -99,7 +105,16 @@ impl Slip {
         self.slip = self.measure();
         let before = self.slips;
         let slip = self.slip.unwrap_or(I16F16::ZERO);
-        self.slips = slip > if before { HOLDS } else { SLIPS };
+        self.above = if slip > SLIPS {
+            self.above.saturating_add(1)
+        } else {
+            0
+        };
+        self.slips = if before {
+            slip > HOLDS
+        } else {
+            self.above >= LASTS
+        };
         self.pace = if slip > BEST {
             self.pace.saturating_sub(SLOWER)
         } else {
