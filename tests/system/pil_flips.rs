@@ -329,7 +329,7 @@ fn took_the_link_for_lost(subject: &Subject, flip: Flip, flipped: &Timeline) -> 
 /// Whether the board did what it does when the first frame after the flip is lost, and
 /// counted that frame as broken.
 fn lost_one_frame(subject: &Subject, baseline: &Timeline, flip: Flip, flipped: &Timeline) -> bool {
-    let next = sound
+    let next = baseline
         .delivered
         .iter()
         .position(|edges| *edges > flip.edge as usize);

@@ -292,6 +292,9 @@ pub struct Setpoints {
     /// Speed and acceleration of the pushes to come, for wheel boards that make
     /// their own profile; `None` leaves them as they are.
     pub push: Option<PushProfile>,
+    /// How often the user has frozen all axes (wraps): each time ends what was commanded directly,
+    /// too.
+    pub holds: u8,
 }
 
 /// Shape of a push of the wheels.
@@ -316,6 +319,7 @@ impl Setpoints {
             travel: None,
             walk: None,
             push: None,
+            holds: 0,
         }
     }
 }

@@ -25,7 +25,7 @@ const DIRECTIONS = [
 ];
 const HELP = "No gamepad. Hold a button, or an arrow key while one of them has the focus; letting go stops.";
 
-/** @param {(name: string, args?: Object<string, any>) => Promise<boolean>} command */
+/** @param {(name: string, args?: Object<string, any>, taken?: () => void) => Promise<boolean>} command */
 export function driver(command) {
   /** Who holds on, and how far: ahead and to the left, each from −1 to 1. @type {Map<string, number[]>} */
   const held = new Map();
@@ -33,6 +33,10 @@ export function driver(command) {
   let moving = null;
   let given = "";
   let busy = false;
+  /** The walk has begun: a change of it that is refused leaves it under way. */
+  let walks = false;
+  /** The gamepad's shoulders were seen open since somebody had to let go. */
+  let padOpen = false;
 
   const slider = (name, unit, min, max, value, step) => {
     const input = html("input", { type: "range", min, max, value, step, "aria-label": `${name}, ${unit}` });
@@ -62,13 +66,19 @@ export function driver(command) {
   }
   const hold = (who, ahead, left) => held.set(who, [ahead, left]);
   const release = (who) => held.delete(who) && held.size === 0 && stop();
-  /** Lets go of everything. */
-  function stop() {
+  /** Lets go of everything, and gives no command: another one stops the robot. */
+  function letGo() {
     held.clear();
-    const was = moving;
     moving = null;
     given = "";
-    if (was === "walk") command("StopGait");
+    walks = false;
+    padOpen = false;
+  }
+  /** Lets go, and stops what moves. */
+  async function stop() {
+    const was = moving;
+    letGo();
+    if (was === "walk" && !(await command("StopGait"))) command("Hold");
     if (was === "wheels") command("Hold");
   }
   means.addEventListener("change", () => {
@@ -78,7 +88,9 @@ export function driver(command) {
 
   const buttons = DIRECTIONS.map(([name, sign, key, ahead, left]) => {
     const one = html("button", { class: "btn", type: "button" }, html("span", {}, name), html("small", {}, `hold, or ${sign}`));
+    one.addEventListener("contextmenu", (event) => event.preventDefault());
     one.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0 || !event.isPrimary) return;
       one.setPointerCapture(event.pointerId);
       hold(name, ahead, left);
     });
@@ -88,7 +100,8 @@ export function driver(command) {
       if (!direction) return;
       event.preventDefault();
       event.stopPropagation();
-      hold(event.key, direction[3], direction[4]);
+      // Who had to let go while the key was down has to press it anew.
+      if (!event.repeat) hold(event.key, direction[3], direction[4]);
     });
     one.addEventListener("keyup", (event) => release(event.key));
     one.addEventListener("blur", () => DIRECTIONS.forEach((d) => release(d[2])));
@@ -111,7 +124,8 @@ export function driver(command) {
       const share = -(one.axes[axis] ?? 0);
       return Math.abs(share) < DEAD_ZONE ? 0 : share;
     });
-    if (holds) hold("gamepad", ahead, left);
+    padOpen ||= !holds;
+    if (holds && padOpen) hold("gamepad", ahead, left);
     else release("gamepad");
   }
 
@@ -128,14 +142,26 @@ export function driver(command) {
     busy = true;
     moving = way;
     given = wanted;
-    const done = await (way === "walk" ? command("Walk", walk) : command("WheelReference", { travel }));
-    busy = false;
-    // Who is refused has let go: the next command needs a new hold.
-    if (!done) {
-      held.clear();
-      moving = null;
-      given = "";
+    if (way === "walk") {
+      // A walk ends when it is stopped: what counts is that it was taken.
+      const ended = command("Walk", walk, () => {
+        busy = false;
+        walks = moving === "walk";
+      });
+      ended.then((done) => {
+        busy = false;
+        if (!done) refused(way);
+      });
+    } else {
+      if (!(await command("WheelReference", { travel }))) refused(way);
+      busy = false;
     }
   }, PIECE_MS);
-  return { root, stop, order };
+  /** Who is refused has let go: the next command needs a new hold. A walk that goes on is stopped. */
+  function refused(way) {
+    if (moving !== way) return;
+    if (walks) stop();
+    else letGo();
+  }
+  return { root, stop, letGo, order };
 }

@@ -57,6 +57,8 @@ export class Link {
     this.seen_us = 0;
     /** @type {Map<number, (answer: Answer) => void>} */
     this.waiting = new Map();
+    /** Who is told that a command was taken, before its end. @type {Map<number, () => void>} */
+    this.taken = new Map();
     // What the handshake gives; nothing is sent before it.
     const later = /** @type {any} */ (null);
     /** @type {WebSocket} */
@@ -128,6 +130,7 @@ export class Link {
   end(why) {
     for (const answer of this.waiting.values()) answer({ status: "unknown", text: why });
     this.waiting.clear();
+    this.taken.clear();
     this.listener.closed(why);
   }
 
@@ -148,9 +151,14 @@ export class Link {
     return new Promise((resolve) => this.waiting.set(this.send(frame), resolve));
   }
 
-  /** @param {string} cmd @param {Object<string, any>} args */
-  command(cmd, args = {}) {
-    return this.answered({ seen_us: this.seen_us, valid_ms: VALID_MS, cmd, args });
+  /** Answered at the command's end; `taken` is called when it begins, if it has an end of its own.
+   * @param {string} cmd @param {Object<string, any>} args @param {() => void} [taken] */
+  command(cmd, args = {}, taken) {
+    return new Promise((resolve) => {
+      const n = this.send({ seen_us: this.seen_us, valid_ms: VALID_MS, cmd, args });
+      this.waiting.set(n, resolve);
+      if (taken) this.taken.set(n, taken);
+    });
   }
 
   stop() {
@@ -168,6 +176,8 @@ export class Link {
 
   told(message) {
     if (message.op === "answer") {
+      this.taken.get(message.n)?.();
+      this.taken.delete(message.n);
       if (message.status === "accepted") return;
       this.waiting.get(message.n)?.(message);
       this.waiting.delete(message.n);

@@ -53,10 +53,10 @@ function tell(what, { status, text, reason, holder }) {
   answer.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
   answer.classList.toggle("bad", status !== "done");
 }
-async function command(name, args) {
+async function command(name, args, taken) {
   if (!link) return false;
   say(answer, `${name} …`);
-  const given = await link.command(name, args);
+  const given = await link.command(name, args, taken);
   tell(name, given);
   return given.status === "done";
 }
@@ -68,6 +68,7 @@ async function inTurn(...names) {
 // ---- stop ----
 const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", {}, "Esc"));
 async function stop() {
+  byHand.letGo();
   if (!link) return unconfirmed();
   const timer = setTimeout(unconfirmed, 250);
   const given = await link.stop();
@@ -235,6 +236,7 @@ addEventListener("keydown", (key) => {
     stop();
   } else if (key.key === " " && !inField && !(key.target instanceof HTMLButtonElement)) {
     key.preventDefault();
+    byHand.letGo();
     command("Hold");
   } else if (key.key === "?" && !inField) {
     keys.open = !keys.open;

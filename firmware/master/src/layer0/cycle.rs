@@ -96,8 +96,9 @@ impl Layer0 {
     }
 
     fn take(&mut self, setpoints: Setpoints) {
-        // A motion of layer 1 ends the user's references of single axes.
-        if setpoints.phase.is_moving() {
+        // A motion of layer 1 ends the user's references of single axes, and so does a Hold.
+        let held = core::mem::replace(&mut self.holds, setpoints.holds) != setpoints.holds;
+        if setpoints.phase.is_moving() || held {
             self.direct = [None; JOINTS];
             self.direct_travel = None;
         }

@@ -122,6 +122,8 @@ pub struct Layer0 {
     direct: [Option<PositionMm>; JOINTS],
     direct_travel: Option<DirectMove>,
     direct_segment: u16,
+    /// Holds of layer 1 that have ended them.
+    holds: u8,
     feet: [Option<FootSwitches>; WHEELS],
     foot_watches: [FootWatch; WHEELS],
     slots: SyncSlots,
@@ -173,6 +175,7 @@ impl Layer0 {
             direct: [None; JOINTS],
             direct_travel: None,
             direct_segment: 0x8000,
+            holds: 0,
             feet: [None; WHEELS],
             foot_watches: [FootWatch::default(); WHEELS],
             slots: SyncSlots::NONE,

@@ -32,6 +32,7 @@ impl Layer1 {
             }
             _ if !allowed => return Err(Refusal::NotArmed),
             Command::Hold => {
+                self.holds = self.holds.wrapping_add(1);
                 let frozen = self.frozen(now_us);
                 self.mode = Mode::Done(frozen);
                 return Ok(true);

@@ -65,6 +65,8 @@ pub struct Layer1 {
     /// Command whose end is still to be reported.
     active: Option<Ticket>,
     segment: u16,
+    /// Commands `Hold` carried out (wraps).
+    holds: u8,
     lost_setpoints: u32,
     tally: Tally,
 }
@@ -88,6 +90,7 @@ impl Layer1 {
             feedback: Feedback::default(),
             active: None,
             segment: 0,
+            holds: 0,
             lost_setpoints: 0,
             tally: Tally::default(),
         })
@@ -156,6 +159,7 @@ impl Layer1 {
             }
         }
         let mut out = self.advance(now_us, events);
+        out.holds = self.holds;
         out.push = Some(PushProfile {
             speed_mm_s: self.params.push_speed_mm_s,
             acceleration_mm_s2: self.params.push_acceleration_mm_s2,

@@ -3,6 +3,7 @@
 use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
 use wheeleg_master::command::{Command, CorrectionKind};
+use wheeleg_master::config::WheelDrive;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::Refusal;
 use wheeleg_protocol::{Address, Correction, Message};
@@ -138,6 +139,41 @@ fn gait_after(moves_mm: &[i16]) -> i64 {
     rig.run(1100);
     assert!(rig.done(ticket));
     rig.node(7).position - start
+}
+
+/// Who lets go of the wheels gives `Hold`: a move under way ends there, a second time, too.
+#[test]
+fn a_hold_stops_a_move_of_the_user() {
+    for wheel_drive in [WheelDrive::Profile, WheelDrive::Stream] {
+        let mut rig = TestRig::new(MasterConfig {
+            wheel_drive,
+            ..MasterConfig::default()
+        });
+        rig.stand();
+        for _ in 0..2 {
+            let start = rig.node(7).position;
+            let travel_mm = PositionMm::from_int(1_000);
+            let ticket = rig.submit(Command::WheelReference { travel_mm });
+            rig.run(100);
+            assert!(rig.done(ticket));
+            let ticket = rig.submit(Command::Hold);
+            rig.run(3);
+            assert!(rig.done(ticket));
+            let slot = |rig: &mut TestRig| {
+                let sync = rig.cycle();
+                let slot = sync.slots.wheel(Address::wheel(7).expect("an address"));
+                slot.filter(|slot| slot.track)
+            };
+            assert_eq!(slot(&mut rig), None, "withdrawn");
+            rig.run(200);
+            assert_eq!(slot(&mut rig), None, "and not taken up again");
+            // 1,000 mm are 110,348 counts; streamed, 100 cycles are 150 mm of them.
+            if wheel_drive == WheelDrive::Stream {
+                let way = rig.node(7).position - start;
+                assert!((10_000..20_000).contains(&way), "{way}");
+            }
+        }
+    }
 }
 
 /// Both number their motions: however many there were, a gait goes on from where the wheels are.

@@ -8,19 +8,21 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
-use wheeleg_config::builtin;
 use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
 use wheeleg_console::{ADDRESS, ConsoleError, FOLDER, Live, Options, Server};
 use wheeleg_studies::StudyError;
 
 use super::{print, stop_on_signals, tell};
 
+/// Scenario without a name: a level floor, on the robot that walks.
+const SCENARIO: &str = "stand";
+
 /// Arguments of `wheeleg serve`.
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
     /// Built-in scenario or path of a TOML file: its ground, pose and seed. Its events and its
     /// motion are the operator's to give.
-    #[arg(default_value = builtin::DEFAULT_SCENARIO)]
+    #[arg(default_value = SCENARIO)]
     scenario: String,
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
