@@ -54,7 +54,9 @@ def main(program):
         with Robot(address, keys["control"]) as robot:
             robot.until(lambda state: state["ready"])
             topics = [c["topic"] for c in robot.get("channels")["channels"]]
-            told = [topic for topic in topics if not topic.startswith(("/run", "/events", "/link"))]
+            # Those on change, and that of walks.
+            quiet = ("/run", "/events", "/link", "/behaviours")
+            told = [topic for topic in topics if not topic.startswith(quiet)]
             robot.subscribe(*topics)
             for topic in told:
                 assert robot.latest(topic)["t_ns"] > 0, topic
