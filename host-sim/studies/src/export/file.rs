@@ -26,7 +26,8 @@ fn free_place(path: &Path) -> PathBuf {
 /// # Errors
 /// [`StudyError::Output`] with the path and what the operating system said.
 pub fn write_new(path: &Path, text: &str) -> Result<(), StudyError> {
-    if std::fs::read(path).is_ok_and(|old| old == text.as_bytes()) {
+    // A device may have no end and a pipe no writer: only a file is read.
+    if path.is_file() && std::fs::read(path).is_ok_and(|old| old == text.as_bytes()) {
         return Ok(());
     }
     if path.is_dir() {
