@@ -184,6 +184,14 @@ impl TravelSetpoint {
     }
 }
 
+/// A foot that goes down does so fast to so far above the ground that is expected, then slowly.
+pub const APPROACH_MM: PositionMm = PositionMm::from_int(10);
+/// A stance presses on by so much beyond where its foot has touched: it takes its share of the load
+/// (4 mm against the stiffness of the air, about 2.7 N/mm).
+pub const PRESS_MM: PositionMm = PositionMm::from_int(4);
+/// Cycles at full length, without ground, after which it is told and the nose goes down (200 ms).
+pub const NO_GROUND: u16 = 20;
+
 /// What a leg of a walk is about, as its vertical cylinder shows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LegPlan {
@@ -194,7 +202,8 @@ pub enum LegPlan {
     Lift,
     /// Foot on its way to the foothold.
     Reach,
-    /// Foot goes down: fast to this stroke, 10 mm above where ground is expected, then slowly.
+    /// Foot goes down: fast to this stroke, [`APPROACH_MM`] above where ground is expected, then
+    /// slowly.
     Lower(
         /// mm.
         PositionMm,

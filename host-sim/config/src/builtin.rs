@@ -121,8 +121,7 @@ pub(crate) fn named_by(robot: &str, scenario: &str) -> String {
 pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name_or_path, SCENARIOS)?;
     if SCENARIOS.iter().any(|(name, ..)| *name == name_or_path) {
-        let read = Scenario::parse_with(&file, &text, &Files::BuiltIn(DATA));
-        return read.map(|(scenario, _)| scenario);
+        return parse_built_in(&file, &text);
     }
     Scenario::parse(&file, &text)
 }
@@ -135,7 +134,12 @@ pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
 pub fn scenario_on_ground(name: &str, seed: u64) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name, SCENARIOS)?;
     let text = with_ground_seed(&text, seed).unwrap_or(text);
-    Scenario::parse_with(&file, &text, &Files::BuiltIn(DATA)).map(|(scenario, _)| scenario)
+    parse_built_in(&file, &text)
+}
+
+fn parse_built_in(file: &str, text: &str) -> Result<Scenario, ConfigError> {
+    let read = Scenario::parse_with(file, text, &Files::BuiltIn(DATA));
+    read.map(|(scenario, _)| scenario)
 }
 
 /// The text of a scenario with another seed of its rocks; `None` if it is not TOML.

@@ -9,7 +9,7 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, MAGIC};
 
 use super::contact::Contact;
-use super::derived::{Derive, derived};
+use super::derived::{Attached, Derive, derived};
 use super::registry::{ChannelDef, json_schema};
 use super::samples::channels;
 use super::sink::{Sink, Taken};
@@ -111,13 +111,7 @@ impl LogFile {
             self.file.headers.push(header(id));
         }
         for file in derive.attached() {
-            log.attach(&mcap::Attachment {
-                log_time: 0,
-                create_time: 0,
-                name: file.name,
-                media_type: file.media_type,
-                data: file.data.into(),
-            })?;
+            attach(log, file)?;
         }
         log.flush()?;
         self.derive = Some(Box::new(derive));
@@ -197,6 +191,26 @@ impl Sink for LogFile {
         }
         Ok(())
     }
+}
+
+/// Puts a file into a log.
+pub(crate) fn attach<W: Write + Seek>(
+    log: &mut mcap::Writer<W>,
+    file: Attached,
+) -> Result<(), LogError> {
+    let Attached {
+        name,
+        media_type,
+        data,
+    } = file;
+    log.attach(&mcap::Attachment {
+        log_time: 0,
+        create_time: 0,
+        name,
+        media_type,
+        data: data.into(),
+    })?;
+    Ok(())
 }
 
 fn header(channel_id: u16) -> MessageHeader {

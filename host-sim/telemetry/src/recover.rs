@@ -9,7 +9,7 @@ use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
 use super::attachments::attachments;
-use super::log_file::{begins_as_log, options};
+use super::log_file::{attach, begins_as_log, options};
 use crate::LogError;
 
 /// What [`recover`] made.
@@ -84,13 +84,7 @@ fn copy(
 ) -> Result<Option<Recovered>, LogError> {
     let mut log = options().create(BufWriter::new(target))?;
     for file in attachments(from)? {
-        log.attach(&mcap::Attachment {
-            log_time: 0,
-            create_time: 0,
-            name: file.name,
-            media_type: file.media_type,
-            data: file.data.into(),
-        })?;
+        attach(&mut log, file)?;
     }
     let mut recovered = Recovered {
         messages: 0,

@@ -6,7 +6,7 @@ use wheeleg_protocol::{
     Address, Envelope, InputBits, JointSetpoint as WireJoint, LinkLossAction, MAX_ENCODED, Message,
     NextReference, SlotReply, Sync, SyncFlags, SyncSlots, Warning,
 };
-use wheeleg_units::{PositionMm, VelocityMmS};
+use wheeleg_units::VelocityMmS;
 
 use super::behaviours::{JointSense, Senses, WheelSense};
 use super::questions::has_started;
@@ -15,7 +15,7 @@ use crate::TxBytes;
 use crate::config::SwitchFrame;
 use crate::contact::{FootSwitches, INNER, OUTER, Side};
 use crate::event::{Event, Events};
-use crate::layer1::params::STROKE_MM;
+use crate::layer1::params::in_stroke;
 use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Setpoints};
 use crate::telemetry::Record;
 
@@ -149,6 +149,7 @@ impl Layer0 {
                 (Some(joint), _) => self.wire_joint(joint),
                 // No reference: the axis keeps its position.
                 (None, Some(reply)) => WireJoint {
+                    // A measured one can lie beyond an end by noise.
                     reference: in_stroke(reply.joint_position()),
                     velocity: VelocityMmS::ZERO.to_wire(),
                     next: None,
@@ -348,11 +349,6 @@ impl Layer0 {
             self.odometry.update(side, count);
         }
     }
-}
-
-/// A stroke that may be asked for: a measured one can lie beyond an end by noise.
-fn in_stroke(stroke_mm: PositionMm) -> PositionMm {
-    stroke_mm.limit(PositionMm::ZERO, STROKE_MM)
 }
 
 /// Bytes of a message from the master. Empty only if it could not be encoded,

@@ -4,7 +4,7 @@ use wheeleg_units::PositionMm;
 
 use super::behaviours::Senses;
 use crate::contact::{FootSwitches, Side};
-use crate::layer1::params::STROKE_MM;
+use crate::layer1::params::in_stroke;
 use crate::layer1::units::um_to_mm;
 use crate::setpoint::{Cylinder, JointSetpoint, Reflex, Setpoints, WHEELS};
 
@@ -64,10 +64,8 @@ impl Reflexes {
             Reflex::None => {}
             Reflex::FollowTravel => {
                 let travelled = travel_um.saturating_sub(self.travel_origin_um);
-                out.reference_mm = setpoint
-                    .reference_mm
-                    .saturating_sub(um_to_mm(travelled))
-                    .limit(PositionMm::ZERO, STROKE_MM);
+                let followed = setpoint.reference_mm.saturating_sub(um_to_mm(travelled));
+                out.reference_mm = in_stroke(followed);
             }
             Reflex::StopOnTouch => {
                 let side = usize::from(joint >= Side::Right.joint(Cylinder::Yaw));

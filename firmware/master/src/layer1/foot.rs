@@ -12,7 +12,7 @@
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use super::params::{ParamError, STROKE_MM};
+use super::params::{ParamError, STROKE_MM, in_stroke};
 use super::units::{metres, seconds_to_us, us_to_seconds};
 use crate::argument::{self, Argument, Value};
 use crate::contact::Side;
@@ -213,8 +213,7 @@ impl FootTrajectory {
         {
             if let Some(slot) = out.joints.get_mut(self.side.joint(cylinder)) {
                 *slot = Some(JointSetpoint {
-                    reference_mm: PositionMm::from_f64(f64::from(stroke) * 1.0e3)
-                        .limit(PositionMm::ZERO, STROKE_MM),
+                    reference_mm: in_stroke(PositionMm::from_f64(f64::from(stroke) * 1.0e3)),
                     velocity_mm_s: VelocityMmS::from_f64(f64::from(rate) * 1.0e3),
                     on_link_loss: if cylinder == Cylinder::Yaw {
                         OnLinkLoss::Hold

@@ -11,6 +11,11 @@ use crate::contact::Side;
 /// Stroke of every cylinder in mm (MODEL.md: ASSUMED, fits the axes of Figs. 12–13).
 pub const STROKE_MM: PositionMm = PositionMm::from_int(180);
 
+/// A stroke that may be asked for: the nearest one that a cylinder has.
+pub(crate) const fn in_stroke(stroke_mm: PositionMm) -> PositionMm {
+    stroke_mm.limit(PositionMm::ZERO, STROKE_MM)
+}
+
 /// Which leg steps when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pattern {

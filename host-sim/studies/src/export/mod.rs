@@ -4,6 +4,7 @@ mod file;
 mod folder;
 pub mod layout;
 pub mod parquet;
+mod reading;
 pub mod ros2;
 
 pub use file::write_new;

@@ -1,7 +1,6 @@
 //! A log as Parquet: a file per channel, a row per message.
 
 use std::fs::File;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -16,6 +15,7 @@ use parquet::schema::types::Type;
 use wheeleg_telemetry::{ChannelDef, FieldType, Logged, Scalar, channels, read};
 
 use super::folder::Filling;
+use super::reading::Reading;
 use crate::StudyError;
 use crate::study::Progress;
 
@@ -49,26 +49,17 @@ pub fn export(
 ) -> Result<Option<Tables>, StudyError> {
     let filling = Filling::begin(folder)?;
     let mut tables: Vec<Option<Table>> = channels().iter().map(|_| None).collect();
-    let mut failed = None;
-    progress.begin(format!("reading {}", log.display()), 0);
+    let mut reading = Reading::begin(log, progress);
     let end = read(log, &mut |logged| {
-        progress.at(logged.t_ns / 1_000_000);
         let table = &mut tables[logged.channel];
         let result = match table {
             Some(table) => table.add(&logged),
             None => Table::create(&filling, &channels()[logged.channel])
                 .and_then(|new| table.insert(new).add(&logged)),
         };
-        failed = result.err();
-        if failed.is_some() || progress.is_stopped() {
-            return ControlFlow::Break(());
-        }
-        ControlFlow::Continue(())
+        reading.after(logged.t_ns, result)
     })?;
-    if let Some(failed) = failed {
-        return Err(failed);
-    }
-    if progress.is_stopped() {
+    if !reading.end()? {
         return Ok(None);
     }
     let mut files = 0;

@@ -5,7 +5,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 use super::Senses;
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::contact::Side;
-use crate::layer1::params::STROKE_MM;
+use crate::layer1::params::in_stroke;
 use crate::setpoint::{Cylinder, LegPlan};
 
 /// A reach whose cylinders are slower than this …
@@ -85,7 +85,7 @@ impl Bump {
             } else {
                 b5.stroke_mm.saturating_add(BACK_MM)
             };
-            self.back = Some((back.limit(PositionMm::ZERO, STROKE_MM), BACK));
+            self.back = Some((in_stroke(back), BACK));
         }
         self.met
     }

@@ -24,6 +24,7 @@ mod pace;
 mod slip;
 mod stuck;
 mod touchdown;
+mod ways;
 
 use fixed::types::I16F16;
 use wheeleg_protocol::{Limit, SlotReply};
@@ -32,10 +33,10 @@ use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 use crate::behaviour::{Act, Behaviour, Behaviours, Tally};
 use crate::contact::{FootSwitches, Side};
 use crate::event::{Event, Events};
-use crate::layer1::params::STROKE_MM;
+use crate::layer1::params::in_stroke;
 use crate::setpoint::{
-    Acts, Cylinder, JOINTS, JointSetpoint, Landing, LegPlan, Setpoints, TravelSetpoint, WHEELS,
-    WalkPlan,
+    APPROACH_MM, Acts, Cylinder, JOINTS, JointSetpoint, Landing, LegPlan, Setpoints,
+    TravelSetpoint, WHEELS, WalkPlan,
 };
 use bump::Bump;
 use contact::Contact;
@@ -272,11 +273,7 @@ impl Behaving {
 
     /// No walk: nothing is remembered, and what the wheels were held back stays.
     fn rest(&mut self) {
-        *self = Self {
-            tally: self.tally,
-            pace: self.pace,
-            ..Self::new(self.enabled, self.nailed)
-        };
+        self.enable(self.enabled);
         self.pace.wish(I16F16::ONE);
     }
 
@@ -286,8 +283,7 @@ impl Behaving {
         let mut out = setpoint;
         for side in SIDES {
             let stands = plan.leg(side) == LegPlan::Stance;
-            let add =
-                |mm: PositionMm, more| mm.saturating_add(more).limit(PositionMm::ZERO, STROKE_MM);
+            let add = |mm: PositionMm, more| in_stroke(mm.saturating_add(more));
             if joint == side.joint(Cylinder::Horizontal) && stands {
                 let lead = PositionMm::ZERO.saturating_sub(self.slip.lead_mm(side));
                 out.reference_mm = add(out.reference_mm, lead);
@@ -330,11 +326,11 @@ impl Behaving {
 
     /// Layer 1 stands still: the wheels slow down to a stop.
     pub(super) fn stop_wheels(&mut self) {
-        self.pace.stop();
+        self.pace.wish(I16F16::ZERO);
     }
 }
 
 /// Whether a foot with nails is not yet where ground was: what touches are the nails.
 fn nails_first(plan: LegPlan, b6: &JointSense) -> bool {
-    matches!(plan, LegPlan::Lower(from) if b6.stroke_mm < from.saturating_add(touchdown::APPROACH_MM))
+    matches!(plan, LegPlan::Lower(from) if b6.stroke_mm < from.saturating_add(APPROACH_MM))
 }

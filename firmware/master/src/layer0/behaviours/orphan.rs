@@ -5,28 +5,21 @@
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::ways::{Ways, at_foot_um};
 use super::{SIDES, Senses};
-use crate::contact::Side;
-use crate::layer1::params::STROKE_MM;
+use crate::layer1::params::in_stroke;
 use crate::layer1::units::um_to_mm;
 use crate::setpoint::{
-    Acts, Cylinder, JointSetpoint, Landing, LegPlan, OnLinkLoss, Setpoints, WHEELS,
+    APPROACH_MM, Acts, Cylinder, JointSetpoint, Landing, LegPlan, OnLinkLoss, PRESS_MM, Setpoints,
+    WHEELS,
 };
-
-/// A stance presses on by so much beyond where its foot has touched.
-const PRESS_MM: PositionMm = PositionMm::from_int(4);
-/// A foot goes down fast to so far above where ground was last.
-const APPROACH_MM: PositionMm = PositionMm::from_int(10);
-/// Seven parts of a foot's way are that of its own wheel, one that of the other: feet are 0.40 m
-/// apart, wheels 0.56 m.
-const OWN_OF_8: i64 = 7;
 
 /// What is remembered for a layer 1 that stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::layer0) struct Orphan {
     /// Stroke of b6 at which each leg stood last.
     stood_mm: [PositionMm; WHEELS],
-    wheels_um: Option<[i64; WHEELS]>,
+    ways: Ways,
     /// Layer 1 has been given up: what it may still say is ignored.
     pub(in crate::layer0) given_up: bool,
 }
@@ -34,7 +27,7 @@ pub(in crate::layer0) struct Orphan {
 impl Orphan {
     /// Takes note of references that layer 1 has just given.
     pub(in crate::layer0) fn note(&mut self, setpoints: &Setpoints, acts: &Acts) {
-        self.wheels_um = None;
+        self.ways = Ways::default();
         let Some(plan) = setpoints.walk else {
             return;
         };
@@ -59,23 +52,14 @@ impl Orphan {
         senses: &Senses,
         acts: &Acts,
     ) {
-        let wheels_um = senses.wheels.map(|wheel| wheel.travel_um);
-        let before = self.wheels_um.replace(wheels_um).unwrap_or(wheels_um);
-        let [left, right] = [0, 1].map(|i: usize| {
-            let now = wheels_um.get(i).copied().unwrap_or(0);
-            now.saturating_sub(before.get(i).copied().unwrap_or(now))
-        });
+        let ways_um = self.ways.since(senses);
         let Some(mut plan) = setpoints.walk else {
             return;
         };
         plan.driven = false;
         for side in SIDES {
             let at = side.index();
-            let (own, other) = match side {
-                Side::Left => (left, right),
-                Side::Right => (right, left),
-            };
-            let way_um = own.saturating_mul(OWN_OF_8).saturating_add(other) >> 3_u32;
+            let way_um = at_foot_um(side, ways_um);
             let Some(leg) = plan.legs.get_mut(at) else {
                 continue;
             };
@@ -140,8 +124,4 @@ fn change(slot: Option<&mut Option<JointSetpoint>>, with: impl FnOnce(&mut Joint
         joint.ahead = None;
         with(joint);
     }
-}
-
-fn in_stroke(stroke_mm: PositionMm) -> PositionMm {
-    stroke_mm.limit(PositionMm::ZERO, STROKE_MM)
 }

@@ -48,11 +48,6 @@ impl Pace {
         self.wish = share;
     }
 
-    /// The wheels come to a stop.
-    pub(super) fn stop(&mut self) {
-        self.wish = I16F16::ZERO;
-    }
-
     /// References of the wheels from those of layer 1.
     pub(super) fn lead(
         &mut self,

@@ -6,6 +6,7 @@
 use fixed::types::I16F16;
 use wheeleg_units::PositionMm;
 
+use super::ways::{Ways, at_foot_um};
 use super::{SIDES, Senses};
 use crate::behaviour::{Act, Behaviour, Behaviours};
 use crate::contact::Side;
@@ -35,8 +36,6 @@ const LEAST: I16F16 = I16F16::lit("0.3");
 /// A pulling leg's b5 leads by so much more in a cycle (50 mm/s), up to so much.
 const PULL_MM: PositionMm = PositionMm::from_raw(1 << 15);
 const FARTHEST_MM: PositionMm = PositionMm::from_int(30);
-/// Seven parts of the wheels' way at a foot are that of its own wheel, one that of the other.
-const OWN_OF_8: i64 = 7;
 
 /// What is known of the wheels' hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +46,7 @@ pub(super) struct Slip {
     b5_mm: [Option<PositionMm>; WHEELS],
     /// Cycles for which a leg has stood.
     stood: [u16; WHEELS],
-    wheels_um: Option<[i64; WHEELS]>,
+    ways: Ways,
     /// Slip; `None`: the wheels hardly turn.
     slip: Option<I16F16>,
     backward: bool,
@@ -65,7 +64,7 @@ impl Default for Slip {
             at: 0,
             b5_mm: [None; WHEELS],
             stood: [0; WHEELS],
-            wheels_um: None,
+            ways: Ways::default(),
             slip: None,
             backward: false,
             above: 0,
@@ -144,12 +143,7 @@ impl Slip {
 
     /// Ways of the wheels and of the standing legs in this cycle, mean of the standing feet.
     fn ways_um(&mut self, senses: &Senses, plan: &WalkPlan) -> [i32; 2] {
-        let now = senses.wheels.map(|wheel| wheel.travel_um);
-        let before = self.wheels_um.replace(now).unwrap_or(now);
-        let [left, right] = [0, 1].map(|i: usize| {
-            let now = now.get(i).copied().unwrap_or(0);
-            now.saturating_sub(before.get(i).copied().unwrap_or(now))
-        });
+        let wheels_um = self.ways.since(senses);
         let (mut sum, mut feet) = ([0_i64; 2], 0_u8);
         let legs = self.b5_mm.iter_mut().zip(&mut self.stood);
         for (side, (b5, stood)) in SIDES.into_iter().zip(legs) {
@@ -166,13 +160,8 @@ impl Slip {
             let (Some(now), Some(before), true) = (stroke, before, *stood > STOOD) else {
                 continue;
             };
-            let (own, other) = match side {
-                Side::Left => (left, right),
-                Side::Right => (right, left),
-            };
             let [wheels, legs] = &mut sum;
-            let at_foot = own.saturating_mul(OWN_OF_8).saturating_add(other) >> 3_u32;
-            *wheels = wheels.saturating_add(at_foot);
+            *wheels = wheels.saturating_add(at_foot_um(side, wheels_um));
             *legs = legs.saturating_add(mm_to_um(before.saturating_sub(now)));
             feet = feet.saturating_add(1);
         }

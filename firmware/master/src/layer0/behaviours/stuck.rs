@@ -2,6 +2,7 @@
 
 use wheeleg_units::PositionMm;
 
+use super::ways::Ways;
 use super::{SIDES, Senses};
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, Setpoints, WHEELS, WalkPlan};
@@ -42,8 +43,7 @@ pub(super) struct Stuck {
     went_down: [bool; WHEELS],
     /// Cycles for which a wheel has been blocked.
     blocked: [u16; WHEELS],
-    /// Travel of the wheels in the last cycle, µm.
-    wheels_um: [Option<i64>; WHEELS],
+    ways: Ways,
 }
 
 impl Stuck {
@@ -130,19 +130,12 @@ impl Stuck {
     /// Whether a wheel gives all that it has, and hardly turns.
     fn blocked(&mut self, senses: &Senses, setpoints: &Setpoints) -> bool {
         let mut blocked = false;
-        for side in SIDES {
-            let at = side.index();
-            let (Some(count), Some(before), Some(wheel)) = (
-                self.blocked.get_mut(at),
-                self.wheels_um.get_mut(at),
-                senses.wheels.get(at),
-            ) else {
-                continue;
-            };
-            let way_um = before
-                .replace(wheel.travel_um)
-                .map_or(0, |before| wheel.travel_um.saturating_sub(before));
-            let asked = setpoints.travel.and_then(|t| t.wheels.get(at).copied());
+        let wheels = self.ways.since(senses).into_iter().zip(senses.wheels);
+        for ((side, count), (way_um, wheel)) in SIDES.into_iter().zip(&mut self.blocked).zip(wheels)
+        {
+            let asked = setpoints
+                .travel
+                .and_then(|t| t.wheels.get(side.index()).copied());
             // mm/s × 10 ms = 10 µm.
             let asked_um = asked.map_or(0, |wheel| {
                 i64::from(wheel.velocity_mm_s.get().to_num::<i32>()).saturating_mul(10)

@@ -8,21 +8,15 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 use super::JointSense;
 use crate::behaviour::{Act, Behaviour, Behaviours};
 use crate::contact::Side;
-use crate::layer1::params::STROKE_MM;
-use crate::setpoint::{Landing, LegPlan};
+use crate::layer1::params::{STROKE_MM, in_stroke};
+use crate::setpoint::{APPROACH_MM, Landing, LegPlan, NO_GROUND, PRESS_MM};
 
-/// Ground is expected so far below where the slow way begins.
-pub(super) const APPROACH_MM: PositionMm = PositionMm::from_int(10);
 /// Slow way in a cycle: 100 mm/s.
 const SEARCH_MM: PositionMm = PositionMm::from_int(1);
 /// The slow way goes on when the piston is as near as this.
 const NEAR_MM: PositionMm = PositionMm::from_int(5);
-/// A foot that is not stopped by its switches presses on so far below the ground that is expected.
-const PRESS_MM: PositionMm = PositionMm::from_int(4);
 /// A leg is at its full length from here on.
 const FULL_MM: PositionMm = PositionMm::from_int(178);
-/// Cycles at full length, without ground, after which it is told (200 ms).
-const NO_GROUND: u16 = 20;
 /// Ground so far from where it was expected is told.
 const SURPRISE_MM: PositionMm = PositionMm::from_int(20);
 /// A piston slower than this …
@@ -43,10 +37,8 @@ pub(super) struct Touchdown {
 
 /// Where the slow way begins, and where the foot stops that does not search.
 const fn limits_mm(from_mm: PositionMm, enabled: Behaviours) -> [PositionMm; 2] {
-    let plan_mm = from_mm
-        .saturating_add(APPROACH_MM)
-        .saturating_add(PRESS_MM)
-        .limit(PositionMm::ZERO, STROKE_MM);
+    // A foot that is not stopped by its switches presses on below the ground that is expected.
+    let plan_mm = in_stroke(from_mm.saturating_add(APPROACH_MM).saturating_add(PRESS_MM));
     let begin = if enabled.contains(Behaviour::Touchdown) {
         from_mm
     } else {

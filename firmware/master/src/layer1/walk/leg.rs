@@ -11,11 +11,12 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::geometry::{Twist, WalkGeometry};
 use crate::contact::{FootSwitches, Side};
-use crate::layer1::params::STROKE_MM;
+use crate::layer1::params::{STROKE_MM, in_stroke};
 use crate::layer1::units::metres;
 use crate::mirror;
 use crate::setpoint::{
-    Acts, Ahead, Cylinder, Feedback, JointSetpoint, Landing, LegPlan, OnLinkLoss,
+    APPROACH_MM, Acts, Ahead, Cylinder, Feedback, JointSetpoint, Landing, LegPlan, NO_GROUND,
+    OnLinkLoss, PRESS_MM,
 };
 
 /// A foot is clear of hard ground after half of the lift, or after so much of it, mm.
@@ -25,11 +26,6 @@ const NAILS_OUT: f32 = 0.9;
 /// Share of the way to the foothold after which the foot goes down: what is left takes as long as
 /// the way down.
 const LOWER_FROM: f32 = 0.6;
-/// From so far above the ground that is expected, mm, layer 0 leads a foot slowly until it touches.
-const APPROACH_MM: f32 = 10.0;
-/// Stroke by which a stance presses on beyond the first touch, mm: it takes its share of the load
-/// (4 mm against the stiffness of the air, about 2.7 N/mm).
-pub(super) const PRESS_MM: f32 = 4.0;
 /// Fastest change of a standing leg's height, mm per cycle (30 mm/s).
 const NOSE_MM: f32 = 0.3;
 /// A bump, or a try to get on, lifts a foot by so much more, mm.
@@ -40,8 +36,6 @@ const NEARER_M: f32 = 0.06;
 const PATIENCE: u16 = 150;
 /// … so many times.
 const TRIES: u8 = 2;
-/// Cycles at full length, without ground, after which the nose goes down.
-const NO_GROUND: u16 = 20;
 /// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
 /// presses less.
 const ANNOUNCED: u8 = 8;
@@ -164,7 +158,7 @@ impl Leg {
     /// Stroke at which a standing leg stands, with what layer 0 has made of it, mm.
     pub(super) fn stood_mm(&self, acts: &Acts) -> f32 {
         let beyond = acts.beyond_mm.get(self.side.index()).copied();
-        let beyond_mm = beyond.unwrap_or_default().get().to_num::<f32>();
+        let beyond_mm = millimetres(beyond.unwrap_or_default());
         (self.stand_mm + beyond_mm).min(full_mm())
     }
 
@@ -181,7 +175,7 @@ impl Leg {
         self.higher_mm = higher_mm;
         self.tries = 0;
         // Where a touch would have been, as the leg stands now.
-        self.ground_mm = self.stand_mm - PRESS_MM;
+        self.ground_mm = self.stand_mm - millimetres(PRESS_MM);
         self.state = LegState::Lift(self.stand_mm);
     }
 
@@ -258,7 +252,7 @@ impl Leg {
     /// Goes down to just above the ground that is expected.
     fn lower(&mut self) {
         self.without = 0;
-        self.state = LegState::Lower((self.ground_mm - APPROACH_MM).max(0.0));
+        self.state = LegState::Lower((self.ground_mm - millimetres(APPROACH_MM)).max(0.0));
     }
 
     /// A foot on its way down, which layer 0 leads.
@@ -266,8 +260,8 @@ impl Leg {
         match acts.landing.get(self.side.index()) {
             Some(Landing::Down(stroke)) => {
                 self.foot_m = sensed.foot_m;
-                self.ground_mm = stroke.get().to_num();
-                self.stand_mm = (self.ground_mm + PRESS_MM).min(full_mm());
+                self.ground_mm = millimetres(*stroke);
+                self.stand_mm = (self.ground_mm + millimetres(PRESS_MM)).min(full_mm());
                 self.state = LegState::Stance;
             }
             Some(Landing::Nothing(cycles)) => {
@@ -380,11 +374,15 @@ fn in_plane(side: Side, [x, y]: [f32; 2], [ux, uy]: [f32; 2]) -> Option<[JointSe
 
 /// Stroke of b6, mm.
 pub(super) fn full_mm() -> f32 {
-    STROKE_MM.get().to_num::<f32>()
+    millimetres(STROKE_MM)
+}
+
+fn millimetres(stroke: PositionMm) -> f32 {
+    stroke.get().to_num()
 }
 
 fn stroke_mm(mm: f32) -> PositionMm {
-    PositionMm::from_f64(f64::from(mm)).limit(PositionMm::ZERO, STROKE_MM)
+    in_stroke(PositionMm::from_f64(f64::from(mm)))
 }
 
 fn distance([ax, ay]: [f32; 2], [bx, by]: [f32; 2]) -> f32 {

@@ -10,7 +10,6 @@ mod types;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use mcap::records::MessageHeader;
@@ -22,6 +21,7 @@ use wheeleg_telemetry::{Derived, LogError, attachments, read_derived};
 use self::cdr::Cdr;
 use self::types::{TOPICS, Topic};
 use super::folder::Filling;
+use super::reading::Reading;
 use crate::StudyError;
 use crate::study::Progress;
 
@@ -97,20 +97,11 @@ pub fn export(log: &Path, folder: &Path, progress: &Progress) -> Result<Option<B
     };
     let urdf = String::from_utf8_lossy(&urdf.data).into_owned();
     let mut bag = Writer::create(&filling.path(FILE), fixed_links(&urdf), urdf)?;
-    progress.begin(format!("reading {}", log.display()), 0);
-    let mut failed = None;
+    let mut reading = Reading::begin(log, progress);
     let whole = read_derived(log, &mut |channel, t_ns, payload| {
-        progress.at(t_ns / 1_000_000);
-        failed = bag.take(channel, t_ns, payload).err();
-        if failed.is_some() || progress.is_stopped() {
-            return ControlFlow::Break(());
-        }
-        ControlFlow::Continue(())
+        reading.after(t_ns, bag.take(channel, t_ns, payload))
     })?;
-    if let Some(failed) = failed {
-        return Err(failed);
-    }
-    if progress.is_stopped() {
+    if !reading.end()? {
         return Ok(None);
     }
     let Some((first_ns, last_ns)) = bag.times else {
