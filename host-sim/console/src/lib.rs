@@ -35,7 +35,7 @@ mod session;
 pub use api::SUBPROTOCOL;
 pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};
 pub use error::ConsoleError;
-pub use live::Live;
+pub use live::{Live, Port};
 pub use mac::Key;
 pub use record::{FOLDER, Summary};
 pub use server::{ADDRESS, Options, Server};

@@ -73,7 +73,7 @@ pub fn replay(
     let summary = summary(&folder).map_err(unusable)?;
     if !summary.repeatable {
         let what = format!(
-            "{}: its inputs are not all there: the robot had run too long, or the disk was too slow",
+            "{}: its inputs are not all there: the robot had run too long, the disk was too slow, or its boards were real",
             folder.display()
         );
         return Err(ConsoleError::other(what, "open its log instead"));

@@ -1,5 +1,6 @@
 //! The server: listens at one address of this computer, and hands each connection to the routes.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,6 +17,7 @@ use tokio::runtime::Runtime;
 use tokio::sync::Semaphore;
 
 use wheeleg_config::Drawing;
+use wheeleg_telemetry::channels;
 
 use crate::api::{self, Peer};
 use crate::error::ConsoleError;
@@ -118,13 +120,24 @@ impl Server {
         };
         let name = live.robot.name.clone();
         let drawing = Drawing::of(&live.robot);
-        let robot_json = json!({ "name": name, "drawing": drawing }).to_string();
+        let robot_json = json!({
+            "name": name,
+            "drawing": drawing,
+            "simulated": live.port.is_none(),
+            "unmeasured": unmeasured(live.port.is_some()),
+        })
+        .to_string();
         let about = About::new(
             &live.robot,
             &live.robot_toml,
             &live.scenario,
             &live.scenario_toml,
         )?;
+        let about = About {
+            // Nobody can give real boards the same once more.
+            repeatable: live.port.is_none(),
+            ..about
+        };
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
         let (hub, robot) = Hub::new(live::start(live, feed)?, name, shared);
@@ -184,6 +197,18 @@ impl Drop for Server {
             let _ = recorder.join();
         }
     }
+}
+
+/// Fields that have no value, by the topic of their channel: those that no real board tells.
+fn unmeasured(real: bool) -> BTreeMap<&'static str, &'static [&'static str]> {
+    let of = |schema: &str| {
+        wheeleg_sim::unmeasured()
+            .iter()
+            .find(|(of, _)| *of == schema)
+    };
+    let channels = channels().iter().filter(|_| real);
+    let fields = channels.filter_map(|def| Some((def.topic, of(def.schema)?.1)));
+    fields.collect()
 }
 
 fn bind(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), ConsoleError> {

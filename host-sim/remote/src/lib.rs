@@ -19,6 +19,9 @@ mod error;
 mod figures;
 mod images;
 mod line;
+pub mod port;
+#[cfg(unix)]
+pub mod pty;
 pub mod qemu;
 mod remote_boards;
 pub mod serial;

@@ -90,6 +90,7 @@ export class Link {
   async open() {
     const [robot, channels, commands, faults] = await Promise.all(["robot", "channels", "commands", "faults"].map((path) => this.ask(path)));
     this.channels = new Map(channels.channels.map((channel) => [channel.id, channel]));
+    for (const { topic, fields } of channels.channels) for (const field of fields) field.measured = !robot.unmeasured[topic]?.includes(field.name);
     this.hashes = { layout: channels.layout, commands: commands.hash };
     const socket = new WebSocket(`ws://${location.host}/ws`, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
@@ -198,7 +199,8 @@ export class Link {
       const values = {};
       for (const field of channel.fields) {
         const [value, length] = READERS[field.wire](view, at);
-        values[field.name] = value;
+        // What no board tells is not 0.
+        values[field.name] = field.measured ? value : NaN;
         at += length;
       }
       this.listener.sample(channel.topic, t_us, values);

@@ -98,7 +98,7 @@ function pose() {
     return {
       commanded_mm: three.map((s) => s?.commanded_mm ?? 90),
       sensed_mm: three.map((s) => s?.sensed_mm ?? 90),
-      load_n: foot.normal_force_n ?? 0,
+      load_n: foot.normal_force_n || 0,
       switches: foot.switches ?? 0,
     };
   });
@@ -133,13 +133,17 @@ const joints = JOINTS.map((name, i) => {
       set(piston, { x: at });
       set(rod, { x: at + 7, width: Math.max(0, 250 - at - 7) });
       set(asked, { x: x(s.commanded_mm) });
-      const shade = (bar) => Math.min(1, Math.max(0, (bar - 1) / 6)).toFixed(2);
+      const shade = (bar) => (Number.isNaN(bar) ? 0 : Math.min(1, Math.max(0, (bar - 1) / 6)).toFixed(2));
+      // Of real boards neither pressures nor valves are known, but what their law asks for.
+      const simulated = !Number.isNaN(s.pressure_a_bar);
+      const air = simulated ? `A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)` : `drive ${fixed(100 * s.drive, 0)} %`;
       set(chamber.a, { width: at - 14, "fill-opacity": shade(s.pressure_a_bar) });
       set(chamber.b, { x: at + 7, width: 214 - at - 7, "fill-opacity": shade(s.pressure_b_bar) });
+      for (const v of valves) v.toggleAttribute("hidden", !simulated);
       valves.forEach((v, k) => set(v, { class: (s.valves_open >> k) & 1 ? "v on" : "v" }));
       say(value, blind ? "No reading" : `${fixed(s.sensed_mm)} mm`);
-      say(side, ` asked ${fixed(s.commanded_mm)}${blind ? "" : `, error ${fixed(s.commanded_mm - s.sensed_mm)}`} mm; A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)`);
-      say(title, `${name}: ${fixed(s.sensed_mm)} mm of ${STROKE_MM} mm, open: ${VALVES.filter((_, k) => (s.valves_open >> k) & 1).join(", ") || "no valve"}`);
+      say(side, ` asked ${fixed(s.commanded_mm)}${blind ? "" : `, error ${fixed(s.commanded_mm - s.sensed_mm)}`} mm; ${air}`);
+      say(title, `${name}: ${fixed(s.sensed_mm)} mm of ${STROKE_MM} mm${simulated ? `, open: ${VALVES.filter((_, k) => (s.valves_open >> k) & 1).join(", ") || "no valve"}` : ""}`);
     },
   };
 });
@@ -265,7 +269,7 @@ function build({ robot, commands: list, faults: injectable }) {
     html(
       "header",
       { class: "bar" },
-      html("h1", {}, "Wheeleg ", html("small", {}, "simulated")),
+      html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
       html("div", { class: "cells" }, head.mode.root, head.gait.root, head.control.root, head.link.root, head.speed.root, head.robot.root),
       html("div", { class: "stopbox" }, stopButton),
     ),
@@ -290,7 +294,7 @@ function build({ robot, commands: list, faults: injectable }) {
         byHand.root,
         html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded),
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
-        html("section", { class: "panel" }, html("h2", {}, "Faults to try"), html("div", { class: "row" }, fault, target, inject), injected),
+        robot.simulated && html("section", { class: "panel" }, html("h2", {}, "Faults to try"), html("div", { class: "row" }, fault, target, inject), injected),
         html("section", { class: "panel eventlist" }, html("h2", {}, "Events"), events),
         keys,
       ),

@@ -16,7 +16,7 @@ const DRAW_MS = 66;
 const COLOURS = ["#161B20", "#128A6B", "#9A5C86", "#8A4FBE"];
 const ASKED = "#0072B2";
 
-/** @typedef {{name: string, unit: string, wire: string, description: string}} Field */
+/** @typedef {{name: string, unit: string, wire: string, description: string, measured: boolean}} Field */
 /** @typedef {{topic: string, fields: Field[], description: string}} Channel */
 /** @typedef {{topic: string, field: string, label: string, colour: string}} Trace */
 /** @typedef {{name: string, unit: string, least: [number, number], traces: Trace[]}} Choice */
@@ -94,10 +94,11 @@ export class Scope {
     this.drawn_ms = 0;
     this.now = 0;
 
-    const known = usual();
+    const measured = new Set(channels.flatMap(({ topic, fields }) => fields.filter((field) => field.measured).map((field) => `${topic} ${field.name}`)));
+    const known = usual().filter(({ traces }) => traces.every(({ topic, field }) => measured.has(`${topic} ${field}`)));
     const others = channels.flatMap((channel) =>
       channel.fields
-        .filter((field) => field.wire !== "text")
+        .filter((field) => field.wire !== "text" && field.measured)
         .map((field) => ({ name: `${channel.topic} ${field.name}`, unit: field.unit, least: /** @type {[number, number]} */ ([0, 0]), traces: [{ topic: channel.topic, field: field.name, label: "", colour: COLOURS[0] }] })),
     );
     this.choices = [...known, ...others];
@@ -111,7 +112,7 @@ export class Scope {
     this.list.addEventListener("pointerenter", () => (this.hovered = true));
     this.list.addEventListener("pointerleave", () => (this.hovered = false));
     this.root = html("section", { class: "panel scope", "data-live": true, "aria-label": "Plots" }, html("header", {}, html("h2", {}, "Plots"), add, span, this.freeze, save, this.note), this.list);
-    this.add(known[4]);
+    this.add(known.find(({ name }) => name === "Left vertical, stroke") ?? known[0]);
   }
 
   chosen(select) {

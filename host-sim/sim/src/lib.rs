@@ -12,6 +12,8 @@
 //! * **board**: application, hardware model, memory and clock at one address
 //! * **operator**: the user of the paper: gets the robot ready, sends the commands of the
 //!   scenario
+//! * **line**: a serial port or pipe between a master here and boards elsewhere, or the other way
+//!   round
 //! * **observer**: samples the robot for the record
 //! * **rogue node**: a node on the bus that should not be there
 //! * **down**: a board without power, or one that hangs
@@ -27,6 +29,7 @@ mod downtime;
 mod error;
 pub mod faults;
 mod hal;
+mod line;
 mod memory;
 mod observe;
 mod operator;
@@ -51,6 +54,7 @@ pub use self::audit::LineAudit;
 pub use self::boards::{JointBoard, identity};
 pub use self::downtime::DownTimes;
 pub use self::error::SimError;
+pub use self::line::{Line, LineBoards, LineMaster, PortLine, unmeasured};
 pub use self::provenance::provenance;
 pub use self::session::Session;
 pub use self::world::BOARD_START_UP_NS;

@@ -1,6 +1,8 @@
 //! Samples of the running world for the recorder: what was commanded, what the
 //! boards sensed, what physically is.
 
+mod line;
+
 use wheeleg_master::behaviour::Behaviour;
 use wheeleg_master::contact::Side;
 use wheeleg_master::setpoint::{LegPlan, Phase};
@@ -18,6 +20,8 @@ use wheeleg_telemetry::{
     BehaviourSample, BodySample, BusSample, Contact, ContactBody, FootSample, JointSample,
     MasterSample, Recorder, SupplySample, WheelSample,
 };
+
+pub(super) use line::UNMEASURED;
 
 const PA_PER_BAR: f64 = 1e5;
 

@@ -1,6 +1,7 @@
 //! The person at the console: gets the robot ready, starts the motion, and
 //! carries out the scenario's events, all through the master's dispatcher.
 
+use wheeleg_master::Master;
 use wheeleg_master::command::Command;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::Reject;
@@ -243,25 +244,24 @@ impl Operator {
             }
         }
     }
+}
 
-    /// Writes the master's events into the record, and tells them on.
-    pub(super) fn listen(
-        &self,
-        world: &mut World,
-        t_ns: u64,
-        recorder: &mut Recorder,
-        told: &mut dyn FnMut(u64, &Event),
-    ) {
-        while let Some((time_us, event)) = world.master().take_event() {
-            told(time_us, &event);
-            // Counters have channels of their own.
-            if let Event::Link { node, record } = event {
-                let node = usize::from(node) - 1;
-                recorder.link(t_ns, node, link_sample(&record));
-                continue;
-            }
-            recorder.event(t_ns, Cause::Master(event));
+/// Writes the master's events into the record, and tells them on.
+pub(super) fn listen(
+    master: &mut Master,
+    t_ns: u64,
+    recorder: &mut Recorder,
+    told: &mut dyn FnMut(u64, &Event),
+) {
+    while let Some((time_us, event)) = master.take_event() {
+        told(time_us, &event);
+        // Counters have channels of their own.
+        if let Event::Link { node, record } = event {
+            let node = usize::from(node) - 1;
+            recorder.link(t_ns, node, link_sample(&record));
+            continue;
         }
+        recorder.event(t_ns, Cause::Master(event));
     }
 }
 

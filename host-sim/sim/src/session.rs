@@ -16,7 +16,7 @@ use wheeleg_telemetry::event::{Act, Answer, Cause};
 
 use crate::faults::{ActiveFaults, Schedule};
 use crate::observe::Observer;
-use crate::operator::Operator;
+use crate::operator::{Operator, listen};
 use crate::world::{Happened, World};
 use crate::{Boards, JointProbe, RunOutcome, SimError, setup};
 
@@ -46,6 +46,16 @@ pub struct Session {
 
 /// Most ends of requests that wait for their console; then the oldest goes.
 const OUTCOMES: usize = 256;
+
+/// Keeps the end of a request for its console.
+pub(crate) fn keep_outcome(outcomes: &mut VecDeque<(u64, Event)>, time_us: u64, event: &Event) {
+    if matches!(event, Event::Done(_) | Event::Refused { .. }) {
+        if outcomes.len() == OUTCOMES {
+            outcomes.pop_front();
+        }
+        outcomes.push_back((time_us, *event));
+    }
+}
 
 /// The faults of a scenario that are there from the power on.
 fn built_in(scenario: &Scenario) -> Vec<FaultSpec> {
@@ -252,6 +262,11 @@ impl Session {
         Ok(())
     }
 
+    /// The simulated world, for who leads its boards over a line.
+    pub(crate) fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
     /// Shows every joint board and its cylinder as they are after a tick.
     pub(crate) fn show(&self, watcher: &mut dyn FnMut(&JointProbe<'_>)) {
         let world = &self.world;
@@ -317,17 +332,11 @@ impl Session {
         }
         let outcomes = &mut self.outcomes;
         let mut told = |time_us, event: &Event| {
-            if let (Some(outcomes), Event::Done(_) | Event::Refused { .. }) =
-                (outcomes.as_mut(), event)
-            {
-                if outcomes.len() == OUTCOMES {
-                    outcomes.pop_front();
-                }
-                outcomes.push_back((time_us, *event));
+            if let Some(outcomes) = outcomes {
+                keep_outcome(outcomes, time_us, event);
             }
         };
-        self.operator
-            .listen(&mut self.world, t_ns, recorder, &mut told);
+        listen(self.world.master(), t_ns, recorder, &mut told);
         for note in self.world.take_notes() {
             recorder.event(t_ns, note);
         }

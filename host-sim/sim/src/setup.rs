@@ -11,9 +11,14 @@ use wheeleg_master::layer1::params::Pattern;
 use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
+use wheeleg_protocol::Address;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::board::Board;
+use super::clock::NS_PER_US;
 use super::operator::side;
+use super::world::LEFT_WHEEL;
+use crate::SimError;
 use wheeleg_config::{LegChoice, Motion, RobotConfig, Scenario};
 
 /// Stroke of b5 with which a walk begins, m: almost as far out as a foothold can be, so that the
@@ -123,4 +128,15 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         parameters: sums(robot),
         ..MasterConfig::default()
     }
+}
+
+/// Sample time of the wheel boards with the robot's parameters, µs: both ends count speeds per
+/// sample.
+///
+/// # Errors
+/// [`SimError`] if the board refuses them.
+pub(super) fn wheel_sample_us(robot: &RobotConfig) -> Result<u32, SimError> {
+    let address = Address::of_slot(LEFT_WHEEL).unwrap_or(Address::MASTER);
+    let board = Board::new(address, robot.node.of(address))?;
+    Ok((board.application.tick_ns() / NS_PER_US) as u32)
 }

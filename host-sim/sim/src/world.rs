@@ -67,6 +67,8 @@ pub(super) struct World {
     pub(super) audit: Audit,
     pub(super) master: Master,
     pub(super) master_alive: bool,
+    /// Of a master that is not here, but at the other end of the line.
+    pub(super) elsewhere: Option<Elsewhere>,
     pub(super) cycle_ns: u64,
     pub(super) now_ns: u64,
     pub(super) next_joint_ns: u64,
@@ -85,6 +87,15 @@ pub(super) struct World {
     /// When boards here are down after a fault, of those that do not find it themselves.
     pub(super) replayed: DownTimes,
     pub(super) stored: NodeParams,
+}
+
+/// A master at the other end of the line.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Elsewhere {
+    /// What it would hear, until that is taken.
+    said: Vec<u8>,
+    /// When the last byte of it has passed, ns.
+    until_ns: u64,
 }
 
 /// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
@@ -192,6 +203,7 @@ impl World {
             master_back_ns: None,
             rogue_nodes: RogueNodes::default(),
             master_alive: true,
+            elsewhere: None,
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
             now_ns: 0,
             next_joint_ns: 0,

@@ -73,6 +73,10 @@ pub enum Cause {
     },
     /// The master has heard broken frames: its counts at the end of the run.
     LineErrors(LinkQuality),
+    /// The line to boards elsewhere is broken; what the operating system says.
+    LineBroken(String),
+    /// It is there again. All axes are disarmed.
+    LineMended,
     /// What ended the run before its end, in words.
     Failed(String),
 }
@@ -259,8 +263,8 @@ impl Cause {
             Self::Contact { .. } => EventKind::Contact,
             Self::Command { .. } | Self::Flood { .. } | Self::Service { .. } => EventKind::Command,
             Self::Scenario(_) => EventKind::Scenario,
-            Self::LineErrors(_) => EventKind::Info,
-            Self::Failed(_) => EventKind::Fault,
+            Self::LineErrors(_) | Self::LineMended => EventKind::Info,
+            Self::LineBroken(_) | Self::Failed(_) => EventKind::Fault,
         }
     }
 
@@ -298,6 +302,8 @@ impl Cause {
                 ServiceOutcome::NotGiven => "service_not_given",
             },
             Self::LineErrors(_) => "line_errors",
+            Self::LineBroken(_) => "line_broken",
+            Self::LineMended => "line_mended",
             Self::Failed(_) => "run_failed",
         }
     }
@@ -329,7 +335,9 @@ impl Cause {
             Self::Service {
                 board, parameter, ..
             } => parameter_name(board.raw(), *parameter),
-            Self::LineErrors(_) | Self::Failed(_) => String::new(),
+            Self::LineErrors(_) | Self::LineBroken(_) | Self::LineMended | Self::Failed(_) => {
+                String::new()
+            }
         }
     }
 

@@ -70,6 +70,8 @@ impl fmt::Display for Cause {
                 write!(f, "service: {}", service(*board, &name, outcome))
             }
             Self::LineErrors(link) => write!(f, "master: {}", line_errors(link)),
+            Self::LineBroken(why) => write!(f, "line: broken: {why}"),
+            Self::LineMended => f.write_str("line: there again; the axes are disarmed"),
             Self::Failed(why) => f.write_str(why),
         }
     }

@@ -63,7 +63,7 @@ impl Inner {
             "stepping": status.phase.is_stepping(),
             "step": status.step,
             "robot": robot,
-            "simulated": true,
+            "simulated": status.simulated,
             "failure": self.failure,
             "control": control,
             "pace": {

@@ -2,6 +2,7 @@
 //! and writes no file; what comes and goes passes through rings, what matters most through atomics
 //! beside them.
 
+mod machine;
 mod pace;
 mod robot;
 mod sink;
@@ -15,6 +16,7 @@ use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::HoldReason;
 use wheeleg_master::setpoint::Phase;
 use wheeleg_protocol::{FaultBits, NodeMode};
+use wheeleg_remote_host::serial::HilOptions;
 use wheeleg_sim::SimError;
 use wheeleg_telemetry::OwnedSample;
 
@@ -44,6 +46,34 @@ pub struct Live {
     pub speed: Option<f64>,
     /// Whether the clock stands at first.
     pub paused: bool,
+    /// The serial port at which the boards are; `None`: they are simulated.
+    pub port: Option<Port>,
+}
+
+/// Boards at a serial port.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Port {
+    /// Which.
+    pub options: HilOptions,
+    /// Number of the master's first request; another at every start.
+    pub first_sequence: u16,
+}
+
+impl Port {
+    /// The port that `text` names, with its rate if that is another: `/dev/ttyUSB0@115200`.
+    ///
+    /// # Errors
+    /// [`SimError`] if it names none.
+    pub fn parse(text: &str) -> Result<Self, SimError> {
+        let mut first = [0; 2];
+        // Where the system has no chance to give, a board may take the first request for an old
+        // one; the master asks again.
+        let _ = getrandom::fill(&mut first);
+        Ok(Self {
+            options: HilOptions::parse(text)?,
+            first_sequence: u16::from_le_bytes(first),
+        })
+    }
 }
 
 impl Live {
@@ -74,6 +104,7 @@ impl Live {
             robot_toml: robot.text.clone(),
             speed: Some(1.0),
             paused: false,
+            port: None,
         })
     }
 }
@@ -151,6 +182,8 @@ pub(crate) enum Answer {
 pub(crate) struct Status {
     /// Master time, µs.
     pub(crate) now_us: u64,
+    /// The boards are simulated, not at a serial port.
+    pub(crate) simulated: bool,
     /// The master lives.
     pub(crate) alive: bool,
     /// Every board is there and fits.

@@ -12,9 +12,10 @@ use wheeleg_master::dispatcher::Request;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_protocol::FaultBits;
-use wheeleg_sim::{Boards, Session, SimError, provenance};
+use wheeleg_sim::{SimError, provenance};
 use wheeleg_telemetry::{Keep, Recorder};
 
+use super::machine::{Machine, only_simulated};
 use super::pace::Pace;
 use super::sink::RingSink;
 use super::{
@@ -63,8 +64,8 @@ pub(crate) fn start(live: Live, feed: Feed) -> Result<Robot, SimError> {
         let Live {
             scenario, robot, ..
         } = &live;
-        let session = match Session::live(Boards::default(), scenario, robot, scenario.seed) {
-            Ok(session) => session,
+        let machine = match Machine::new(scenario, robot, live.port.as_ref()) {
+            Ok(machine) => machine,
             Err(why) => {
                 let _ = built.send(Err(why));
                 return;
@@ -79,7 +80,7 @@ pub(crate) fn start(live: Live, feed: Feed) -> Result<Robot, SimError> {
             .with(FeedSink(Rc::clone(&feed)));
         provenance(&mut recorder, scenario, robot, scenario.seed);
         Loop {
-            session,
+            machine,
             recorder,
             feed,
             pace,
@@ -122,7 +123,7 @@ pub(crate) fn start(live: Live, feed: Feed) -> Result<Robot, SimError> {
 }
 
 struct Loop {
-    session: Session,
+    machine: Machine,
     recorder: Recorder<'static>,
     feed: Rc<RefCell<Feed>>,
     pace: Pace,
@@ -194,7 +195,7 @@ impl Loop {
         while self.target_ns < end_ns {
             self.listen();
             self.target_ns += TICK_NS;
-            if let Err(why) = self.session.step_to(self.target_ns, &mut self.recorder) {
+            if let Err(why) = self.machine.step_to(self.target_ns, &mut self.recorder) {
                 self.failed = true;
                 let _ = self.reports.push(Report::Failed(Box::new(why)));
                 break;
@@ -213,7 +214,7 @@ impl Loop {
         let seen_us = self.signals.seen_us.load(Ordering::Acquire);
         if seen_us != self.seen_us {
             self.seen_us = seen_us;
-            self.session.beat(seen_us);
+            self.machine.beat(seen_us);
             self.given(Given::Beat(seen_us));
         }
         for _ in 0..INPUTS {
@@ -252,13 +253,13 @@ impl Loop {
         };
         self.given(Given::Stop(stop.id));
         // A dead master takes none.
-        if let Some(Ok(_)) = self.session.request(stop, &mut self.recorder) {
+        if let Some(Ok(_)) = self.machine.request(stop, &mut self.recorder) {
             self.stops = asked;
         }
     }
 
     fn now_us(&self) -> u64 {
-        self.session.now_ns() / 1_000
+        self.machine.now_ns() / 1_000
     }
 
     fn request(
@@ -295,7 +296,7 @@ impl Loop {
             deadline_us,
             spoken,
         });
-        match self.session.request(request, &mut self.recorder) {
+        match self.machine.request(request, &mut self.recorder) {
             Some(Ok(_)) => Answer::Accepted,
             Some(Err(why)) => Answer::Rejected(why),
             None => Answer::NoMaster,
@@ -304,6 +305,13 @@ impl Loop {
 
     fn host(&mut self, id: u32, command: HostCommand) -> Answer {
         let now = Instant::now();
+        let paces = matches!(
+            command,
+            HostCommand::Pause | HostCommand::Step(_) | HostCommand::Speed(_)
+        );
+        if paces && !self.machine.is_simulated() {
+            return Answer::Simulation(Box::new(only_simulated("the clock is set for")));
+        }
         match command {
             HostCommand::Pause => {
                 self.steps = 0;
@@ -315,7 +323,7 @@ impl Loop {
                 self.steps = cycles;
             }
             HostCommand::Speed(speed) => {
-                let held = self.session.master().layer0().lease().is_held();
+                let held = self.machine.master().layer0().lease().is_held();
                 if held && speed > SPEED_OF_CONTROL {
                     return Answer::TooFast;
                 }
@@ -344,7 +352,7 @@ impl Loop {
     }
 
     fn inject(&mut self, fault: &wheeleg_config::faults::FaultSpec, begin: bool) -> Answer {
-        match self.session.inject(fault, begin, &mut self.recorder) {
+        match self.machine.inject(fault, begin, &mut self.recorder) {
             Ok(()) => {
                 self.given(Given::Fault(*fault, begin));
                 Answer::Done
@@ -364,7 +372,7 @@ impl Loop {
     }
 
     fn tell_outcomes(&mut self) {
-        while let Some((time_us, event)) = self.session.take_outcome() {
+        while let Some((time_us, event)) = self.machine.take_outcome() {
             let (ticket, answer) = match event {
                 Event::Done(ticket) => (ticket, Answer::Done),
                 Event::Refused { ticket, reason } => (ticket, Answer::Refused(reason)),
@@ -389,8 +397,8 @@ impl Loop {
     }
 
     fn status(&self) -> Status {
-        let master = self.session.master();
-        let record = self.session.record();
+        let master = self.machine.master();
+        let record = self.machine.record();
         let mut boards = [BoardStatus {
             mode: None,
             faults: FaultBits::NONE,
@@ -403,7 +411,8 @@ impl Loop {
         }
         Status {
             now_us: self.now_us(),
-            alive: !self.failed && self.session.master_alive(),
+            simulated: self.machine.is_simulated(),
+            alive: !self.failed && self.machine.master_alive(),
             ready: master.is_ready(),
             armed: master.is_armed(),
             hold: master.layer0().hold(),

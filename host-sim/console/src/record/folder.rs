@@ -122,7 +122,7 @@ impl Folder {
                 end_us: None,
                 hash: None,
                 dropped: 0,
-                repeatable: before.is_some(),
+                repeatable: about.repeatable && before.is_some(),
                 failure: None,
             },
             path,

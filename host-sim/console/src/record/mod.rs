@@ -49,6 +49,8 @@ pub(crate) struct About {
     pub(crate) scenario_toml: String,
     /// Picture of the robot on its ground, at rest.
     pub(crate) scene: Scene,
+    /// The same can be given to it once more.
+    pub(crate) repeatable: bool,
 }
 
 impl About {
@@ -66,6 +68,7 @@ impl About {
             robot_toml: robot_toml.to_owned(),
             scenario_toml: scenario_toml.to_owned(),
             scene: scene.map_err(|e| ConsoleError::other(e.to_string(), "choose another robot"))?,
+            repeatable: true,
         })
     }
 }

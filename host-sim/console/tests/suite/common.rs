@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::Keys;
-use wheeleg_console::{Live, Options, Server};
+use wheeleg_console::{ConsoleError, Live, Options, Server};
 
 /// A server, its keys and where it listens.
 pub(crate) struct TestRig {
@@ -30,12 +30,28 @@ impl TestRig {
     }
 
     fn with(speed: Option<f64>, record: bool) -> Self {
-        let home = tempfile::tempdir().expect("a folder");
-        let keys = Keys::open(home.path()).expect("keys");
         let live = Live {
             speed,
             ..Live::load("three-step", Some("wheeleg-2003")).expect("built in")
         };
+        Self::start(live, record).expect("it starts")
+    }
+
+    /// This robot.
+    #[cfg(unix)]
+    pub(crate) fn of(live: Live) -> Self {
+        Self::start(live, false).expect("it starts")
+    }
+
+    /// The same, of which it is not known whether it can be.
+    #[cfg(unix)]
+    pub(crate) fn try_of(live: Live) -> Result<(), ConsoleError> {
+        Self::start(live, false).map(|_| ())
+    }
+
+    fn start(live: Live, record: bool) -> Result<Self, ConsoleError> {
+        let home = tempfile::tempdir().expect("a folder");
+        let keys = Keys::open(home.path()).expect("keys");
         let server = Server::start(Options {
             live,
             recordings: home.path().join("recordings"),
@@ -43,15 +59,14 @@ impl TestRig {
             listen: "127.0.0.1:0".parse().expect("an address"),
             keys: keys.clone(),
             page: None,
-        })
-        .expect("it starts");
+        })?;
         let url = Url::parse(&server.address().to_string()).expect("an address");
-        Self {
+        Ok(Self {
             server,
             keys,
             url,
             home,
-        }
+        })
     }
 
     pub(crate) fn control(&self, name: &str) -> Client {

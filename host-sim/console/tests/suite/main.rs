@@ -6,4 +6,6 @@ mod common;
 mod control;
 mod hostile;
 mod looking;
+#[cfg(unix)]
+mod port;
 mod recording;

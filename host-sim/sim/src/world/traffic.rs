@@ -3,7 +3,7 @@
 use wheeleg_protocol::Address;
 use wheeleg_units::Micros;
 
-use super::World;
+use super::{Elsewhere, World};
 use crate::SimError;
 use crate::audit::Audit;
 use crate::bus::{Bus, Driver};
@@ -36,6 +36,28 @@ impl World {
     pub(super) fn transmit(&mut self, from: Driver, start_ns: u64, bytes: Vec<u8>) {
         let (bus, audit) = (&mut self.bus, &mut self.audit);
         transmit(bus, audit, &mut self.faults, from, start_ns, bytes);
+    }
+
+    /// From now on the master is at the other end of the line.
+    pub(crate) fn leave_to_a_master_elsewhere(&mut self) {
+        self.master_alive = false;
+        self.elsewhere = Some(Elsewhere::default());
+    }
+
+    /// Bytes of a master elsewhere are on the line from `t_ns` on, behind those before them.
+    pub(crate) fn heard_from_elsewhere(&mut self, t_ns: u64, bytes: &[u8]) {
+        let Some(elsewhere) = &mut self.elsewhere else {
+            return;
+        };
+        let start_ns = elsewhere.until_ns.max(t_ns);
+        elsewhere.until_ns = start_ns + self.bus.duration_ns(bytes.len());
+        self.transmit(Address::MASTER.raw(), start_ns, bytes.to_vec());
+    }
+
+    /// Takes what a master elsewhere hears.
+    pub(crate) fn take_said(&mut self) -> Vec<u8> {
+        let elsewhere = self.elsewhere.as_mut();
+        elsewhere.map_or_else(Vec::new, |e| std::mem::take(&mut e.said))
     }
 
     /// The master's cycle begins: SYNC.
@@ -83,6 +105,11 @@ impl World {
                 && let Some((bytes, end_ns)) = self.bus.heard_by(master, &delivery)
             {
                 self.master.on_bus_bytes(&bytes, end_ns / NS_PER_US);
+            }
+            if let Some(elsewhere) = &mut self.elsewhere
+                && let Some((bytes, _)) = self.bus.heard_by(master, &delivery)
+            {
+                elsewhere.said.extend_from_slice(&bytes);
             }
             self.rogue_nodes.hear(&self.bus, &delivery);
             if let Some((bytes, _)) = self.bus.heard_by(rogue_nodes::AUDITOR, &delivery) {

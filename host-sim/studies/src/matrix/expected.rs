@@ -83,7 +83,7 @@ impl Expected {
                 _ => false,
             },
             Cause::LineErrors(link) => self == Self::ChecksumErrors && link.crc > 0,
-            Cause::Failed(_) => false,
+            Cause::LineBroken(_) | Cause::LineMended | Cause::Failed(_) => false,
             Cause::Contact { .. } | Cause::Command { .. } | Cause::Scenario(_) => false,
         }
     }

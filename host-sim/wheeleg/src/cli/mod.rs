@@ -1,5 +1,7 @@
 //! The command line: one file per command.
 
+#[cfg(unix)]
+mod boards;
 mod campaign;
 mod channels;
 mod check;
@@ -68,6 +70,9 @@ enum Command {
     Run(run::RunArgs),
     /// Run a robot live and serve the operator's console on this computer.
     Serve(serve::ServeArgs),
+    /// Run the boards of a simulated robot behind a serial port without hardware.
+    #[cfg(unix)]
+    Boards(boards::BoardsArgs),
     /// See and drive the robot that `wheeleg serve` runs.
     Ctl(ctl::CtlArgs),
     /// Repeat a recording of `wheeleg serve`, and compare it with what was recorded.
@@ -120,6 +125,8 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Run(args)) => run::command(&args),
         Some(Command::Replay(args)) => replay::command(&args),
         Some(Command::Serve(args)) => serve::command(&args),
+        #[cfg(unix)]
+        Some(Command::Boards(args)) => boards::command(&args),
         Some(Command::Campaign(args)) => campaign::command(&args),
         Some(Command::Ctl(args)) => ctl::command(&args),
         Some(Command::Faults(args)) => faults::command(&args),

@@ -1,4 +1,4 @@
-//! `wheeleg serve`: one simulated robot, live, for the operator's console.
+//! `wheeleg serve`: one robot, live, for the operator's console: simulated, or real boards.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use clap::Args;
 use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
-use wheeleg_console::{ADDRESS, ConsoleError, FOLDER, Live, Options, Server};
+use wheeleg_console::{ADDRESS, ConsoleError, FOLDER, Live, Options, Port, Server};
 use wheeleg_studies::StudyError;
 
 use super::{print, stop_on_signals, tell};
@@ -30,6 +30,10 @@ pub(super) struct ServeArgs {
     /// Where to listen: an address of this computer and a port.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = ADDRESS)]
     listen: SocketAddr,
+    /// Lead the boards at this serial port instead of simulated ones: /dev/ttyUSB0, or with another
+    /// rate than 1000000 bit/s /dev/ttyUSB0@115200.
+    #[arg(long, value_name = "PORT[@RATE]", conflicts_with_all = ["speed", "paused"])]
+    port: Option<String>,
     /// Simulated time over time of the clock on the wall, 0.1 to 10, or `max`.
     #[arg(long, value_name = "SPEED", default_value = "1", value_parser = parse_speed)]
     speed: Speed,
@@ -84,6 +88,7 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
             Speed::Max => None,
         },
         paused: args.paused,
+        port: args.port.as_deref().map(Port::parse).transpose()?,
         ..live
     };
     let server = Server::start(Options {
@@ -109,6 +114,9 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         folder.join(CONTROL_FILE).display(),
         folder.join(VIEW_FILE).display()
     );
+    if let Some(port) = &args.port {
+        let _ = writeln!(text, "boards   {port}");
+    }
     if args.record {
         let _ = writeln!(text, "records  {}", args.recordings.display());
     }
@@ -117,7 +125,11 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     loop {
         if let Some(signal) = stop.signal() {
             drop(server);
-            tell("the robot is switched off");
+            tell(if args.port.is_some() {
+                "nobody leads the boards any more: they hold"
+            } else {
+                "the robot is switched off"
+            });
             return Ok(ExitCode::from(signal.exit_code()));
         }
         std::thread::sleep(Duration::from_millis(50));

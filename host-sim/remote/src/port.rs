@@ -1,0 +1,114 @@
+//! A serial port with the robot's bus behind it, and the two ends of one without hardware.
+//!
+//! Nothing here waits: what is there is read, what the system takes at once is sent. A port that
+//! is lost is opened again, once in [`RETRY`].
+
+use std::io::{self, Read as _, Write as _};
+use std::time::{Duration, Instant};
+
+use serialport::{ClearBuffer, SerialPort};
+
+use crate::RemoteError;
+use crate::serial::HilOptions;
+
+/// Time between two tries to open a port that was lost.
+const RETRY: Duration = Duration::from_secs(1);
+
+/// A serial port that nobody else has.
+pub struct BusPort {
+    options: HilOptions,
+    open: Option<Box<dyn SerialPort>>,
+    /// Why it is not open.
+    lost: String,
+    tried: Instant,
+}
+
+impl std::fmt::Debug for BusPort {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("BusPort")
+            .field("options", &self.options)
+            .field("lost", &self.broken())
+            .finish_non_exhaustive()
+    }
+}
+
+impl BusPort {
+    /// Opens the port for this program alone.
+    ///
+    /// # Errors
+    /// [`RemoteError`]: another program has it, or what the operating system says.
+    pub fn open(options: &HilOptions) -> Result<Self, RemoteError> {
+        Ok(Self {
+            open: Some(open(options)?),
+            options: options.clone(),
+            lost: String::new(),
+            tried: Instant::now(),
+        })
+    }
+
+    /// Why nothing passes, while nothing does.
+    #[must_use]
+    pub fn broken(&self) -> Option<&str> {
+        self.open.is_none().then_some(self.lost.as_str())
+    }
+
+    /// What has come, up to the size of the buffer; nothing from a port that is lost.
+    pub fn read(&mut self, buffer: &mut [u8]) -> usize {
+        self.retry();
+        let Some(port) = &mut self.open else {
+            return 0;
+        };
+        match port.read(buffer) {
+            Ok(0) => self.lose(&io::ErrorKind::UnexpectedEof.into()),
+            Ok(count) => return count,
+            Err(e) if is_idle(&e) => {}
+            Err(e) => self.lose(&e),
+        }
+        0
+    }
+
+    /// Sends bytes. What the system does not take at once is lost, as on a cable that is cut.
+    pub fn write(&mut self, bytes: &[u8]) {
+        if let Some(port) = &mut self.open
+            && let Err(e) = port.write_all(bytes)
+            && !is_idle(&e)
+        {
+            self.lose(&e);
+        }
+    }
+
+    fn lose(&mut self, error: &io::Error) {
+        self.lost = format!("the serial port {} is lost: {error}", self.options.port);
+        self.open = None;
+        self.tried = Instant::now();
+    }
+
+    fn retry(&mut self) {
+        if self.open.is_none() && self.tried.elapsed() >= RETRY {
+            self.tried = Instant::now();
+            self.open = open(&self.options).ok();
+        }
+    }
+}
+
+/// Nothing to read yet, or no room to write.
+fn is_idle(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), Interrupted | TimedOut | WouldBlock)
+}
+
+fn open(options: &HilOptions) -> Result<Box<dyn SerialPort>, RemoteError> {
+    let name = &options.port;
+    // Locked as well as opened for one program: to root the latter means nothing.
+    let port = serialport::new(name, options.baud).timeout(Duration::ZERO);
+    let port = port.open().map_err(|e| {
+        RemoteError::new(
+            format!("cannot open the serial port {name}: {e}"),
+            "check that the adapter is plugged in, that no other program leads the boards there, \
+             and that you may use the port (group `dialout` on Debian)",
+        )
+    })?;
+    // What a former session left in the buffers belongs to nobody.
+    let _ = port.clear(ClearBuffer::All);
+    Ok(port)
+}

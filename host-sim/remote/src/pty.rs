@@ -1,0 +1,64 @@
+//! A serial port without hardware: what is at its other end is this program.
+
+use std::io::{self, Read as _, Write as _};
+use std::time::Duration;
+
+use serialport::{SerialPort, TTYPort};
+
+use crate::RemoteError;
+
+/// A pseudo-terminal. Its far end stays open, so that programs may come and go there.
+#[derive(Debug)]
+pub struct Pty {
+    near: TTYPort,
+    far: TTYPort,
+}
+
+impl Pty {
+    /// A new one.
+    ///
+    /// # Errors
+    /// [`RemoteError`] with what the operating system says.
+    pub fn open() -> Result<Self, RemoteError> {
+        let failed = |e: serialport::Error| {
+            RemoteError::new(
+                format!("cannot make a pseudo-terminal: {e}"),
+                "end programs that have many of them open",
+            )
+        };
+        let (mut near, far) = TTYPort::pair().map_err(failed)?;
+        near.set_timeout(Duration::ZERO).map_err(failed)?;
+        Ok(Self { near, far })
+    }
+
+    /// Path of the far end.
+    #[must_use]
+    pub fn path(&self) -> String {
+        self.far.name().unwrap_or_default()
+    }
+
+    /// What has come, up to the size of the buffer.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        idle(self.near.read(buffer))
+    }
+
+    /// Sends bytes. What nobody reads at the far end is lost once the system has no more room.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        idle(self.near.write_all(bytes).map(|()| bytes.len())).map(|_| ())
+    }
+}
+
+/// Nothing to read and no room to write are no errors.
+fn idle(result: io::Result<usize>) -> io::Result<usize> {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    match result {
+        Err(e) if matches!(e.kind(), Interrupted | TimedOut | WouldBlock) => Ok(0),
+        other => other,
+    }
+}
