@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use wheeleg_identity::sources;
 
 /// Whatever this crate is built from.
-const NAMES: [&str; 20] = [
+const NAMES: [&str; 21] = [
     "Cargo.toml",
     "Cargo.lock",
     "protocol",
@@ -19,6 +19,7 @@ const NAMES: [&str; 20] = [
     "firmware/node",
     "firmware/master",
     "host-sim/config",
+    "host-sim/console",
     "host-sim/interface",
     "host-sim/plant",
     "host-sim/remote",

@@ -20,10 +20,11 @@ from wheeleg import Refused, Robot
 
 
 @contextlib.contextmanager
-def served(program, home):
+def served(program, home, *options):
     """`wheeleg serve` in a home of its own: address, keys, folder of recordings, process."""
     recordings = home / "recordings"
     arguments = [program, "serve", "stand", "--listen", "127.0.0.1:0", "--recordings", str(recordings)]
+    arguments += options
     environment = dict(os.environ, XDG_STATE_HOME=str(home))
     process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True)
     try:

@@ -75,6 +75,17 @@ pub(crate) fn client(report: &mut Report) {
     });
 }
 
+/// A robot looked at by a client of Foxglove's protocol, from its published text alone.
+pub(crate) fn viewer(report: &mut Report) {
+    report.step("console for Foxglove and Lichtblick", || {
+        rust::build(&["--bin", "wheeleg"])?;
+        run(command(tools::python()?)
+            .arg("tests/python/check_foxglove.py")
+            .arg(target_dir().join("release").join("wheeleg")))?;
+        Ok(())
+    });
+}
+
 /// The script that judges accessibility.
 fn axe() -> StepResult<PathBuf> {
     Ok(tools::node_modules()?.join("axe-core").join("axe.min.js"))

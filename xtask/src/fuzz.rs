@@ -20,7 +20,7 @@ pub(crate) const VERSION: &str = "0.13.2";
 const FOLDER: &str = "tests/fuzz";
 
 /// The targets, and the longest input that each is given.
-const TARGETS: [(&str, u32); 11] = [
+const TARGETS: [(&str, u32); 12] = [
     ("decoder", 2000),
     ("frames", 4000),
     ("parse", 200),
@@ -32,10 +32,11 @@ const TARGETS: [(&str, u32); 11] = [
     ("scenario", 40_000),
     ("files", 60_000),
     ("written", 16_000),
+    ("console", 4_096),
 ];
 
 /// Targets that read the simulator's files; a long build.
-const OF_THE_SIMULATOR: [&str; 3] = ["scenario", "files", "written"];
+const OF_THE_SIMULATOR: [&str; 4] = ["scenario", "files", "written", "console"];
 
 /// Seconds for each target in the test suite.
 const SUITE_SECONDS: u64 = 4;

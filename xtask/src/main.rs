@@ -160,6 +160,7 @@ fn test(report: &mut Report) {
     mcap::steps(report, run.as_deref());
     browser::steps(report, run.as_deref());
     browser::client(report);
+    browser::viewer(report);
     rigid_body::steps(report);
     plant::steps(report);
     campaign::steps(report);

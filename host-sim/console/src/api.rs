@@ -12,7 +12,7 @@ use axum::http::header::{
     AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, REFERRER_POLICY,
     X_CONTENT_TYPE_OPTIONS,
 };
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{MethodRouter, get, post};
@@ -20,6 +20,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::catalogue::fault_list;
+use crate::foxglove::{self, Viewing};
 use crate::guard::Hosts;
 use crate::hex;
 use crate::page::Page;
@@ -29,8 +30,12 @@ use crate::session::{self, Context};
 
 /// Subprotocol of the socket.
 pub const SUBPROTOCOL: &str = "wheeleg.console.v1";
+/// Path of the socket for Foxglove and Lichtblick.
+const FOXGLOVE: &str = "/foxglove";
 /// Bytes that may wait in a socket's own buffer.
 const WRITE_BUFFER_MAX: usize = 128 * 1024;
+/// The same of a viewer, who is told schemas and the ground in one message each.
+const VIEWER_BUFFER_MAX: usize = 16 << 20;
 
 const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
     connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
@@ -41,6 +46,10 @@ pub(crate) struct Server {
     pub(crate) context: Arc<Context>,
     /// Names under which the server answers.
     pub(crate) hosts: Hosts,
+    /// Foreign pages that may look by Foxglove's protocol.
+    pub(crate) viewer_pages: Vec<String>,
+    /// Whether a viewer with the control key may write parameters.
+    pub(crate) viewers_write: bool,
     /// The page.
     pub(crate) page: Page,
 }
@@ -108,6 +117,7 @@ pub(crate) fn router(server: Arc<Server>) -> Router {
         .layer(middleware::from_fn_with_state(Arc::clone(&server), key));
     Router::new()
         .route("/ws", get(socket))
+        .route(FOXGLOVE, get(viewer))
         .route(
             "/openapi.json",
             get(|| async { json_text(OPENAPI.to_owned()) }),
@@ -148,7 +158,12 @@ fn json_text(text: String) -> Response {
 
 /// Lets nobody in from a foreign page, and says to the browser what the page may do.
 async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Next) -> Response {
-    let host = server.hosts.check(request.headers()).map(str::to_owned);
+    let pages = match request.uri().path() {
+        FOXGLOVE => &server.viewer_pages[..],
+        _ => &[],
+    };
+    let host = server.hosts.check(request.headers(), pages);
+    let host = host.map(str::to_owned);
     let mut response = match host {
         Some(host) => {
             request.extensions_mut().insert(Host(host));
@@ -180,6 +195,15 @@ async fn key(
     request: Request,
     next: Next,
 ) -> Response {
+    if server.context.look_only {
+        // No secret, and without a key nobody can read one on its way.
+        let lists = ["/robot", "/channels", "/commands", "/faults"];
+        let path = request.uri().path();
+        if request.method() == Method::GET && lists.iter().any(|list| path.ends_with(list)) {
+            return next.run(request).await;
+        }
+        return plain();
+    }
     if has_key(&server.context, request.headers()) {
         return next.run(request).await;
     }
@@ -191,6 +215,15 @@ async fn key(
         StatusCode::UNAUTHORIZED,
         "the key is missing or wrong",
         remedy,
+    )
+}
+
+/// What is not served where others on the way could read a key.
+fn plain() -> Response {
+    problem(
+        StatusCode::FORBIDDEN,
+        "over plain HTTP a key could be read on its way",
+        "serve with TLS; with the view key the socket of PROTOCOL.md lets you look and stop",
     )
 }
 
@@ -239,6 +272,72 @@ async fn socket(
     }
     let context = Arc::clone(&server.context);
     upgrade.on_upgrade(move |socket| session::serve(socket, context, host, peer.ip()))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Token {
+    token: String,
+}
+
+/// A viewer can send no header: its key stands in the address, which this server writes nowhere.
+async fn viewer(
+    State(server): State<Arc<Server>>,
+    Extension(Peer(peer)): Extension<Peer>,
+    query: Result<Query<Token>, axum::extract::rejection::QueryRejection>,
+    upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+) -> Response {
+    let context = &server.context;
+    if context.look_only {
+        return plain();
+    }
+    let token = query
+        .ok()
+        .and_then(|Query(Token { token })| hex::decode::<32>(&token));
+    let (controls, views) = token.map_or((false, false), |token| {
+        (
+            context.keys.control.is(&token),
+            context.keys.view.is(&token),
+        )
+    });
+    if !(controls | views) {
+        let remedy = "open ws://ADDRESS/foxglove?token=KEY with the digits of view.key";
+        if context.wrong_keys.count(peer.ip(), Instant::now()) {
+            return problem(StatusCode::TOO_MANY_REQUESTS, "too many wrong keys", remedy);
+        }
+        let detail = "the key is missing or wrong";
+        return problem(StatusCode::UNAUTHORIZED, detail, remedy);
+    }
+    let Ok(upgrade) = upgrade else {
+        let detail = "this is a WebSocket";
+        return problem(StatusCode::BAD_REQUEST, detail, "see PROTOCOL.md");
+    };
+    if !context.hub.has_place() {
+        return problem(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "all places are taken",
+            "close another client",
+        );
+    }
+    let upgrade = upgrade
+        .protocols(foxglove::SUBPROTOCOLS)
+        .max_message_size(foxglove::MESSAGE_MAX)
+        .max_frame_size(foxglove::MESSAGE_MAX)
+        .write_buffer_size(0)
+        .max_write_buffer_size(VIEWER_BUFFER_MAX);
+    if upgrade.selected_protocol().is_none() {
+        let detail = format!(
+            "the subprotocol must be {}",
+            foxglove::SUBPROTOCOLS.join(" or ")
+        );
+        return problem(StatusCode::BAD_REQUEST, &detail, "see PROTOCOL.md");
+    }
+    let viewing = Viewing {
+        robot: context.hub.robot_name.clone(),
+        may_write: controls && server.viewers_write,
+    };
+    let hub = Arc::clone(&context.hub);
+    upgrade.on_upgrade(move |socket| foxglove::serve(socket, hub, viewing))
 }
 
 async fn page(State(server): State<Arc<Server>>, uri: Uri) -> Response {

@@ -1,9 +1,11 @@
 //! A client for programs: speaks the contract of PROTOCOL.md over a blocking socket.
 
-use std::io::{ErrorKind, Read as _, Write as _};
-use std::net::{TcpStream, ToSocketAddrs as _};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{IpAddr, TcpStream, ToSocketAddrs as _};
 use std::time::{Duration, Instant};
 
+use rustls::pki_types::ServerName;
+use rustls::{ClientConnection, StreamOwned};
 use serde_json::{Value, json};
 use tungstenite::client::ClientRequestBuilder;
 use tungstenite::http::Uri;
@@ -13,6 +15,7 @@ use crate::api::SUBPROTOCOL;
 use crate::error::ConsoleError;
 use crate::hex;
 use crate::mac::{Key, Transcript};
+use crate::tls::{self, Fingerprint};
 
 /// Time for a connection, and for an answer over HTTP.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -26,38 +29,88 @@ const LOOK: Duration = Duration::from_millis(10);
 pub struct Url {
     /// Name or address and port.
     host: String,
+    /// Certificate of the server; without one it is reached by plain HTTP.
+    certificate: Option<Fingerprint>,
+    /// It is to be reached with TLS.
+    tls: bool,
 }
 
 impl Url {
-    /// Reads `http://HOST:PORT`, `ws://HOST:PORT` or `HOST:PORT`.
+    /// Reads `http://HOST:PORT`, `https://HOST:PORT`, the same with `ws` and `wss`, or `HOST:PORT`.
     ///
     /// # Errors
     /// What is wrong with it.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let host = text
-            .strip_prefix("http://")
-            .or_else(|| text.strip_prefix("ws://"))
-            .unwrap_or(text)
-            .trim_end_matches('/');
+        let plain = ["http://", "ws://"]
+            .iter()
+            .find_map(|s| text.strip_prefix(s));
+        let tls = ["https://", "wss://"]
+            .iter()
+            .find_map(|s| text.strip_prefix(s));
+        let host = plain.or(tls).unwrap_or(text).trim_end_matches('/');
         let port = host.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
         if !matches!(port, Some(Ok(_))) || host.contains('/') {
-            return Err("an address of a server is http://HOST:PORT".to_owned());
+            return Err(
+                "an address of a server is http://HOST:PORT or https://HOST:PORT".to_owned(),
+            );
         }
         Ok(Self {
             host: host.to_owned(),
+            certificate: None,
+            tls: tls.is_some(),
         })
+    }
+
+    /// The same, of the server that has the certificate with this fingerprint.
+    #[must_use]
+    pub fn with_certificate(self, certificate: Fingerprint) -> Self {
+        Self {
+            certificate: Some(certificate),
+            ..self
+        }
+    }
+
+    /// Whether others on the way could read what is sent: neither TLS, nor this computer's own.
+    #[must_use]
+    pub fn is_exposed(&self) -> bool {
+        let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
+        let address = name.trim_matches(['[', ']']).parse::<IpAddr>();
+        let own = address.map_or(name == "localhost", |address| address.is_loopback());
+        !self.tls && !own
     }
 
     fn error(&self, what: impl ToString) -> ConsoleError {
         ConsoleError::Link {
-            url: format!("http://{}", self.host),
+            url: format!("http{}://{}", if self.tls { "s" } else { "" }, self.host),
             what: what.to_string(),
             help: "start a server with `wheeleg serve`; give its address with --url and its key with --key"
                 .to_owned(),
         }
     }
 
-    fn stream(&self) -> Result<TcpStream, ConsoleError> {
+    fn stream(&self) -> Result<Stream, ConsoleError> {
+        let tcp = self.tcp()?;
+        if !self.tls {
+            return Ok(Stream::Plain(tcp));
+        }
+        let certificate = self.certificate.ok_or_else(|| {
+            self.error("the certificate of the server is not known: give its --fingerprint, which `wheeleg serve` prints")
+        })?;
+        let config = tls::client(certificate).map_err(|e| self.error(e))?;
+        let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
+        let name = name.trim_matches(['[', ']']).to_owned();
+        let name = ServerName::try_from(name).map_err(|e| self.error(e))?;
+        let connection = ClientConnection::new(config, name).map_err(|e| self.error(e))?;
+        let mut stream = StreamOwned::new(connection, tcp);
+        // The handshake, while a read still waits: later ones are short looks.
+        while stream.conn.is_handshaking() {
+            let done = stream.conn.complete_io(&mut stream.sock);
+            done.map_err(|e| self.error(format!("no TLS to the server of that certificate: {e}")))?;
+        }
+        Ok(Stream::Tls(Box::new(stream)))
+    }
+
+    fn tcp(&self) -> Result<TcpStream, ConsoleError> {
         let mut addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
         let address = addresses.next().ok_or_else(|| self.error("no such host"))?;
         let stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e))?;
@@ -70,11 +123,55 @@ impl Url {
     }
 }
 
+/// A connection.
+enum Stream {
+    Plain(TcpStream),
+    Tls(Box<StreamOwned<ClientConnection, TcpStream>>),
+}
+
+impl Stream {
+    fn set_read_timeout(&self, time: Duration) -> std::io::Result<()> {
+        let tcp = match self {
+            Self::Plain(tcp) => tcp,
+            Self::Tls(tls) => &tls.sock,
+        };
+        tcp.set_read_timeout(Some(time))
+    }
+}
+
+impl Read for Stream {
+    fn read(&mut self, buf: &mut [u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Plain(tcp) => tcp.read(buf),
+            Self::Tls(tls) => tls.read(buf),
+        }
+    }
+}
+
+impl Write for Stream {
+    fn write(&mut self, buf: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Plain(tcp) => tcp.write(buf),
+            Self::Tls(tls) => tls.write(buf),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::Plain(tcp) => tcp.flush(),
+            Self::Tls(tls) => tls.flush(),
+        }
+    }
+}
+
 /// Asks a path of the HTTP API; status and JSON of the answer.
 ///
 /// # Errors
-/// [`ConsoleError::Link`] if there is no answer.
+/// [`ConsoleError::Link`] if there is no answer, or if others could read the key on its way.
 pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Value), ConsoleError> {
+    if url.is_exposed() {
+        return Err(url.error("over plain HTTP a key could be read on its way: `ctl watch` and `ctl stop` alone need none"));
+    }
     let mut stream = url.stream()?;
     let request = format!(
         "{method} /api/v1/{path} HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n",
@@ -82,10 +179,13 @@ pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Valu
         key.to_hex()
     );
     let mut answer = String::new();
-    stream
-        .write_all(request.as_bytes())
-        .and_then(|()| stream.take(1 << 20).read_to_string(&mut answer))
-        .map_err(|e| url.error(e))?;
+    let asked = stream.write_all(request.as_bytes());
+    let read = asked.and_then(|()| stream.flush()).and_then(|()| {
+        let read = stream.take(1 << 20).read_to_string(&mut answer);
+        // The end of the answer is known; some servers leave TLS without a word.
+        read.or_else(|e| (e.kind() == ErrorKind::UnexpectedEof).then_some(0).ok_or(e))
+    });
+    read.map_err(|e| url.error(e))?;
     let odd = || url.error("this is no console of Wheeleg");
     let (head, body) = answer.split_once("\r\n\r\n").ok_or_else(odd)?;
     let status = head.split(' ').nth(1).and_then(|code| code.parse().ok());
@@ -137,7 +237,7 @@ pub enum Outcome {
 /// A connection whose server has proved to have the key.
 pub struct Client {
     url: Url,
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<Stream>,
     key: Key,
     n: u64,
     /// Newest master time that has come, µs.
@@ -193,7 +293,7 @@ impl Client {
         if !transcript.is_server(key, session, &mac.ok_or_else(odd)?) {
             return Err(url.error("this is not your robot: it does not have the key"));
         }
-        let looks = socket.get_ref().set_read_timeout(Some(LOOK));
+        let looks = socket.get_ref().set_read_timeout(LOOK);
         looks.map_err(|e| url.error(e))?;
         Ok(Self {
             url: url.clone(),
@@ -219,9 +319,7 @@ impl Client {
         self.n += 1;
         frame["n"] = json!(self.n);
         let json = frame.to_string();
-        let mut bytes = self.key.frame(json.as_bytes()).to_vec();
-        bytes.extend_from_slice(json.as_bytes());
-        self.send_raw(bytes)?;
+        self.send_raw(self.key.seal(json.as_bytes()))?;
         Ok(self.n)
     }
 
@@ -342,7 +440,7 @@ impl Client {
 }
 
 /// The next JSON of a handshake.
-fn text(url: &Url, socket: &mut WebSocket<TcpStream>) -> Result<Value, ConsoleError> {
+fn text(url: &Url, socket: &mut WebSocket<Stream>) -> Result<Value, ConsoleError> {
     loop {
         match socket.read().map_err(|e| url.error(e))? {
             Message::Text(text) => {
@@ -351,6 +449,38 @@ fn text(url: &Url, socket: &mut WebSocket<TcpStream>) -> Result<Value, ConsoleEr
             }
             Message::Close(_) => return Err(url.error("the server closes")),
             _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_is_sent_where_others_could_read_it() {
+        let url = |text| Url::parse(text).expect("an address");
+        for own in [
+            "127.0.0.1:7420",
+            "http://localhost:7420",
+            "ws://[::1]:7420",
+            "https://192.0.2.7:7420",
+        ] {
+            assert!(!url(own).is_exposed(), "{own}");
+        }
+        for exposed in [
+            "192.0.2.7:7420",
+            "http://robot.example:7420",
+            "ws://localhost.evil.example:7420",
+            "[2001:db8::7]:7420",
+        ] {
+            let url = url(exposed);
+            assert!(url.is_exposed(), "{exposed}");
+            let error = http(&url, "GET", "state", &Key::new([7; 32])).expect_err("refused");
+            assert!(error.to_string().contains("could be read"), "{error}");
+        }
+        for wrong in ["robot", "http://robot", "https://robot:x", "http://a/b:1"] {
+            assert!(Url::parse(wrong).is_err(), "{wrong}");
         }
     }
 }

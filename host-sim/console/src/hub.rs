@@ -4,6 +4,7 @@
 mod control;
 mod samples;
 mod state;
+mod viewers;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -15,6 +16,8 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
 use crate::catalogue::Catalogue;
+use crate::desk::{ClientId, Desk};
+use crate::foxglove::{Place, Viewers};
 use crate::live::{Answer, Input, Moving, Report, Robot, Signals, Status};
 use crate::messages::{done, refused};
 use crate::outbox::{Close, Outbox};
@@ -53,9 +56,6 @@ impl Role {
     }
 }
 
-/// Number of a client at the hub.
-pub(crate) type ClientId = u64;
-
 struct Subscription {
     /// `None`: all samples.
     period_ns: Option<u64>,
@@ -70,15 +70,6 @@ struct Client {
     session: String,
     outbox: Arc<Outbox>,
     subscriptions: BTreeMap<u16, Subscription>,
-}
-
-/// Who holds the control, or has asked for it.
-struct Holder {
-    client: ClientId,
-    name: String,
-    session: String,
-    /// Whether the master has granted it, and at which master time.
-    granted_us: Option<u64>,
 }
 
 /// A request that is not at its end.
@@ -96,6 +87,8 @@ enum Asked {
     Other,
     Inject(FaultSpec),
     EndFault(FaultSpec),
+    /// A parameter is to have this raw value.
+    Write(Place, i32),
 }
 
 /// What of a channel came since the last look.
@@ -114,7 +107,8 @@ struct Inner {
     next_request: u32,
     next_client: ClientId,
     clients: BTreeMap<ClientId, Client>,
-    holder: Option<Holder>,
+    viewers: Viewers,
+    desk: Desk,
     pending: BTreeMap<u32, Pending>,
     arrived: Vec<Arrived>,
     events: VecDeque<Value>,
@@ -132,13 +126,15 @@ struct Channels {
     samples: rtrb::Consumer<Moving>,
 }
 
+pub(crate) use viewers::Looking;
+
 /// The hub.
 pub(crate) struct Hub {
     inner: Mutex<Inner>,
     signals: Arc<Signals>,
     /// Channels and commands.
     pub(crate) catalogue: Catalogue,
-    robot_name: String,
+    pub(crate) robot_name: String,
     recordings: Arc<record::Shared>,
     stops: watch::Sender<Stops>,
 }
@@ -159,6 +155,7 @@ impl Hub {
         robot: Robot,
         robot_name: String,
         recordings: Arc<record::Shared>,
+        viewers: Viewers,
     ) -> (Arc<Self>, std::thread::JoinHandle<()>) {
         let now = Instant::now();
         let hub = Self {
@@ -171,7 +168,8 @@ impl Hub {
                 next_request: 1,
                 next_client: 1,
                 clients: BTreeMap::new(),
-                holder: None,
+                viewers,
+                desk: Desk::default(),
                 pending: BTreeMap::new(),
                 arrived: channels().iter().map(|_| Arrived::default()).collect(),
                 events: VecDeque::with_capacity(EVENTS),
@@ -197,14 +195,16 @@ impl Hub {
     /// Ends the robot and closes everybody.
     pub(crate) fn end(&self) {
         self.signals.end();
-        for client in self.inner().clients.values() {
+        let inner = self.inner();
+        for client in inner.clients.values() {
             client.outbox.close(Close::Ended);
         }
+        inner.viewers.close(Close::Ended);
     }
 
     /// Whether a client with this role finds a place.
     pub(crate) fn has_place(&self) -> bool {
-        self.inner().clients.len() < CLIENTS
+        self.inner().taken_places() < CLIENTS
     }
 
     /// A client whose key was right.
@@ -220,7 +220,7 @@ impl Hub {
             Role::Control => CLIENTS,
             Role::View => CLIENTS - 1,
         };
-        if inner.clients.len() >= places {
+        if inner.taken_places() >= places {
             return None;
         }
         let id = inner.next_client;
@@ -249,8 +249,7 @@ impl Hub {
         let mut inner = self.inner();
         match body {
             Body::Beat { seen_us } => {
-                let holds = inner.holder.as_ref().is_some_and(|h| h.client == id);
-                if holds {
+                if inner.desk.holds(id) {
                     self.signals.beat(seen_us);
                 }
             }
@@ -364,9 +363,11 @@ impl Hub {
             inner.answered(id, now_us, answer);
         }
         inner.take_samples();
+        inner.viewers.draw_contacts();
         if now >= inner.batch_due {
             inner.batch_due = now + BATCH_PERIOD;
             inner.send_batches();
+            inner.viewers.tell_time(inner.now_us() * 1_000);
         }
         if now >= inner.state_due {
             inner.state_due = now + STATE_PERIOD;
@@ -378,6 +379,11 @@ impl Hub {
 }
 
 impl Inner {
+    /// Places that clients and viewers have.
+    fn taken_places(&self) -> usize {
+        self.clients.len() + self.viewers.count()
+    }
+
     fn tell(&self, id: ClientId, message: &Value) {
         if let Some(client) = self.clients.get(&id) {
             client.outbox.ordered(message.to_string().into());

@@ -90,17 +90,7 @@ pub fn folder() -> Result<PathBuf, ConsoleError> {
 /// [`ConsoleError::Key`] if the file cannot be read, others can read it, or it holds no key.
 pub fn read(path: &Path) -> Result<Key, ConsoleError> {
     let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
-    let file = File::open(path).map_err(cannot)?;
-    if let Some(mode) = open_to_others(&file).map_err(cannot)? {
-        return Err(ConsoleError::Key {
-            path: path.to_owned(),
-            what: format!("others can read this key (mode {mode:o})"),
-            help: format!(
-                "chmod 600 {}; if somebody may have read it, make new keys: wheeleg serve --new-key",
-                path.display()
-            ),
-        });
-    }
+    let file = owners_alone(path)?;
     let mut text = String::new();
     file.take(DIGITS as u64 + 3)
         .read_to_string(&mut text)
@@ -113,6 +103,26 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
         )),
         Some(bytes) if bytes == [0; 32] => Err(wrong(path, "is no key: it is all zero".to_owned())),
         Some(bytes) => Ok(Key::new(bytes)),
+    }
+}
+
+/// Opens a file that its owner alone can read.
+///
+/// # Errors
+/// [`ConsoleError::Key`] if it cannot be read, or others can read it.
+pub(crate) fn owners_alone(path: &Path) -> Result<File, ConsoleError> {
+    let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
+    let file = File::open(path).map_err(cannot)?;
+    match open_to_others(&file).map_err(cannot)? {
+        None => Ok(file),
+        Some(mode) => Err(ConsoleError::Key {
+            path: path.to_owned(),
+            what: format!("others can read this key (mode {mode:o})"),
+            help: format!(
+                "chmod 600 {}; if somebody may have read it, make new keys: wheeleg serve --new-key",
+                path.display()
+            ),
+        }),
     }
 }
 

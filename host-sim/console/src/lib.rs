@@ -14,7 +14,10 @@
 mod api;
 mod catalogue;
 pub mod client;
+pub mod desk;
+pub mod door;
 mod error;
+pub mod foxglove;
 mod guard;
 mod hex;
 mod hub;
@@ -31,6 +34,7 @@ pub mod replay;
 pub mod request;
 mod server;
 mod session;
+mod tls;
 
 pub use api::SUBPROTOCOL;
 pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};
@@ -38,4 +42,5 @@ pub use error::ConsoleError;
 pub use live::{Live, Port};
 pub use mac::Key;
 pub use record::{FOLDER, Summary};
-pub use server::{ADDRESS, Options, Server};
+pub use server::{ADDRESS, Options, Protection, Server};
+pub use tls::{Files, Fingerprint};

@@ -52,11 +52,17 @@ impl Key {
     }
 
     /// Code before a client frame; this is the session's key.
-    pub(crate) fn frame(&self, json: &[u8]) -> [u8; FRAME_MAC] {
+    fn frame(&self, json: &[u8]) -> [u8; FRAME_MAC] {
         let full: [u8; 32] = self.mac(&[b"f1", json]).finalize().into_bytes().into();
         let mut out = [0; FRAME_MAC];
         out.copy_from_slice(&full[..FRAME_MAC]);
         out
+    }
+
+    /// A client frame around its JSON; this is the session's key.
+    #[must_use]
+    pub fn seal(&self, json: &[u8]) -> Vec<u8> {
+        [&self.frame(json)[..], json].concat()
     }
 
     /// The JSON of a client frame, if its code is right; this is the session's key.

@@ -27,6 +27,8 @@ pub(crate) enum Close {
     WrongKey,
     /// The key is wrong once more.
     Wait,
+    /// The client wants to drive where others could read and change what it sends.
+    LookOnly,
     /// The client has loaded other lists.
     OtherHash,
     /// A frame is not authentic, not the next, or malformed.
@@ -43,7 +45,7 @@ impl Close {
     /// Code of the close frame.
     pub(crate) const fn code(self) -> u16 {
         match self {
-            Self::WrongKey | Self::Wait => 4001,
+            Self::WrongKey | Self::Wait | Self::LookOnly => 4001,
             Self::OtherHash => 4002,
             Self::BadFrame => 4003,
             Self::TooSlow => 4004,
@@ -57,6 +59,7 @@ impl Close {
         match self {
             Self::WrongKey => "wrong_key",
             Self::Wait => "wait",
+            Self::LookOnly => "look_only",
             Self::OtherHash => "other_hash",
             Self::BadFrame => "bad_frame",
             Self::TooSlow => "too_slow",

@@ -8,7 +8,7 @@ const PER_S: f64 = 100.0;
 const BURST: f64 = 200.0;
 
 /// A bucket of tokens.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Bucket {
     tokens: f64,
     filled: Instant,

@@ -1,46 +1,61 @@
-//! The server: listens at one address of this computer, and hands each connection to the routes.
+//! The server: listens at one address, with TLS where others are on the way, and hands each connection to the routes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use axum::Router;
 use axum::extract::Extension;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use serde_json::json;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpSocket};
 use tokio::runtime::Runtime;
-use tokio::sync::Semaphore;
+use tokio_rustls::TlsAcceptor;
 
 use wheeleg_config::Drawing;
 use wheeleg_telemetry::channels;
 
 use crate::api::{self, Peer};
 use crate::error::ConsoleError;
-use crate::guard::{Hosts, WrongKeys};
+use crate::foxglove::{self, Viewers};
+use crate::guard::{Hosts, Places, WrongKeys, is_host, is_origin};
 use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};
 use crate::page::Page;
 use crate::record::{self, About};
 use crate::session::Context;
+use crate::tls::{Certificate, Files, Fingerprint};
 
 /// Where the server listens unless it is told otherwise.
 pub const ADDRESS: &str = "127.0.0.1:7420";
 /// Threads of the server; the robot has its own.
 const WORKERS: usize = 2;
-/// Connections at a time.
-const CONNECTIONS: usize = 128;
 /// Time in which a request must have come.
 const HEAD: Duration = Duration::from_secs(3);
 /// Bytes that may wait in the system for a client.
 const SEND_BUFFER: u32 = 64 * 1024;
 /// Connections that may wait to be accepted.
 const BACKLOG: u32 = 256;
+
+/// How what is sent is protected on its way.
+#[derive(Debug, Clone, Default)]
+pub enum Protection {
+    /// TLS with a certificate made at the start; at addresses of this computer's own, nothing is
+    /// on the way.
+    #[default]
+    AsNeeded,
+    /// TLS with this certificate.
+    Tls(Files),
+    /// Nothing: from elsewhere one may look and stop, and no more.
+    Plain,
+}
 
 /// What is served, to whom and where.
 #[derive(Debug)]
@@ -51,17 +66,28 @@ pub struct Options {
     pub recordings: PathBuf,
     /// Whether the first recording begins with the power.
     pub record: bool,
-    /// Where to listen: an address of this computer.
+    /// Where to listen.
     pub listen: SocketAddr,
+    /// Names under which clients know this computer, beside its address.
+    pub names: Vec<String>,
+    /// How what is sent is protected on its way.
+    pub protection: Protection,
     /// Who may drive, and who may look.
     pub keys: Keys,
     /// Folder of the page, instead of that in the program.
     pub page: Option<PathBuf>,
+    /// Origins of foreign pages that may look by Foxglove's protocol.
+    pub viewer_pages: Vec<String>,
+    /// Whether a viewer with the control key may write parameters.
+    pub viewers_write: bool,
 }
 
 /// A server that runs until it is dropped.
 pub struct Server {
     address: SocketAddr,
+    name: Option<String>,
+    fingerprint: Option<Fingerprint>,
+    look_only: bool,
     hub: Arc<Hub>,
     runtime: Option<Runtime>,
     robot: Option<JoinHandle<()>>,
@@ -80,7 +106,7 @@ impl Server {
     /// Powers the robot up and lets clients in.
     ///
     /// # Errors
-    /// [`ConsoleError`] if the address is none of this computer's own or is in use, the page is
+    /// [`ConsoleError`] if the address is in use or has no name, the certificate is wrong, the page is
     /// not there, the robot cannot be built, or the recording's folder cannot be made.
     pub fn start(options: Options) -> Result<Self, ConsoleError> {
         let Options {
@@ -88,22 +114,46 @@ impl Server {
             recordings,
             record,
             listen,
+            names,
+            protection,
             keys,
             page,
+            viewer_pages,
+            viewers_write,
         } = options;
-        if !listen.ip().is_loopback() {
+        if let Some(page) = viewer_pages.iter().find(|page| !is_origin(page)) {
+            return Err(ConsoleError::other(
+                format!("{page:?} is no origin of a page"),
+                "give scheme, name and port alone, such as https://app.example.org",
+            ));
+        }
+        let outside = !listen.ip().is_loopback();
+        if listen.ip().is_unspecified() && names.is_empty() {
             return Err(ConsoleError::Listen {
                 address: listen.to_string(),
-                what: "others on the network could read the keys: only addresses of this \
-                       computer's own are served, such as 127.0.0.1"
+                what: "this listens at every address, and no name is given under which it answers"
                     .to_owned(),
-                help: format!(
-                    "from another computer: ssh -L {port}:127.0.0.1:{port} THIS-COMPUTER, \
-                     then open http://127.0.0.1:{port} there",
-                    port = listen.port()
-                ),
+                help: "give the names that clients use with --name NAME, or listen at one address"
+                    .to_owned(),
             });
         }
+        if let Some(name) = names.iter().find(|name| !is_host(name)) {
+            return Err(ConsoleError::other(
+                format!("{name:?} is no name of a computer"),
+                "give names or addresses without scheme and port, such as robot.example",
+            ));
+        }
+        let certificate = match protection {
+            Protection::Tls(files) => Some(Certificate::read(&files)?),
+            Protection::AsNeeded if outside => {
+                let own = (!listen.ip().is_unspecified()).then(|| listen.ip().to_string());
+                let all = own.into_iter().chain(names.iter().cloned());
+                let all: BTreeSet<String> = all.chain(["localhost".to_owned()]).collect();
+                Some(Certificate::make(all.into_iter().collect())?)
+            }
+            Protection::AsNeeded | Protection::Plain => None,
+        };
+        let look_only = outside && certificate.is_none();
         let page = Page::new(page.as_deref())?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(WORKERS)
@@ -138,9 +188,16 @@ impl Server {
             repeatable: live.port.is_none(),
             ..about
         };
+        let (contact_sink, contacts) = foxglove::contacts();
+        let viewers = Viewers::new(about.scene.clone(), &live.robot.node, contacts);
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
-        let (hub, robot) = Hub::new(live::start(live, feed)?, name, shared);
+        let (hub, robot) = Hub::new(
+            live::start(live, feed, contact_sink)?,
+            name,
+            shared,
+            viewers,
+        );
         let server = Arc::new(api::Server {
             context: Arc::new(Context {
                 hub: Arc::clone(&hub),
@@ -148,14 +205,22 @@ impl Server {
                 keys,
                 wrong_keys: WrongKeys::default(),
                 recordings: recordings.root,
+                look_only,
             }),
-            hosts: Hosts::new(address),
+            hosts: Hosts::new(address, &names, certificate.is_some()),
+            viewer_pages,
+            viewers_write,
             page,
         });
         runtime.spawn(turn(Arc::clone(&hub)));
-        runtime.spawn(accept(listener, server));
+        let fingerprint = certificate.as_ref().map(|c| c.fingerprint);
+        let tls = certificate.map(|c| TlsAcceptor::from(c.config));
+        runtime.spawn(accept(listener, server, tls));
         Ok(Self {
             address,
+            name: names.into_iter().next(),
+            fingerprint,
+            look_only,
             hub,
             runtime: Some(runtime),
             robot: Some(robot),
@@ -167,6 +232,32 @@ impl Server {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Its address as one opens it, without a path.
+    #[must_use]
+    pub fn url(&self) -> String {
+        let scheme = if self.fingerprint.is_some() {
+            "https"
+        } else {
+            "http"
+        };
+        match &self.name {
+            Some(name) => format!("{scheme}://{name}:{}", self.address.port()),
+            None => format!("{scheme}://{}", self.address),
+        }
+    }
+
+    /// SHA-256 of its certificate, if it serves with TLS.
+    #[must_use]
+    pub fn fingerprint(&self) -> Option<Fingerprint> {
+        self.fingerprint
+    }
+
+    /// Whether others on the way can read all, so that nobody may drive.
+    #[must_use]
+    pub fn is_look_only(&self) -> bool {
+        self.look_only
     }
 
     #[doc(hidden)]
@@ -245,8 +336,8 @@ async fn turn(hub: Arc<Hub>) {
     }
 }
 
-async fn accept(listener: TcpListener, server: Arc<api::Server>) {
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
+async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<TlsAcceptor>) {
+    let places = Arc::new(Places::default());
     let router = api::router(server);
     loop {
         let (stream, peer) = match listener.accept().await {
@@ -257,22 +348,35 @@ async fn accept(listener: TcpListener, server: Arc<api::Server>) {
                 continue;
             }
         };
-        let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
+        let Some(place) = places.take(peer.ip()) else {
             // Closed at once: who holds all places loses them within seconds.
             continue;
         };
         // Without it an answer waits for the client's acknowledgement: 40 ms.
         let _ = stream.set_nodelay(true);
-        let service = TowerToHyperService::new(router.clone().layer(Extension(Peer(peer))));
+        let router = router.clone().layer(Extension(Peer(peer)));
+        let tls = tls.clone();
         tokio::spawn(async move {
-            let connection = http1::Builder::new()
-                .timer(TokioTimer::new())
-                .header_read_timeout(HEAD)
-                .max_buf_size(16 * 1024)
-                .serve_connection(TokioIo::new(stream), service)
-                .with_upgrades();
-            let _ = connection.await;
+            match tls {
+                None => serve(stream, router).await,
+                Some(tls) => {
+                    if let Ok(Ok(stream)) = tokio::time::timeout(HEAD, tls.accept(stream)).await {
+                        serve(stream, router).await;
+                    }
+                }
+            }
             drop(place);
         });
     }
+}
+
+/// Serves one connection until it ends.
+async fn serve(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) {
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HEAD)
+        .max_buf_size(16 * 1024)
+        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router))
+        .with_upgrades();
+    let _ = connection.await;
 }

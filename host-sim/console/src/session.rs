@@ -6,28 +6,28 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use futures_util::stream::SplitSink;
 use futures_util::{SinkExt as _, StreamExt as _};
 use serde::Deserialize;
 use serde_json::json;
 use tokio::time::timeout;
 
+use crate::door::{Door, Entered};
 use crate::guard::WrongKeys;
 use crate::hex;
 use crate::hub::{Hub, Role};
 use crate::keys::Keys;
 use crate::mac::{Key, Transcript};
 use crate::outbox::{Close, Outbox};
-use crate::rate::Bucket;
-use crate::request::{Body, parse};
 
 /// Time for the whole handshake.
 const HANDSHAKE: Duration = Duration::from_secs(2);
 /// Time in which a client must take one message.
-const PROGRESS: Duration = Duration::from_secs(5);
+pub(crate) const PROGRESS: Duration = Duration::from_secs(5);
 /// How often a client that is sent nothing is asked whether it is there.
 const PING: Duration = Duration::from_secs(5);
 /// Time after which a client that sends nothing, no answer to a ping either, is gone.
-const SILENCE: Duration = Duration::from_secs(20);
+pub(crate) const SILENCE: Duration = Duration::from_secs(20);
 /// How late a wrong key is answered after too many of them.
 const LATE: Duration = Duration::from_millis(1_500);
 /// Version of the contract.
@@ -45,6 +45,8 @@ pub(crate) struct Context {
     pub(crate) wrong_keys: WrongKeys,
     /// Folder of the recordings.
     pub(crate) recordings: PathBuf,
+    /// Others on the way can read all: nobody may drive, and no key is to be sent.
+    pub(crate) look_only: bool,
 }
 
 #[derive(Deserialize)]
@@ -116,23 +118,9 @@ pub(crate) async fn serve(
     let welcome = Message::Text(welcome.to_string().into());
     if let Ok(Ok(())) = timeout(PROGRESS, socket.send(welcome)).await {
         let (mut out, mut input) = socket.split();
-        let write = async {
-            loop {
-                let message = timeout(PING, outbox.wait()).await;
-                let message = message.unwrap_or_else(|_| Message::Ping(axum::body::Bytes::new()));
-                let last = matches!(message, Message::Close(_));
-                let sent = timeout(PROGRESS, out.send(message)).await;
-                if last || !matches!(sent, Ok(Ok(()))) {
-                    break;
-                }
-            }
-        };
+        let write = send_all(&mut out, || outbox.wait());
         let read = async {
-            let mut reader = Reader {
-                key,
-                next: 1,
-                bucket: Bucket::new(Instant::now()),
-            };
+            let mut door = Door::new(key, Instant::now());
             while let Ok(Some(Ok(message))) = timeout(SILENCE, input.next()).await {
                 let frame = match message {
                     Message::Binary(frame) => frame,
@@ -144,12 +132,13 @@ pub(crate) async fn serve(
                         return;
                     }
                 };
-                let Some((n, body, limited)) = reader.open(&frame) else {
+                let Some(entered) = door.open(&frame, Instant::now()) else {
                     outbox.close(Close::BadFrame);
                     // The writer sends the close, and ends the session.
                     std::future::pending::<()>().await;
                     return;
                 };
+                let Entered { n, body, limited } = entered;
                 context.hub.ask(id, n, body, limited);
             }
         };
@@ -161,25 +150,19 @@ pub(crate) async fn serve(
     context.hub.leave(id);
 }
 
-struct Reader {
-    key: Key,
-    /// Number that the next frame must have.
-    next: u64,
-    bucket: Bucket,
-}
-
-impl Reader {
-    /// What a frame asks, if it is authentic and the next one; true with it: too often.
-    fn open(&mut self, frame: &[u8]) -> Option<(u64, Body, bool)> {
-        let json = self.key.open(frame)?;
-        let frame = parse(json).ok()?;
-        if frame.n != self.next {
-            return None;
+/// Sends what waits for a client until it is closed or takes nothing more.
+pub(crate) async fn send_all<F: Future<Output = Message>>(
+    out: &mut SplitSink<WebSocket, Message>,
+    next: impl Fn() -> F,
+) {
+    loop {
+        let message = timeout(PING, next()).await;
+        let message = message.unwrap_or_else(|_| Message::Ping(axum::body::Bytes::new()));
+        let last = matches!(message, Message::Close(_));
+        let sent = timeout(PROGRESS, out.send(message)).await;
+        if last || !matches!(sent, Ok(Ok(()))) {
+            break;
         }
-        self.next += 1;
-        let exempt = matches!(frame.body, Body::Stop | Body::Beat { .. });
-        let limited = !exempt && !self.bucket.take(Instant::now());
-        Some((frame.n, frame.body, limited))
     }
 }
 
@@ -192,6 +175,10 @@ async fn refuse(socket: &mut WebSocket, why: Close) {
         Close::Wait => (
             "too many wrong keys",
             "wait a minute, then open the address that the server prints",
+        ),
+        Close::LookOnly => (
+            "over plain HTTP nobody drives: others on the way could",
+            "serve with TLS, or connect with the view key",
         ),
         Close::OtherHash => (
             "the server has other channels or commands than this client",
@@ -247,6 +234,9 @@ async fn handshake(
         "view" => (Role::View, &context.keys.view),
         _ => return Err(wrong),
     };
+    if context.look_only && role == Role::Control {
+        return Err(Some(Close::LookOnly));
+    }
     let transcript = Transcript {
         nonce_s: &nonce_s,
         nonce_c: &nonce_c,

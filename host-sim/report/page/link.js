@@ -80,6 +80,8 @@ export class Link {
 
   /** A document of the HTTP API. @param {string} path */
   async ask(path) {
+    // Nor may a key be sent there.
+    if (!isSecureContext) throw new Error("browsers give a page over plain HTTP no cryptography: open it by HTTPS, or use wheeleg ctl");
     const response = await fetch(`/api/v1/${path}`, { headers: { Authorization: `Bearer ${this.identity.key}` } });
     const answer = await response.json();
     if (!response.ok) throw new Error(`${answer.detail}: ${answer.remedy}`);
@@ -92,7 +94,7 @@ export class Link {
     this.channels = new Map(channels.channels.map((channel) => [channel.id, channel]));
     for (const { topic, fields } of channels.channels) for (const field of fields) field.measured = !robot.unmeasured[topic]?.includes(field.name);
     this.hashes = { layout: channels.layout, commands: commands.hash };
-    const socket = new WebSocket(`ws://${location.host}/ws`, SUBPROTOCOL);
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     await new Promise((resolve, reject) => {

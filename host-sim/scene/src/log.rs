@@ -65,6 +65,12 @@ impl Scene {
         })
     }
 
+    /// The robot as URDF, whose links and joints the channels name.
+    #[must_use]
+    pub fn urdf(&self) -> &str {
+        &self.urdf
+    }
+
     /// Ground and shapes: once, so that whoever opens the log in its middle finds it as the newest
     /// message of its channel.
     fn show(&mut self, t_ns: u64, give: Put<'_>) {

@@ -262,7 +262,7 @@ impl FaultKind {
 }
 
 const CONSOLE: &str =
-    "the operator's connection is not simulated; the tests of the console break it";
+    "in a run nobody is at a console; the row of the fault matrix has an operator";
 const UPDATE: &str = "there is no firmware update over the bus yet";
 const SOFT: &str =
     "the ground does not change in mid-run; a scenario chooses its soil by [[terrain]]";

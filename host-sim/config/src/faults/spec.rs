@@ -393,7 +393,7 @@ mod tests {
             ("pot-open:joint9", "joint9"),
             (
                 "ui-replay@1s",
-                "not implemented: the operator's connection is not simulated",
+                "not implemented: in a run nobody is at a console",
             ),
             (
                 "foot-sinks@1s",

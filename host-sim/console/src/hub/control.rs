@@ -5,7 +5,8 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use wheeleg_master::command::{Command, CommandCode};
 
-use super::{Asked, ClientId, Holder, Inner, Pending, Role, TICKET};
+use super::{Asked, Inner, Pending, Role, TICKET};
+use crate::desk::{ClientId, Denied};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
 use crate::reason::Reason;
@@ -27,7 +28,7 @@ impl Inner {
             let text = "the view key may look and stop; connect with the control key";
             return self.tell(id, &refused(n, Reason::Role, text));
         }
-        let holds = self.holder.as_ref().is_some_and(|h| h.client == id);
+        let holds = self.desk.holds(id);
         let (input, what) = match order {
             Order::Robot(Command::EmergencyStop) => {
                 let text = "a stop is no command that waits: send {\"op\":\"stop\"}";
@@ -35,31 +36,29 @@ impl Inner {
             }
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
-                match &self.holder {
-                    Some(other) if takes && !holds => {
+                let who = (&*client.name, &*client.session);
+                match self.desk.ask(id, who, takes) {
+                    Ok(()) => {}
+                    Err(Denied::Held) => {
                         let asked = json!({ "op": "asked", "by": client.name });
-                        let answer = self.held(n, other);
-                        self.tell(other.client, &asked);
+                        let answer = self.held(n);
+                        if let Some(holder) = self.desk.holder() {
+                            self.tell(holder.client, &asked);
+                        }
                         return self.tell(id, &answer);
                     }
-                    None if takes => {
-                        self.holder = Some(Holder {
-                            client: id,
-                            name: client.name.clone(),
-                            session: client.session.clone(),
-                            granted_us: None,
-                        });
-                    }
-                    _ if !holds => {
+                    Err(Denied::NotInControl) => {
                         let text = "take the control first";
                         return self.tell(id, &refused(n, Reason::NotInControl, text));
                     }
-                    _ => {}
                 }
                 let what = match command.code() {
                     CommandCode::TakeControl => Asked::Take,
                     CommandCode::ReleaseControl => Asked::Release,
-                    _ => Asked::Other,
+                    _ => match command {
+                        Command::WriteParameter { node, id, raw } => Asked::Write((node, id), raw),
+                        _ => Asked::Other,
+                    },
                 };
                 let input = Input::Request {
                     id: self.next_request,
@@ -71,9 +70,8 @@ impl Inner {
                 (input, what)
             }
             Order::Host(command) => {
-                if let Some(other) = self.holder.as_ref().filter(|_| !holds) {
-                    let answer = self.held(n, other);
-                    return self.tell(id, &answer);
+                if self.desk.holder().is_some() && !holds {
+                    return self.tell(id, &self.held(n));
                 }
                 let what = match &command {
                     HostCommand::Inject(fault) => Asked::Inject(*fault),
@@ -87,7 +85,7 @@ impl Inner {
         let takes = matches!(what, Asked::Take);
         if self.robot.inputs.push(input).is_err() {
             if takes && !holds {
-                self.holder = None;
+                self.desk.withdraw(id);
             }
             return self.tell(
                 id,
@@ -106,10 +104,11 @@ impl Inner {
     }
 
     /// The answer to who wants what another holds.
-    pub(super) fn held(&self, n: u64, holder: &Holder) -> Value {
-        let text = format!("{:?} holds the control", holder.name);
+    fn held(&self, n: u64) -> Value {
+        let name = self.desk.holder().map_or("", |holder| &holder.name);
+        let text = format!("{name:?} holds the control");
         let mut answer = refused(n, Reason::ControlHeld, &text);
-        answer["holder"] = json!(holder.name);
+        answer["holder"] = json!(name);
         answer["age_ms"] = json!(self.age_ms());
         answer
     }
@@ -136,18 +135,16 @@ impl Inner {
         let pending = self.pending.remove(&id);
         let message = outcome(n, time_us, &answer);
         let is_done = matches!(answer, Answer::Done);
-        let holder = self.holder.as_mut().filter(|h| h.client == client);
-        match (pending.map(|p| p.what), holder) {
-            (Some(Asked::Take), Some(holder)) if is_done => {
-                holder.granted_us.get_or_insert(time_us);
-            }
-            (Some(Asked::Take), Some(holder)) if holder.granted_us.is_none() => self.holder = None,
-            (Some(Asked::Release), Some(_)) if is_done => self.holder = None,
-            (Some(Asked::Inject(fault)), _) if is_done => {
+        match pending.map(|p| p.what) {
+            Some(Asked::Take) if is_done => self.desk.grant(client, time_us),
+            Some(Asked::Take) => self.desk.withdraw(client),
+            Some(Asked::Release) if is_done => self.desk.release(client),
+            Some(Asked::Inject(fault)) if is_done => {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
             }
-            (Some(Asked::EndFault(fault)), _) if is_done => {
+            Some(Asked::Write(place, raw)) if is_done => self.viewers.written(place, raw),
+            Some(Asked::EndFault(fault)) if is_done => {
                 self.faults.retain(|(active, _)| *active != fault);
             }
             _ => {}
@@ -156,14 +153,8 @@ impl Inner {
     }
 
     pub(super) fn take_status(&mut self, status: Status) {
-        // The master knows best whether anybody is in control.
-        let lost = self.holder.as_ref().is_some_and(|holder| {
-            let granted = holder.granted_us;
-            granted.is_some_and(|us| status.now_us > us && status.lease_seen_us.is_none())
-        });
-        if lost {
-            self.holder = None;
-        }
+        self.desk
+            .look(status.now_us, status.lease_seen_us.is_some());
         self.status = Some(status);
         self.faults.retain(|(_, over_us)| *over_us > status.now_us);
     }
@@ -180,10 +171,8 @@ impl Inner {
                 client, n, what, ..
             }) = self.pending.remove(&id)
             {
-                if matches!(what, Asked::Take)
-                    && self.holder.as_ref().is_some_and(|h| h.granted_us.is_none())
-                {
-                    self.holder = None;
+                if matches!(what, Asked::Take) {
+                    self.desk.withdraw(client);
                 }
                 self.tell(
                     client,

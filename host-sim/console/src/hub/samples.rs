@@ -7,7 +7,8 @@ use axum::extract::ws::Utf8Bytes;
 use serde_json::Value;
 use wheeleg_telemetry::OwnedSample;
 
-use super::{Client, ClientId, EVENTS, Inner, Subscription};
+use super::{Client, EVENTS, Inner, Subscription};
+use crate::desk::ClientId;
 use crate::live::Moving;
 use crate::messages::event_json;
 
@@ -36,6 +37,9 @@ impl Inner {
                 }
             }
         }
+        for (index, wanted) in (0..).zip(&mut wanted) {
+            wanted.0 |= self.viewers.want_sample(index);
+        }
         let mut newest: BTreeMap<u16, Moving> = BTreeMap::new();
         let mut missed: BTreeMap<u16, u32> = BTreeMap::new();
         for _ in 0..crate::live::SAMPLES {
@@ -50,6 +54,8 @@ impl Inner {
                 let event = event_json(moving.t_ns, event);
                 tell_event(&self.clients, &mut self.events, event);
             }
+            self.viewers
+                .see(moving.channel, moving.t_ns, &moving.sample);
             let (some, all) = wanted[channel];
             if gap > 0 {
                 let gap = u32::try_from(gap).unwrap_or(u32::MAX);
@@ -64,6 +70,9 @@ impl Inner {
             if some {
                 newest.insert(moving.channel, moving);
             }
+        }
+        for (channel, moving) in &newest {
+            self.viewers.show(*channel, moving.t_ns, &moving.sample);
         }
         let mut encoded: BTreeMap<u16, Bytes> = BTreeMap::new();
         for client in self.clients.values_mut() {

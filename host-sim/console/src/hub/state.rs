@@ -30,7 +30,7 @@ impl Inner {
         let Some(status) = self.status else {
             return r#"{"op":"state","master_us":0,"alive":false}"#.to_owned();
         };
-        let holder = self.holder.as_ref().filter(|h| h.granted_us.is_some());
+        let holder = self.desk.holder().filter(|h| h.granted_us.is_some());
         let control = holder.map(|holder| {
             json!({ "holder": holder.name, "session": holder.session, "age_ms": self.age_ms() })
         });
@@ -78,7 +78,7 @@ impl Inner {
             "faults": self.active_faults(),
             "recording": recording,
             "boards": boards.collect::<Vec<_>>(),
-            "clients": self.clients.len(),
+            "clients": self.taken_places(),
         })
         .to_string()
     }

@@ -22,6 +22,7 @@ use super::{
     Answer, BoardStatus, INPUTS, Input, Live, Moving, REPORTS, Report, SAMPLES, Signals, Status,
 };
 use crate::catalogue::SPEED_OF_CONTROL;
+use crate::foxglove::ContactSink;
 use crate::record::{Feed, FeedSink, Given};
 use crate::request::{HostCommand, Spoken};
 
@@ -53,7 +54,7 @@ pub(crate) struct Robot {
 ///
 /// # Errors
 /// [`SimError`] if it cannot be built.
-pub(crate) fn start(live: Live, feed: Feed) -> Result<Robot, SimError> {
+pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Robot, SimError> {
     let (inputs, from_hub) = rtrb::RingBuffer::new(INPUTS);
     let (to_hub, reports) = rtrb::RingBuffer::new(REPORTS);
     let (to_samples, samples) = rtrb::RingBuffer::new(SAMPLES);
@@ -77,7 +78,8 @@ pub(crate) fn start(live: Live, feed: Feed) -> Result<Robot, SimError> {
         let feed = Rc::new(RefCell::new(feed));
         let mut recorder = Recorder::new(Keep::nothing())
             .with(RingSink::new(to_samples, Arc::clone(&beside)))
-            .with(FeedSink(Rc::clone(&feed)));
+            .with(FeedSink(Rc::clone(&feed)))
+            .with(contacts);
         provenance(&mut recorder, scenario, robot, scenario.seed);
         Loop {
             machine,

@@ -7,6 +7,9 @@ use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::Keys;
 use wheeleg_console::{ConsoleError, Live, Options, Server};
 
+/// A foreign page that may look by Foxglove's protocol.
+pub(crate) const PAGE: &str = "https://viewer.example";
+
 /// A server, its keys and where it listens.
 pub(crate) struct TestRig {
     pub(crate) server: Server,
@@ -59,6 +62,10 @@ impl TestRig {
             listen: "127.0.0.1:0".parse().expect("an address"),
             keys: keys.clone(),
             page: None,
+            names: Vec::new(),
+            protection: wheeleg_console::Protection::AsNeeded,
+            viewer_pages: vec![PAGE.to_owned()],
+            viewers_write: true,
         })?;
         let url = Url::parse(&server.address().to_string()).expect("an address");
         Ok(Self {

@@ -207,6 +207,144 @@ fn half_requests_and_half_handshakes_lose_their_place() {
     assert_eq!(state["alive"], true, "{state}");
 }
 
+/// Waits until somebody with the right key gets in.
+fn gets_in(rig: &TestRig) {
+    let begin = Instant::now();
+    while Client::connect(&rig.url, "control", "owner", &rig.keys.control).is_err() {
+        assert!(begin.elapsed() < Duration::from_secs(15), "locked out");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+#[test]
+fn requests_without_an_end_and_idle_connections_lose_their_place() {
+    let rig = TestRig::new();
+    let address = rig.server.address();
+    let body = format!(
+        "POST /api/v1/stop HTTP/1.1\r\nHost: {address}\r\nContent-Length: 1000000\r\n\r\nx"
+    );
+    let idle = format!("GET / HTTP/1.1\r\nHost: {address}\r\n\r\n");
+    for request in [body, idle] {
+        let mut open = Vec::new();
+        for _ in 0..200 {
+            let Ok(mut stream) = TcpStream::connect(address) else {
+                continue;
+            };
+            let _ = stream.write_all(request.as_bytes());
+            open.push(stream);
+        }
+        gets_in(&rig);
+    }
+    assert_eq!(
+        rig.state()["emergency_stop"],
+        false,
+        "no key, no stop over HTTP"
+    );
+}
+
+#[test]
+fn who_takes_all_places_of_an_address_leaves_those_of_others() {
+    let rig = TestRig::new();
+    let address = rig.server.address();
+    // Over and over, as fast as it goes.
+    let over = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let attacker = std::thread::spawn({
+        let over = std::sync::Arc::clone(&over);
+        move || {
+            let runtime = tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build();
+            runtime.expect("a runtime").block_on(async move {
+                let mut open = std::collections::VecDeque::new();
+                while !over.load(std::sync::atomic::Ordering::Relaxed) {
+                    let socket = tokio::net::TcpSocket::new_v4().expect("a socket");
+                    socket
+                        .bind("127.0.0.2:0".parse().expect("an address"))
+                        .expect("bound");
+                    if let Ok(stream) = socket.connect(address).await {
+                        open.push_back(stream);
+                    }
+                    if open.len() > 400 {
+                        open.pop_front();
+                    }
+                }
+            });
+        }
+    });
+    std::thread::sleep(Duration::from_millis(500));
+    gets_in(&rig);
+    over.store(true, std::sync::atomic::Ordering::Relaxed);
+    attacker.join().expect("it ends");
+}
+
+#[test]
+fn each_connection_has_a_nonce_of_its_own() {
+    let rig = TestRig::new();
+    let nonce = || {
+        let uri = format!("ws://{}/ws", rig.server.address());
+        let request =
+            tungstenite::client::ClientRequestBuilder::new(uri.parse().expect("an address"));
+        let request = request.with_sub_protocol("wheeleg.console.v1");
+        let stream = TcpStream::connect(rig.server.address()).expect("connected");
+        let (mut socket, _) = tungstenite::client(request, stream).expect("upgraded");
+        let hello = socket.read().expect("hello").into_text().expect("a text");
+        let hello: serde_json::Value = serde_json::from_str(&hello).expect("JSON");
+        hello["nonce"].as_str().expect("digits").to_owned()
+    };
+    let mut nonces: Vec<String> = (0..20).map(|_| nonce()).collect();
+    nonces.sort();
+    nonces.dedup();
+    assert_eq!(nonces.len(), 20);
+    assert!(
+        nonces.iter().all(
+            |n| n.len() == 64 && n.chars().collect::<std::collections::BTreeSet<_>>().len() > 4
+        )
+    );
+}
+
+#[test]
+fn no_key_is_told_to_anybody_or_written_anywhere() {
+    let rig = TestRig::recorded(1.0);
+    let mut driver = rig.driver("driver");
+    done(&mut driver, "Disarm");
+    done(&mut driver, "RecordStop");
+    let keys = [rig.keys.control.to_hex(), rig.keys.view.to_hex()];
+    let host = rig.server.address();
+    let key = format!("Authorization: Bearer {}\r\n", rig.keys.view.to_hex());
+    let told = [
+        "state",
+        "robot",
+        "channels",
+        "commands",
+        "events",
+        "faults",
+        "recordings",
+    ];
+    let told = told.map(|path| get(&rig, &format!("/api/v1/{path}"), &key));
+    let wrong = get(&rig, &format!("/foxglove?token={}x", keys[1]), "");
+    for text in told
+        .iter()
+        .chain([&wrong, &get(&rig, "/", ""), &host.to_string()])
+    {
+        assert!(keys.iter().all(|key| !text.contains(key)), "{text}");
+    }
+    let mut files = 0;
+    let folder = rig.home.path().join("recordings/0001");
+    for file in std::fs::read_dir(folder).expect("a recording") {
+        let path = file.expect("a file").path();
+        let bytes = std::fs::read(&path).expect("read");
+        files += 1;
+        for key in &keys {
+            assert!(
+                !bytes.windows(64).any(|at| at == key.as_bytes()),
+                "{}",
+                path.display()
+            );
+        }
+    }
+    assert!(files >= 4, "{files}");
+}
+
 #[test]
 fn rubbish_of_any_kind_ends_the_connection_and_nothing_else() {
     let rig = TestRig::new();
@@ -232,10 +370,10 @@ fn rubbish_of_any_kind_ends_the_connection_and_nothing_else() {
 }
 
 #[test]
-fn an_address_of_the_network_and_one_in_use_are_refused_with_a_remedy() {
+fn an_address_without_a_name_and_one_in_use_are_refused_with_a_remedy() {
     let rig = TestRig::new();
     for (listen, word) in [
-        ("0.0.0.0:0", "ssh -L"),
+        ("0.0.0.0:0", "--name"),
         (&rig.server.address().to_string(), "--listen"),
     ] {
         let live = wheeleg_console::Live::load("stand", None).expect("built in");
@@ -246,6 +384,10 @@ fn an_address_of_the_network_and_one_in_use_are_refused_with_a_remedy() {
             listen: listen.parse().expect("an address"),
             keys: rig.keys.clone(),
             page: None,
+            names: Vec::new(),
+            protection: wheeleg_console::Protection::AsNeeded,
+            viewer_pages: Vec::new(),
+            viewers_write: false,
         });
         let error = refused.expect_err("refused");
         let help = miette::Diagnostic::help(&error)

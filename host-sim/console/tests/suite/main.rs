@@ -4,8 +4,11 @@
 mod api;
 mod common;
 mod control;
+mod foxglove;
 mod hostile;
 mod looking;
 #[cfg(unix)]
 mod port;
+mod protected;
 mod recording;
+mod threats;

@@ -2,6 +2,7 @@
 
 use super::expected::Expected;
 use super::measure::{Measured, line, lost_messages, messages};
+use super::operator::Strangers;
 use super::ran::Ran;
 use super::row::{Expect, Row, Stop};
 use wheeleg_config::RobotConfig;
@@ -147,6 +148,12 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         matches!(outcome, Some(ServiceOutcome::Taken(_)))
     });
     f.check(!taken, || "a board takes what it must refuse".to_owned());
+    if let Some(Strangers { frames, taken }) = ran.strangers {
+        f.check(frames > 0, || "nobody tried".to_owned());
+        f.check(taken == 0, || {
+            format!("{taken} of {frames} frames that must have no effect have one")
+        });
+    }
     let answering = row.answering;
     f.check(m.replies >= answering, || {
         format!("only {} boards answer, {answering} must", m.replies)
@@ -348,6 +355,7 @@ mod tests {
             recording: Recording::default(),
             line: LineAudit::default(),
             arming_asked: true,
+            strangers: None,
             outputs: Outputs::default(),
             error: None,
         }
@@ -395,6 +403,29 @@ mod tests {
         ] {
             assert!(stopped.contains(what), "{what}: {stopped}");
         }
+    }
+
+    #[test]
+    fn a_frame_that_must_have_no_effect_and_has_one_fails_its_row() {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let row = select(&["ui-replay".to_owned()]).expect("a row")[0];
+        let failures = |frames, taken| {
+            let strangers = Some(Strangers { frames, taken });
+            let ran = Ran {
+                strangers,
+                ..empty_run()
+            };
+            judge(*row, &robot, &ran, Measured::default())
+                .failures
+                .join("; ")
+        };
+        assert!(failures(100, 1).contains("1 of 100 frames"));
+        assert!(failures(0, 0).contains("nobody tried"));
+        let sound = failures(100, 0);
+        assert!(
+            !sound.contains("frames") && !sound.contains("tried"),
+            "{sound}"
+        );
     }
 
     #[test]

@@ -10,6 +10,7 @@
 mod expected;
 mod judge;
 mod measure;
+mod operator;
 mod page;
 mod ran;
 mod row;
@@ -20,7 +21,7 @@ mod summary;
 pub use expected::Expected;
 pub use judge::{AfterAll, Outcome, Verdict};
 pub use measure::Measured;
-pub use row::{Expect, Phase, Row, RowFault, Since, Stop, Variant};
+pub use row::{Connection, Expect, Phase, Row, RowFault, Since, Stop, Variant};
 pub use rows::ROWS;
 pub use run::{run, select};
 pub use summary::Summary;
@@ -81,16 +82,17 @@ mod tests {
         let once = select(&twice).expect("rows");
         let ids: Vec<&str> = once.iter().map(|row| row.id).collect();
         assert_eq!(ids, ["pot-open", "pot-short"]);
-        let refused = one("ui-replay").expect_err("not implemented").to_string();
+        let refused = one("foot-sinks").expect_err("not implemented").to_string();
         assert!(refused.contains("not implemented"), "{refused}");
     }
 
-    /// Rows that cannot be run are the faults that cannot be injected, in their order.
+    /// Rows that cannot be run, or need an operator at a console, are the faults that cannot be
+    /// injected, in their order.
     #[test]
     fn rows_and_faults_that_are_not_implemented_are_the_same() {
         let missing = ROWS
             .iter()
-            .filter(|row| row.expect == Expect::NotImplemented);
+            .filter(|row| row.expect == Expect::NotImplemented || row.connection.is_some());
         let ids: Vec<&str> = missing.map(|row| row.id).collect();
         let listed: Vec<&str> = NOT_IMPLEMENTED.iter().map(|(id, _)| *id).collect();
         assert_eq!(ids, listed);

@@ -92,6 +92,13 @@ fn what_goes_wrong(outcome: &Outcome) -> String {
         // The instant from which the row counts is that of the E-stop.
         all.push(format!("E-stop@{:.3}s", outcome.measured.since_s));
     }
+    if let Some(connection) = outcome.row.connection {
+        all.push(format!(
+            "{}@{:.3}s",
+            connection.label(),
+            outcome.measured.at_s
+        ));
+    }
     all.join(", ")
 }
 

@@ -131,6 +131,47 @@ pub enum Ask {
     Read(u8, &'static str),
 }
 
+/// What goes wrong with the connection of an operator who is in control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Connection {
+    /// It is cut.
+    Lost,
+    /// What the robot sends no longer arrives; what the operator sends does.
+    HalfOpen,
+    /// What the operator sends takes 0.5 s.
+    Slow,
+    /// It is cut for 1 s; then the client connects anew and sends 1,000 commands of before.
+    Reconnects,
+    /// Another client commands, takes and beats.
+    SecondClient,
+    /// Frames come with a bit the other way, or under another session's key.
+    BadMac,
+    /// Frames come twice, at another session, or before their turn.
+    Replay,
+}
+
+impl Connection {
+    /// Whether frames come that must have no effect.
+    #[must_use]
+    pub const fn has_strangers(self) -> bool {
+        !matches!(self, Self::Lost | Self::HalfOpen | Self::Slow)
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Lost => "operator's line cut",
+            Self::HalfOpen => "operator sees nothing new",
+            Self::Slow => "operator's line 0.5 s late",
+            Self::Reconnects => "operator's line cut for 1 s, 1,000 commands then",
+            Self::SecondClient => "second operator",
+            Self::BadMac => "forged frames",
+            Self::Replay => "repeated frames",
+        }
+    }
+}
+
 /// One row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -142,6 +183,8 @@ pub struct Row {
     pub asks: &'static [(f64, Ask)],
     /// Whether the E-stop is pressed 100 ms after the instant; latencies count from then.
     pub estop: bool,
+    /// What goes wrong with the connection of an operator, who is in control in such a row.
+    pub connection: Option<Connection>,
     /// When.
     pub phase: Phase,
     /// How long the run goes on after the instant, s.
@@ -167,6 +210,9 @@ impl Row {
     /// Why it cannot be run, if it cannot.
     #[must_use]
     pub fn not_implemented(&self) -> Option<&'static str> {
+        if self.connection.is_some() {
+            return None;
+        }
         let listed = NOT_IMPLEMENTED.iter().find(|(id, _)| *id == self.id);
         listed.map(|(_, reason)| *reason)
     }
@@ -191,6 +237,7 @@ pub(super) const fn row(
         faults,
         asks: &[],
         estop: false,
+        connection: None,
         phase,
         after_s: AFTER_S,
         variant: Variant::Plain,
@@ -241,6 +288,11 @@ impl Row {
 
     pub(super) const fn asking(mut self, asks: &'static [(f64, Ask)]) -> Self {
         self.asks = asks;
+        self
+    }
+
+    pub(super) const fn of_connection(mut self, connection: Connection) -> Self {
+        self.connection = Some(connection);
         self
     }
 

@@ -6,8 +6,8 @@ use super::expected::Expected::{
     SaysFault, SaysReset, ServiceRefused, ServiceUnchanged,
 };
 use super::row::{
-    Ask, Expect, FOR_GOOD, Phase, Row, RowFault, Variant, at, missing, row, stop, stop_axis,
-    stop_moving,
+    Ask, Connection, Expect, FOR_GOOD, Phase, Row, RowFault, Variant, at, missing, row, stop,
+    stop_axis, stop_moving,
 };
 use wheeleg_master::command::{CommandCode, Layer};
 use wheeleg_master::contact::{Sector, Side};
@@ -33,6 +33,13 @@ const SENSOR_SHUT_MS: f64 = 4.1;
 const OTHERS_MS: f64 = 35.0;
 /// Two bus cycles and a tick: every board has heard the E-stop, ms.
 const ESTOP_MS: f64 = 23.0;
+
+/// An operator was seen last up to 65 ms before the line goes wrong, is gone 400 ms after that, and
+/// missed at the next cycle.
+const OPERATOR_MS: [f64; 2] = [330.0, 420.0];
+/// All boards have heard of it, ms.
+const OPERATOR_SHUT_MS: f64 = 460.0;
+const OPERATOR_GONE: &[Expected] = &[Hold(HoldReason::OperatorLost)];
 
 /// A user changes a parameter and stores it, and looks at it later.
 const SAVE: [(f64, Ask); 5] = [
@@ -251,13 +258,29 @@ pub const ROWS: &[Row] = &[
         stop(LINK_MS, LINK_SHUT_MS), &[Latched(Fault::LinkLost)])
         .noted("both layers are one program: it ends, the boards see a master that is silent, and later one that starts anew"),
     // User interface.
-    missing("ui-link-lost"),
-    missing("ui-half-open"),
-    missing("ui-slow"),
-    missing("ui-reconnects"),
-    missing("ui-second-client"),
-    missing("ui-bad-mac"),
-    missing("ui-replay"),
+    row("ui-link-lost", &[], Phase::Flight, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
+        .of_connection(Connection::Lost),
+    row("ui-half-open", &[], Phase::Push, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
+        .of_connection(Connection::HalfOpen)
+        .noted("beats go on, about a robot that was seen before: they gain nothing"),
+    row("ui-slow", &[], Phase::Flight, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
+        .of_connection(Connection::Slow)
+        .noted("beats arrive, each later than an operator may be"),
+    row("ui-reconnects", &[], Phase::Push, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
+        .of_connection(Connection::Reconnects)
+        .silent_about(&[Done(CommandCode::JointReference)])
+        .noted("of 1,000 commands that waited in the client, and 100 of the session before, none is carried out"),
+    row("ui-second-client", &[], Phase::Flight, goes_on(0.001), &[])
+        .of_connection(Connection::SecondClient)
+        .silent_about(&[Hold(HoldReason::OperatorLost)])
+        .noted("it has the key of control; that it may stop is tested over sockets"),
+    row("ui-bad-mac", &[], Phase::Flight, goes_on(0.001), &[])
+        .of_connection(Connection::BadMac)
+        .silent_about(&[Hold(HoldReason::OperatorLost)])
+        .noted("every frame of the holder, with each of its bits the other way"),
+    row("ui-replay", &[], Phase::Push, goes_on(0.001), &[])
+        .of_connection(Connection::Replay)
+        .silent_about(&[Hold(HoldReason::OperatorLost)]),
     // Parameters.
     row("invalid-parameter/joint", &[at("invalid-parameter:joint3", FOR_GOOD)], Phase::Push, goes_on(0.001),
         &refusals(3)),

@@ -10,8 +10,9 @@ use wheeleg_protocol::param::{ParamInfo, params_at};
 
 use super::judge::{Outcome, judge};
 use super::measure::{Measured, measure};
+use super::operator::{Operator, Robot};
 use super::ran::{ESTOP_S, Outputs, Ran};
-use super::row::{Ask, Expect, Phase, Row, Variant};
+use super::row::{Ask, Connection, Expect, Phase, Row, Variant};
 use super::rows::ROWS;
 use crate::StudyError;
 use crate::study::Progress;
@@ -23,7 +24,7 @@ use wheeleg_config::{
 };
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults::check;
-use wheeleg_sim::{self as sil, Boards, JointProbe, LineAudit, Observers};
+use wheeleg_sim::{self as sil, Boards, JointProbe, LineAudit, Observers, Session, SimError};
 use wheeleg_telemetry::{Recorder, Recording};
 
 /// Arming is asked for this long before the end, s.
@@ -151,7 +152,13 @@ impl Robots {
         }
         check(&scenario, robot, &Nodes::default())?;
         let arming_asked = stops && faults.iter().all(|fault| fault.over_s() < arm_s);
-        let ran = simulate(&scenario, robot, self.seed, &|| progress.is_stopped());
+        let is_stopped = || progress.is_stopped();
+        let ran = match row.connection {
+            Some(connection) => {
+                operated(&scenario, robot, self.seed, (connection, at_s), &is_stopped)
+            }
+            None => simulate(&scenario, robot, self.seed, &is_stopped),
+        };
         let Some(ran) = ran else {
             return Ok(None);
         };
@@ -243,9 +250,82 @@ fn simulate(
         recording,
         line,
         arming_asked: false,
+        strangers: None,
         outputs,
         error,
     })
+}
+
+/// The same with an operator in control, whose connection goes wrong at `at_s`.
+fn operated(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    (connection, at_s): (Connection, f64),
+    is_stopped: &dyn Fn() -> bool,
+) -> Option<Ran> {
+    let mut recorder = Recorder::in_memory();
+    let mut operator = Operator::new(connection);
+    let ran = operate(
+        scenario,
+        robot,
+        seed,
+        at_s,
+        &mut operator,
+        &mut recorder,
+        is_stopped,
+    );
+    let (line, error) = match ran {
+        Ok(None) => return None,
+        Ok(Some(line)) => (line, None),
+        Err(e) => (LineAudit::default(), Some(e)),
+    };
+    let (recording, error) = match recorder.finish() {
+        Ok(recording) => (recording, error),
+        Err(e) => (Recording::default(), error.or(Some(e.into()))),
+    };
+    Some(Ran {
+        at_s,
+        faults: Vec::new(),
+        recording,
+        line,
+        arming_asked: false,
+        strangers: connection.has_strangers().then_some(operator.strangers),
+        outputs: Outputs::default(),
+        error,
+    })
+}
+
+/// Steps a session through its scenario; `None`: it was stopped.
+fn operate(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    at_s: f64,
+    operator: &mut Operator,
+    recorder: &mut Recorder<'_>,
+    is_stopped: &dyn Fn() -> bool,
+) -> Result<Option<LineAudit>, SimError> {
+    let mut session = Session::new(Boards::default(), scenario, robot, seed)?;
+    let at_ms = (at_s * 1e3).round() as u64;
+    let mut begin_ms = None;
+    for now_ms in 1.. {
+        session.step_to(now_ms * 1_000_000, recorder)?;
+        if session.is_over() || is_stopped() {
+            break;
+        }
+        if session.scenario_s().is_some() {
+            let ms = now_ms - *begin_ms.get_or_insert(now_ms);
+            let robot = &mut Robot {
+                session: &mut session,
+                recorder: &mut *recorder,
+            };
+            operator.tick(ms, ms.checked_sub(at_ms), robot);
+        }
+    }
+    let whole = session.is_over();
+    let outcome = session.finish(!whole, recorder);
+    Ok(whole.then_some(outcome.line))
 }
 
 /// The instant of a row, s: somewhere in its phase, by the seed, on a whole tick.

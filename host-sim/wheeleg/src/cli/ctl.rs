@@ -9,7 +9,7 @@ use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::{self, CONTROL_FILE, VIEW_FILE};
-use wheeleg_console::{ADDRESS, Key};
+use wheeleg_console::{ADDRESS, Fingerprint, Key};
 use wheeleg_studies::StudyError;
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
@@ -27,6 +27,9 @@ pub(super) struct CtlArgs {
     /// Address of the server.
     #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
     url: Url,
+    /// SHA-256 of the certificate of a server with TLS, as it prints it.
+    #[arg(long, value_name = "HEX", value_parser = Fingerprint::parse)]
+    fingerprint: Option<Fingerprint>,
     /// File of the key [default: the one that `wheeleg serve` has made].
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
@@ -35,6 +38,17 @@ pub(super) struct CtlArgs {
     json: bool,
     #[command(subcommand)]
     command: CtlCommand,
+}
+
+impl CtlArgs {
+    /// The server that is meant.
+    fn url(&self) -> Url {
+        let url = self.url.clone();
+        match self.fingerprint {
+            Some(fingerprint) => url.with_certificate(fingerprint),
+            None => url,
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -129,7 +143,7 @@ fn read_key(args: &CtlArgs, file: &str) -> Result<Key, StudyError> {
 }
 
 fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
-    let (code, state) = http(&args.url, "GET", "state", key).map_err(refused)?;
+    let (code, state) = http(&args.url(), "GET", "state", key).map_err(refused)?;
     if code != 200 {
         return Ok(not_answered(&state));
     }
@@ -184,7 +198,10 @@ fn not_answered(problem: &Value) -> ExitCode {
 }
 
 fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
-    let (code, answer) = http(&args.url, "POST", "stop", key).map_err(refused)?;
+    if args.url().is_exposed() {
+        return stop_by_session(args, key);
+    }
+    let (code, answer) = http(&args.url(), "POST", "stop", key).map_err(refused)?;
     match code {
         200 if args.json => print(&format!("{answer}\n")),
         200 => print("stopped: the stop is in SYNC, and latched\n"),
@@ -192,12 +209,20 @@ fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
             tell("NOT CONFIRMED: CUT THE AIR");
             Ok(ExitCode::from(LOST))
         }
+        403 => stop_by_session(args, key),
         _ => Ok(not_answered(&answer)),
     }
 }
 
+/// Over plain HTTP no key may be sent: the frames of a session prove it without.
+fn stop_by_session(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(&args.url(), "view", "ctl", key).map_err(refused)?;
+    let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
+    Ok(print_outcome(args, &client.outcome(n)))
+}
+
 fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&args.url, "view", "ctl", key).map_err(refused)?;
+    let mut client = Client::connect(&args.url(), "view", "ctl", key).map_err(refused)?;
     if !topics.is_empty() {
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
         let n = client.send(frame).map_err(refused)?;
@@ -315,7 +340,7 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
         .map(|text| argument(text))
         .collect::<Result<_, _>>()?;
     let arguments = Value::Object(arguments);
-    let mut client = Client::connect(&args.url, "control", "ctl", key).map_err(refused)?;
+    let mut client = Client::connect(&args.url(), "control", "ctl", key).map_err(refused)?;
     let mut give = |name: &str, arguments: &Value| {
         let end = client.carry_out(name, arguments, VALID_MS).map_err(refused);
         client.keep_control(true);
@@ -337,7 +362,7 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
 
 fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, StudyError> {
     let key = read_key(args, CONTROL_FILE)?;
-    let mut client = Client::connect(&args.url, "control", "ctl", &key).map_err(refused)?;
+    let mut client = Client::connect(&args.url(), "control", "ctl", &key).map_err(refused)?;
     let end = client
         .carry_out(name, arguments, VALID_MS)
         .map_err(refused)?;

@@ -9,7 +9,9 @@ use std::time::Duration;
 
 use clap::Args;
 use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
-use wheeleg_console::{ADDRESS, ConsoleError, FOLDER, Live, Options, Port, Server};
+use wheeleg_console::{
+    ADDRESS, ConsoleError, FOLDER, Files, Live, Options, Port, Protection, Server,
+};
 use wheeleg_studies::StudyError;
 
 use super::{print, stop_on_signals, tell};
@@ -27,13 +29,27 @@ pub(super) struct ServeArgs {
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
-    /// Where to listen: an address of this computer and a port.
+    /// Where to listen. Beyond this computer it is with TLS, of a certificate that is made at the
+    /// start unless one is given.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = ADDRESS)]
     listen: SocketAddr,
     /// Lead the boards at this serial port instead of simulated ones: /dev/ttyUSB0, or with another
     /// rate than 1000000 bit/s /dev/ttyUSB0@115200.
     #[arg(long, value_name = "PORT[@RATE]", conflicts_with_all = ["speed", "paused"])]
     port: Option<String>,
+    /// Name under which clients know this computer; needed to listen at every address. Can be given
+    /// several times.
+    #[arg(long, value_name = "NAME")]
+    name: Vec<String>,
+    /// Certificate for TLS, PEM.
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Its private key, PEM; only its owner may read it.
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Serve beyond this computer without TLS: then one may look and stop, and nobody may drive.
+    #[arg(long, conflicts_with = "tls_cert")]
+    plain_http: bool,
     /// Simulated time over time of the clock on the wall, 0.1 to 10, or `max`.
     #[arg(long, value_name = "SPEED", default_value = "1", value_parser = parse_speed)]
     speed: Speed,
@@ -50,6 +66,14 @@ pub(super) struct ServeArgs {
     /// Make new keys: the old ones open nothing any more.
     #[arg(long)]
     new_key: bool,
+    /// Page that may look by the protocol of Foxglove and Lichtblick, such as
+    /// https://app.example.org; programs on this computer always may. Can be given several times.
+    #[arg(long, value_name = "URL")]
+    allow_origin: Vec<String>,
+    /// Let a viewer by that protocol write parameters: with the control key, while the robot is
+    /// disarmed and nobody is in control.
+    #[arg(long)]
+    foxglove_write: bool,
     /// Folder of the page, instead of the one in this program: for who works on it.
     #[arg(long, value_name = "DIR")]
     page_dir: Option<PathBuf>,
@@ -96,17 +120,36 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         recordings: args.recordings.clone(),
         record: args.record,
         listen: args.listen,
+        names: args.name.clone(),
+        protection: match (&args.tls_cert, &args.tls_key) {
+            (Some(certificate), Some(key)) => Protection::Tls(Files {
+                certificate: certificate.clone(),
+                key: key.clone(),
+            }),
+            _ if args.plain_http => Protection::Plain,
+            _ => Protection::AsNeeded,
+        },
         keys,
         page: args.page_dir.clone(),
+        viewer_pages: args.allow_origin.clone(),
+        viewers_write: args.foxglove_write,
     })
     .map_err(refused)?;
-    let address = server.address();
+    let url = server.url();
     let mut text = String::new();
-    if std::io::stdout().is_terminal() {
-        // The key is for who sits here; no pipe and no log gets it.
-        let _ = writeln!(text, "open     http://{address}/#k={control}");
+    if server.is_look_only() {
+        text.push_str(
+            "NOT PROTECTED: who is on the way can read and change all. Look and stop alone.\n",
+        );
+    }
+    // The key is for who sits here; no pipe and no log gets it.
+    if std::io::stdout().is_terminal() && !server.is_look_only() {
+        let _ = writeln!(text, "open     {url}/#k={control}");
     } else {
-        let _ = writeln!(text, "open     http://{address}/");
+        let _ = writeln!(text, "open     {url}/");
+    }
+    if let Some(fingerprint) = server.fingerprint() {
+        let _ = writeln!(text, "SHA-256  {fingerprint}");
     }
     let _ = writeln!(
         text,
@@ -116,6 +159,13 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     );
     if let Some(port) = &args.port {
         let _ = writeln!(text, "boards   {port}");
+    }
+    if !server.is_look_only() {
+        let socket = url.replacen("http", "ws", 1);
+        let _ = writeln!(
+            text,
+            "viewers  {socket}/foxglove?token=KEY, that of the file to look"
+        );
     }
     if args.record {
         let _ = writeln!(text, "records  {}", args.recordings.display());

@@ -23,6 +23,8 @@
 
 mod action;
 mod chip;
+#[cfg(feature = "sim")]
+pub mod console;
 pub mod decoder;
 #[cfg(feature = "sim")]
 pub mod files;
@@ -104,5 +106,10 @@ pub const TARGETS: &[Target] = &[
     Target {
         name: "written",
         run: written::run,
+    },
+    #[cfg(feature = "sim")]
+    Target {
+        name: "console",
+        run: console::run,
     },
 ];

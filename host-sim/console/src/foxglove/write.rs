@@ -1,0 +1,155 @@
+//! Parameters that a viewer sets. It goes through a session of the console of its own, which takes
+//! the control, writes and releases it: the master, the recording and who else wants the control
+//! see an operator like any other.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::Message;
+use serde_json::{Map, Value, json};
+use tokio::time::timeout;
+
+use super::outbox::status;
+use super::parameters::Place;
+use super::request::Setting;
+use super::viewers::ViewerId;
+use crate::desk::ClientId;
+use crate::hex;
+use crate::hub::{Hub, Role};
+use crate::outbox::Outbox;
+use crate::request::{Body, Spoken};
+
+/// Name of the session.
+const NAME: &str = "foxglove";
+/// Longest time for one command.
+const ANSWER: Duration = Duration::from_secs(3);
+/// How long a command may wait, µs.
+const VALID_US: u64 = 1_000_000;
+
+/// Sets parameters of disarmed boards, and tells the viewer what they are now.
+pub(crate) async fn write(
+    hub: Arc<Hub>,
+    viewer: ViewerId,
+    settings: Vec<Setting>,
+    request: Option<String>,
+) {
+    let names: Vec<String> = settings.iter().map(|s| s.name.clone()).collect();
+    if let Err(why) = write_all(&hub, settings).await {
+        hub.tell_viewer(
+            viewer,
+            status(2, &format!("nothing more is written: {why}")),
+        );
+    }
+    // What was not taken is told as it is.
+    if !names.is_empty() {
+        hub.tell_parameters(viewer, &names, request.as_deref());
+    }
+}
+
+async fn write_all(hub: &Arc<Hub>, settings: Vec<Setting>) -> Result<(), String> {
+    let mut writes = Vec::with_capacity(settings.len());
+    for setting in settings {
+        writes.push(hub.parameter(&setting.name, setting.value.as_ref())?);
+    }
+    if hub.is_armed() {
+        return Err("the robot is armed: disarm it first".to_owned());
+    }
+    let mut session = Session::open(hub)?;
+    session.carry_out("TakeControl", json!({})).await?;
+    let written = session.write_all(writes).await;
+    let released = session.carry_out("ReleaseControl", json!({})).await;
+    written.and(released)
+}
+
+/// A session of the console within the server.
+struct Session {
+    hub: Arc<Hub>,
+    id: ClientId,
+    outbox: Arc<Outbox>,
+    n: u64,
+}
+
+impl Session {
+    fn open(hub: &Arc<Hub>) -> Result<Self, String> {
+        let mut number = [0; 8];
+        getrandom::fill(&mut number).map_err(|e| e.to_string())?;
+        let outbox = Arc::new(Outbox::default());
+        let entered = hub.enter(Role::Control, NAME, &hex::encode(&number), &outbox);
+        let (id, _) = entered.ok_or("all places of the console are taken")?;
+        Ok(Self {
+            hub: Arc::clone(hub),
+            id,
+            outbox,
+            n: 0,
+        })
+    }
+
+    async fn write_all(&mut self, writes: Vec<(Place, i32)>) -> Result<(), String> {
+        for ((board, parameter), raw) in writes {
+            // Now that nobody else can arm it.
+            if self.hub.is_armed() {
+                return Err("the robot is armed: disarm it first".to_owned());
+            }
+            let args = json!({ "board": board, "parameter": parameter, "value": raw });
+            self.carry_out("WriteParameter", args).await?;
+        }
+        Ok(())
+    }
+
+    /// Gives a command and waits for its end.
+    async fn carry_out(&mut self, name: &str, args: Value) -> Result<(), String> {
+        let args = match args {
+            Value::Object(args) => args,
+            _ => Map::new(),
+        };
+        let spoken = Spoken {
+            cmd: name.to_owned(),
+            args,
+        };
+        let order = spoken.order().map_err(|bad| bad.text)?;
+        self.n += 1;
+        let body = Body::Give {
+            order,
+            spoken,
+            seen_us: self.hub.now_us(),
+            valid_us: VALID_US,
+        };
+        self.hub.ask(self.id, self.n, body, false);
+        timeout(ANSWER, self.answer())
+            .await
+            .map_err(|_| format!("no answer to {name}"))?
+    }
+
+    async fn answer(&mut self) -> Result<(), String> {
+        loop {
+            let Message::Text(text) = self.outbox.wait().await else {
+                return Err("the server ends".to_owned());
+            };
+            let message: Value = serde_json::from_str(&text).unwrap_or_default();
+            if message["op"] == "state" {
+                // It sees the robot.
+                let seen_us = message["master_us"].as_u64().unwrap_or_default();
+                self.hub.ask(self.id, 0, Body::Beat { seen_us }, false);
+            }
+            if message["op"] != "answer" || message["n"] != self.n {
+                continue;
+            }
+            match message["status"].as_str() {
+                Some("accepted") => {}
+                Some("done") => return Ok(()),
+                _ => {
+                    let why = message["text"]
+                        .as_str()
+                        .unwrap_or("it is not known whether");
+                    return Err(why.to_owned());
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.hub.leave(self.id);
+    }
+}

@@ -1,0 +1,183 @@
+//! TLS: the server's certificate, and how a client of ours knows it again.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
+use rustls::crypto::{CryptoProvider, ring, verify_tls12_signature, verify_tls13_signature};
+use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, PrivatePkcs8KeyDer, ServerName, UnixTime};
+use rustls::{ClientConfig, DigitallySignedStruct, ServerConfig, SignatureScheme};
+use sha2::{Digest as _, Sha256};
+
+use crate::error::ConsoleError;
+use crate::hex;
+use crate::keys;
+
+/// SHA-256 of a certificate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fingerprint([u8; 32]);
+
+impl Fingerprint {
+    fn of(certificate: &CertificateDer<'_>) -> Self {
+        Self(Sha256::digest(certificate).into())
+    }
+
+    /// Reads 64 hexadecimal digits, with or without colons between pairs.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let digits: String = text.chars().filter(|c| *c != ':').collect();
+        let bytes = hex::decode(&digits);
+        bytes.map(Self).ok_or_else(|| {
+            "a fingerprint is the SHA-256 of a certificate, 64 hexadecimal digits".to_owned()
+        })
+    }
+}
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&hex::encode(&self.0))
+    }
+}
+
+/// Files of a certificate of the user's own.
+#[derive(Debug, Clone)]
+pub struct Files {
+    /// Certificate, and those that vouch for it, in PEM.
+    pub certificate: PathBuf,
+    /// Its private key, in PEM; only its owner may read it.
+    pub key: PathBuf,
+}
+
+/// A certificate with its key, ready to serve.
+pub(crate) struct Certificate {
+    pub(crate) config: Arc<ServerConfig>,
+    pub(crate) fingerprint: Fingerprint,
+}
+
+impl Certificate {
+    /// Reads one.
+    pub(crate) fn read(files: &Files) -> Result<Self, ConsoleError> {
+        let chain = CertificateDer::pem_file_iter(&files.certificate)
+            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+            .map_err(|e| wrong(&files.certificate, e))?;
+        let first = chain.first();
+        let first = first.ok_or_else(|| wrong(&files.certificate, "holds no certificate"))?;
+        let fingerprint = Fingerprint::of(first);
+        let _ = keys::owners_alone(&files.key)?;
+        let key = PrivateKeyDer::from_pem_file(&files.key).map_err(|e| wrong(&files.key, e))?;
+        let config = config(chain, key).map_err(|e| wrong(&files.certificate, e))?;
+        Ok(Self {
+            config,
+            fingerprint,
+        })
+    }
+
+    /// Makes one for these names, that nobody else vouches for.
+    pub(crate) fn make(names: Vec<String>) -> Result<Self, ConsoleError> {
+        let failed = |e: &dyn fmt::Display| {
+            let what = format!("no certificate can be made: {e}");
+            ConsoleError::other(what, "give one with --tls-cert and --tls-key")
+        };
+        let made = rcgen::generate_simple_self_signed(names).map_err(|e| failed(&e))?;
+        let certificate = made.cert.der().clone();
+        let fingerprint = Fingerprint::of(&certificate);
+        let key = PrivatePkcs8KeyDer::from(made.signing_key.serialize_der());
+        let config = config(vec![certificate], key.into()).map_err(|e| failed(&e))?;
+        Ok(Self {
+            config,
+            fingerprint,
+        })
+    }
+}
+
+fn provider() -> Arc<CryptoProvider> {
+    Arc::new(ring::default_provider())
+}
+
+fn config(
+    chain: Vec<CertificateDer<'static>>,
+    key: PrivateKeyDer<'static>,
+) -> Result<Arc<ServerConfig>, rustls::Error> {
+    let mut config = ServerConfig::builder_with_provider(provider())
+        .with_safe_default_protocol_versions()?
+        .with_no_client_auth()
+        .with_single_cert(chain, key)?;
+    config.alpn_protocols = vec![b"http/1.1".to_vec()];
+    Ok(Arc::new(config))
+}
+
+fn wrong(path: &Path, what: impl fmt::Display) -> ConsoleError {
+    ConsoleError::other(
+        format!("{}: {what}", path.display()),
+        "--tls-cert takes a certificate in PEM, --tls-key its private key in PEM",
+    )
+}
+
+/// How a client of ours connects: to the one certificate that has this fingerprint, whoever
+/// vouches for it.
+pub(crate) fn client(fingerprint: Fingerprint) -> Result<Arc<ClientConfig>, rustls::Error> {
+    let provider = provider();
+    let pinned = Pinned {
+        fingerprint,
+        provider: Arc::clone(&provider),
+    };
+    let config = ClientConfig::builder_with_provider(provider)
+        .with_safe_default_protocol_versions()?
+        .dangerous()
+        .with_custom_certificate_verifier(Arc::new(pinned))
+        .with_no_client_auth();
+    Ok(Arc::new(config))
+}
+
+/// Knows one certificate.
+#[derive(Debug)]
+struct Pinned {
+    fingerprint: Fingerprint,
+    provider: Arc<CryptoProvider>,
+}
+
+impl ServerCertVerifier for Pinned {
+    fn verify_server_cert(
+        &self,
+        end_entity: &CertificateDer<'_>,
+        _intermediates: &[CertificateDer<'_>],
+        _server_name: &ServerName<'_>,
+        _ocsp_response: &[u8],
+        _now: UnixTime,
+    ) -> Result<ServerCertVerified, rustls::Error> {
+        if Fingerprint::of(end_entity) == self.fingerprint {
+            return Ok(ServerCertVerified::assertion());
+        }
+        let unknown = rustls::CertificateError::UnknownIssuer;
+        Err(rustls::Error::InvalidCertificate(unknown))
+    }
+
+    fn verify_tls12_signature(
+        &self,
+        message: &[u8],
+        cert: &CertificateDer<'_>,
+        dss: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, rustls::Error> {
+        let algorithms = &self.provider.signature_verification_algorithms;
+        verify_tls12_signature(message, cert, dss, algorithms)
+    }
+
+    fn verify_tls13_signature(
+        &self,
+        message: &[u8],
+        cert: &CertificateDer<'_>,
+        dss: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, rustls::Error> {
+        let algorithms = &self.provider.signature_verification_algorithms;
+        verify_tls13_signature(message, cert, dss, algorithms)
+    }
+
+    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
+        let algorithms = &self.provider.signature_verification_algorithms;
+        algorithms.supported_schemes()
+    }
+}
