@@ -9,6 +9,9 @@
 //! * **control**: the right to give commands; a lease of the master, held by one client
 //! * **beat**: what keeps the control: the holder has seen the robot as it was at a master time
 //! * **outbox**: what waits for one client
+//! * **desk**: who of the clients is in control
+//! * **door**: lets in the frames of one session
+//! * **viewer**: a client by the protocol of Foxglove and Lichtblick: looks, and may stop
 //! * **recording**: a folder with the log of a live robot and all that it was given, in which it can be repeated
 
 mod api;
