@@ -28,12 +28,12 @@ def test_a_command_moves_a_joint_and_the_state_goes_on_bit_for_bit():
     robot = wheeleg.Robot("stand", seed=1)
     assert robot.time_s == 0.0
     home_m = robot.observe()["stroke_m"]
-    robot.command("JointReference", joint=2, stroke=f"{1e3 * home_m[1] - 20:.1f} mm")
+    robot.command("JointReference", joint=2, stroke=f"{1e3 * home_m[1] + 20:.1f} mm")
     rows = robot.run(0.4, every_s=0.05)
     kept = robot.state()
     later = robot.run(0.6)
     moved_m = later["stroke_m"][-1] - home_m
-    assert abs(moved_m[1] + 0.02) < 1e-3, moved_m
+    assert abs(moved_m[1] - 0.02) < 1e-3, moved_m
     assert abs(moved_m[4]) < 2e-3
     assert rows["stroke_m"].shape == (8, 6)
     assert rows["pressure_pa"].shape == (8, 12)
@@ -59,20 +59,25 @@ def test_wrong_and_refused_commands_say_why_and_leave_an_event():
     robot.take_events()
     for name, arguments, told in [
         ("JointReference", {"joint": 9, "stroke": "80 mm"}, "1 to 6"),
-        ("JointReference", {"joint": 2, "stroke": "8 m"}, "180"),
+        ("JointReference", {"joint": 2, "stroke": "8 m"}, "allowed 0 to 0.18 m"),
         ("JointReference", {"joint": 2}, "stroke"),
         ("JointReferenc", {}, "JointReference"),
         ("Arm", {"joint": 2}, "no arguments"),
     ]:
         with pytest.raises(wheeleg.ConfigError, match=told):
             robot.command(name, **arguments)
+    # Refused at the door: nothing takes commands while no time passes.
+    with pytest.raises(wheeleg.ConfigError, match="the master refuses JointReference"):
+        for _ in range(200):
+            robot.command("JointReference", joint=2, stroke="20 mm")
+    robot.run(0.05)
+    # Refused when its turn comes.
     robot.command("EmergencyStop")
     robot.run(0.1)
-    with pytest.raises(wheeleg.ConfigError, match="the master refuses StartGait"):
-        robot.command("StartGait")
-    robot.run(0.01)
+    robot.command("StartGait")
+    robot.run(0.05)
     codes = [event["code"] for event in robot.take_events()]
-    assert "command_rejected" in codes
+    assert "command_rejected" in codes and "command_refused" in codes
     assert robot.take_events() == []
 
 

@@ -1,10 +1,24 @@
 """Types of the compiled part. What each call does stands in its docstring: ``help(wheeleg)``."""
 
-from collections.abc import Sequence
-from typing import Any, TypedDict, final
+from collections.abc import Mapping, Sequence
+from typing import Any, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "LAWS",
+    "Axis",
+    "AxisSim",
+    "AxisSimState",
+    "Board",
+    "BoardState",
+    "ConfigError",
+    "Cylinder",
+    "Robot",
+    "SimulationError",
+    "__version__",
+]
 
 __version__: str
 LAWS: list[str]
@@ -14,6 +28,7 @@ _Floats = NDArray[np.float64]
 class ConfigError(ValueError): ...
 class SimulationError(RuntimeError): ...
 
+@type_check_only
 class Parameter(TypedDict):
     """A parameter of an axis file."""
 
@@ -24,6 +39,7 @@ class Parameter(TypedDict):
     source: str
     doc: str
 
+@type_check_only
 class Snapshot(TypedDict):
     """What a board says after a tick."""
 
@@ -35,6 +51,7 @@ class Snapshot(TypedDict):
     driving: bool
     faults: list[str]
 
+@type_check_only
 class Event(TypedDict):
     """Something that happened to a robot."""
 
@@ -51,7 +68,7 @@ class Axis:
     @staticmethod
     def built_in() -> list[str]: ...
     def with_values(
-        self, values: dict[str, bool | float | str | tuple[Sequence[float], str]]
+        self, values: Mapping[str, bool | float | str | tuple[Sequence[float], str]]
     ) -> Axis: ...
     @property
     def name(self) -> str: ...
@@ -85,7 +102,7 @@ class Board:
         axis: Axis | str,
         *,
         law: str = "predictive",
-        parameters: dict[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
     ) -> Board: ...
     def tick(
         self, code: float, reference_m: float, velocity_m_s: float = 0.0
@@ -111,7 +128,7 @@ class AxisSim:
         *,
         seed: int,
         law: str = "predictive",
-        parameters: dict[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
         sheet: Axis | str | None = None,
     ) -> AxisSim: ...
     def tick(self, reference_m: float, velocity_m_s: float = 0.0) -> dict[str, float]: ...

@@ -156,7 +156,7 @@ class WheelegRobot(gymnasium.Env[_Floats, _Floats]):
     """Move the robot forward, one action every 0.1 s; the boards' firmware follows.
 
     Action: seven numbers from -1 to 1: the strokes of joints 1 to 6 about the start pose, times
-    ``reach_m``, and the travel of the wheels in this step, times ``travel_m``.
+    ``reach_m`` and within the stroke, and the travel of the wheels in this step, times ``travel_m``.
 
     Observation, as the boards sense: strokes about the start pose over ``reach_m`` (6), speeds of
     the joints, m/s (6), travel of the wheels in the last step over ``travel_m`` (2), foot switches

@@ -204,8 +204,9 @@ impl Robot {
     }
 
     /// Gives the master a command, by its name and arguments in docs/reference/commands.md, as in
-    /// a scenario: command("JointReference", joint=2, stroke="80 mm"). A command that is wrong or
-    /// refused is a ConfigError.
+    /// a scenario: command("JointReference", joint=2, stroke="80 mm"). A command that is wrong, or
+    /// that the master does not take, is a ConfigError; one that it refuses when its turn comes
+    /// leaves an event `command_refused` (take_events).
     #[pyo3(signature = (name, **arguments))]
     fn command(
         &self,
