@@ -232,8 +232,21 @@ fn behaviours() -> StepResult<String> {
 fn identification() -> StepResult<String> {
     let found = figures(
         cargo()
-            .args(["test", "--locked", "--release", "--package", "wheeleg-studies"])
-            .args(["--test", "identify", "--", "--exact", "--ignored", "--nocapture"])
+            .args([
+                "test",
+                "--locked",
+                "--release",
+                "--package",
+                "wheeleg-studies",
+            ])
+            .args([
+                "--test",
+                "identify",
+                "--",
+                "--exact",
+                "--ignored",
+                "--nocapture",
+            ])
             .arg("intervals_have_the_truth_about_as_often_as_they_say"),
         |line| line.contains("identify: "),
     )?;

@@ -236,11 +236,6 @@ mod tests {
         exact(&argument::PERIOD, 0.5, 60.0);
         exact(&argument::STEPS, 1.0, 10_000.0);
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     #[test]
     fn a_command_is_read_as_in_a_scenario_and_a_wrong_one_names_its_range() {
@@ -253,6 +248,6 @@ mod tests {
         assert_eq!(read, Command::JointReference { joint, stroke_mm });
         let error = command(&text("8 m")).expect_err("beyond the stroke");
         let told = error.problems()[0].summary();
-        assert!(told.contains("stroke") && told.contains("180"), "{told}");
+        assert!(told.contains("stroke") && told.contains("0.18 m"), "{told}");
     }
 }

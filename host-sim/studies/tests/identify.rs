@@ -8,7 +8,7 @@ use wheeleg_studies::identify::fit::{Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
 use wheeleg_studies::identify::lab::Lab;
 use wheeleg_studies::identify::told::{covers, untold};
-use wheeleg_studies::identify::{Options, fitted, identify, noise};
+use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
 use wheeleg_studies::study::{Progress, Settings};
 
 const OUT: [u16; 4] = [1000, 0, 0, 1000];
@@ -101,8 +101,12 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
     let text = measured(&applied(&config.axis, &truth), 1, 4800, rich, true);
     let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
     let progress = Progress::silent();
-    let (fit, told, information, stopped) =
-        fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
+    let Fitted {
+        fit,
+        told,
+        information,
+        stopped,
+    } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
     assert!(stopped.is_none());
     let found = (0..COUNT).filter(|i| told[*i].told).count();
     assert!(found >= 8, "{found} told: {told:?}");
@@ -129,8 +133,12 @@ fn what_the_valves_never_did_cannot_be_told() {
     let config = config();
     let text = measured(&config.axis, 1, 600, |_| OUT, false);
     let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
-    let (fit, told, information, _) =
-        fitted(&problem(&config, &lab), 1, &Progress::silent()).expect("a fit");
+    let Fitted {
+        fit,
+        told,
+        information,
+        ..
+    } = fitted(&problem(&config, &lab), 1, &Progress::silent()).expect("a fit");
     let closing = FREE
         .iter()
         .position(|f| f.name == "closing_delay")
@@ -276,7 +284,7 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
         let truth = truth(1000 + seed);
         let text = measured(&applied(&config.axis, &truth), seed, 4800, rich, true);
         let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
-        let (fit, told, ..) =
+        let Fitted { fit, told, .. } =
             fitted(&problem(&config, &lab), seed, &Progress::silent()).expect("a fit");
         let which = (0..COUNT).filter(|i| told[*i].told);
         let mut within = true;
@@ -292,5 +300,6 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
         "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); told within 5 % in {close} of {count} cylinders (bar 95 %)",
         100.0 * share
     );
-    assert!((0.85..=1.0).contains(&share), "{share}");
+    assert!((0.90..=0.99).contains(&share), "{share}");
+    assert!(20 * close >= 19 * count, "{close} of {count}");
 }

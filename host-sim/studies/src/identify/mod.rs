@@ -15,6 +15,7 @@ pub mod told;
 
 use std::path::Path;
 
+use nalgebra::DMatrix;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use schemars::JsonSchema;
@@ -252,15 +253,24 @@ fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
     }
 }
 
+/// A fit, and what it tells.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// The fit.
+    pub fit: Fit,
+    /// Of each factor.
+    pub told: [Told; COUNT],
+    /// Information of the data about the logarithms.
+    pub information: DMatrix<f64>,
+    /// What stopped it before all starts were tried.
+    pub stopped: Option<Stopped>,
+}
+
 /// The fit of a measurement, with what it tells: used by the study and by its tests.
 ///
 /// # Errors
 /// As [`best`].
-pub fn fitted(
-    problem: &Problem<'_>,
-    seed: u64,
-    progress: &Progress,
-) -> Result<(Fit, [Told; COUNT], nalgebra::DMatrix<f64>, Option<Stopped>), StudyError> {
+pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<Fitted, StudyError> {
     let pressures = problem.lab.samples.iter().any(|s| s.pressure_pa.is_some());
     let channels = if pressures { 3 } else { 1 };
     let (first, stopped) = best(problem, &starts(&problem.limits, seed), progress)?;
@@ -282,7 +292,12 @@ pub fn fitted(
         )
     })?;
     let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
-    Ok((fit, told::told(&information), information, stopped))
+    Ok(Fitted {
+        fit,
+        told: told::told(&information),
+        information,
+        stopped,
+    })
 }
 
 impl Identified {
@@ -302,7 +317,12 @@ impl Identified {
             noise,
             limits: free::limits(&config),
         };
-        let (fit, told, information, stopped) = fitted(&problem, options.seed, progress)?;
+        let Fitted {
+            fit,
+            told,
+            information,
+            stopped,
+        } = fitted(&problem, options.seed, progress)?;
         let play = |axis: &AxisParams| {
             predict(axis, &lab, lab.on_us.len()).map_err(|e| {
                 StudyError::refused(
