@@ -14,7 +14,7 @@ mod documents;
 
 /// Who may depend on which of our own crates (ARCHITECTURE.md). Development
 /// dependencies count too: a test is no back door.
-const ARROWS: [(&str, &[&str]); 29] = [
+const ARROWS: [(&str, &[&str]); 30] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
     ("wheeleg-kinematics", &[]),
@@ -129,6 +129,20 @@ const ARROWS: [(&str, &[&str]); 29] = [
         ],
     ),
     ("wheeleg-studies", &STUDIES),
+    (
+        "wheeleg-python",
+        &[
+            "wheeleg-campaign",
+            "wheeleg-config",
+            "wheeleg-master",
+            "wheeleg-plant",
+            "wheeleg-protocol",
+            "wheeleg-sim",
+            "wheeleg-studies",
+            "wheeleg-telemetry",
+            "wheeleg-units",
+        ],
+    ),
     ("wheeleg", &PROGRAM),
     ("wheeleg-tests", &TESTED),
     (

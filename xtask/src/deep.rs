@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 15] = [
+const CHECKS: [Check; 16] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -69,6 +69,12 @@ const CHECKS: [Check; 15] = [
         "200 cases shared, killed 20 times and replayed; Slurm on two nodes of this computer",
         10,
         campaign::deep,
+    ),
+    Check(
+        "identify",
+        "100 random cylinders identified: how often an interval has the truth",
+        30,
+        identification,
     ),
     Check(
         "long-run",
@@ -221,6 +227,31 @@ fn behaviours() -> StepResult<String> {
         ("WHEELEG_BEHAVIOUR_SEEDS", 20),
         " behaviours with and without: ",
     )
+}
+
+fn identification() -> StepResult<String> {
+    let found = figures(
+        cargo()
+            .args([
+                "test",
+                "--locked",
+                "--release",
+                "--package",
+                "wheeleg-studies",
+            ])
+            .args([
+                "--test",
+                "identify",
+                "--",
+                "--exact",
+                "--ignored",
+                "--nocapture",
+            ])
+            .arg("intervals_have_the_truth_about_as_often_as_they_say"),
+        |line| line.contains("identify: "),
+    )?;
+    let first = found.into_iter().next();
+    Ok(first.context("no line with `identify: `")?)
 }
 
 fn long_run() -> StepResult<String> {

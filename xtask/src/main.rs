@@ -28,6 +28,7 @@ mod no_std;
 mod pil;
 mod plant;
 mod process;
+mod python;
 mod qemu;
 mod record;
 mod report;
@@ -91,6 +92,8 @@ enum Command {
     Plant,
     /// The table of a campaign and its SQL in DuckDB.
     Campaign,
+    /// The Python package: wheel, fresh environment, tests, notebooks.
+    Python,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),
     /// Make a book of `docs`, if mdbook is there.
@@ -129,6 +132,7 @@ fn main() -> ExitCode {
         Command::RigidBody => rigid_body::steps(&mut report),
         Command::Plant => plant::steps(&mut report),
         Command::Campaign => campaign::steps(&mut report),
+        Command::Python => python::steps(&mut report),
         Command::Mutants(options) => mutants::steps(&mut report, &options),
         Command::Docs => docs::steps(&mut report),
         Command::Deep(options) => deep::steps(&mut report, &options),
@@ -164,6 +168,7 @@ fn test(report: &mut Report) {
     rigid_body::steps(report);
     plant::steps(report);
     campaign::steps(report);
+    python::steps(report);
 }
 
 fn lints(report: &mut Report) {

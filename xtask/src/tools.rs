@@ -1,7 +1,7 @@
 //! Tools that `cargo xtask setup` installs, and whether they are here.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
@@ -59,9 +59,14 @@ pub(crate) fn python() -> StepResult<PathBuf> {
 }
 
 pub(crate) fn python_path() -> PathBuf {
+    python_in(&virtual_environment())
+}
+
+/// The interpreter of a virtual environment.
+pub(crate) fn python_in(environment: &Path) -> PathBuf {
     if cfg!(windows) {
-        virtual_environment().join("Scripts").join("python.exe")
+        environment.join("Scripts").join("python.exe")
     } else {
-        virtual_environment().join("bin").join("python")
+        environment.join("bin").join("python")
     }
 }

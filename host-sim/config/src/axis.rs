@@ -6,16 +6,19 @@
 
 use std::path::Path;
 
+use toml_edit::DocumentMut;
 use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_plant::chamber::GasModel;
 use wheeleg_plant::sensors::AdcNoise;
 
 use super::builtin;
-use super::error::ConfigError;
+use super::error::{ConfigError, Problem};
+use super::overlay;
 use super::params::{ParameterInfo, params};
 use super::plant::pneumatics::{self, Pneumatics, Sensing};
 use super::reader::Reader;
 use super::relations::{self, Moved};
+use super::suggest::closest;
 
 params! {
     /// What moves with the rod.
@@ -84,6 +87,19 @@ pub struct AxisConfig {
     pub parameters: Vec<ParameterInfo>,
 }
 
+/// Another value for a parameter of an axis file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Dotted path, as `moving.mass`.
+    pub path: String,
+    /// Value, or the values of a list, in `unit`.
+    pub values: Vec<f64>,
+    /// Unit.
+    pub unit: String,
+    /// Where the value is from.
+    pub source: String,
+}
+
 impl AxisConfig {
     /// An axis by built-in name, or by path to a TOML file.
     ///
@@ -94,12 +110,63 @@ impl AxisConfig {
         Self::parse(&file, &text)
     }
 
+    /// The text of an axis, by built-in name or path.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if there is no such axis or file.
+    pub fn source(name_or_path: &str) -> Result<builtin::Source, ConfigError> {
+        let (file, text) = builtin::find("axis", name_or_path, AXES)?;
+        Ok(builtin::Source { file, text })
+    }
+
     /// An axis from a file.
     ///
     /// # Errors
     /// As [`AxisConfig::load`].
     pub fn from_path(path: &Path) -> Result<Self, ConfigError> {
         Self::load(&path.to_string_lossy())
+    }
+
+    /// The text of an axis file with other values in it, each of which is checked as the file's
+    /// own are when the text is read again.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if the file is wrong as it is, or has no such parameter.
+    pub fn rewritten(file: &str, text: &str, changes: &[Change]) -> Result<String, ConfigError> {
+        let what = format!("the axis file {file} cannot be changed");
+        let listing = Self::parse(file, text)?.parameters;
+        let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| {
+            // The reader of the file has accepted it.
+            ConfigError::new(&what, vec![Problem::whole(file, e.to_string(), None)])
+        })?;
+        let mut problems = Vec::new();
+        for change in changes {
+            let info = listing.iter().find(|info| info.path == change.path);
+            let fits = info.filter(|info| info.value.len() == change.values.len());
+            let done = fits.is_some_and(|info| {
+                let Change { unit, source, .. } = change;
+                overlay::set_quantity(&mut document, info, &change.values, unit, source)
+            });
+            if !done {
+                let paths = listing.iter().map(|info| info.path.as_str());
+                let message = match info {
+                    Some(info) => format!(
+                        "`{}` has {} values, not {}",
+                        change.path,
+                        info.value.len(),
+                        change.values.len()
+                    ),
+                    None => format!("there is no parameter `{}`", change.path),
+                };
+                let near = closest(&change.path, paths).map(|near| format!("did you mean {near}?"));
+                problems.push(Problem::whole(file, message, near));
+            }
+        }
+        if problems.is_empty() {
+            Ok(document.to_string())
+        } else {
+            Err(ConfigError::new(what, problems))
+        }
     }
 
     /// Reads an axis from TOML text; `file` is the name for messages.
@@ -229,6 +296,29 @@ mod tests {
         assert!(near(a.line_volume_m3, b.line_volume_m3) && near(a.line_delay_s, b.line_delay_s));
         assert!(near(a.friction.static_n, b.friction.static_n));
         assert_eq!(file.moving_mass_kg, copy.moving_mass_kg);
+    }
+
+    #[test]
+    fn a_rewritten_axis_has_the_new_value_and_its_source_and_an_unknown_one_is_refused() {
+        let (_, file, text) = AXES[0];
+        let change = |path: &str, value: f64, unit: &str| Change {
+            path: path.to_owned(),
+            values: vec![value],
+            unit: unit.to_owned(),
+            source: "IDENTIFIED".to_owned(),
+        };
+        let text_of = |change| AxisConfig::rewritten(file, text, &[change]);
+        let lighter = text_of(change("moving.mass", 900.0, "g")).expect("a parameter");
+        let axis = AxisConfig::parse(file, &lighter).expect("an axis");
+        assert_eq!(axis.axis.moving_mass_kg, 0.9);
+        let listed = axis.parameters.iter().find(|p| p.path == "moving.mass");
+        assert_eq!(listed.expect("listed").source, "IDENTIFIED");
+        // Range and unit are the reader's business.
+        let heavy = text_of(change("moving.mass", 5000.0, "kg")).expect("a parameter");
+        assert!(AxisConfig::parse(file, &heavy).is_err());
+        let error = text_of(change("moving.mas", 1.0, "kg")).expect_err("no such parameter");
+        let told = error.problems()[0].summary();
+        assert!(told.contains("moving.mas"), "{told}");
     }
 
     #[test]

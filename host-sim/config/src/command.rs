@@ -5,6 +5,7 @@ use fixed::types::I16F16;
 use wheeleg_master::argument::{Argument, ArgumentKind, Limits, Value};
 use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given, TABLE};
 
+use super::error::ConfigError;
 use super::node;
 use super::params::FieldSpec;
 use super::quantity::Dimension;
@@ -19,6 +20,18 @@ pub(super) fn read(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Comman
     let code = r.choice(entry, "command", &names)?;
     reject_others(r, entry, &code.info(), top);
     arguments(r, entry, code)
+}
+
+/// A command from TOML text, as the fields of an event of a scenario:
+/// `command = "JointReference"`, then its arguments.
+///
+/// # Errors
+/// [`ConfigError`] with every problem: argument, value, accepted units or range.
+pub fn command(text: &str) -> Result<Command, ConfigError> {
+    let what = "the command is not usable";
+    let mut r = Reader::parse(what, "command", text, false)?;
+    let command = r.table("").and_then(|entry| read(&mut r, &entry, &[]));
+    r.finish(what, command).map(|(command, _)| command)
 }
 
 /// Reads the arguments of a command that stand in `entry`.
@@ -222,5 +235,19 @@ mod tests {
         exact(&argument::ACCELERATION, 0.01, 5.0);
         exact(&argument::PERIOD, 0.5, 60.0);
         exact(&argument::STEPS, 1.0, 10_000.0);
+    }
+
+    #[test]
+    fn a_command_is_read_as_in_a_scenario_and_a_wrong_one_names_its_range() {
+        let text = |stroke: &str| {
+            format!("command = \"JointReference\"\njoint = 2\nstroke = \"{stroke}\"\n")
+        };
+        let read = command(&text("0.08 m")).expect("a command");
+        let stroke_mm = wheeleg_units::PositionMm::from_f64(80.0);
+        let joint = 2;
+        assert_eq!(read, Command::JointReference { joint, stroke_mm });
+        let error = command(&text("8 m")).expect_err("beyond the stroke");
+        let told = error.problems()[0].summary();
+        assert!(told.contains("stroke") && told.contains("0.18 m"), "{told}");
     }
 }

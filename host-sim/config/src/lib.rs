@@ -24,6 +24,7 @@ pub mod faults;
 pub mod keys;
 mod law;
 mod node;
+mod overlay;
 mod params;
 pub mod plan;
 pub mod plant;
@@ -38,6 +39,7 @@ pub mod timing;
 
 pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};
+pub use command::command;
 pub use drawing::Drawing;
 pub use error::{ConfigError, Problem};
 pub use law::LawChoice;

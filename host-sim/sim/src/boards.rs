@@ -51,6 +51,49 @@ pub struct JointBoard {
     valves: [PwmChannel; 4],
 }
 
+/// The four valve channels as the application owns them.
+fn bank(valves: &[PwmChannel; 4]) -> Valves {
+    let [fill_a, vent_a, fill_b, vent_b] = valves.clone();
+    FourValves {
+        fill_a,
+        vent_a,
+        fill_b,
+        vent_b,
+    }
+}
+
+/// The four foot switches as the application owns them.
+fn feet(foot: &[Line; 4]) -> Feet {
+    let [front, left, rear, right] = foot.clone();
+    FootSwitches(front, left, rear, right)
+}
+
+/// A board of its own, in the same state: the two share no hardware.
+impl Clone for JointBoard {
+    fn clone(&self) -> Self {
+        let sensor = self.sensor.copy();
+        let foot = self.foot.each_ref().map(Line::copy);
+        let valves = self.valves.each_ref().map(PwmChannel::copy);
+        let application = match &self.application {
+            JointApplication::Plain(node) => JointApplication::Plain(node.clone().on_hardware(
+                bank(&valves),
+                sensor.clone(),
+                NoSwitches,
+            )),
+            JointApplication::WithFoot(node) => JointApplication::WithFoot(
+                node.clone()
+                    .on_hardware(bank(&valves), sensor.clone(), feet(&foot)),
+            ),
+        };
+        Self {
+            application,
+            sensor,
+            foot,
+            valves,
+        }
+    }
+}
+
 /// The board at an address; the 96-bit unique id of its processor is the address in
 /// every byte.
 pub fn identity(address: Address) -> NodeIdentity {
@@ -128,20 +171,12 @@ impl JointBoard {
         let sensor = AdcInput::default();
         let valves: [PwmChannel; 4] = std::array::from_fn(|_| PwmChannel::new(VALVE_COUNTS));
         let foot: [Line; 4] = std::array::from_fn(|_| Line::default());
-        let [fill_a, vent_a, fill_b, vent_b] = valves.clone();
-        let bank = FourValves {
-            fill_a,
-            vent_a,
-            fill_b,
-            vent_b,
-        };
+        let valve_bank = bank(&valves);
         let application = if address.raw().is_multiple_of(3) {
-            let [front, left, rear, right] = foot.clone();
-            let switches = FootSwitches(front, left, rear, right);
-            JointNode::from_store(who, parameters, bank, sensor.clone(), switches)
+            JointNode::from_store(who, parameters, valve_bank, sensor.clone(), feet(&foot))
                 .map(JointApplication::WithFoot)
         } else {
-            JointNode::from_store(who, parameters, bank, sensor.clone(), NoSwitches)
+            JointNode::from_store(who, parameters, valve_bank, sensor.clone(), NoSwitches)
                 .map(JointApplication::Plain)
         };
         let mut application = application.map_err(|e| rejected(address, e))?;

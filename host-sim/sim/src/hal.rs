@@ -2,13 +2,14 @@
 //! results, switches, PWM channels and pins that the event loop can reach.
 //!
 //! A handle and its clone share one cell: the application owns one, the event
-//! loop the other. Inputs are written by the loop at the start of a tick and
+//! loop the other. The cells are atomic so that a board can go to another thread;
+//! no two threads use one at a time. Inputs are written by the loop at the start of a tick and
 //! stay latched; PWM compare values are preloaded by the application and read
 //! by the loop at the next tick edge, as the hardware timer does.
 
-use std::cell::Cell;
 use std::convert::Infallible;
-use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU16, Ordering::Relaxed};
 
 use embedded_hal::digital::{self, InputPin, OutputPin};
 use embedded_hal::pwm::{self, SetDutyCycle};
@@ -17,18 +18,23 @@ use wheeleg_units::{AdcCode, WheelCount};
 
 /// A digital line, as input or output.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Line(Rc<Cell<bool>>);
+pub(super) struct Line(Arc<AtomicBool>);
 
 impl Line {
     /// Level seen by an input, or driven by an output.
     #[must_use]
     pub(super) fn level(&self) -> bool {
-        self.0.get()
+        self.0.load(Relaxed)
+    }
+
+    /// A line of its own at the same level.
+    pub(super) fn copy(&self) -> Self {
+        Self(Arc::new(self.level().into()))
     }
 
     /// Sets the level of an input.
     pub(super) fn set_level(&self, high: bool) {
-        self.0.set(high);
+        self.0.store(high, Relaxed);
     }
 }
 
@@ -38,22 +44,22 @@ impl digital::ErrorType for Line {
 
 impl InputPin for Line {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.get())
+        Ok(self.level())
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        Ok(!self.0.get())
+        Ok(!self.level())
     }
 }
 
 impl OutputPin for Line {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.set(false);
+        self.set_level(false);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.set(true);
+        self.set_level(true);
         Ok(())
     }
 }
@@ -61,7 +67,7 @@ impl OutputPin for Line {
 /// One channel of a timer with preloaded compare register.
 #[derive(Debug, Clone)]
 pub(super) struct PwmChannel {
-    compare: Rc<Cell<u16>>,
+    compare: Arc<AtomicU16>,
     max: u16,
 }
 
@@ -70,15 +76,23 @@ impl PwmChannel {
     #[must_use]
     pub(super) fn new(max: u16) -> Self {
         Self {
-            compare: Rc::new(Cell::new(0)),
+            compare: Arc::default(),
             max,
+        }
+    }
+
+    /// A channel of its own with the same compare value.
+    pub(super) fn copy(&self) -> Self {
+        Self {
+            compare: Arc::new(self.preloaded().into()),
+            max: self.max,
         }
     }
 
     /// The preloaded compare value, in counts.
     #[must_use]
     pub(super) fn preloaded(&self) -> u16 {
-        self.compare.get()
+        self.compare.load(Relaxed)
     }
 }
 
@@ -93,49 +107,48 @@ impl SetDutyCycle for PwmChannel {
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
         // The compare register of a timer that counts to `max` holds no more.
-        self.compare.set(duty.min(self.max));
+        self.compare.store(duty.min(self.max), Relaxed);
         Ok(())
     }
 }
 
 /// Converter result of a linear potentiometer, latched at the tick edge.
 #[derive(Debug, Clone, Default)]
-pub(super) struct AdcInput(Rc<Cell<u16>>);
+pub(super) struct AdcInput(Arc<AtomicU16>);
 
 impl AdcInput {
+    /// An input of its own with the same code.
+    pub(super) fn copy(&self) -> Self {
+        Self(Arc::new(self.0.load(Relaxed).into()))
+    }
+
     /// Latches a code, 16 bits left-aligned.
     pub(super) fn latch(&self, code: u16) {
-        self.0.set(code);
+        self.0.store(code, Relaxed);
     }
 }
 
 impl PositionSensor for AdcInput {
     fn read(&mut self) -> Result<AdcCode, SensorError> {
-        Ok(AdcCode::new(self.0.get()))
+        Ok(AdcCode::new(self.0.load(Relaxed)))
     }
 }
 
 /// Quadrature counter of a wheel, latched at the sample edge.
-#[derive(Debug, Clone)]
-pub(super) struct CounterInput(Rc<Cell<WheelCount>>);
-
-impl Default for CounterInput {
-    fn default() -> Self {
-        Self(Rc::new(Cell::new(WheelCount::ZERO)))
-    }
-}
+#[derive(Debug, Clone, Default)]
+pub(super) struct CounterInput(Arc<AtomicI32>);
 
 impl CounterInput {
     /// Latches the total number of quadrature edges; the counter keeps 24 bits.
     pub(super) fn latch(&self, edges: i64) {
         // Truncation keeps the low bits, of which the counter keeps 24.
-        self.0.set(WheelCount::wrapping_new(edges as i32));
+        self.0.store(edges as i32, Relaxed);
     }
 }
 
 impl Encoder for CounterInput {
     fn count(&mut self, _: WheelCount) -> WheelCount {
-        self.0.get()
+        WheelCount::wrapping_new(self.0.load(Relaxed))
     }
 }
 

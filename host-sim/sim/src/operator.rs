@@ -218,7 +218,7 @@ impl Operator {
         command: Command,
         t_ns: u64,
         recorder: &mut Recorder,
-    ) {
+    ) -> Answer {
         let code = command.code();
         let answer = if world.master_alive() {
             world
@@ -228,6 +228,7 @@ impl Operator {
             Answer::Nothing
         };
         recorder.event(t_ns, Cause::Command { code, answer });
+        answer
     }
 
     /// A user who gives commands without end, as a fault of the run. The first

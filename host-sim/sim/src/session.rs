@@ -169,10 +169,10 @@ impl Session {
     }
 
     /// A user command, now. A refusal is an event of the recording, as on the real console.
-    pub fn submit(&mut self, command: Command, recorder: &mut Recorder) {
+    pub fn submit(&mut self, command: Command, recorder: &mut Recorder) -> Answer {
         let t_ns = self.scenario_ns().unwrap_or(0);
         self.operator
-            .submit(&mut self.world, command, t_ns, recorder);
+            .submit(&mut self.world, command, t_ns, recorder)
     }
 
     /// A request of a client of the master, now. `None`: the master is dead and says nothing.

@@ -4,6 +4,7 @@
 //! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
 //! * [`matrix`]: every fault, and what must come of it;
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`axis_sim`]);
+//! * [`identify`]: a user's cylinder from measurements;
 //! * [`figures`]: the paper's figures and misprints;
 //! * [`study`]: what all of them do in the same way;
 //! * [`view`]: a log, or two, as a page;
@@ -27,6 +28,7 @@ mod error;
 pub mod export;
 pub mod field;
 pub mod figures;
+pub mod identify;
 pub mod matrix;
 mod motion;
 pub mod run;

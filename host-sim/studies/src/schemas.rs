@@ -15,5 +15,6 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         schema::<crate::matrix::Summary<'static>>(),
         schema::<crate::field::Summary>(),
         schema::<crate::figures::Summary<'static>>(),
+        schema::<crate::identify::Summary<'static>>(),
     ]
 }

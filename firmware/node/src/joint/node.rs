@@ -57,7 +57,7 @@ impl TickState {
 /// `V` are the four valve outputs, `S` the position sensor, `W` the switches
 /// (four on the vertical joints' boards, [`crate::hardware::NoSwitches`] on
 /// the others).
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct JointNode<V, S, W> {
     pub(super) core: BoardCore,
     pub(super) parameters: JointParameters,
@@ -176,6 +176,17 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             node.axis_fault(Fault::ParameterCorrupt, Micros::ZERO);
         }
         Ok(node)
+    }
+
+    /// The same board on other hardware of the same kind: how a simulator copies one.
+    #[must_use]
+    pub fn on_hardware(self, valves: V, sensor: S, switches: W) -> Self {
+        Self {
+            valves,
+            sensor,
+            switch_pins: switches,
+            ..self
+        }
     }
 
     /// Takes bytes of the bus, in any chunking; the last of them ended at

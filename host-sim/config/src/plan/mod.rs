@@ -6,14 +6,12 @@
 //! | `factor.rs` | one factor: what it sets, and its values |
 //! | `value.rs` | one value: a number, a name, yes or no |
 //! | `distribution.rs` | distributions, and where they end |
-//! | `overlay.rs` | another value in the text of a file |
 //! | `resolve.rs` | values of all factors to a scenario and a robot |
 //! | `check.rs` | every value that a factor can have, against the files' own ranges |
 
 mod check;
 mod distribution;
 mod factor;
-mod overlay;
 mod resolve;
 mod sources;
 mod value;

@@ -7,8 +7,9 @@ use toml_edit::{DocumentMut, Item};
 
 use super::factor::{Factor, Sets};
 use super::value::Value;
-use super::{Plan, Text, overlay};
+use super::{Plan, Text};
 use crate::error::{ConfigError, Problem};
+use crate::overlay;
 use crate::params::ParameterInfo;
 use crate::quantity::Dimension;
 use crate::{LawChoice, RobotConfig, Scenario};

@@ -35,8 +35,10 @@ const JOINT: u8 = 2;
 /// Bus cycles from power-up to arming: the self-test takes ten readings.
 const START_CYCLES: u32 = 3;
 
-/// A joint board's application, fed by the bench as by a master.
+/// A joint board's application, fed by the bench as by a master. A clone goes on on its own from
+/// the same state.
 #[allow(missing_debug_implementations)] // The application has none.
+#[derive(Clone)]
 pub struct Node {
     board: JointBoard,
     address: Address,

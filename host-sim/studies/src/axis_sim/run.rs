@@ -155,7 +155,6 @@ impl<B: Board> AxisSim<B> {
                 }
             }
             let (reference_m, rate_m_s) = motion.at(t);
-            let code = AdcCode::new(self.axis.read_position(&mut self.state));
             let wait = motion.start_s() - t;
             let announced = (wait > 0.0 && wait <= self.preview_s).then(|| {
                 (
@@ -163,32 +162,18 @@ impl<B: Board> AxisSim<B> {
                     (wait * 1e3).round() as u32,
                 )
             });
-            let action = self.board.tick(&Sample {
-                code,
-                reference: PositionMm::from_f64(reference_m * 1e3),
-                reference_velocity: VelocityMmS::from_f64(rate_m_s * 1e3),
-                announced,
-            });
-            let m = &self.state.core.motion;
-            let c = &self.state.core.cylinders[0];
-            let row = Row {
-                reference_m,
-                stroke_m: m.stroke_m,
-                measured_m: action.measured_mm * 1e-3,
-                velocity_m_s: m.velocity_m_s,
-                pressure_pa: self.axis.assembly.cylinders[0].pressures_pa(c, m.stroke_m),
-                load_n: m.load_n,
-                on_us: self.pending,
-                switches: self.switches() - start_switches,
-                air_kg: c.supply_mass_kg - start_air,
-                settled: action.settled,
-            };
+            let mut row = Row::default();
+            let action = self.tick_with(reference_m, rate_m_s, announced, |now, board| {
+                row = Row {
+                    switches: now.switches - start_switches,
+                    air_kg: now.air_kg - start_air,
+                    ..*now
+                };
+                watch(&row, board);
+            })?;
             faults = faults.union(action.faults);
             drove &= action.driving;
-            watch(&row, &self.board);
             rows.push(row);
-            self.axis.tick(&mut self.state, self.pending)?;
-            self.pending = action.on_us;
         }
         Ok(Trace {
             motion: motion.clone(),
@@ -196,6 +181,51 @@ impl<B: Board> AxisSim<B> {
             faults,
             drove,
         })
+    }
+
+    /// One tick of 1 ms towards a reference \[m\] that moves at a speed \[m/s\]. Gives what the
+    /// board did, and the row of the tick's start; switches and air count from power-up.
+    ///
+    /// # Errors
+    /// Any [`PlantError`]; the bench is not usable after one.
+    pub fn tick(&mut self, reference_m: f64, rate_m_s: f64) -> Result<(Action, Row), PlantError> {
+        let mut row = Row::default();
+        let action = self.tick_with(reference_m, rate_m_s, None, |now, _| row = *now)?;
+        Ok((action, row))
+    }
+
+    /// The same with a reference to come, and shows row and board before the plant goes on.
+    fn tick_with(
+        &mut self,
+        reference_m: f64,
+        rate_m_s: f64,
+        announced: Option<(PositionMm, u32)>,
+        show: impl FnOnce(&Row, &B),
+    ) -> Result<Action, PlantError> {
+        let action = self.board.tick(&Sample {
+            code: AdcCode::new(self.axis.read_position(&mut self.state)),
+            reference: PositionMm::from_f64(reference_m * 1e3),
+            reference_velocity: VelocityMmS::from_f64(rate_m_s * 1e3),
+            announced,
+        });
+        let m = &self.state.core.motion;
+        let c = &self.state.core.cylinders[0];
+        let row = Row {
+            reference_m,
+            stroke_m: m.stroke_m,
+            measured_m: action.measured_mm * 1e-3,
+            velocity_m_s: m.velocity_m_s,
+            pressure_pa: self.axis.assembly.cylinders[0].pressures_pa(c, m.stroke_m),
+            load_n: m.load_n,
+            on_us: self.pending,
+            switches: self.switches(),
+            air_kg: c.supply_mass_kg,
+            settled: action.settled,
+        };
+        show(&row, &self.board);
+        self.axis.tick(&mut self.state, self.pending)?;
+        self.pending = action.on_us;
+        Ok(action)
     }
 
     fn switches(&self) -> u64 {

@@ -15,6 +15,7 @@ mod export;
 mod faults;
 mod field;
 mod figures;
+mod identify;
 mod interface;
 mod list;
 mod log;
@@ -103,6 +104,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Find gains and delays of one axis; writes a report and parameters for a board.
     Tune(tune::TuneArgs),
+    /// Fit an axis to measurements of a cylinder: intervals, and what they cannot tell.
+    Identify(identify::IdentifyArgs),
     /// Check the pneumatic plant of an axis, or export it for another integrator.
     Plant(plant::PlantArgs),
     /// Check the model against numbers that others computed.
@@ -141,6 +144,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Delay(args)) => delay::command(&args),
         Some(Command::Compare(args)) => compare::command(&args),
         Some(Command::Tune(args)) => tune::command(&args),
+        Some(Command::Identify(args)) => identify::command(&args),
         Some(Command::Plant(args)) => plant::command(&args),
         Some(Command::Check(args)) => check::command(&args),
         Some(Command::View(args)) => view::command(&args),

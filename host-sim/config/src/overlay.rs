@@ -16,7 +16,7 @@ fn parts(path: &str) -> Vec<(&str, Option<usize>)> {
 }
 
 /// `events[0]` as `events` and 0.
-pub(super) fn split_index(part: &str) -> Option<(&str, usize)> {
+pub(crate) fn split_index(part: &str) -> Option<(&str, usize)> {
     let (key, index) = part.strip_suffix(']')?.rsplit_once('[')?;
     Some((key, index.parse().ok()?))
 }
@@ -51,7 +51,7 @@ fn last(path: &str) -> &str {
 }
 
 /// Writes a quantity; false where the path leads nowhere.
-pub(super) fn set_quantity(
+pub(crate) fn set_quantity(
     document: &mut DocumentMut,
     info: &ParameterInfo,
     values: &[f64],
@@ -82,7 +82,7 @@ pub(super) fn set_quantity(
 }
 
 /// Writes a plain value; false where the path leads nowhere.
-pub(super) fn set(document: &mut DocumentMut, path: &str, value: Value) -> bool {
+pub(crate) fn set(document: &mut DocumentMut, path: &str, value: Value) -> bool {
     let Some(table) = holder(document, path).and_then(Item::as_table_like_mut) else {
         return false;
     };
@@ -91,7 +91,7 @@ pub(super) fn set(document: &mut DocumentMut, path: &str, value: Value) -> bool 
 }
 
 /// The text that a file has at a path, if it has one.
-pub(super) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str> {
+pub(crate) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str> {
     let mut item = document.as_item();
     for (key, index) in parts(path) {
         item = item.get(key)?;
@@ -103,7 +103,7 @@ pub(super) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str>
 }
 
 /// Adds a fault to a scenario.
-pub(super) fn add_fault(document: &mut DocumentMut, fault: &str) {
+pub(crate) fn add_fault(document: &mut DocumentMut, fault: &str) {
     let table = document.as_table_mut();
     match table.get_mut("faults").and_then(Item::as_array_mut) {
         Some(list) => list.push(fault),

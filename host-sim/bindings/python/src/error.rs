@@ -1,0 +1,63 @@
+//! Errors as Python exceptions, in the words of the program.
+
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
+use pyo3::PyErr;
+use pyo3::create_exception;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use wheeleg_plant::PlantError;
+use wheeleg_studies::axis_sim::Kind;
+
+create_exception!(
+    wheeleg,
+    ConfigError,
+    PyValueError,
+    "A file, a parameter or a command is wrong: names file, field, value and allowed range."
+);
+create_exception!(
+    wheeleg,
+    SimulationError,
+    PyRuntimeError,
+    "The simulation cannot go on: the plant has left its range, or the robot does not get ready."
+);
+
+/// Width of a message, columns.
+const WIDTH: usize = 100;
+
+/// What the program prints of an error, without colours.
+fn printed(error: &dyn Diagnostic) -> String {
+    let mut text = String::new();
+    let handler =
+        GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor()).with_width(WIDTH);
+    match handler.render_report(&mut text, error) {
+        Ok(()) => text.trim_end().to_owned(),
+        Err(_) => error.to_string(),
+    }
+}
+
+/// Wrong input.
+pub(crate) fn config(error: &dyn Diagnostic) -> PyErr {
+    ConfigError::new_err(printed(error))
+}
+
+/// Wrong input that is no file's.
+pub(crate) fn value(message: impl Into<String>) -> PyErr {
+    ConfigError::new_err(message.into())
+}
+
+/// What ends a simulation.
+pub(crate) fn simulation(error: &dyn Diagnostic) -> PyErr {
+    SimulationError::new_err(printed(error))
+}
+
+/// Of the plant: an input or a parameter out of its range is the caller's.
+pub(crate) fn plant(error: &PlantError) -> PyErr {
+    match error {
+        PlantError::Parameter { .. } | PlantError::Input { .. } => value(error.to_string()),
+        _ => SimulationError::new_err(error.to_string()),
+    }
+}
+
+/// Names of the control laws.
+pub(crate) fn laws() -> Vec<&'static str> {
+    Kind::ALL.map(Kind::name).to_vec()
+}

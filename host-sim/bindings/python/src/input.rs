@@ -1,0 +1,101 @@
+//! What comes from Python, checked: a wrong value is told with its place and its range.
+
+use std::fmt::Display;
+
+use numpy::{AllowTypeChange, PyArrayLike1, PyArrayLike2};
+use pyo3::prelude::*;
+use wheeleg_plant::axis::TICK_US;
+
+use crate::error;
+
+/// Ticks between two looks at the signals of the interpreter.
+const CHUNK: usize = 2000;
+
+/// Numbers one a tick.
+pub(crate) type Series<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+/// Four numbers a tick.
+pub(crate) type Series4<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+
+/// A number within a range; `what` says which.
+pub(crate) fn within(what: &dyn Display, value: f64, min: f64, max: f64) -> PyResult<f64> {
+    if value >= min && value <= max {
+        Ok(value)
+    } else {
+        Err(error::value(format!(
+            "{what} = {value} is outside {min}..={max}"
+        )))
+    }
+}
+
+/// A whole number within a range.
+pub(crate) fn whole(what: &dyn Display, value: f64, max: u16) -> PyResult<u16> {
+    let value = within(what, value, 0.0, f64::from(max))?;
+    if value.fract() == 0.0 {
+        Ok(value as u16)
+    } else {
+        Err(error::value(format!("{what} = {value} is no whole number")))
+    }
+}
+
+/// On-times of the four valves, µs.
+pub(crate) fn on_times(what: &str, values: &[f64]) -> PyResult<[u16; 4]> {
+    if values.len() != 4 {
+        return Err(error::value(format!(
+            "{what} has {} values, not 4: fill A, vent A, fill B, vent B",
+            values.len()
+        )));
+    }
+    let mut on_us = [0; 4];
+    for (i, (to, value)) in on_us.iter_mut().zip(values).enumerate() {
+        *to = whole(&format_args!("{what}[{i}]"), *value, TICK_US)?;
+    }
+    Ok(on_us)
+}
+
+/// A series within a range, all of it.
+pub(crate) fn series(what: &str, values: &Series<'_>, min: f64, max: f64) -> PyResult<Vec<f64>> {
+    let values = values.as_array();
+    let checked = values.iter().enumerate();
+    checked
+        .map(|(i, v)| within(&format_args!("{what}[{i}]"), *v, min, max))
+        .collect()
+}
+
+/// A series beside another one, of the same length.
+pub(crate) fn beside(
+    what: &str,
+    values: Option<&Series<'_>>,
+    [min, max]: [f64; 2],
+    length: usize,
+) -> PyResult<Option<Vec<f64>>> {
+    let Some(values) = values else {
+        return Ok(None);
+    };
+    let values = series(what, values, min, max)?;
+    if values.len() == length {
+        Ok(Some(values))
+    } else {
+        Err(error::value(format!(
+            "{what} has {} values, not {length} as the ticks",
+            values.len()
+        )))
+    }
+}
+
+/// Simulates `ticks` ticks without the interpreter lock. Ctrl-C ends it between two chunks.
+pub(crate) fn unlocked<E: Send>(
+    py: Python<'_>,
+    ticks: usize,
+    mut tick: impl FnMut(usize) -> Result<(), E> + Send,
+    failed: impl Fn(&E) -> PyErr,
+) -> PyResult<()> {
+    let mut begin = 0;
+    while begin < ticks {
+        let end = ticks.min(begin + CHUNK);
+        py.detach(|| (begin..end).try_for_each(&mut tick))
+            .map_err(|e| failed(&e))?;
+        py.check_signals()?;
+        begin = end;
+    }
+    Ok(())
+}

@@ -1,0 +1,41 @@
+//! The Python package `wheeleg`: the simulator's own plant and the robot's own firmware, with
+//! numpy arrays in and out.
+//!
+//! Nothing is modelled here. A class holds what a crate below has, checks what comes in, and
+//! turns rows into arrays. The interpreter lock is released while anything is simulated.
+//!
+//! # Glossary
+//!
+//! * **axis**: the file of one cylinder with its valves, mass and sensor
+//! * **cylinder**: the plant of an axis; one gives the valves' on-times
+//! * **board**: the application of a joint board; one gives readings and references
+//! * **axis simulation**: both in closed loop; one gives references
+//! * **robot**: the whole robot in a scenario; one gives commands of the master
+//! * **state**: everything that decides how it goes on, taken and put back bit for bit
+
+mod axis;
+mod axis_sim;
+mod board;
+mod columns;
+mod cylinder;
+mod error;
+mod input;
+mod robot;
+
+use pyo3::prelude::*;
+
+#[pymodule(gil_used = false)]
+fn _wheeleg(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add_class::<axis::Axis>()?;
+    module.add_class::<cylinder::Cylinder>()?;
+    module.add_class::<board::Board>()?;
+    module.add_class::<board::BoardState>()?;
+    module.add_class::<axis_sim::AxisSim>()?;
+    module.add_class::<axis_sim::AxisSimState>()?;
+    module.add_class::<robot::Robot>()?;
+    module.add("ConfigError", py.get_type::<error::ConfigError>())?;
+    module.add("SimulationError", py.get_type::<error::SimulationError>())?;
+    module.add("LAWS", error::laws())?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))
+}

@@ -1,0 +1,353 @@
+//! Measurements of a cylinder: a CSV file, read and checked.
+//!
+//! Columns: `time_s`; `position_mm`; the valves either as on-times of a tick of 1 ms (`fill_a_us`,
+//! `vent_a_us`, `fill_b_us`, `vent_b_us`) or as states (`fill_a`, …, 0 or 1) that hold until the
+//! next row; if there are any, `pressure_a_bar` and `pressure_b_bar`, absolute, and `load_n`.
+
+use std::path::Path;
+
+use wheeleg_plant::axis::{AxisParams, TICK_US};
+
+use crate::StudyError;
+
+const VALVES: [&str; 4] = ["fill_a", "vent_a", "fill_b", "vent_b"];
+const PRESSURES: [&str; 2] = ["pressure_a_bar", "pressure_b_bar"];
+/// Longest measurement, s.
+const LONGEST_S: f64 = 600.0;
+/// Longest time between two rows, ms.
+const PERIOD_MAX_MS: f64 = 100.0;
+/// Fewest rows.
+const ROWS_MIN: usize = 200;
+/// How far beyond its stroke a position may be, as a share of it: sensors are not set that well.
+const BEYOND: f64 = 0.02;
+
+/// What was measured at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Tick since the begin.
+    pub tick: usize,
+    /// Stroke \[m\].
+    pub position_m: f64,
+    /// Absolute pressures of A and B \[Pa\].
+    pub pressure_pa: Option<[f64; 2]>,
+}
+
+/// A measurement, in ticks of 1 ms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lab {
+    /// On-times of each tick \[µs\].
+    pub on_us: Vec<[u16; 4]>,
+    /// Force on the rod in each tick \[N\], positive extends; `None`: the axis file's.
+    pub load_n: Option<Vec<f64>>,
+    /// What was measured, in order of time.
+    pub samples: Vec<Sample>,
+}
+
+/// A place of the file in an error.
+struct At<'a> {
+    file: &'a str,
+    line: u64,
+}
+
+impl At<'_> {
+    fn wrong(&self, column: &str, what: &str, help: &str) -> StudyError {
+        let Self { file, line } = self;
+        StudyError::refused(
+            format!("{file}, line {line}, column `{column}`: {what}"),
+            help,
+        )
+    }
+
+    fn within(
+        &self,
+        column: &str,
+        value: f64,
+        [min, max]: [f64; 2],
+        help: &str,
+    ) -> Result<f64, StudyError> {
+        if value >= min && value <= max {
+            Ok(value)
+        } else {
+            Err(self.wrong(column, &format!("{value} is outside {min} to {max}"), help))
+        }
+    }
+}
+
+/// Where the columns are.
+struct Columns {
+    names: Vec<String>,
+    time: usize,
+    position: usize,
+    valves: [usize; 4],
+    /// On-times; otherwise states.
+    on_times: bool,
+    pressures: Option<[usize; 2]>,
+    load: Option<usize>,
+}
+
+impl Columns {
+    fn of(file: &str, names: Vec<String>) -> Result<Self, StudyError> {
+        let find = |name: &str| names.iter().position(|n| n == name);
+        let help = "the columns are time_s, position_mm, fill_a_us, vent_a_us, fill_b_us, vent_b_us \
+                    (or fill_a, vent_a, fill_b, vent_b as 0 and 1), and if there are any \
+                    pressure_a_bar, pressure_b_bar, load_n";
+        let need = |name: &str| {
+            find(name).ok_or_else(|| {
+                StudyError::refused(format!("{file}, line 1: there is no column `{name}`"), help)
+            })
+        };
+        let times = VALVES.map(|valve| format!("{valve}_us"));
+        let on_times = times.iter().any(|name| find(name).is_some());
+        let mut valves = [0; 4];
+        for (at, valve) in valves.iter_mut().zip(0..4) {
+            *at = need(if on_times {
+                &times[valve]
+            } else {
+                VALVES[valve]
+            })?;
+        }
+        let pressures = match PRESSURES.map(find) {
+            [None, None] => None,
+            _ => Some([need(PRESSURES[0])?, need(PRESSURES[1])?]),
+        };
+        let columns = Self {
+            time: need("time_s")?,
+            position: need("position_mm")?,
+            valves,
+            on_times,
+            pressures,
+            load: find("load_n"),
+            names,
+        };
+        let mut known = vec![columns.time, columns.position];
+        known.extend(columns.valves);
+        known.extend(columns.pressures.into_iter().flatten());
+        known.extend(columns.load);
+        let mut others = columns.names.iter().enumerate();
+        match others.find(|(i, _)| !known.contains(i)) {
+            Some((_, name)) => Err(StudyError::refused(
+                format!("{file}, line 1: the column `{name}` is not known, or stands there twice"),
+                help,
+            )),
+            None => Ok(columns),
+        }
+    }
+}
+
+impl Lab {
+    /// Reads a file; the axis has the ranges.
+    ///
+    /// # Errors
+    /// [`StudyError`] names file, line, column, value and allowed range.
+    pub fn load(path: &Path, axis: &AxisParams) -> Result<Self, StudyError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            StudyError::refused(
+                format!("cannot read {file}: {e}"),
+                "give the path of a CSV file",
+            )
+        })?;
+        Self::parse(&file, &text, axis)
+    }
+
+    /// The same from text.
+    ///
+    /// # Errors
+    /// As [`Lab::load`].
+    pub fn parse(file: &str, text: &str, axis: &AxisParams) -> Result<Self, StudyError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let bad = |e: &csv::Error| {
+            StudyError::refused(
+                format!("{file}: {e}"),
+                "each line has a value for each column",
+            )
+        };
+        let names = reader.headers().map_err(|e| bad(&e))?;
+        let columns = Columns::of(file, names.iter().map(str::to_owned).collect())?;
+        let mut rows = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(|e| bad(&e))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            rows.push((line, row(&At { file, line }, &columns, &record, axis)?));
+        }
+        if rows.len() < ROWS_MIN {
+            return Err(StudyError::refused(
+                format!(
+                    "{file} has {} rows; at least {ROWS_MIN} are needed",
+                    rows.len()
+                ),
+                "measure longer, or more often",
+            ));
+        }
+        units(file, &rows, axis)?;
+        ticks(file, &columns, &rows)
+    }
+}
+
+/// A row as it stands.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    time_s: f64,
+    position_m: f64,
+    on_us: [u16; 4],
+    pressure_pa: Option<[f64; 2]>,
+    load_n: Option<f64>,
+}
+
+fn row(
+    at: &At<'_>,
+    columns: &Columns,
+    record: &csv::StringRecord,
+    axis: &AxisParams,
+) -> Result<Row, StudyError> {
+    let number = |column: usize| {
+        let (name, text) = (&columns.names[column], record.get(column).unwrap_or(""));
+        let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
+        value.ok_or_else(|| {
+            at.wrong(
+                name,
+                &format!("\"{text}\" is no number"),
+                "a number with a decimal point",
+            )
+        })
+    };
+    let stroke_mm = axis.cylinder.stroke_m * 1e3;
+    let most_mm = stroke_mm * (1.0 + BEYOND);
+    let position_mm = at.within(
+        "position_mm",
+        number(columns.position)?,
+        [-BEYOND * stroke_mm, most_mm],
+        "positions are strokes in mm, 0 where the rod is in; the axis file has the cylinder's stroke",
+    )?;
+    let mut on_us = [0; 4];
+    for (valve, on) in on_us.iter_mut().enumerate() {
+        let column = columns.valves[valve];
+        let name = &columns.names[column];
+        let most = if columns.on_times {
+            f64::from(TICK_US)
+        } else {
+            1.0
+        };
+        let help = if columns.on_times {
+            "on-times are whole microseconds of a tick of 1 ms"
+        } else {
+            "a state is 0 or 1"
+        };
+        let value = at.within(name, number(column)?, [0.0, most], help)?;
+        if value.fract() != 0.0 {
+            return Err(at.wrong(name, &format!("{value} is no whole number"), help));
+        }
+        *on = if columns.on_times {
+            value as u16
+        } else {
+            value as u16 * TICK_US
+        };
+    }
+    let pressure = |column: usize| {
+        let help = "pressures are absolute, in bar";
+        at.within(&columns.names[column], number(column)?, [0.1, 20.0], help)
+    };
+    let pressure_pa = match columns.pressures {
+        Some([a, b]) => Some([pressure(a)? * 1e5, pressure(b)? * 1e5]),
+        None => None,
+    };
+    let load_n = match columns.load {
+        Some(column) => Some(at.within(
+            "load_n",
+            number(column)?,
+            [-1e4, 1e4],
+            "a force in N, positive extends",
+        )?),
+        None => None,
+    };
+    Ok(Row {
+        time_s: number(columns.time)?,
+        position_m: position_mm * 1e-3,
+        on_us,
+        pressure_pa,
+        load_n,
+    })
+}
+
+/// A piston that hardly moves is one in metres, or one that tells nothing.
+fn units(file: &str, rows: &[(u64, Row)], axis: &AxisParams) -> Result<(), StudyError> {
+    let positions = rows.iter().map(|(_, row)| row.position_m);
+    let (low, high) = positions.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+    let stroke_m = axis.cylinder.stroke_m;
+    if high - low >= 0.02 * stroke_m {
+        return Ok(());
+    }
+    let metres = high <= 1.1e-3 * stroke_m && high > low;
+    Err(StudyError::refused(
+        format!(
+            "{file}, column `position_mm`: all values lie within {:.3} mm, less than 2 % of the stroke of {:.0} mm",
+            (high - low) * 1e3,
+            stroke_m * 1e3
+        ),
+        if metres {
+            "they look like metres: multiply them by 1000"
+        } else {
+            "a piston that stands tells nothing: move it over a good part of its stroke"
+        },
+    ))
+}
+
+/// Rows on a grid of whole ms, without gaps.
+fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, StudyError> {
+    let begin_s = rows[0].1.time_s;
+    let ms = |row: &Row| (row.time_s - begin_s) * 1e3;
+    let period_ms = ms(&rows[1].1);
+    let at = |line: u64| At { file, line };
+    let help = if columns.on_times {
+        "on-times need a row for every ms"
+    } else {
+        "rows stand at equal times, a whole number of ms apart: fill or cut what is missing"
+    };
+    let most = if columns.on_times { 1.0 } else { PERIOD_MAX_MS };
+    let step = period_ms.round();
+    if !(1.0..=most).contains(&step) || (period_ms - step).abs() > 0.05 {
+        let what = format!("{period_ms:.3} ms after the first row; allowed: whole ms, 1 to {most}");
+        return Err(at(rows[1].0).wrong("time_s", &what, help));
+    }
+    for (k, (line, row)) in rows.iter().enumerate() {
+        let due_ms = k as f64 * step;
+        if (ms(row) - due_ms).abs() > 0.3 * step {
+            let what = format!(
+                "{} is {:.3} ms after the begin, and should be {due_ms} ms",
+                row.time_s,
+                ms(row)
+            );
+            return Err(at(*line).wrong("time_s", &what, help));
+        }
+    }
+    if rows.len() as f64 * step > LONGEST_S * 1e3 {
+        return Err(StudyError::refused(
+            format!("{file} is longer than {LONGEST_S} s"),
+            "cut it",
+        ));
+    }
+    let held = step as usize;
+    let each = |value: &dyn Fn(&Row) -> f64| -> Vec<f64> {
+        rows.iter()
+            .flat_map(|(_, row)| std::iter::repeat_n(value(row), held))
+            .collect()
+    };
+    Ok(Lab {
+        on_us: rows
+            .iter()
+            .flat_map(|(_, row)| std::iter::repeat_n(row.on_us, held))
+            .collect(),
+        load_n: columns.load.map(|_| each(&|row| row.load_n.unwrap_or(0.0))),
+        samples: rows
+            .iter()
+            .enumerate()
+            .map(|(k, (_, row))| Sample {
+                tick: k * held,
+                position_m: row.position_m,
+                pressure_pa: row.pressure_pa,
+            })
+            .collect(),
+    })
+}

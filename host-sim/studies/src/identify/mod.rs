@@ -1,0 +1,442 @@
+//! A user's cylinder from measurements: `wheeleg identify`.
+//!
+//! A measurement ([`lab`]) has what the valves were told and where the piston was. The plant is
+//! fitted to its first part ([`fit`]) by factors on parameters of the axis file ([`free`]), and
+//! judged by the rest. Every parameter gets an interval; what the data cannot tell is said
+//! ([`told`]), and which valve sequence would tell most of it ([`experiment`]).
+
+pub mod experiment;
+pub mod fit;
+pub mod free;
+pub mod lab;
+mod page;
+mod predict;
+pub mod told;
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use schemars::JsonSchema;
+use serde::Serialize;
+use wheeleg_config::AxisConfig;
+use wheeleg_config::axis::Change;
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::sensors::AdcNoise;
+
+use self::experiment::Experiment;
+use self::fit::{Fit, Noise, Problem, scatter, trust};
+use self::free::{COUNT, FREE, Logs, applied};
+use self::lab::Lab;
+use self::predict::{Predicted, predict};
+use self::told::Told;
+use crate::StudyError;
+use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
+
+/// Starts of the fit: the file, and others around it.
+const STARTS: usize = 4;
+/// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
+const PRESSURE_PA: f64 = 2e3;
+/// A rest of the measurement that is missed by more than this many times the sensor's noise is
+/// not explained by the model.
+const EXPLAINED: f64 = 3.0;
+
+/// The identified axis, below the folder of the results.
+pub const AXIS: &str = "axis.toml";
+/// The next experiment.
+pub const NEXT: &str = "next-experiment.csv";
+
+/// One factor.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Parameter {
+    /// Name.
+    pub name: &'static str,
+    /// In words.
+    pub words: &'static str,
+    /// Parameters of the axis file that it multiplies.
+    pub paths: &'static [&'static str],
+    /// Factor on the file's value.
+    pub factor: f64,
+    /// Least factor, 95 %.
+    pub low: f64,
+    /// Largest factor, 95 %.
+    pub high: f64,
+    /// Whether the data tell it; otherwise it is what the file is trusted to.
+    pub told: bool,
+}
+
+/// How far the plant is from what was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Misses {
+    /// Root mean square of the position's error in what was fitted \[mm\].
+    pub fitted_mm: f64,
+    /// The same in the rest, which the fit has not seen \[mm\].
+    pub held_out_mm: f64,
+}
+
+/// What came of an identification.
+#[derive(Debug, Clone)]
+pub struct Identified {
+    /// The axis of the file.
+    pub config: AxisConfig,
+    /// What was measured.
+    pub lab: Lab,
+    /// Ticks that were fitted.
+    pub ticks: usize,
+    /// The fit.
+    pub fit: Fit,
+    /// All factors.
+    pub parameters: Vec<Parameter>,
+    /// With the file as it is.
+    pub before: Misses,
+    /// With the factors.
+    pub after: Misses,
+    /// Noise of the position sensor by the axis file \[mm\].
+    pub noise_mm: f64,
+    /// What the data cannot tell.
+    pub untold: Vec<String>,
+    /// Next experiments, the most telling first.
+    pub experiments: Vec<Experiment>,
+    /// Stroke by the file and by the fit, at every sample.
+    pub played: [Vec<Predicted>; 2],
+    /// The identified axis.
+    pub toml: String,
+    /// What stopped it before its end.
+    pub stopped: Option<Stopped>,
+}
+
+/// Contents of `summary.json`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Summary<'a> {
+    /// Name of the axis.
+    axis: &'a str,
+    /// Rows of the measurement.
+    rows: usize,
+    /// Length of the measurement \[s\].
+    measured_s: f64,
+    /// Length of the part that was fitted \[s\].
+    fitted_s: f64,
+    /// All factors.
+    parameters: &'a [Parameter],
+    /// How far the file was off.
+    before: Misses,
+    /// How far the identified axis is off.
+    after: Misses,
+    /// Noise of the position sensor by the axis file \[mm\].
+    noise_mm: f64,
+    /// Whether the rest of the measurement is met within three times the noise.
+    explained: bool,
+    /// What the data cannot tell.
+    cannot_tell: &'a [String],
+    /// The most telling next experiment, null if the plant plays none.
+    next_experiment: Option<&'a str>,
+}
+
+impl study::Summary for Summary<'_> {
+    const SCHEMA: &'static str = "wheeleg.identify/1";
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Options<'a> {
+    /// The measurement.
+    pub lab: &'a Path,
+    /// Built-in axis or path of an axis file.
+    pub axis: &'a str,
+    /// Share of the measurement, from its end, that the fit does not see, 0.1 to 0.9.
+    pub hold_out: f64,
+    /// Seed of the starts.
+    pub seed: u64,
+}
+
+/// Identifies an axis, and writes report, figures, `summary.json`, [`AXIS`] and [`NEXT`].
+///
+/// # Errors
+/// [`StudyError`] if a file is wrong, the plant cannot play the measurement, or something cannot
+/// be drawn or written.
+pub fn identify(
+    options: &Options<'_>,
+    settings: impl FnOnce(&str) -> Settings,
+) -> Result<Finished<Identified>, StudyError> {
+    let source = AxisConfig::source(options.axis)?;
+    let config = AxisConfig::parse(&source.file, &source.text)?;
+    let lab = Lab::load(options.lab, &config.axis)?;
+    let job = Job::begin("identify", &settings(&config.name))?;
+    let identified = Identified::of(config, lab, options, &job.progress)?;
+    let toml = identified.rewritten(&source.file, &source.text, options)?;
+    Identified { toml, ..identified }.write(job)
+}
+
+/// Noise of the position by the axis file, and a guess of that of pressures.
+#[must_use]
+pub fn noise(axis: &AxisParams) -> Noise {
+    let lsb_m = axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits);
+    let each = match axis.adc.noise {
+        AdcNoise::None => 0.0,
+        AdcNoise::Uniform { half_width_lsb } => half_width_lsb.powi(2) / 3.0,
+        AdcNoise::Gaussian { sigma_lsb } => sigma_lsb.powi(2),
+    };
+    let mean = each / f64::from(axis.adc.oversampling.max(1));
+    Noise {
+        position_m: lsb_m * (mean + 1.0 / 12.0).sqrt(),
+        pressure_pa: PRESSURE_PA,
+    }
+}
+
+/// Starts of the fit.
+fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let mut all = vec![[0.0; COUNT]];
+    all.extend((1..STARTS).map(|_| {
+        std::array::from_fn(|i| {
+            let [low, high] = limits[i];
+            (trust(i) * rng.random_range(-1.0..1.0)).clamp(low, high)
+        })
+    }));
+    all
+}
+
+/// The best of several fits, if there is any, and what stopped them.
+///
+/// # Errors
+/// [`StudyError::Refused`] if the plant plays the measurement from no start.
+pub fn best(
+    problem: &Problem<'_>,
+    starts: &[Logs],
+    progress: &Progress,
+) -> Result<(Fit, Option<Stopped>), StudyError> {
+    let go_on = || !progress.is_stopped();
+    let fits = progress.each("starts", starts, |start| {
+        Ok::<_, StudyError>(problem.fit(start, &go_on))
+    })?;
+    let done = fits.iter().flatten().count() as u64;
+    let stopped = progress.stopped(done, starts.len() as u64, "starts");
+    let fits = fits.into_iter().flatten().flatten();
+    let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let best = best.ok_or_else(|| {
+        StudyError::refused(
+            "the plant of the axis file cannot play this measurement",
+            "check the file's stroke, mass, load and supply against the bench",
+        )
+    })?;
+    Ok((best, stopped))
+}
+
+/// Variance of a residual that counts: of residuals that follow each other, fewer do.
+fn variance(fit: &Fit, channels: usize) -> f64 {
+    let of = |first: usize| {
+        let residuals = fit.residuals.iter().skip(first).step_by(channels);
+        let (deviation, neighbours) = scatter(&nalgebra::DVector::from_iterator(
+            fit.residuals.len() / channels,
+            residuals.copied(),
+        ));
+        deviation.powi(2) * (1.0 + neighbours) / (1.0 - neighbours)
+    };
+    (0..channels).map(of).fold(1.0, f64::max)
+}
+
+fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
+    let root = |fitted: bool| {
+        let pairs = lab.samples.iter().zip(predicted);
+        let (count, sum) = pairs
+            .filter(|(sample, _)| (sample.tick < ticks) == fitted)
+            .fold((0.0, 0.0), |(n, sum), (sample, predicted)| {
+                let error_mm = (predicted.position_m - sample.position_m) * 1e3;
+                (n + 1.0, sum + error_mm * error_mm)
+            });
+        (sum / f64::max(count, 1.0)).sqrt()
+    };
+    Misses {
+        fitted_mm: root(true),
+        held_out_mm: root(false),
+    }
+}
+
+/// A fit, and what it tells.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// The fit.
+    pub fit: Fit,
+    /// Of each factor.
+    pub told: [Told; COUNT],
+    /// Information of the data about the logarithms.
+    pub information: DMatrix<f64>,
+    /// What stopped it before all starts were tried.
+    pub stopped: Option<Stopped>,
+}
+
+/// The fit of a measurement, with what it tells: used by the study and by its tests.
+///
+/// # Errors
+/// As [`best`].
+pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<Fitted, StudyError> {
+    let pressures = problem.lab.samples.iter().any(|s| s.pressure_pa.is_some());
+    let channels = if pressures { 3 } else { 1 };
+    let (first, stopped) = best(problem, &starts(&problem.limits, seed), progress)?;
+    // What the model misses is noise to the fit: the file is not overruled by it.
+    let share = variance(&first, channels).sqrt();
+    let second = Problem {
+        noise: Noise {
+            position_m: problem.noise.position_m * share,
+            pressure_pa: problem.noise.pressure_pa * share,
+        },
+        ..*problem
+    };
+    let go_on = || !progress.is_stopped();
+    let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
+    let jacobian = second.jacobian(&fit.logs).ok_or_else(|| {
+        StudyError::refused(
+            "the plant leaves its range close to the best fit",
+            "check the file's stroke, mass, load and supply against the bench",
+        )
+    })?;
+    let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
+    Ok(Fitted {
+        fit,
+        told: told::told(&information),
+        information,
+        stopped,
+    })
+}
+
+impl Identified {
+    fn of(
+        config: AxisConfig,
+        lab: Lab,
+        options: &Options<'_>,
+        progress: &Progress,
+    ) -> Result<Self, StudyError> {
+        let axis = &config.axis;
+        let ticks = (lab.on_us.len() as f64 * (1.0 - options.hold_out)).round() as usize;
+        let noise = noise(axis);
+        let problem = Problem {
+            axis,
+            lab: &lab,
+            ticks,
+            noise,
+            limits: free::limits(&config),
+        };
+        let Fitted {
+            fit,
+            told,
+            information,
+            stopped,
+        } = fitted(&problem, options.seed, progress)?;
+        let play = |axis: &AxisParams| {
+            predict(axis, &lab, lab.on_us.len()).map_err(|e| {
+                StudyError::refused(
+                    format!("the plant cannot play the rest of the measurement: {e}"),
+                    "check the file's stroke, mass, load and supply against the bench",
+                )
+            })
+        };
+        let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
+        let parameters = FREE.iter().zip(&fit.logs).zip(&told);
+        let parameters = parameters.map(|((free, log), told)| {
+            let [low, high] = told.factors(*log);
+            Parameter {
+                name: free.name,
+                words: free.words,
+                paths: free.paths,
+                factor: log.exp(),
+                low,
+                high,
+                told: told.told,
+            }
+        });
+        Ok(Self {
+            parameters: parameters.collect(),
+            before: misses(&lab, &played[0], ticks),
+            after: misses(&lab, &played[1], ticks),
+            noise_mm: noise.position_m * 1e3,
+            untold: told::untold(&information),
+            experiments: experiment::ranked(&problem, &fit.logs, &information, 1.0),
+            ticks,
+            fit,
+            played,
+            toml: String::new(),
+            stopped,
+            lab,
+            config,
+        })
+    }
+
+    /// Whether the rest of the measurement is met.
+    #[must_use]
+    pub fn is_explained(&self) -> bool {
+        self.after.held_out_mm <= EXPLAINED * self.noise_mm
+    }
+
+    /// The axis file with what was found.
+    fn rewritten(
+        &self,
+        file: &str,
+        text: &str,
+        options: &Options<'_>,
+    ) -> Result<String, StudyError> {
+        let lab = options.lab.file_name().map(|name| name.to_string_lossy());
+        let lab = lab.unwrap_or_default();
+        let changes = self.parameters.iter().flat_map(|parameter| {
+            let lab = &lab;
+            self.config
+                .parameters
+                .iter()
+                .filter(|info| parameter.paths.contains(&info.path.as_str()))
+                .map(move |info| {
+                    let value = |factor: f64| info.value.first().map_or(0.0, |v| v * factor);
+                    let interval = format!(
+                        "{} to {} {}",
+                        wheeleg_config::brief(value(parameter.low)),
+                        wheeleg_config::brief(value(parameter.high)),
+                        info.unit
+                    );
+                    Change {
+                        path: info.path.clone(),
+                        values: vec![value(parameter.factor).clamp(info.min, info.max)],
+                        unit: info.unit.clone(),
+                        source: if parameter.told {
+                            format!("IDENTIFIED from {lab}: {interval} (95 %)")
+                        } else {
+                            format!("ASSUMED: {lab} does not tell it; before: {}", info.source)
+                        },
+                    }
+                })
+        });
+        let changes: Vec<Change> = changes.collect();
+        Ok(AxisConfig::rewritten(file, text, &changes)?)
+    }
+
+    /// What `summary.json` holds.
+    #[must_use]
+    pub fn summary(&self) -> Summary<'_> {
+        Summary {
+            axis: &self.config.name,
+            rows: self.lab.samples.len(),
+            measured_s: self.lab.on_us.len() as f64 * 1e-3,
+            fitted_s: self.ticks as f64 * 1e-3,
+            parameters: &self.parameters,
+            before: self.before,
+            after: self.after,
+            noise_mm: self.noise_mm,
+            explained: self.is_explained(),
+            cannot_tell: &self.untold,
+            next_experiment: self.experiments.first().map(|e| e.name),
+        }
+    }
+
+    fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
+        let stopped = self.stopped.clone();
+        let summary = job.summary(&self.summary(), stopped.as_ref())?;
+        // A fit that was stopped is none to build on.
+        if stopped.is_none() {
+            job.save(AXIS, &self.toml)?;
+        }
+        if let Some(experiment) = self.experiments.first() {
+            job.save(NEXT, &experiment::csv(experiment))?;
+        }
+        let drawn = job.draw(page::figures(&self))?;
+        let page = page::render(&self, &drawn)?;
+        job.finish(self, summary, &page, stopped)
+    }
+}

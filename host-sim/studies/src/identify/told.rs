@@ -1,0 +1,120 @@
+//! What a fit tells: intervals, and what the data cannot tell.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::fit::{Z95, trust};
+use super::free::{COUNT, FREE, Logs};
+
+/// A parameter is told if the data leave less than this share of the file's uncertainty.
+const TOLD: f64 = 0.5;
+/// Least share of a parameter in a direction that is named.
+const SHARE: f64 = 0.3;
+
+/// What the data say of one factor.
+#[derive(Debug, Clone, Copy)]
+pub struct Told {
+    /// Standard deviation of the logarithm.
+    pub deviation: f64,
+    /// Whether the data tell it.
+    pub told: bool,
+}
+
+impl Told {
+    /// Least and largest factor, 95 %.
+    #[must_use]
+    pub fn factors(&self, log: f64) -> [f64; 2] {
+        [-1.0, 1.0].map(|sign| (log + sign * Z95 * self.deviation).exp())
+    }
+}
+
+/// Information of data about the logarithms: J'J over the variance of a residual that counts.
+#[must_use]
+pub fn information(jacobian: &DMatrix<f64>, variance: f64) -> DMatrix<f64> {
+    jacobian.tr_mul(jacobian) / variance
+}
+
+/// Deviations under the information of data and file.
+#[must_use]
+pub fn told(information: &DMatrix<f64>) -> [Told; COUNT] {
+    let mut whole = information.clone();
+    for i in 0..COUNT {
+        whole[(i, i)] += trust(i).powi(-2);
+    }
+    let covariance = whole.cholesky().map(|c| c.inverse());
+    std::array::from_fn(|i| {
+        let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
+        let deviation = variance.sqrt().min(trust(i));
+        Told {
+            deviation,
+            told: deviation < TOLD * trust(i),
+        }
+    })
+}
+
+/// What can change together without the data noticing, in words: directions in which the data
+/// say less than the file.
+#[must_use]
+pub fn untold(information: &DMatrix<f64>) -> Vec<String> {
+    // In units of what the file is trusted to.
+    let scaled = DMatrix::from_fn(COUNT, COUNT, |i, k| {
+        trust(i) * information[(i, k)] * trust(k)
+    });
+    let eigen = SymmetricEigen::new(scaled);
+    let limit = TOLD.powi(-2) - 1.0;
+    let mut weak: Vec<usize> = (0..COUNT)
+        .filter(|k| eigen.eigenvalues[*k] < limit)
+        .collect();
+    weak.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    weak.into_iter()
+        .map(|k| {
+            let direction = eigen.eigenvectors.column(k);
+            let mut parts: Vec<usize> =
+                (0..COUNT).filter(|i| direction[*i].abs() > SHARE).collect();
+            parts.sort_by(|a, b| direction[*b].abs().total_cmp(&direction[*a].abs()));
+            let lead = parts.first().map_or(1.0, |i| direction[*i].signum());
+            let words: Vec<String> = parts
+                .iter()
+                .map(|i| {
+                    let way = if direction[*i] * lead > 0.0 {
+                        "up"
+                    } else {
+                        "down"
+                    };
+                    format!("{} {way}", FREE[*i].words)
+                })
+                .collect();
+            match &words[..] {
+                [_] => format!(
+                    "{}: it has hardly an effect on what was measured",
+                    FREE[parts[0]].words
+                ),
+                _ => format!("{} together look the same", words.join(", ")),
+            }
+        })
+        .collect()
+}
+
+/// Volume of what is not known, as the mean of the logarithms of the deviations over the file's
+/// along the main directions: 0 is what the file says, smaller is better.
+#[must_use]
+pub fn ignorance(information: &DMatrix<f64>) -> f64 {
+    let scaled = DMatrix::from_fn(COUNT, COUNT, |i, k| {
+        let own = if i == k { 1.0 } else { 0.0 };
+        own + trust(i) * information[(i, k)] * trust(k)
+    });
+    let values = SymmetricEigen::new(scaled).eigenvalues;
+    -0.5 * values.iter().map(|v| v.max(1.0).ln()).sum::<f64>() / COUNT as f64
+}
+
+/// Whether a value lies in the interval of its parameter; for tests of the coverage.
+#[must_use]
+pub fn covers(told: &Told, log: f64, truth: f64) -> bool {
+    (log - truth).abs() <= Z95 * told.deviation
+}
+
+/// Largest told deviation from a truth; for tests.
+#[must_use]
+pub fn worst_told(told: &[Told; COUNT], logs: &Logs, truth: &Logs) -> f64 {
+    let all = (0..COUNT).filter(|i| told[*i].told);
+    all.map(|i| (logs[i] - truth[i]).abs()).fold(0.0, f64::max)
+}

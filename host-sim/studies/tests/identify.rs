@@ -1,0 +1,305 @@
+//! Identification: the truth is known, because the measurements are the plant's own.
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use wheeleg_config::AxisConfig;
+use wheeleg_plant::axis::{Axis, AxisParams};
+use wheeleg_studies::identify::fit::{Problem, trust};
+use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
+use wheeleg_studies::identify::lab::Lab;
+use wheeleg_studies::identify::told::{covers, untold};
+use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
+use wheeleg_studies::study::{Progress, Settings};
+
+const OUT: [u16; 4] = [1000, 0, 0, 1000];
+const BACK: [u16; 4] = [0, 1000, 1000, 0];
+
+/// A rest, then strokes of many lengths, pulses, and chambers by themselves.
+fn rich(t: usize) -> [u16; 4] {
+    let Some(t) = t.checked_sub(200) else {
+        return [0; 4];
+    };
+    let (slot, at) = (t / 400 % 12, t % 400);
+    match slot {
+        0 | 4 => OUT,
+        1 | 5 => BACK,
+        2 if at < 90 => OUT,
+        3 if at < 60 => BACK,
+        6 if at % 60 < 9 => OUT,
+        7 if at % 60 < 7 => BACK,
+        8 => [1000, 0, 1000, 0],
+        9 => [0, 0, 0, 1000],
+        10 => [0, 1000, 0, 0],
+        11 => [0, 0, 1000, 0],
+        _ => [0; 4],
+    }
+}
+
+fn config() -> AxisConfig {
+    AxisConfig::load("bench-vq110u").expect("built in")
+}
+
+/// What a bench with these parameters writes: position by its converter, and pressures if asked.
+fn measured(
+    axis: &AxisParams,
+    seed: u64,
+    ticks: usize,
+    valves: fn(usize) -> [u16; 4],
+    pressures: bool,
+) -> String {
+    let plant = Axis::new(axis).expect("a plant");
+    let mut state = plant.initial_state(seed);
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let mut text = "time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us".to_owned();
+    text.push_str(if pressures {
+        ",pressure_a_bar,pressure_b_bar\n"
+    } else {
+        "\n"
+    });
+    for tick in 0..ticks {
+        let sensor = &axis.potentiometer;
+        let share = f64::from(plant.read_position(&mut state)) / 65_536.0;
+        let position_mm = (share * sensor.electrical_stroke_m - sensor.offset_m) * 1e3;
+        let on_us = valves(tick);
+        let [fill_a, vent_a, fill_b, vent_b] = on_us;
+        let time_s = tick as f64 * 1e-3;
+        text.push_str(&format!(
+            "{time_s:.3},{position_mm:.4},{fill_a},{vent_a},{fill_b},{vent_b}"
+        ));
+        if pressures {
+            for pressure_pa in plant.outputs(&state).pressure_pa {
+                let bar = pressure_pa * 1e-5 + 0.02 * (rng.random_range(-1.0..1.0_f64));
+                text.push_str(&format!(",{bar:.4}"));
+            }
+        }
+        text.push('\n');
+        plant.tick(&mut state, on_us).expect("it plays");
+    }
+    text
+}
+
+/// A cylinder that is not what its data sheet says.
+fn truth(seed: u64) -> Logs {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    std::array::from_fn(|i| 0.5 * trust(i) * rng.random_range(-1.0..1.0))
+}
+
+fn problem<'a>(config: &'a AxisConfig, lab: &'a Lab) -> Problem<'a> {
+    Problem {
+        axis: &config.axis,
+        lab,
+        ticks: lab.on_us.len(),
+        noise: noise(&config.axis),
+        limits: limits(config),
+    }
+}
+
+#[test]
+fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
+    let config = config();
+    let truth = truth(3);
+    let text = measured(&applied(&config.axis, &truth), 1, 4800, rich, true);
+    let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
+    let progress = Progress::silent();
+    let Fitted {
+        fit,
+        told,
+        information,
+        stopped,
+    } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
+    assert!(stopped.is_none());
+    let found = (0..COUNT).filter(|i| told[*i].told).count();
+    assert!(found >= 8, "{found} told: {told:?}");
+    for i in (0..COUNT).filter(|i| told[*i].told) {
+        let off = (fit.logs[i] - truth[i]).abs();
+        let name = FREE[i].name;
+        // Three standard deviations, and a bar of its own for a mistake in the intervals.
+        assert!(
+            off < 3.0 * told[i].deviation + 0.01,
+            "{name}: {off} of {}",
+            told[i].deviation
+        );
+        assert!(off < 0.25, "{name}: {off}");
+    }
+    // The truth is about as likely as the fit: a model that has got stuck is not.
+    let residuals = problem(&config, &lab).residuals(&truth).expect("a plant");
+    assert!(fit.residuals.norm() < 1.1 * residuals.norm());
+    assert!(untold(&information).len() <= COUNT - found);
+}
+
+/// A valve that never shuts has no closing delay that could be seen.
+#[test]
+fn what_the_valves_never_did_cannot_be_told() {
+    let config = config();
+    let text = measured(&config.axis, 1, 600, |_| OUT, false);
+    let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
+    let Fitted {
+        fit,
+        told,
+        information,
+        ..
+    } = fitted(&problem(&config, &lab), 1, &Progress::silent()).expect("a fit");
+    let closing = FREE
+        .iter()
+        .position(|f| f.name == "closing_delay")
+        .expect("one");
+    assert!(!told[closing].told && fit.logs[closing].abs() < 1e-6);
+    let words = untold(&information);
+    assert!(
+        words.iter().any(|w| w.starts_with("closing delay")),
+        "{words:?}"
+    );
+    // One stroke: far from everything is known, and the intervals say so.
+    assert!(told.iter().filter(|t| t.told).count() < COUNT - 2);
+}
+
+fn study(text: &str, folder: &std::path::Path) -> Result<String, String> {
+    let lab = folder.join("lab.csv");
+    std::fs::write(&lab, text).expect("written");
+    let options = Options {
+        lab: &lab,
+        axis: "bench-vq110u",
+        hold_out: 0.3,
+        seed: 1,
+    };
+    let finished = identify(&options, |_| Settings::new(folder.join("out")));
+    finished.map(|f| f.summary).map_err(|e| e.to_string())
+}
+
+#[test]
+fn the_study_writes_an_axis_that_meets_what_it_has_not_seen_and_notices_a_leak() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = config();
+    let real = applied(&config.axis, &truth(5));
+    let summary = study(&measured(&real, 2, 4800, rich, false), folder.path()).expect("it is met");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let off = |which: &str| summary[which]["held_out_mm"].as_f64().expect("a number");
+    assert_eq!(summary["explained"], true, "{summary}");
+    assert!(off("after") < 0.2 * off("before"), "{summary}");
+    let out = folder.path().join("out");
+    let text = std::fs::read_to_string(out.join("axis.toml")).expect("an axis");
+    let axis = AxisConfig::parse("axis.toml", &text).expect("a sound one");
+    assert!(text.contains("IDENTIFIED from lab.csv"));
+    let kg = |axis: &AxisParams| axis.moving_mass_kg;
+    assert!((kg(&axis.axis) / kg(&real) - 1.0).abs() < 0.3);
+    assert!(out.join("next-experiment.csv").exists() && out.join("report.html").exists());
+
+    let mut leaky = real.clone();
+    leaky.cylinder.piston_leak_m3_s_pa *= 20_000.0;
+    let other = tempfile::tempdir().expect("a folder");
+    let summary = study(&measured(&leaky, 2, 4800, rich, false), other.path()).expect("it ends");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["explained"], false, "{summary}");
+}
+
+#[test]
+fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
+    let config = config();
+    let sound = measured(&config.axis, 1, 300, |_| OUT, true);
+    let told = |text: &str| {
+        let wrong = Lab::parse("lab.csv", text, &config.axis);
+        wrong.err().map_or_else(String::new, |e| e.to_string())
+    };
+    assert_eq!(told(&sound), "");
+    let lines: Vec<&str> = sound.lines().collect();
+    let with = |line: usize, text: &str| {
+        let mut lines = lines.clone();
+        lines[line - 1] = text;
+        lines.join("\n")
+    };
+    let cases = [
+        (
+            with(7, "0.005,400,1000,0,0,1000,1,1"),
+            "line 7, column `position_mm`: 400 is outside",
+        ),
+        (
+            with(7, "0.005,40,1001,0,0,1000,1,1"),
+            "column `fill_a_us`: 1001 is outside 0 to 1000",
+        ),
+        (
+            with(7, "0.005,40,0.5,0,0,1000,1,1"),
+            "column `fill_a_us`: 0.5 is no whole number",
+        ),
+        (
+            with(7, "0.005,40,0,0,0,1000,101325,1"),
+            "column `pressure_a_bar`: 101325 is outside",
+        ),
+        (
+            with(7, "0.005,many,0,0,0,1000,1,1"),
+            "\"many\" is no number",
+        ),
+        (
+            with(7, "0.105,40,0,0,0,1000,1,1"),
+            "line 7, column `time_s`",
+        ),
+        (with(7, "0.005,40,0,0,0"), "lab.csv"),
+        (
+            with(
+                1,
+                "time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us,pressure_a_bar,p",
+            ),
+            "pressure_b_bar",
+        ),
+        (
+            with(
+                1,
+                "time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b,pressure_a_bar,pressure_b_bar",
+            ),
+            "vent_b_us",
+        ),
+        (lines[..100].join("\n"), "99 rows"),
+    ];
+    for (text, words) in cases {
+        let told = told(&text);
+        assert!(
+            told.contains("lab.csv") && told.contains(words),
+            "{told:?} lacks {words:?}"
+        );
+    }
+    // In metres.
+    let metres: Vec<String> = lines
+        .iter()
+        .enumerate()
+        .map(|(k, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if k > 0 {
+                let mm: f64 = cells[1].parse().expect("a number");
+                cells[1] = format!("{:.7}", mm * 1e-3);
+            }
+            cells.join(",")
+        })
+        .collect();
+    assert!(told(&metres.join("\n")).contains("less than 2 % of the stroke"));
+}
+
+/// `cargo xtask deep identify`: random cylinders, and how often an interval has the truth.
+#[test]
+#[ignore = "takes minutes"]
+fn intervals_have_the_truth_about_as_often_as_they_say() {
+    let count = std::env::var("WHEELEG_IDENTIFY_CYLINDERS").ok();
+    let count: u64 = count.and_then(|n| n.parse().ok()).unwrap_or(100);
+    let config = config();
+    let (mut covered, mut all, mut close) = (0, 0, 0);
+    for seed in 0..count {
+        let truth = truth(1000 + seed);
+        let text = measured(&applied(&config.axis, &truth), seed, 4800, rich, true);
+        let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
+        let Fitted { fit, told, .. } =
+            fitted(&problem(&config, &lab), seed, &Progress::silent()).expect("a fit");
+        let which = (0..COUNT).filter(|i| told[*i].told);
+        let mut within = true;
+        for i in which {
+            all += 1;
+            covered += u32::from(covers(&told[i], fit.logs[i], truth[i]));
+            within &= (fit.logs[i] - truth[i]).abs() < 0.05;
+        }
+        close += u64::from(within);
+    }
+    let share = f64::from(covered) / f64::from(all.max(1));
+    println!(
+        "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); told within 5 % in {close} of {count} cylinders (bar 95 %)",
+        100.0 * share
+    );
+    assert!((0.90..=0.99).contains(&share), "{share}");
+    assert!(20 * close >= 19 * count, "{close} of {count}");
+}

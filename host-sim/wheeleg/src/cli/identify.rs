@@ -1,0 +1,106 @@
+//! `wheeleg identify`: a user's cylinder from measurements.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::{Drawing, end, stop_on_signals};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::identify::{self, AXIS, Identified, NEXT, Options};
+use wheeleg_studies::study::Settings;
+
+/// Arguments of `wheeleg identify`.
+#[derive(Debug, Args)]
+pub(super) struct IdentifyArgs {
+    /// Measurement: a CSV file with time_s, position_mm and the valves as on-times
+    /// (fill_a_us, vent_a_us, fill_b_us, vent_b_us) or states (fill_a, …: 0, 1); if
+    /// there are any, pressure_a_bar, pressure_b_bar (absolute) and load_n.
+    lab: PathBuf,
+    /// Built-in axis or path of an axis file: the data sheet.
+    #[arg(long, value_name = "AXIS")]
+    axis: String,
+    /// Share of the measurement, from its end, that the fit does not see, 0.1 to 0.9.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
+    hold_out: f64,
+    /// Folder for report, figures and axis file [default: runs/identify-<axis>].
+    /// Results of an earlier run in it move to its folder `previous`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of the starts of the fit.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    drawing: Drawing,
+    /// Print the summary as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.1..=0.9).contains(&value) {
+        Ok(value)
+    } else {
+        Err("allowed: 0.1 to 0.9".to_owned())
+    }
+}
+
+/// Identifies, writes and prints. A measurement that the model does not explain is a target missed.
+pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
+    let stop = stop_on_signals()?;
+    let default = |axis: &str| PathBuf::from("runs").join(format!("identify-{axis}"));
+    let options = Options {
+        lab: &args.lab,
+        axis: &args.axis,
+        hold_out: args.hold_out,
+        seed: args.seed,
+    };
+    let finished = identify::identify(&options, |axis| Settings {
+        out: args.out.clone().unwrap_or_else(|| default(axis)),
+        png: args.drawing.png,
+        stop,
+    })?;
+    let text = |identified: &Identified| text(identified, &finished.report);
+    let passed = finished.result.is_explained() && finished.stopped.is_none();
+    end(&finished, args.json, text, passed)
+}
+
+fn text(identified: &Identified, report: &Path) -> String {
+    let mut text = format!("{:<34}{:>9}{:>9}{:>9}\n", "", "factor", "from", "to");
+    for p in &identified.parameters {
+        let note = if p.told { "" } else { "  not told" };
+        let _ = writeln!(
+            text,
+            "{:<34}{:>9.4}{:>9.4}{:>9.4}{note}",
+            p.words, p.factor, p.low, p.high
+        );
+    }
+    for untold in &identified.untold {
+        let _ = writeln!(text, "cannot tell    {untold}");
+    }
+    let _ = writeln!(
+        text,
+        "not seen       {:.3} mm off, by the file {:.3} mm; noise of the sensor {:.3} mm",
+        identified.after.held_out_mm, identified.before.held_out_mm, identified.noise_mm
+    );
+    if !identified.is_explained() {
+        text.push_str("               the model lacks something that the bench has\n");
+    }
+    if let Some(next) = identified.experiments.first() {
+        let path = report.with_file_name(NEXT);
+        let _ = writeln!(text, "next           {}: {}", path.display(), next.words);
+    }
+    let axis = if identified.stopped.is_some() {
+        "not written: the fit was stopped".to_owned()
+    } else {
+        report.with_file_name(AXIS).display().to_string()
+    };
+    let _ = writeln!(
+        text,
+        "axis           {axis}\nreport         {}",
+        report.display()
+    );
+    text
+}

@@ -1,0 +1,91 @@
+//! The Python package: built as a wheel, installed into a fresh environment, tested there.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::process::{command, figures, root, run, target_dir};
+use crate::report::{Report, StepResult};
+use crate::{rust, tools};
+
+/// Folder of the package.
+const PACKAGE: &str = "host-sim/bindings/python";
+
+/// Wheel, installation, tests, notebooks.
+pub(crate) fn steps(report: &mut Report) {
+    let Some(python) = report.step("python: a wheel in a fresh environment", installed) else {
+        return;
+    };
+    let wheeleg = target_dir().join("release").join("wheeleg");
+    report.step("python: tests of the package", || {
+        rust::build(&["--bin", "wheeleg"])?;
+        let told = figures(
+            command(&python)
+                .args(["-m", "pytest", "-q", "-rA", "-p", "no:cacheprovider"])
+                .arg(Path::new(PACKAGE).join("tests"))
+                .env("WHEELEG", &wheeleg),
+            |line| line.starts_with("python: "),
+        )?;
+        for figure in told {
+            println!("    {figure}");
+        }
+        Ok(())
+    });
+    report.step("python: notebooks", || {
+        run(command(&python)
+            .arg("tests/python/run_notebooks.py")
+            .arg("docs/notebooks")
+            .env("WHEELEG", &wheeleg)
+            .env("MPLBACKEND", "agg"))?;
+        Ok(())
+    });
+}
+
+/// The interpreter of an environment that has the wheel, and beside it the suite's packages.
+fn installed() -> StepResult<PathBuf> {
+    let suite = tools::python()?;
+    let folder = target_dir().join("xtask").join("python");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    let wheels = folder.join("wheels");
+    fs::create_dir_all(&wheels)?;
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    run(command(&suite)
+        .args(["-m", "maturin", "build", "--release", "--locked"])
+        .arg("--manifest-path")
+        .arg(Path::new(PACKAGE).join("Cargo.toml"))
+        .arg("--interpreter")
+        .arg(&suite)
+        .arg("--out")
+        .arg(&wheels)
+        .env("CARGO", cargo))?;
+    let wheel = only_file(&wheels)?;
+    let venv = folder.join("venv");
+    run(command(&suite).args(["-m", "venv"]).arg(&venv))?;
+    let python = tools::python_in(&venv);
+    run(command(&python)
+        .args(["-m", "pip", "install", "--quiet", "--no-index", "--no-deps"])
+        .arg("--disable-pip-version-check")
+        .arg(&wheel))?;
+    // Tests and notebooks need packages that the set-up has installed once.
+    let borrow = "import sys, sysconfig, pathlib; \
+                  at = pathlib.Path(sysconfig.get_path('purelib')); \
+                  (at / 'suite.pth').write_text(sys.argv[1] + '\\n')";
+    let place = crate::process::output(command(&suite).args([
+        "-c",
+        "import sysconfig; print(sysconfig.get_path('purelib'))",
+    ]))?;
+    run(command(&python).args(["-c", borrow, place.trim()]))?;
+    // What the wheel says it needs must be there, in a version that it accepts.
+    run(command(&python).args(["-m", "pip", "check", "--disable-pip-version-check"]))?;
+    Ok(python)
+}
+
+fn only_file(folder: &Path) -> Result<PathBuf> {
+    let mut files = fs::read_dir(folder)?;
+    let first = files.next().context("maturin has made no wheel")??;
+    Ok(root().join(first.path()))
+}
