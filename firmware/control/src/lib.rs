@@ -47,11 +47,12 @@
 )]
 
 pub mod axis;
-pub mod fuzzy;
+mod gain;
 pub mod joint;
+pub mod law;
+mod math;
+pub mod observer;
+pub mod paper;
 pub mod pwm;
-pub mod reference;
-pub mod rules;
 pub mod valve;
-pub mod velocity;
 pub mod wheel;

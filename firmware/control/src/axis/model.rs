@@ -1,8 +1,8 @@
 //! The coefficients of the predictive law, made of an axis's data.
 
 use super::data::{AxisData, AxisField};
-use super::gas::FlowCurve;
-use super::valves::ValveTimes;
+use crate::observer::flow::FlowCurve;
+use crate::observer::valve_delay::ValveTimes;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{Micros, PositionMm, divide};
 
@@ -137,7 +137,7 @@ const OBSERVE_SPEED: u64 = (3 * ((FRESH * FRESH) >> 16) * ((1 << 16) + MEMORY)) 
 /// also takes what the pressures have wrong.
 const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * 59 / 100;
 /// Ticks of a period.
-pub(super) const STROKES: u64 = 4;
+pub(crate) const STROKES: u64 = 4;
 /// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides
 /// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
 /// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.

@@ -2,16 +2,12 @@
 
 use super::types::Law;
 use crate::axis::{AxisData, AxisField, AxisModel};
-use crate::fuzzy::GridRules;
-use crate::rules;
-use crate::velocity::VelocityWindow;
+use crate::gain::Gain;
+use crate::paper::fuzzy::GridRules;
+use crate::paper::rules;
+use crate::paper::velocity::VelocityWindow;
 use core::hash::{Hash as _, Hasher};
-use fixed::FixedI32;
-use fixed::types::extra::U24;
 use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, divide_signed, saturate_i32};
-
-/// Gain format: I8F24, ±128, step 6.0e-8.
-pub type Gain = FixedI32<U24>;
 
 /// Rule base of a joint correction: seven by seven sets.
 pub type JointRules = GridRules<7, 7>;

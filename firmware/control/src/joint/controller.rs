@@ -4,10 +4,10 @@ use super::config::{INPUT_SHIFT, INTEGRAL_SHIFT, JointConfig};
 use super::modes;
 use super::settle::Settle;
 use super::types::{Correction, JointInput, JointLimits, JointOutput, Law};
-use crate::axis::predictive::Predictive;
+use crate::law::Predictive;
+use crate::paper::velocity::VelocityEstimator;
 use crate::pwm::OnTimes;
 use crate::valve::{ValveOpenings, allocate};
-use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{
     Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32, shift_right_round_inner,

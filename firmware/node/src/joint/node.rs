@@ -18,7 +18,7 @@ use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
 use wheeleg_control::joint::{JointConfig, JointController};
 use wheeleg_control::pwm::ValvePwm;
-use wheeleg_control::reference::Reference;
+use wheeleg_control::law::reference_generator::Reference;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
 

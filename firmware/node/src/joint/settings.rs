@@ -11,7 +11,7 @@ use crate::supervisor::{SupervisionTimes, watchdog};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains, Law};
 use wheeleg_control::pwm::PwmTiming;
-use wheeleg_control::reference::GeneratorConfig;
+use wheeleg_control::law::reference_generator::GeneratorConfig;
 use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS, divide_signed};

@@ -1,12 +1,12 @@
 //! The last stroke: rest or target pressures, and the pulses of the next period.
 
-use super::pressures::{made_up, targets};
-use super::rest::{Approach, REFERENCE_RESTS};
+use super::allocation::{made_up, targets};
 use super::seat::Seat;
+use super::standstill::{Approach, REFERENCE_RESTS};
 use super::{MakesUp, NOTHING, Predictive, STILL};
-use crate::axis::gas::Pressures;
-use crate::axis::model::AxisModel;
+use crate::axis::AxisModel;
 use crate::joint::{Announced, JointInput};
+use crate::observer::pressure::Pressures;
 use wheeleg_units::Duty;
 
 impl Predictive {

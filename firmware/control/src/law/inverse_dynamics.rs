@@ -1,11 +1,11 @@
 //! The force that is wanted at the end of the dead time.
 
 use super::STILL;
-use super::rest::{REFERENCE_RESTS, Rest};
-use crate::axis::gas::Pressures;
-use crate::axis::model::AxisModel;
-use crate::axis::motion::{Inertia, Motion, rubbed};
-use crate::axis::{clip, mix, part, scaled, square_root, within};
+use super::standstill::{REFERENCE_RESTS, Rest};
+use crate::axis::AxisModel;
+use crate::math::{clip, mix, part, scaled, square_root, within};
+use crate::observer::motion::{Inertia, Motion, rubbed};
+use crate::observer::pressure::Pressures;
 
 /// Fast enough for the sign of friction to be that of the motion (10 mm/s).
 const SLIDES: i32 = 10 << 16;

@@ -1,7 +1,7 @@
 //! Stroke, speed and load from the measured stroke and the pressure force.
 
-use super::model::AxisModel;
-use super::{clip, mix, part, quotient, scaled, within};
+use crate::axis::AxisModel;
+use crate::math::{clip, mix, part, quotient, scaled, within};
 
 /// Slower than this, raw mm/s, a piston held by its friction counts as stuck (4 mm/s).
 const STICK: i32 = 4 << 16;
@@ -198,14 +198,14 @@ pub struct Motion {
 
 /// What is left of a speed that loses `taken` to friction, which turns nothing round.
 #[inline]
-pub(super) fn rubbed(speed: i32, taken: i32) -> i32 {
+pub(crate) fn rubbed(speed: i32, taken: i32) -> i32 {
     speed.saturating_sub(within(speed, taken))
 }
 
 impl Motion {
     /// Adds itself to a sum.
     #[inline]
-    pub(super) fn sum(&self, sum: u32) -> u32 {
+    pub(crate) fn sum(&self, sum: u32) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             stroke,

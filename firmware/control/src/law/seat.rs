@@ -11,11 +11,11 @@
 //! full, or the other to be empty. An axis without precharge has no seat: the air of it would make a
 //! start without notice 20 ms later (`tests/system/delay.rs`). It is awake again by a new target, or 1.5 mm off its place.
 
+use super::standstill::REFERENCE_RESTS;
 use super::{Predictive, STILL};
-use crate::axis::gas::Pressures;
-use crate::axis::model::AxisModel;
-use crate::axis::predictive::rest::REFERENCE_RESTS;
+use crate::axis::AxisModel;
 use crate::joint::JointInput;
+use crate::observer::pressure::Pressures;
 
 /// A target so near a stop is the stop, raw mm (0.5 mm).
 const TARGET: i32 = 1 << 15;

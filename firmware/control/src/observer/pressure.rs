@@ -1,49 +1,176 @@
 //! The air of a cylinder: what was sent to the valves, followed into the chambers.
 
-use super::gas::{ChamberFlows, power};
-use super::mix;
-use super::model::AxisModel;
-use super::valves::{Ready, ValveTimes, ValveTrack};
+use super::flow::power;
+use super::valve_delay::{Ready, ValveTimes, ValveTrack};
+use crate::axis::AxisModel;
+use crate::math::{mix, part, scaled};
+use wheeleg_units::Duty;
+
+/// Pressures of A and B in 1/256 Pa absolute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Pressures {
+    /// Bore side.
+    pub a: i32,
+    /// Rod side.
+    pub b: i32,
+}
+
+/// What flows through the valves of one chamber while they are open, as powers:
+/// pressure times a speed of the piston, in 2^8 Pa mm/s.
+///
+/// Neither the piston's place nor the time is in them, so that those of one period
+/// serve for that period and for the dead time ahead.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ChamberFlows {
+    /// Through the open fill valve; 0 until asked for.
+    pub fill: i32,
+    /// Through the open vent valve, positive lowers the pressure; 0 until asked for.
+    pub vent: i32,
+}
+
+impl ChamberFlows {
+    /// Those that are asked for, at `pressure`, for an open valve's `flow` as a speed of the
+    /// piston, raw mm/s.
+    #[inline]
+    pub(crate) fn of(model: &AxisModel, flow: i32, pressure: i32, fill: bool, vent: bool) -> Self {
+        let curve = &model.curve;
+        Self {
+            fill: if fill {
+                curve.power(model.supply, pressure, flow)
+            } else {
+                0
+            },
+            vent: if vent {
+                curve.power(pressure, model.ambient, flow)
+            } else {
+                0
+            },
+        }
+    }
+
+    /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
+    /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
+    /// `stiffness` ([`AxisModel::stiffness`]).
+    #[inline]
+    #[must_use]
+    pub fn change(&self, open: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
+        let [fill, vent] = open;
+        let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
+        // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
+        let work = product(self.fill, fill)
+            .wrapping_sub(product(self.vent, vent))
+            .wrapping_add(product(squeeze, span))
+            .wrapping_add(1 << 15)
+            .wrapping_shr(16) as i32;
+        // × n/L: see `AxisModel::stiffness`.
+        scaled(work, stiffness, 10)
+    }
+
+    /// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa,
+    /// not negative).
+    #[inline]
+    #[must_use]
+    pub fn need(power: i32, change: i32, stiffness: i32) -> i32 {
+        // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
+        let rate = part(power, stiffness, 22).max(SLOWEST);
+        // Below 2^31.
+        let size = change.min(500_000 << 8).wrapping_shl(4);
+        size.checked_div(rate).unwrap_or(0)
+    }
+}
+
+/// Shortest length of a chamber, 1/256 mm (4 mm; a line alone is longer).
+const SHORTEST: i32 = 4 << 8;
+/// Slowest change of pressure that is counted on, 1/256 Pa per 16 µs (50 Pa/ms).
+const SLOWEST: i32 = 205;
+
+impl AxisModel {
+    /// Length of chamber A with the piston at `stroke`, raw mm.
+    #[inline]
+    #[must_use]
+    pub(crate) const fn length_a(&self, stroke: i32) -> i32 {
+        stroke.saturating_add(self.lead_a)
+    }
+
+    /// Length of chamber B.
+    #[inline]
+    #[must_use]
+    pub(crate) const fn length_b(&self, stroke: i32) -> i32 {
+        self.stroke
+            .saturating_sub(stroke)
+            .saturating_add(self.lead_b)
+    }
+
+    /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:
+    /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
+    #[inline]
+    #[must_use]
+    pub(crate) fn stiffness(&self, length: i32) -> i32 {
+        let short = length.wrapping_shr(8).max(SHORTEST);
+        self.exponent.checked_div(short).unwrap_or(0)
+    }
+
+    /// Force of the two pressures, mN, positive extending.
+    #[inline]
+    #[must_use]
+    pub fn pressure_force(&self, p: Pressures) -> i32 {
+        part(p.a, self.force_a, 32)
+            .saturating_sub(part(p.b, self.force_b, 32))
+            .saturating_sub(self.force_rod)
+    }
+
+    /// A force that the supply can give as a share of its largest, in steps of 2^-14.
+    #[inline]
+    pub(crate) fn duty(&self, force: i32) -> Duty {
+        let share = if force > 0 {
+            self.share_out
+        } else {
+            self.share_in
+        };
+        // Within ±2^14.
+        Duty::from_raw(part(force, share, 26).wrapping_shl(16))
+    }
+}
 
 /// Highest pressure that is followed, 1/256 Pa (2.1 MPa).
 const MOST: i32 = (1 << 29) - 1;
 
 /// A moment of the periods, µs; wraps.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Clock {
+pub(crate) struct Clock {
     /// Begin of the present period.
-    pub(super) now: u32,
+    pub(crate) now: u32,
     /// Begin of the next one.
-    pub(super) next: u32,
+    pub(crate) next: u32,
     /// The moment for which pressures are worked out: [`AxisModel::moment`] after the begin.
-    pub(super) moment: u32,
+    pub(crate) moment: u32,
 }
 
 /// What a chamber is told of its geometry and of the piston.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piston {
+pub(crate) struct Piston {
     /// Flow of an open valve as a speed of the piston, raw mm/s.
-    pub(super) flow: i32,
+    pub(crate) flow: i32,
     /// Length of the chamber in the middle of the period that ends at the moment, and where the
     /// dead time ends, raw mm.
-    pub(super) lengths: [i32; 2],
+    pub(crate) lengths: [i32; 2],
     /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
-    pub(super) speeds: [i32; 2],
+    pub(crate) speeds: [i32; 2],
     /// Not 0: the stroke has time for the flows of valves that are shut.
-    pub(super) all_flows: i32,
+    pub(crate) all_flows: i32,
 }
 
 /// Pulses under way and pressure of one chamber.
 #[derive(Clone, Debug)]
-pub(super) struct Chamber {
+pub(crate) struct Chamber {
     fill: ValveTrack,
     vent: ValveTrack,
     /// Sum of the pulses.
     pulses_check: u32,
     /// Pressure at the moment, 1/256 Pa.
-    pub(super) pressure: i32,
+    pub(crate) pressure: i32,
     /// The same at the end of the dead time, with what has been committed to by then.
-    pub(super) expected: i32,
+    pub(crate) expected: i32,
     /// Sum of the pressures.
     pressures_check: u32,
     /// Flows at this pressure, as far as they are known.
@@ -58,7 +185,7 @@ pub(super) struct Chamber {
 
 impl Chamber {
     /// Valves shut, at `pressure` (1/256 Pa absolute).
-    pub(super) fn new(pressure: i32) -> Self {
+    pub(crate) fn new(pressure: i32) -> Self {
         let mut chamber = Self {
             fill: ValveTrack::new(),
             vent: ValveTrack::new(),
@@ -79,7 +206,7 @@ impl Chamber {
 
     /// Flips a bit of one of the words that only this file sees, for tests of those who keep it.
     #[cfg(test)]
-    pub(super) const fn damage(&mut self, word: u32, bit: u32) {
+    pub(crate) const fn damage(&mut self, word: u32, bit: u32) {
         let flip = 1 << bit;
         match word {
             0 => self.flows.fill ^= flip,
@@ -93,7 +220,7 @@ impl Chamber {
 
     /// Tracks of fill and vent, for tests of what is sent.
     #[cfg(test)]
-    pub(super) const fn tracks(&self) -> [ValveTrack; 2] {
+    pub(crate) const fn tracks(&self) -> [ValveTrack; 2] {
         [self.fill, self.vent]
     }
 
@@ -117,19 +244,19 @@ impl Chamber {
 
     /// Whether the pulses under way are as they were left.
     #[inline]
-    pub(super) fn pulses_are_sound(&self) -> bool {
+    pub(crate) fn pulses_are_sound(&self) -> bool {
         self.pulses_check == self.sum_of_pulses()
     }
 
     /// Whether the pressures are as they were left.
     #[inline]
-    pub(super) const fn pressures_are_sound(&self) -> bool {
+    pub(crate) const fn pressures_are_sound(&self) -> bool {
         self.pressures_check == self.sum_of_pressures()
     }
 
     /// Whether what the next pulses are made with is as it was left.
     #[inline]
-    pub(super) const fn means_are_sound(&self) -> bool {
+    pub(crate) const fn means_are_sound(&self) -> bool {
         self.means_check == self.sum_of_means()
     }
 
@@ -138,7 +265,7 @@ impl Chamber {
     /// if it is not yet known here. What was damaged before keeps its broken seal.
     #[cold]
     #[inline(never)]
-    pub(super) fn end(
+    pub(crate) fn end(
         &mut self,
         now: u32,
         on: [u16; 2],
@@ -163,7 +290,7 @@ impl Chamber {
     /// times, fill and vent, µs. They come on top of what is left of the law's own pulses. Nothing
     /// is foreseen.
     #[inline(never)]
-    pub(super) fn observe(
+    pub(crate) fn observe(
         &mut self,
         model: &AxisModel,
         clock: &Clock,
@@ -204,7 +331,7 @@ impl Chamber {
     /// made with.
     // Called in one place.
     #[inline(always)]
-    pub(super) fn follow(
+    pub(crate) fn follow(
         &mut self,
         model: &AxisModel,
         clock: &Clock,
@@ -265,7 +392,7 @@ impl Chamber {
     /// On-times of the next period that bring the chamber from what is expected to `target`,
     /// fill and vent, µs. The valve that would undo it shuts as soon as its pulse allows.
     #[inline]
-    pub(super) fn pulses(&self, model: &AxisModel, flow: i32, target: i32) -> [u16; 2] {
+    pub(crate) fn pulses(&self, model: &AxisModel, flow: i32, target: i32) -> [u16; 2] {
         let change = target.saturating_sub(self.expected);
         let [ready_fill, ready_vent] = self.ready;
         let times = &model.times;
@@ -294,14 +421,14 @@ impl Chamber {
 
     /// Whether both coils are off at the begin of the next period.
     #[inline]
-    pub(super) const fn idle(&self) -> bool {
+    pub(crate) const fn idle(&self) -> bool {
         let [fill, vent] = self.ready;
         !fill.coil() && !vent.coil()
     }
 
     /// Everything shut as soon as the pulses under way allow.
     #[inline]
-    pub(super) fn shut(&self, model: &AxisModel) -> [u16; 2] {
+    pub(crate) fn shut(&self, model: &AxisModel) -> [u16; 2] {
         let times = &model.times;
         self.ready.map(|ready| microseconds(ready.rest(times)))
     }

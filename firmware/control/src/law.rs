@@ -39,24 +39,25 @@
 //! next period to the microsecond. What a stroke leaves to the next is sealed by it, and looked
 //! at before the next uses it ([`Predictive::kept_is_sound`]).
 
-mod force;
+mod allocation;
 mod handover;
-mod plan;
-mod pressures;
-mod rest;
+mod inverse_dynamics;
+mod pulse_planner;
+pub mod reference_generator;
 mod seals;
 mod seat;
+mod standstill;
 
-use super::air::{Chamber, Clock, Piston};
-use super::gas::Pressures;
-use super::learn::Learner;
-use super::model::AxisModel;
-use super::motion::{Inertia, Motion};
+use crate::axis::AxisModel;
 use crate::joint::JointInput;
+use crate::observer::mass::Learner;
+use crate::observer::motion::{Inertia, Motion};
+use crate::observer::pressure::Pressures;
+use crate::observer::pressure::{Chamber, Clock, Piston};
 use crate::pwm::OnTimes;
-use force::{Ahead, Course, Push, Wish};
-use pressures::targets;
-use rest::Rest;
+use allocation::targets;
+use inverse_dynamics::{Ahead, Course, Push, Wish};
+use standstill::Rest;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 /// Slower than this, raw mm/s, the piston stands (3 mm/s).

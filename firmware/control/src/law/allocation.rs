@@ -1,8 +1,8 @@
 //! Chamber pressures for a force.
 
-use crate::axis::gas::Pressures;
-use crate::axis::model::AxisModel;
-use crate::axis::{part, scaled};
+use crate::axis::AxisModel;
+use crate::math::{part, scaled};
+use crate::observer::pressure::Pressures;
 use wheeleg_units::saturate_i32;
 
 /// A chamber lags whose pressure is so much above its target (10 kPa in 1/256 Pa).

@@ -6,7 +6,7 @@
 //! the line. The same rules are followed here, in whole microseconds, on the
 //! on-times that are sent, a whole period of the law at once.
 
-use super::mix;
+use crate::math::mix;
 
 /// A change of a coil is decided no longer ahead than this, µs: a period of 2 ms ticks.
 const LONGEST_PLAN: i32 = 8000;
@@ -81,7 +81,7 @@ impl ValveTrack {
     /// Adds itself to a sum. Fields share a word such that a flipped bit of any flips one bit
     /// of it.
     #[inline]
-    pub(super) fn sum(&self, sum: u32) -> u32 {
+    pub(crate) fn sum(&self, sum: u32) -> u32 {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             state,
@@ -156,7 +156,7 @@ impl ValveTrack {
 
     /// The coil falls at the moment `at`, or did before.
     #[inline(never)]
-    pub(super) fn end(&mut self, at: u32, times: &ValveTimes) {
+    pub(crate) fn end(&mut self, at: u32, times: &ValveTimes) {
         if self.coil() {
             self.change(at, times);
         } else {
@@ -166,7 +166,7 @@ impl ValveTrack {
 
     /// Its coil, which somebody else has driven, is off from the moment `at` on.
     #[inline]
-    pub(super) const fn shuts(&mut self, at: u32) {
+    pub(crate) const fn shuts(&mut self, at: u32) {
         self.changed = at;
     }
 
@@ -312,7 +312,7 @@ impl ValveTrack {
 
     /// What it can do in the period that begins `next`, up to which the coil is decided.
     #[inline]
-    pub(super) fn ready(&self, next: u32, times: &ValveTimes) -> Ready {
+    pub(crate) fn ready(&self, next: u32, times: &ValveTimes) -> Ready {
         if self.coil() {
             return Ready(self.left(next, times));
         }
@@ -327,7 +327,7 @@ impl ValveTrack {
 
 /// What a valve can do in the next period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Ready(
+pub(crate) struct Ready(
     /// What is left of the shortest pulse under way, µs; negative if the coil is off.
     i32,
 );
@@ -346,26 +346,26 @@ impl Ready {
 
     /// As a word to be sealed.
     #[inline]
-    pub(super) const fn word(self) -> i32 {
+    pub(crate) const fn word(self) -> i32 {
         self.0
     }
 
     /// Whether the coil is on at the begin of the period.
     #[inline]
-    pub(super) const fn coil(self) -> bool {
+    pub(crate) const fn coil(self) -> bool {
         self.0 >= 0
     }
 
     /// On-time of the period for no opening beyond what is [`ValveTrack::committed`].
     #[inline]
-    pub(super) fn rest(self, times: &ValveTimes) -> i32 {
+    pub(crate) fn rest(self, times: &ValveTimes) -> i32 {
         self.0.max(0).min(times.period)
     }
 
     /// On-time of the period for `need` µs of opening beyond what is
     /// [`ValveTrack::committed`]; `rival` says that the chamber's other valve is on.
     #[inline]
-    pub(super) fn on_time(self, need: i32, rival: bool, times: &ValveTimes) -> i32 {
+    pub(crate) fn on_time(self, need: i32, rival: bool, times: &ValveTimes) -> i32 {
         let pulse = if self.coil() {
             // A few microseconds are not worth a tick.
             let need = if need < 20 { 0 } else { need };

@@ -1,9 +1,9 @@
 //! Who decides about the valves: the law, or somebody else.
 
-use super::force::{Course, Push};
+use super::inverse_dynamics::{Course, Push};
 use super::{NOTHING, Predictive, Stroke};
-use crate::axis::model::AxisModel;
-use crate::axis::motion::Inertia;
+use crate::axis::AxisModel;
+use crate::observer::motion::Inertia;
 use crate::pwm::OnTimes;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 

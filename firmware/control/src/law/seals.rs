@@ -1,7 +1,7 @@
 //! What a stroke leaves to the next ones, sealed by it and looked at before it is used.
 
 use super::{Predictive, Stroke};
-use crate::axis::mix;
+use crate::math::mix;
 use core::hash::{Hash, Hasher};
 
 impl Hash for Predictive {

@@ -1,9 +1,9 @@
 //! When the piston may rest, and when it must move again.
 
 use super::STILL;
-use crate::axis::model::AxisModel;
-use crate::axis::motion::Motion;
-use crate::axis::{mix, part, scaled, square_root};
+use crate::axis::AxisModel;
+use crate::math::{mix, part, scaled, square_root};
+use crate::observer::motion::Motion;
 
 /// Slower than this a piston in the band is caught by shutting the valves, raw mm/s (4 mm/s).
 const CATCH: i32 = 4 << 16;

@@ -11,8 +11,8 @@
 //! fastest, and where it ends. What lies on the straight line from the first to the last
 //! is due to c; what the fastest has above that line is due to m, in J as in v.
 
-use super::model::AxisModel;
-use super::{part, quotient, scaled};
+use crate::axis::AxisModel;
+use crate::math::{part, quotient, scaled};
 
 /// A move is looked at for so many periods at most.
 const PERIODS_MAX: u16 = 250;
@@ -107,14 +107,14 @@ impl Learner {
 
     /// Flips a bit, for tests of those who keep it.
     #[cfg(test)]
-    pub(super) const fn damage(&mut self) {
+    pub(crate) const fn damage(&mut self) {
         self.first ^= 1 << 20;
     }
 
     /// Whether all of it is as it was left.
     #[inline]
     #[must_use]
-    pub(super) fn is_sound(&self) -> bool {
+    pub(crate) fn is_sound(&self) -> bool {
         self.check == self.sum()
     }
 
