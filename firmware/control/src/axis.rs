@@ -2,7 +2,6 @@
 
 mod data;
 mod model;
-pub mod probe;
 
 pub use data::{AxisData, AxisField};
-pub use model::AxisModel;
+pub use model::{AxisModel, PERIOD_TICKS};

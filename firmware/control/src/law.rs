@@ -1,82 +1,54 @@
-//! The predictive law: paper's idea, positions made of forces made of air.
+//! The predictive law: position of one axis with four on/off valves and one potentiometer.
 //!
 //! ```text
-//! stroke, speed, pressures ── dead time ahead ──► x, v, pA, pB there
-//! e = reference − x            v* = v_r + min(slope e, √(2 brake (|e| − …)), top)
-//! a* = dv*/dt + damping (v* − v)
-//! F* = m a* + friction(v*) − load + what it takes to unstick
-//! pA*, pB* : their force is F*, about the mean pressure
-//! opening of each valve: the pressure it lacks / the rate at which it changes
+//! observer ──► dead-time predictor ──► switching curve ──► inverse dynamics ──► allocation ──► pulse planner
+//! p, x, v, load     p, x, v at T_d        v*(e), dv*/de         F*                pA*, pB*       µs of each valve
+//!                        standstill (seat, preload): instead of F* all valves shut, or a force of its own
 //! ```
 //!
-//! * **Dead time.** A pulse begun now acts t_on and the wave's way later.
-//!   Everything is decided for that moment: the motion is extrapolated, and air
-//!   that pulses under way will still bring is counted in.
-//! * **Braking** follows a parabola in e, so that one law serves 1 and 400 mm; the
-//!   deceleration is what the force left beside the load allows.
-//! * **Friction** is fed forward in the direction of v*; a piston that stands
-//!   outside the band is pushed with a growing force until it slips.
-//! * **Rest.** Inside the band and slow, all valves shut, and stay shut until the
-//!   error has left three bands. A piston is also let to rest when friction alone
-//!   will stop it in the band. What does not come to rest near its target for
-//!   long may do so in a wider band, up to three times and 0.4 mm; and each time it
-//!   enters that band the law waits with the valves shut, to see where it comes to
-//!   rest, before it acts again: no limit cycle lasts.
-//! * **Seat.** Position control against an end stop never rests: cushion and load hold the piston
-//!   beside its target. At a target within [`seat::TARGET`] of a stop a force is controlled
-//!   instead, until the piston is pressed against it.
-//! * **Announced moves.** With a move announced, and the piston at rest at the present target or
-//!   against a stop, the force is brought to the edge
-//!   of slipping in its direction: the counter chamber vents and the drive
-//!   chamber fills ahead of time, and the piston stands.
-//! * **Pressure swap.** A chamber vents no faster than its valve lets it. In an
-//!   announced move, and in one from an end stop, the other chamber makes up for what
-//!   it still has too much, and gives way as it falls: the force is there as soon as
-//!   either chamber can make it.
+//! | file | concept |
+//! |---|---|
+//! | [`reference_generator`] | second-order reference with a lead-limiting governor; runs ahead of the law, each tick |
+//! | `dead_time_predictor` | motion at the end of the dead time, where a pulse begun now acts |
+//! | `switching_curve` | proximate time-optimal: parabola of braking, straight line at the target |
+//! | `inverse_dynamics` | force for the speed that is wanted, with friction fed forward and the break-away ramp |
+//! | `allocation` | from a force to two chamber pressures about their mean; the pressure swap |
+//! | `pulse_planner` | from a pressure to the on-times of the next period |
+//! | `standstill` | when the valves stay shut: a state machine |
+//! | `seat` | a force instead of a position at an end stop |
+//! | `preload` | the edge of slipping ahead of an announced move |
+//! | `handover` | who decides about the valves, the law or others |
 //!
-//! Valves that take milliseconds need no new decision in every one: the law is worked out once
-//! in a period of four ticks, a quarter of it in each ([`Stroke`]), and plans the pulses of the
-//! next period to the microsecond. What a stroke leaves to the next is sealed by it, and looked
-//! at before the next uses it ([`Predictive::kept_is_sound`]).
+//! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
+//! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond.
+//! Gains and thresholds stand in [`crate::tuning`], all of them; formats are those of [`crate::observer`].
 
 mod allocation;
+mod dead_time_predictor;
 mod handover;
 mod inverse_dynamics;
+mod preload;
 mod pulse_planner;
 pub mod reference_generator;
-mod seals;
 mod seat;
 mod standstill;
+mod switching_curve;
 
-use crate::axis::AxisModel;
+use crate::axis::{AxisModel, PERIOD_TICKS};
 use crate::joint::JointInput;
-use crate::observer::mass::Learner;
-use crate::observer::motion::{Inertia, Motion};
-use crate::observer::pressure::Pressures;
-use crate::observer::pressure::{Chamber, Clock, Piston};
+use crate::observer::Observer;
+use crate::observer::motion::Motion;
+use crate::observer::pressure::{Period, Pressures};
 use crate::pwm::OnTimes;
-use allocation::targets;
-use inverse_dynamics::{Ahead, Course, Push, Wish};
-use standstill::Rest;
-use wheeleg_units::{Duty, PositionMm, VelocityMmS};
-
-/// Slower than this, raw mm/s, the piston stands (3 mm/s).
-const STILL: i32 = 3 << 16;
-
-/// No move is awaited.
-const NOTHING: i32 = i32::MIN;
-
-/// The drive chamber makes up for what the counter chamber still has too much.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-enum MakesUp {
-    /// It does not.
-    No,
-    /// In a move that extends.
-    Extends,
-    /// In one that retracts.
-    Retracts,
-}
+use crate::tuning::STILL_SPEED;
+use allocation::PressureSwap;
+use dead_time_predictor::PredictedState;
+use inverse_dynamics::{BreakawayRamp, ForceDemand};
+use preload::{Awaited, Preload};
+use seat::Seat;
+use standstill::{Approach, Standstill};
+use switching_curve::SpeedGains;
+use wheeleg_units::{Duty, VelocityMmS};
 
 /// What the law gives in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,114 +65,36 @@ pub struct Drive {
     pub limited: bool,
 }
 
-/// The quarters of the law, by the tick of its period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-enum Stroke {
-    /// Chamber A: what it sees of the pulses, its pressure at the moment and ahead; the mass is
-    /// learnt.
-    #[default]
-    A = 1,
-    /// Chamber B.
-    B,
-    /// Motion, and the force that is wanted.
-    Motion,
-    /// Rest, target pressures, pulses of the next period.
-    Pulses,
-}
+/// State of the law and of its observer. It keeps no coefficients: every call is given those of the
+/// axis, which must be the same from call to call.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Predictive {
+    observer: Observer,
+    gains: SpeedGains,
+    ramp: BreakawayRamp,
+    standstill: Standstill,
+    preload: Preload,
+    swap: PressureSwap,
 
-impl Stroke {
-    /// Ticks of the period before it.
-    #[inline]
-    const fn turn(self) -> u16 {
-        (self as u16).wrapping_sub(1)
-    }
-
-    #[inline]
-    const fn next(self) -> Self {
-        match self {
-            Self::A => Self::B,
-            Self::B => Self::Motion,
-            Self::Motion => Self::Pulses,
-            Self::Pulses => Self::A,
-        }
-    }
-}
-
-/// Small ones that every tick uses, in an order in which they are a whole word, which is sealed
-/// as it is. It is never zero.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(4))]
-struct Turn {
-    /// The stroke to come.
-    stroke: Stroke,
+    /// A stroke has been measured.
     primed: bool,
     /// The law decides about the coils, not somebody else.
     drives: bool,
-    /// For the record: the force asked for was beyond what is possible.
-    limited: bool,
-}
-
-impl Turn {
-    #[inline]
-    const fn word(self) -> u32 {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            stroke,
-            primed,
-            drives,
-            limited,
-        } = self;
-        u32::from_le_bytes([stroke as u8, primed as u8, drives as u8, limited as u8])
-    }
-}
-
-/// State of the law. It keeps no coefficients: every call is given those of the
-/// axis, which must be the same from call to call.
-#[derive(Clone, Debug)]
-pub struct Predictive {
-    a: Chamber,
-    b: Chamber,
-
-    /// Where the chambers are followed to.
-    course: Course,
-    course_check: u32,
-
-    motion: Motion,
-    /// Pressure force at the moment, mN.
-    force: i32,
-    /// The force that is wanted at the end of the dead time, mN.
-    wanted: i32,
-    motion_check: u32,
-
-    inertia: Inertia,
-    push: Push,
-    push_check: u32,
-
-    learner: Learner,
-
-    rest: Rest,
-    /// Where the piston stood when the next move was announced; [`NOTHING`] without one.
-    awaits: i32,
-    /// The drive chamber makes up for what the counter chamber still has too much.
-    makes_up: MakesUp,
-    /// The valves stay shut.
-    quiet: bool,
-    rest_check: u32,
-
-    // What every tick uses, in the `Hash`.
-    turn: Turn,
-    /// Begin of the next period, µs; wraps.
-    next: u32,
+    /// Tick of the period that comes next.
+    turn: u8,
+    /// Begin of the present period, µs; wraps. In the last tick of a period, once that is observed, of the next.
+    begin: u32,
     /// Stroke of the last tick, raw mm.
     measured: i32,
-    /// On-times of the present period from its begin, µs; in its last tick, of the next one. Where
-    /// somebody else decides: for how long the valves were sent open since their chambers were followed.
+    /// On-times of the present period from its begin, µs.
     plan: OnTimes,
+    /// For how long somebody else had the valves open in it, without their delays, µs.
+    external: OnTimes,
 
-    // For the record.
-    /// Share of the force that was asked for, as far as it is possible.
+    /// For the record: the share of the force that was asked for, as far as it is possible, and whether it
+    /// is not.
     duty: Duty,
+    limited: bool,
 }
 
 impl Predictive {
@@ -208,248 +102,173 @@ impl Predictive {
     /// from power-up on: the middle is wrong by the least. Others count as vented.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
-        Self::with(model, Inertia::new(model, model.mass))
-    }
-
-    #[inline]
-    fn with(model: &AxisModel, inertia: Inertia) -> Self {
         let pressures = if model.precharged {
-            targets(model, 0)
+            allocation::targets(model, 0)
         } else {
             Pressures {
                 a: model.ambient,
                 b: model.ambient,
             }
         };
-        let mut law = Self {
-            a: Chamber::new(pressures.a),
-            b: Chamber::new(pressures.b),
-            course: Course::default(),
-            course_check: 0,
-            motion: Motion::default(),
-            force: model.pressure_force(pressures),
-            wanted: 0,
-            motion_check: 0,
-            inertia,
-            push: Push::default(),
-            push_check: 0,
-            learner: Learner::new(),
-            rest: Rest::default(),
-            awaits: NOTHING,
-            makes_up: MakesUp::No,
-            quiet: true,
-            rest_check: 0,
-            turn: Turn::default(),
-            next: 0,
+        Self {
+            observer: Observer::new(model, pressures),
+            gains: SpeedGains::new(model, model.mass),
+            ramp: BreakawayRamp::default(),
+            standstill: Standstill::default(),
+            preload: Preload::default(),
+            swap: PressureSwap::No,
+            primed: false,
+            drives: false,
+            turn: 0,
+            begin: 0,
             measured: 0,
             plan: [0; 4],
+            external: [0; 4],
             duty: Duty::ZERO,
-        };
-        law.seal();
-        law
+            limited: false,
+        }
+    }
+
+    /// Its observer.
+    #[must_use]
+    pub const fn observer(&self) -> &Observer {
+        &self.observer
     }
 
     /// Estimated motion and load.
     #[must_use]
     pub const fn motion(&self) -> &Motion {
-        &self.motion
+        &self.observer.motion
     }
 
     /// Estimated pressures.
     #[must_use]
     pub const fn pressures(&self) -> Pressures {
-        Pressures {
-            a: self.a.pressure,
-            b: self.b.pressure,
-        }
+        self.observer.pressures()
     }
 
     /// Mass in use, kg × 2^16: as told, or learnt.
     #[must_use]
     pub const fn mass(&self) -> i32 {
-        self.inertia.mass
+        self.observer.inertia.mass
     }
 
     /// At rest at its reference.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
-        self.rest.is_settled()
+        self.standstill.is_at_rest()
     }
 
-    /// A tick of the law's own; on-times for the next tick, which are sent.
-    ///
-    /// It begins to decide with a period, once all is counted that somebody else has sent.
-    #[inline]
+    /// A tick of the law's own; on-times for the next tick, which are sent. The law begins to decide at the
+    /// end of a period, once all is counted that somebody else has sent.
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
-        if !self.turn.drives && !self.begins(model, input.measured) {
-            return self.gives([0; 4]);
+        if self.ends_period(input.measured) {
+            self.observe_period(model, input.measured);
+            self.drives = true;
+            self.plan_period(model, input);
         }
-        let on = match self.turn.stroke {
-            Stroke::A => {
-                self.follow(model, true);
-                self.due(model, 1)
-            }
-            Stroke::B => {
-                self.follow(model, false);
-                self.due(model, 2)
-            }
-            Stroke::Motion => {
-                self.want(model, input);
-                self.due(model, 3)
-            }
-            Stroke::Pulses => {
-                self.choose(model, input);
-                self.due(model, 0)
-            }
-        };
-        self.next_stroke(input.measured);
-        self.gives(on)
-    }
-
-    /// With these on-times.
-    #[inline(always)]
-    const fn gives(&self, on: OnTimes) -> Drive {
+        let on = self.due(model);
+        self.next_tick(input.measured);
         Drive {
             on,
-            velocity: VelocityMmS::from_raw(self.motion.speed),
+            velocity: VelocityMmS::from_raw(self.observer.motion.speed),
             duty: self.duty,
-            settled: self.rest.is_settled(),
-            limited: self.turn.limited,
+            settled: self.is_settled(),
+            limited: self.limited,
         }
     }
 
-    /// The present period.
-    #[inline]
-    const fn clock(&self, model: &AxisModel) -> Clock {
-        let now = self.next.wrapping_sub(model.times.period as u32);
-        Clock {
-            now,
-            next: self.next,
-            moment: now.wrapping_add(model.moment as u32),
+    /// The present period on the clock of the valves.
+    const fn period(&self, model: &AxisModel) -> Period {
+        Period {
+            begin: self.begin,
+            next: self.begin.wrapping_add(model.times.period as u32),
+            moment: self.begin.wrapping_add(model.moment as u32),
         }
     }
 
-    /// To the next stroke.
-    #[inline]
-    const fn next_stroke(&mut self, measured: PositionMm) {
-        self.measured = measured.raw();
-        self.turn.stroke = self.turn.stroke.next();
-    }
-
-    /// One of the chambers, A at the begin of a period.
-    #[inline(never)]
-    fn follow(&mut self, model: &AxisModel, first: bool) {
-        if first {
-            self.next = self.next.wrapping_add(model.times.period as u32);
-        }
-        let clock = self.clock(model);
-        let Course {
-            middle,
-            speed,
-            end,
-            ahead,
-            now,
-            force,
-        } = self.course;
-        let [fill_a, vent_a, fill_b, vent_b] = self.plan;
-        let (chamber, piston, plan) = if first {
-            let piston = Piston {
-                flow: model.flow_a,
-                lengths: [model.length_a(middle), model.length_a(end)],
-                speeds: [speed.wrapping_neg(), ahead.wrapping_neg()],
-                all_flows: 0,
-            };
-            (&mut self.a, piston, [fill_a, vent_a])
-        } else {
-            let piston = Piston {
-                flow: model.flow_b,
-                lengths: [model.length_b(middle), model.length_b(end)],
-                speeds: [speed, ahead],
-                all_flows: 1,
-            };
-            (&mut self.b, piston, [fill_b, vent_b])
-        };
-        if self.turn.drives {
-            chamber.follow(model, &clock, &piston, plan);
-        } else {
-            chamber.observe(model, &clock, &piston, plan);
-            // Counted.
-            self.plan = if first {
-                [0, 0, fill_b, vent_b]
-            } else {
-                [fill_a, vent_a, 0, 0]
-            };
-        }
-        if first && model.learns_mass {
-            // Of the period before.
-            self.learner.sample(model, now, force);
-        }
-    }
-
-    /// The motion up to the moment, and where it will go.
-    #[inline]
-    fn moves(&mut self, model: &AxisModel, measured: PositionMm) {
-        let before = self.force;
-        self.force = model.pressure_force(self.pressures());
-        let force = before.saturating_add(self.force) >> 1;
-        self.motion.predict(model, &self.inertia, force);
-        let mean = self.measured.saturating_add(measured.raw()) >> 1;
-        self.motion.correct(model, &self.inertia, mean);
-        self.course = Course::of(model, &self.motion, force);
-        self.course_check = self.course.sum();
-    }
-
-    /// Motion, and the force that is wanted.
-    #[inline]
-    fn want(&mut self, model: &AxisModel, input: &JointInput) {
-        self.moves(model, input.measured);
-        let reference = input.reference.raw();
-        // Also one that came between this stroke and the last of the period before.
-        let other = self.rest.is_fresh() || self.rest.is_other(model, reference);
-        if other {
-            self.push = Push::default();
-        }
-        if !other && self.learner.has_news() {
-            // Twice after a move: what was wanted a period ago will do.
-            self.learn(model);
-        } else {
-            let expected = Pressures {
-                a: self.a.expected,
-                b: self.b.expected,
-            };
-            let ahead = Ahead::new(model, &self.inertia, &self.motion, self.force, expected);
-            let wish = Wish {
-                reference,
-                reference_speed: input.reference_velocity.raw(),
-                motion: &self.motion,
-                ahead,
-                inertia: &self.inertia,
-            };
-            if !self.quiet {
-                wish.push(model, &mut self.push);
-            }
-            self.wanted = wish.force(model, self.push, &self.rest);
-        }
-        self.push_check = self.push.sum();
-        self.motion_check = self.sum_of_motion();
-    }
-
-    /// Takes what a move has told of the mass, a step of it in a period.
-    #[inline]
-    fn learn(&mut self, model: &AxisModel) {
-        if self.learner.has_news()
-            && let Some(mass) = self.learner.news(model)
-        {
-            self.inertia = Inertia::new(model, mass);
-        }
-    }
-
-    /// On-times of the next tick by the plan, of which so many ticks are gone by then.
-    #[inline]
-    fn due(&self, model: &AxisModel, ticks: u16) -> OnTimes {
+    /// On-times of the next tick by the plan.
+    fn due(&self, model: &AxisModel) -> OnTimes {
         let tick = model.times.tick as u16;
-        let gone = tick.wrapping_mul(ticks);
+        // The tick after the last of a period is the first of the next one, whose plan is new.
+        let next = self.turn.wrapping_add(1) % PERIOD_TICKS;
+        let gone = tick.wrapping_mul(u16::from(next));
         self.plan.map(|on| on.saturating_sub(gone).min(tick))
+    }
+
+    /// The pulses of the next period.
+    fn plan_period(&mut self, model: &AxisModel, input: &JointInput) {
+        let reference = input.reference.raw();
+        let reference_speed = input.reference_velocity.raw();
+        if self.standstill.aim(model, reference) {
+            self.ramp = BreakawayRamp::default();
+        }
+        let stands = self.is_settled() || self.observer.motion.speed.wrapping_abs() < STILL_SPEED;
+        let preload = self.preload(model, input, stands);
+        let seat = match preload {
+            Some(_) => None,
+            None => self.seat(model, input),
+        };
+        match (preload, seat) {
+            (Some(_), _) => {}
+            (None, Some(seat)) => self.standstill.seat(seat == Seat::Seated),
+            (None, None) => self.standstill.update(
+                model,
+                &Approach {
+                    reference,
+                    reference_speed,
+                    measured: input.measured.raw(),
+                    motion: &self.observer.motion,
+                    force: self.observer.force,
+                    mass: self.observer.inertia.mass,
+                },
+            ),
+        }
+        if preload.is_some() || (stands && self.observer.motion.at_stop(model)) {
+            let to = match (preload, input.announced) {
+                (Some(_), Some(announced)) => announced.reference.raw(),
+                _ => reference,
+            };
+            self.swap = PressureSwap::towards(to, self.observer.motion.stroke);
+        }
+        let force = match (preload, seat) {
+            (Some(Awaited::Ready), _) => return self.shut(model),
+            (Some(Awaited::Force(force)), _) | (None, Some(Seat::Press(force))) => force,
+            (None, _) if self.standstill.valves_closed() => return self.shut(model),
+            (None, _) => self.force_demand(model, reference, reference_speed),
+        };
+        self.make_force(model, force, preload.is_none() && self.standstill.is_near());
+    }
+
+    /// F* of the position servo, mN.
+    fn force_demand(&mut self, model: &AxisModel, reference: i32, reference_speed: i32) -> i32 {
+        let demand = ForceDemand {
+            reference,
+            reference_speed,
+            observer: &self.observer,
+            ahead: PredictedState::new(model, &self.observer),
+            gains: &self.gains,
+        };
+        demand.ramp(model, &mut self.ramp);
+        demand.force(model, self.ramp, &self.standstill)
+    }
+
+    /// All valves shut as soon as the pulses under way allow.
+    fn shut(&mut self, model: &AxisModel) {
+        self.plan = pulse_planner::shut(model, &self.observer, self.begin);
+        self.limited = false;
+        self.duty = Duty::ZERO;
+    }
+
+    /// Pulses that make a force, mN; near the target, of one chamber alone.
+    fn make_force(&mut self, model: &AxisModel, force: i32, near: bool) {
+        let possible = force
+            .max(model.force_in.wrapping_neg())
+            .min(model.force_out);
+        let target = self.swap.targets(model, possible, self.observer.expected());
+        self.plan = pulse_planner::plan(model, &self.observer, target, self.begin, near);
+        self.limited = possible != force;
+        self.duty = allocation::duty(model, possible);
     }
 }
 

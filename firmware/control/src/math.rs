@@ -4,7 +4,7 @@
 /// the 2^(32 − shift) largest or smallest numbers. It is the upper word of the product
 /// that is limited, in one instruction: a limit of all of it takes six.
 #[inline]
-pub(crate) fn scaled(a: i32, b: i32, shift: u32) -> i32 {
+pub(crate) fn mul_shr_sat(a: i32, b: i32, shift: u32) -> i32 {
     let product = i64::from(a).wrapping_mul(i64::from(b));
     let left = 32_u32.wrapping_sub(shift);
     let bound = i32::MAX.wrapping_shr(left);
@@ -15,7 +15,7 @@ pub(crate) fn scaled(a: i32, b: i32, shift: u32) -> i32 {
 
 /// `a × b / 2^shift`, rounded down, of a quotient that is known to fit.
 #[inline]
-pub(crate) const fn part(a: i32, b: i32, shift: u32) -> i32 {
+pub(crate) const fn mul_shr(a: i32, b: i32, shift: u32) -> i32 {
     (a as i64).wrapping_mul(b as i64).wrapping_shr(shift) as i32
 }
 
@@ -52,15 +52,6 @@ pub(crate) fn clip<const BITS: u32>(value: i32) -> i32 {
     value.max(!bound).min(bound)
 }
 
-/// One step of a sum of words of which any flipped bit changes it: a bijection of the
-/// running value and of the word.
-#[inline(always)]
-pub(crate) const fn mix(sum: u32, word: i32) -> u32 {
-    // Odd multiplier (Knuth, 2^32 / golden ratio).
-    sum.wrapping_mul(0x9E37_79B1)
-        .wrapping_add(word.cast_unsigned())
-}
-
 /// `value` limited to ±`bound`.
 #[inline]
 pub(crate) fn within(value: i32, bound: i32) -> i32 {
@@ -88,9 +79,35 @@ pub(crate) fn square_root(value: u32) -> u32 {
     root.wrapping_shr(zeros.wrapping_shr(1).wrapping_add(1))
 }
 
+/// Cube root, × 2^16, of a share × 2^30 of at most one.
+///
+/// Newton's method on a share that is brought into 1/8…1 by shifts of three bits: the
+/// chord is within a ninth of the root there, and a step squares that.
+pub(crate) fn cube_root(share: u32) -> i32 {
+    if share >= 1 << 30 {
+        return 1 << 16;
+    }
+    if share == 0 {
+        return 0;
+    }
+    let third = share.leading_zeros().wrapping_sub(2) / 3;
+    let near = share.wrapping_shl(third.wrapping_mul(3)).wrapping_shr(14);
+    // The chord from 1/8 to 1.
+    let mut root = near
+        .wrapping_mul(9362)
+        .wrapping_shr(14)
+        .wrapping_add(28_087);
+    for _ in 0..3 {
+        let square = root.wrapping_mul(root.min((1 << 16) - 1)).wrapping_shr(16);
+        let step = near.wrapping_shl(16).checked_div(square).unwrap_or(0);
+        root = root.wrapping_mul(2).wrapping_add(step) / 3;
+    }
+    root.wrapping_shr(third) as i32
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{quotient, scaled, square_root};
+    use super::{cube_root, mul_shr_sat, quotient, square_root};
     use proptest::prelude::*;
 
     proptest! {
@@ -121,7 +138,7 @@ mod tests {
         ) {
             let b = b >> b_bits;
             let exact = (i64::from(a) * i64::from(b)) >> shift;
-            let found = i64::from(scaled(a, b, shift));
+            let found = i64::from(mul_shr_sat(a, b, shift));
             let limited = exact.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
             let off = if exact == limited { 0 } else { (1_i64 << (32 - shift)) - 1 };
             prop_assert!((found - limited).abs() <= off, "{found} {exact}");
@@ -140,6 +157,23 @@ mod tests {
                 square_root(root * root).abs_diff(root) <= 1 + root / 2000,
                 "{root}"
             );
+        }
+    }
+
+    #[test]
+    fn cube_roots() {
+        assert_eq!(cube_root(0), 0);
+        assert_eq!(cube_root(1 << 30), 1 << 16);
+        for share in [
+            1_u32,
+            20_000,
+            100 << 14,
+            8192 << 14,
+            30_000 << 14,
+            65_000 << 14,
+        ] {
+            let exact = (f64::from(share) / f64::from(1 << 30)).cbrt() * 65_536.0;
+            assert!((f64::from(cube_root(share)) - exact).abs() < 2.0, "{share}");
         }
     }
 }

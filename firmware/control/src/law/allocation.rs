@@ -1,12 +1,25 @@
-//! Chamber pressures for a force.
+//! Force-to-pressure allocation: two chamber pressures that make one force.
+//!
+//! ```text
+//! pA = p_m + F / (2 AA)          p_m: mean of supply and atmosphere
+//! pB = (pA AA − pa (AA − AB) − F) / AB          each limited to what valves can make; the other makes up for it
+//! ```
+//!
+//! About the mean pressure both chambers can change fastest either way, and the axis is stiffest. (Two
+//! actuators and one force: the split is a choice. Symmetric about a mean is the usual one, e.g. Shen and
+//! Goldfarb 2007.)
+//!
+//! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in one from an end
+//! stop, the drive chamber makes up for what the counter chamber still has too much, and gives way as that falls:
+//! the force is there as soon as either chamber can make it.
+//!
+//! Config [`AxisModel`], state [`PressureSwap`], update [`PressureSwap::targets`].
 
 use crate::axis::AxisModel;
-use crate::math::{part, scaled};
+use crate::math::{mul_shr, mul_shr_sat};
 use crate::observer::pressure::Pressures;
-use wheeleg_units::saturate_i32;
-
-/// A chamber lags whose pressure is so much above its target (10 kPa in 1/256 Pa).
-const LAG: i32 = 10_000 << 8;
+use crate::tuning::SWAP_LAG;
+use wheeleg_units::{Duty, saturate_i32};
 
 /// A pressure that valves can make.
 #[inline]
@@ -30,8 +43,8 @@ fn b_of(model: &AxisModel, force: i32, a: i32) -> i32 {
 fn a_of(model: &AxisModel, force: i32, b: i32) -> i32 {
     let sum = force
         .saturating_add(model.force_rod)
-        .saturating_add(part(b, model.force_b, 32));
-    scaled(sum, model.pressure_a, 12)
+        .saturating_add(mul_shr(b, model.force_b, 32));
+    mul_shr_sat(sum, model.pressure_a, 12)
 }
 
 /// Pressures whose force is `force`, about the mean. The force must be one that the
@@ -42,7 +55,7 @@ pub(super) fn targets(model: &AxisModel, force: i32) -> Pressures {
         model,
         model
             .mean
-            .saturating_add(part(force, model.half_pressure_a, 12)),
+            .saturating_add(mul_shr(force, model.half_pressure_a, 12)),
     );
     let b = b_of(model, force, a);
     let bounded = possible(model, b);
@@ -53,29 +66,77 @@ pub(super) fn targets(model: &AxisModel, force: i32) -> Pressures {
     Pressures { a, b: bounded }
 }
 
-/// Targets while the counter chamber still has too much: the drive chamber makes the
-/// force with what that one has. `None` if it does not lag.
-#[inline]
-pub(super) fn made_up(
-    model: &AxisModel,
-    force: i32,
-    target: Pressures,
-    now: Pressures,
-    extends: bool,
-) -> Option<Pressures> {
-    if extends {
-        let a = possible(model, a_of(model, force, now.b)).max(target.a);
-        (now.b.saturating_sub(target.b) > LAG).then_some(Pressures { a, ..target })
-    } else {
-        let b = possible(model, b_of(model, force, now.a)).max(target.b);
-        (now.a.saturating_sub(target.a) > LAG).then_some(Pressures { b, ..target })
+/// The drive chamber makes up for what the counter chamber still has too much.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum PressureSwap {
+    /// It does not.
+    No,
+    /// In a move that extends.
+    Extends,
+    /// In one that retracts.
+    Retracts,
+}
+
+impl PressureSwap {
+    /// For a move from `stroke` to `target`, raw mm.
+    pub(super) const fn towards(target: i32, stroke: i32) -> Self {
+        if target > stroke {
+            Self::Extends
+        } else {
+            Self::Retracts
+        }
     }
+
+    /// Chamber pressures for a force that the supply can give, with chambers that are `expected` to be at these.
+    /// The swap is over when the counter chamber no longer lags.
+    pub(super) fn targets(
+        &mut self,
+        model: &AxisModel,
+        force: i32,
+        expected: Pressures,
+    ) -> Pressures {
+        let target = targets(model, force);
+        let (lag, swapped) = match self {
+            Self::No => return target,
+            Self::Extends => {
+                let a = possible(model, a_of(model, force, expected.b)).max(target.a);
+                (
+                    expected.b.saturating_sub(target.b),
+                    Pressures { a, ..target },
+                )
+            }
+            Self::Retracts => {
+                let b = possible(model, b_of(model, force, expected.a)).max(target.b);
+                (
+                    expected.a.saturating_sub(target.a),
+                    Pressures { b, ..target },
+                )
+            }
+        };
+        if lag > SWAP_LAG {
+            swapped
+        } else {
+            *self = Self::No;
+            target
+        }
+    }
+}
+
+/// A force that the supply can give as a share of its largest, in steps of 2^-14.
+pub(super) fn duty(model: &AxisModel, force: i32) -> Duty {
+    let share = if force > 0 {
+        model.share_out
+    } else {
+        model.share_in
+    };
+    // Within ±2^14.
+    Duty::from_raw(mul_shr(force, share, 26).wrapping_shl(16))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{AxisData, AxisModel};
+    use crate::axis::AxisData;
     use wheeleg_units::{Micros, PositionMm};
 
     /// Force of `pressures` with the areas themselves, mN.
@@ -119,5 +180,39 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// B still has 2 bar too much: A makes up for it, and gives way once that is less than 10 kPa.
+    #[test]
+    fn a_counter_chamber_that_lags_is_made_up_for() {
+        let data = AxisData::default();
+        let model = AxisModel::new(&data, Micros(1000)).unwrap();
+        let target = targets(&model, 20_000);
+        let swapped = |lag_pa: i32| {
+            let mut swap = PressureSwap::towards(1, 0);
+            let expected = Pressures {
+                a: model.mean,
+                b: target.b + (lag_pa << 8),
+            };
+            let found = swap.targets(&model, 20_000, expected);
+            let made = Pressures {
+                a: found.a,
+                b: expected.b,
+            };
+            (swap, force(made, &data))
+        };
+        for lag_pa in [11_000, 100_000, 200_000] {
+            let (swap, made) = swapped(lag_pa);
+            assert_eq!(swap, PressureSwap::Extends);
+            assert!((made - 20_000.0).abs() < 150.0, "{lag_pa}: {made}");
+        }
+        assert_eq!(swapped(9_000).0, PressureSwap::No);
+        let mut other = PressureSwap::towards(0, 1);
+        let expected = Pressures {
+            a: target.a + (50_000 << 8),
+            b: model.mean,
+        };
+        let found = other.targets(&model, 20_000, expected);
+        assert!(found.b > target.b && found.a == target.a);
     }
 }

@@ -1,227 +1,201 @@
-//! When the piston may rest, and when it must move again.
+//! Standstill: when the valves stay shut, a state machine.
+//!
+//! ```text
+//!           in the band and slow, or friction stops it there      for REST_PERIODS
+//!  SERVO ───────────────────────────────────────────────► CATCH ─────────────────► REST
+//!    ▲ │ ▲                                                  │                        │
+//!    │ │ └──────────────────────────────────────────────────┘                        │
+//!    │ └─► PAUSE   patience is over and it entered the band: one swing with the valves shut
+//!    └──────────────────────────────────────────────────── out of the release band ──┘
+//!  PRESS: at an end stop a force is controlled (`seat`); it ends in REST
+//! ```
+//!
+//! * **Stopping way.** Friction alone stops the piston in the band if m v²/2 lies between the work of what friction
+//!   has left beside the forces that act, over the ways to both edges of the band.
+//! * **Patience.** What does not come to rest near its target for long may do so in a wider band, up to 2.4 times
+//!   and 0.4 mm, and the friction that is fed forward fades. Each time it enters that band the law waits with the
+//!   valves shut for a swing of the mass on the air, 2π √(m / k), k = n p (AA²/VA + AB²/VB): no limit
+//!   cycle lasts.
+//! * **Release.** At rest nothing switches until the error has left the band of release for some periods; at once with
+//!   a new target.
+//!
+//! The hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
+//! pause are ours, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
+//!
+//! Config [`AxisModel`], state [`Standstill`], update [`Standstill::update`].
 
-use super::STILL;
 use crate::axis::AxisModel;
-use crate::math::{mix, part, scaled, square_root};
+use crate::math::{mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
+use crate::tuning::{
+    BAND_WIDEST, CATCH_SPEED, FLED, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
+    PATIENCE, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST,
+    REST_PERIODS, START_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, SWING_PERIODS_MAX,
+    SWING_PERIODS_MIN, WIDENS_AFTER, WIDENS_SHIFT,
+};
 
-/// Slower than this a piston in the band is caught by shutting the valves, raw mm/s (4 mm/s).
-const CATCH: i32 = 4 << 16;
-/// A reference slower than this is a step (1 mm/s).
-pub(super) const REFERENCE_RESTS: i32 = 1 << 16;
-/// Periods in the band before rest.
-const REST_PERIODS: u16 = 6;
-/// Periods near the target without coming to rest after which the law acts and waits …
-const PATIENCE: u16 = 100;
-/// … and, so many periods later, the band widens …
-const WIDENS: i32 = 120;
-/// … by one band in so many periods, up to three bands in all …
-const PATIENCE_STEP: i32 = 1 << PATIENCE_SHIFT;
-const PATIENCE_SHIFT: u32 = 7;
-/// … but never wider than this, raw mm (0.4 mm).
-const WIDEST: i32 = 26_214;
-/// A piston further from its target than this does not rest there, raw mm (0.45 mm).
-const LEFT: i32 = 29_491;
-/// A piston that rests may be so much further from its target than one that comes to rest, in
-/// sixteenths of the band.
-const RELEASE: i32 = 16;
-/// Periods near the target (24 bands) after which the piston counts as near.
-const NEAR: u16 = 4;
-/// Periods outside before the end of rest at the same target, …
-const RELEASE_PERIODS: u16 = 5;
-/// … and with a new one.
-const START_PERIODS: u16 = 1;
-/// Periods of a pause that one counts for in which the piston stands beside the band.
-const PAUSE_SPENT: u16 = 8;
-/// Share of the friction told that is counted on to stop a piston, × 2^16 (0.85).
-const STOPS: i32 = 55_705;
-/// Faster than this a piston would not stay where it is, raw mm/s (40 mm/s).
-const GENTLE: i32 = 40 << 16;
-/// Nor does one that is further from its target than this, raw mm (2 mm), and outside its band.
-const FLED: i32 = 2 << 16;
+/// Periods in which the band widens by one.
+const WIDENS_STEP: i32 = 1 << WIDENS_SHIFT;
 
-/// Rest at a target, and how long it has been tried. In an order in which it is whole words,
-/// which are sealed as they are.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C)]
-pub(super) struct Rest {
-    target: i32,
-    held: u16,
-    released: u16,
-    near: u16,
-    /// What is left of the pause under way, periods.
-    pause: u16,
-    /// In the band in the last period.
-    inside: bool,
-    /// The target has changed since the piston came to rest.
-    aimed: bool,
-    settled: bool,
-    /// The target was a new one when the last stroke looked at it.
-    fresh: bool,
+/// What the standstill logic has decided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) enum State {
+    /// The position servo acts.
+    #[default]
+    Servo,
+    /// Valves shut for what is left of a swing.
+    Pause,
+    /// Valves shut: friction stops the piston.
+    Catch,
+    /// At rest, valves shut.
+    Rest,
+    /// Pressed against an end stop.
+    Press,
 }
 
-impl Rest {
-    /// Adds itself to a sum. Fields that are narrower than a word share one, such that a
-    /// flipped bit of any flips one bit of it.
-    #[inline]
-    pub(super) fn sum(&self, sum: u32) -> u32 {
-        let [first, second, third, fourth] = self.words();
-        mix(mix(mix(mix(sum, first), second), third), fourth)
-    }
+/// Rest at a target, and how long it has been tried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Standstill {
+    state: State,
+    /// Raw mm.
+    target: i32,
+    /// The target has changed since the piston came to rest.
+    aimed: bool,
+    /// Periods near the target without coming to rest.
+    near: u16,
+    /// In the band in the last period.
+    inside: bool,
+    /// Periods in [`State::Catch`].
+    caught: u16,
+    /// What is left of the pause under way, periods.
+    pause: u16,
+    /// Periods outside the band of release.
+    outside: u16,
+}
 
-    #[inline]
-    fn words(&self) -> [i32; 4] {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            target,
-            held,
-            released,
-            near,
-            pause,
-            inside,
-            aimed,
-            settled,
-            fresh,
-        } = *self;
-        let two = |low: u16, high: u16| i32::from(low) | i32::from(high).wrapping_shl(16);
-        let flags = i32::from(inside)
-            | i32::from(aimed).wrapping_shl(8)
-            | i32::from(settled).wrapping_shl(16)
-            | i32::from(fresh).wrapping_shl(24);
-        [target, two(held, released), two(near, pause), flags]
+impl Standstill {
+    /// Shut valves from power-up on, with the piston at `stroke`, raw mm.
+    pub(super) fn at(stroke: i32) -> Self {
+        Self {
+            target: stroke,
+            ..Self::default()
+        }
     }
 
     /// At rest.
-    pub(super) const fn is_settled(&self) -> bool {
-        self.settled
+    pub(super) const fn is_at_rest(&self) -> bool {
+        matches!(self.state, State::Rest)
     }
 
-    /// Whether it has been near its target without coming to rest for longer than patience allows.
-    #[inline]
-    pub(super) fn lingers(&self) -> bool {
-        self.near > PATIENCE
-    }
-
-    /// At rest, by what is known beside its error.
-    pub(super) const fn settle(&mut self) {
-        self.settled = true;
-        self.aimed = false;
-        self.released = 0;
-        self.near = 0;
-        self.pause = 0;
+    /// Whether the valves are to stay shut.
+    pub(super) const fn valves_closed(&self) -> bool {
+        matches!(self.state, State::Pause | State::Catch | State::Rest)
     }
 
     /// Whether it rests at the present target.
-    #[inline]
     pub(super) const fn holds(&self) -> bool {
-        self.settled && !self.aimed
+        self.is_at_rest() && !self.aimed
+    }
+
+    /// Whether it has been near its target without coming to rest for longer than patience allows.
+    pub(super) const fn lingers(&self) -> bool {
+        self.near > PATIENCE
     }
 
     /// Whether the piston has been near its target for some time.
-    #[inline]
     pub(super) const fn is_near(&self) -> bool {
-        self.near > NEAR
+        self.near > NEAR_PERIODS
     }
 
-    /// Forgets the rest state with the piston at `stroke`.
-    #[inline]
-    pub(super) const fn release(&mut self, stroke: i32) {
-        self.settled = false;
-        self.held = 0;
-        self.pause = 0;
-        self.target = stroke;
-    }
-
-    /// Whether the reference is another target.
-    #[inline]
-    pub(super) const fn is_other(&self, model: &AxisModel, reference: i32) -> bool {
-        reference.saturating_sub(self.target).saturating_abs() > model.band
-    }
-
-    /// Whether the target was a new one when the last stroke looked at it.
-    #[inline]
-    pub(super) const fn is_fresh(&self) -> bool {
-        self.fresh
-    }
-
-    /// Takes over the reference.
-    #[inline]
-    pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) {
-        self.fresh = self.is_other(model, reference);
-        if self.fresh {
+    /// Takes over the reference; gives whether it is another target.
+    pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
+        let other = reference.saturating_sub(self.target).saturating_abs() > model.band;
+        if other {
             self.target = reference;
             self.near = 0;
             self.pause = 0;
             self.aimed = true;
         }
+        other
     }
 
-    /// One period; whether the valves are to stay shut.
-    #[inline]
-    pub(super) fn quiet(&mut self, model: &AxisModel, now: &Approach) -> bool {
-        // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
-        let narrow = model.band;
+    /// At an end stop: pressed against it, or at rest there.
+    pub(super) const fn seat(&mut self, seated: bool) {
+        if seated {
+            self.rest();
+            self.near = 0;
+            self.pause = 0;
+        } else {
+            self.state = State::Press;
+            self.caught = 0;
+        }
+    }
+
+    const fn rest(&mut self) {
+        self.state = State::Rest;
+        self.aimed = false;
+        self.outside = 0;
+    }
+
+    /// One period.
+    pub(super) fn update(&mut self, model: &AxisModel, now: &Approach) {
         let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        if self.settled && self.stays(model, now, steps) {
-            return true;
+        if self.is_at_rest() {
+            if self.stays(model, now, steps) {
+                return;
+            }
+            self.caught = 0;
+            self.near = self.near.max(PATIENCE);
+        }
+        if !steps {
+            self.state = State::Servo;
+            self.near = self.near.saturating_sub(1);
+            self.caught = 0;
+            self.pause = 0;
+            self.inside = false;
+            return;
         }
         let error = now
             .reference
             .saturating_sub(now.motion.stroke)
             .saturating_abs();
-        if !steps {
-            self.near = self.near.saturating_sub(1);
-            self.held = 0;
-            self.pause = 0;
-            self.inside = false;
-            return false;
-        }
-        self.near = if error < narrow.wrapping_mul(24) {
+        // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
+        self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
             self.near.wrapping_add(1).min(PATIENCE * 4)
         } else {
             self.near.saturating_sub(1)
         };
-        // Patience: what has not come to rest for long may do so in a wider band.
-        let beyond = self.beyond();
-        let (band, catch) = if beyond > WIDENS {
-            let beyond = beyond.wrapping_sub(WIDENS).min(2 * PATIENCE_STEP);
-            // A band of at most 5 mm and the catch, both below 2^19, times up to 3.
-            let extra = |base: i32| base.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
-            let band = narrow.wrapping_add(extra(narrow)).min(WIDEST.max(narrow));
-            (band, CATCH.wrapping_add(extra(CATCH)))
-        } else {
-            (narrow, CATCH)
-        };
+        let band = self.band(model);
+        let catch = CATCH_SPEED.wrapping_add(self.widened(CATCH_SPEED));
         let speed = now.motion.speed.wrapping_abs();
         let inside = error < band;
-        let waits = self.waits(model, now, speed, error, inside);
-        let slow = inside && speed < catch;
-        if !(slow || now.stops_within(model, band)) {
-            self.held = 0;
-            return waits;
+        self.wait(model, now, speed, error, inside);
+        if (inside && speed < catch) || now.stops_within(model, band) {
+            self.state = State::Catch;
+            self.caught = self.caught.wrapping_add(1);
+            if self.caught > REST_PERIODS {
+                self.rest();
+            }
+        } else {
+            self.caught = 0;
+            self.state = if self.pause > 0 {
+                State::Pause
+            } else {
+                State::Servo
+            };
         }
-        self.held = self.held.wrapping_add(1);
-        if self.held > REST_PERIODS {
-            self.settled = true;
-            self.aimed = false;
-            self.released = 0;
-        }
-        true
     }
 
-    /// One period of a piston that rests; whether it stays so.
-    #[inline]
+    /// Whether a piston at rest stays so.
     fn stays(&mut self, model: &AxisModel, now: &Approach, steps: bool) -> bool {
-        let narrow = model.band;
-        let beyond = self.beyond().wrapping_sub(WIDENS);
-        let beyond = beyond.clamp(0, 2 * PATIENCE_STEP);
-        let extra = narrow.wrapping_mul(beyond).wrapping_shr(PATIENCE_SHIFT);
-        let band = narrow.wrapping_add(extra).min(WIDEST.max(narrow));
-        let release = narrow
-            .wrapping_mul(RELEASE)
+        let band = self.band(model);
+        let half = model.band >> 1;
+        let release = model
+            .band
+            .wrapping_mul(RELEASE_SIXTEENTHS)
             .wrapping_shr(4)
             .wrapping_add(band)
-            .min(LEFT.max(band.wrapping_add(narrow >> 1)));
+            .min(RELEASE_WIDEST.max(band.wrapping_add(half)));
         // The ground pushes a standing joint to and fro. A target that has moved is another matter.
         let release = if self.aimed {
             release
@@ -230,23 +204,17 @@ impl Rest {
         };
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
         if steps && away <= release {
-            self.released = 0;
+            self.outside = 0;
             self.aimed = false;
             return true;
         }
-        self.released = self.released.wrapping_add(1);
+        self.outside = self.outside.wrapping_add(1);
         let periods = if self.aimed {
             START_PERIODS
         } else {
             RELEASE_PERIODS
         };
-        if steps && self.released < periods {
-            return true;
-        }
-        self.settled = false;
-        self.held = 0;
-        self.near = self.near.max(PATIENCE);
-        false
+        steps && self.outside < periods
     }
 
     /// Act and wait. Where acting alone has not brought the piston to rest for long,
@@ -254,21 +222,13 @@ impl Rest {
     /// swing on the air of the chambers: a piston that swings on it, or on the bristles of
     /// its friction, comes to rest by itself, and every pulse meant to help would keep it
     /// going. One that flees, because the forces on it are not in balance, is not waited for.
-    #[inline]
-    fn waits(
-        &mut self,
-        model: &AxisModel,
-        now: &Approach,
-        speed: i32,
-        error: i32,
-        inside: bool,
-    ) -> bool {
+    fn wait(&mut self, model: &AxisModel, now: &Approach, speed: i32, error: i32, inside: bool) {
         let entered = inside && !self.inside;
         self.inside = inside;
-        if speed > GENTLE || (error > FLED && !inside) {
+        if speed > GENTLE_SPEED || (error > FLED && !inside) {
             self.pause = 0;
         } else if self.pause > 0 {
-            let spent = if inside || speed >= STILL {
+            let spent = if inside || speed >= STILL_SPEED {
                 1
             } else {
                 PAUSE_SPENT
@@ -277,7 +237,6 @@ impl Rest {
         } else if entered && self.beyond() > 0 {
             self.pause = swing(model, now.mass);
         }
-        self.pause > 0
     }
 
     /// Periods near the target beyond what patience allows.
@@ -285,23 +244,38 @@ impl Rest {
         i32::from(self.near.saturating_sub(PATIENCE))
     }
 
+    /// What is added to `base`, up to 1.4 times it, where patience is over for long.
+    fn widened(&self, base: i32) -> i32 {
+        let beyond = self.beyond().wrapping_sub(WIDENS_AFTER);
+        let beyond = beyond.max(0);
+        // Both below 2^19, times up to 2^8.
+        base.wrapping_mul(beyond).wrapping_shr(WIDENS_SHIFT)
+    }
+
+    /// Rest band, raw mm.
+    fn band(&self, model: &AxisModel) -> i32 {
+        let narrow = model.band;
+        narrow
+            .wrapping_add(self.widened(narrow))
+            .min(BAND_WIDEST.max(narrow))
+    }
+
     /// What is fed forward for friction that is less than told makes a relay: where
     /// the piston does not come to rest, it fades.
-    #[inline]
     pub(super) fn faded(&self, grip: i32) -> i32 {
-        let left = (PATIENCE_STEP + PATIENCE_STEP / 4)
+        let left = (WIDENS_STEP + WIDENS_STEP / 4)
             .saturating_sub(self.beyond())
             .max(0);
-        part(grip, left.min(PATIENCE_STEP), PATIENCE_SHIFT)
+        mul_shr(grip, left.min(WIDENS_STEP), WIDENS_SHIFT)
     }
 }
 
 /// Periods of a swing of a mass (kg × 2^16) on the air of both chambers, 25…250.
 #[inline]
 fn swing(model: &AxisModel, mass: i32) -> u16 {
-    let square_8 = scaled(mass, model.swing, 16);
+    let square_8 = mul_shr_sat(mass, model.swing, 16);
     let periods = square_root(square_8.unsigned_abs()).wrapping_shr(4);
-    periods.clamp(25, 250) as u16
+    periods.clamp(SWING_PERIODS_MIN, SWING_PERIODS_MAX) as u16
 }
 
 /// How the piston comes to its target.
@@ -328,13 +302,13 @@ impl Approach<'_> {
     fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
         let speed = self.motion.speed.wrapping_shr(8);
         let error = self.reference.saturating_sub(self.motion.stroke);
-        if error.saturating_abs() > band.wrapping_mul(12) {
+        if error.saturating_abs() > band.wrapping_mul(STOP_ZONE_BANDS) {
             return false;
         }
         let net = self.force.saturating_add(self.motion.load);
         let along = if speed < 0 { net.saturating_neg() } else { net };
-        let stopping = part(model.coulomb, STOPS, 16).saturating_sub(along);
-        if stopping < model.coulomb >> 2 {
+        let stopping = mul_shr(model.coulomb, FRICTION_STOPS, 16).saturating_sub(along);
+        if stopping < model.coulomb >> STOP_LEAST_SHIFT {
             return false;
         }
         // kg × mm²/s² = µJ = mN × mm, all × 2^16.
@@ -354,43 +328,254 @@ impl Approach<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    extern crate std;
     use crate::axis::AxisData;
+    use std::vec::Vec;
     use wheeleg_units::{Micros, PositionMm};
 
+    fn model() -> AxisModel {
+        AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
+    }
+
+    /// Hundredths of a millimetre.
+    fn hundredths(value: i32) -> i32 {
+        (value << 16) / 100
+    }
+
+    /// A piston `off` (1/100 mm) from its target at `speed` mm/s, with 20 N on it.
+    fn seen<R>(off: i32, speed: i32, look: impl FnOnce(&Approach) -> R) -> R {
+        let stroke = (90 << 16) + hundredths(off);
+        let motion = Motion {
+            stroke,
+            speed: speed << 16,
+            ..Motion::default()
+        };
+        look(&Approach {
+            reference: 90 << 16,
+            reference_speed: 0,
+            measured: stroke,
+            motion: &motion,
+            force: 20_000,
+            mass: 3 << 15,
+        })
+    }
+
+    /// The states that a piston takes there for so many periods.
+    fn states(standstill: &mut Standstill, off: i32, speed: i32, periods: u32) -> Vec<State> {
+        states_of(&model(), standstill, off, speed, periods)
+    }
+
+    fn states_of(
+        model: &AxisModel,
+        standstill: &mut Standstill,
+        off: i32,
+        speed: i32,
+        periods: u32,
+    ) -> Vec<State> {
+        (0..periods)
+            .map(|_| {
+                seen(off, speed, |now| standstill.update(model, now));
+                standstill.state
+            })
+            .collect()
+    }
+
+    fn aimed() -> Standstill {
+        let mut standstill = Standstill::at(0);
+        assert!(standstill.aim(&model(), 90 << 16));
+        standstill
+    }
+
     #[test]
-    fn every_flipped_bit_of_the_rest_state_flips_one_that_is_sealed() {
-        let sealed = Rest::words;
-        let some = Rest {
-            target: 0x12_3456,
-            held: 77,
-            released: 5,
-            near: 501,
-            pause: 150,
-            inside: true,
-            aimed: false,
-            settled: true,
-            fresh: false,
-        };
-        let flips_one = |flip: &dyn Fn(&mut Rest)| {
-            let mut flipped = some;
-            flip(&mut flipped);
-            let pairs = sealed(&flipped).into_iter().zip(sealed(&some));
-            let bits: u32 = pairs.map(|(a, b)| (a ^ b).count_ones()).sum();
-            assert_eq!(bits, 1, "{flipped:?}");
-        };
-        for bit in 0..32 {
-            flips_one(&|rest| rest.target ^= 1 << bit);
+    fn a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods() {
+        // The band is 0.12 mm.
+        for (off, speed, caught) in [
+            (11, 3, true),
+            (-11, -3, true),
+            (13, 3, false),
+            (11, 5, false),
+        ] {
+            let states = states(&mut aimed(), off, speed, 7);
+            let expected = [State::Catch; 6].into_iter().chain([State::Rest]);
+            assert_eq!(states.into_iter().eq(expected), caught, "{off} {speed}");
         }
-        for bit in 0..16 {
-            flips_one(&|rest| rest.held ^= 1 << bit);
-            flips_one(&|rest| rest.released ^= 1 << bit);
-            flips_one(&|rest| rest.near ^= 1 << bit);
-            flips_one(&|rest| rest.pause ^= 1 << bit);
+    }
+
+    #[test]
+    fn rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target() {
+        let rested = || {
+            let mut standstill = aimed();
+            states(&mut standstill, 0, 0, 10);
+            assert!(standstill.holds());
+            standstill
+        };
+        assert_eq!(states(&mut rested(), 23, 0, 200).last(), Some(&State::Rest));
+        let left = states(&mut rested(), 25, 0, 5);
+        assert_eq!(
+            left.iter().filter(|state| **state == State::Rest).count(),
+            4
+        );
+        let mut moved = rested();
+        assert!(moved.aim(&model(), 91 << 16) && !moved.holds());
+        seen(25, 0, |now| {
+            moved.update(
+                &model(),
+                &Approach {
+                    reference: 91 << 16,
+                    ..*now
+                },
+            );
+        });
+        assert_eq!(moved.state, State::Servo);
+    }
+
+    /// Hunting beside its target, a piston gets a wider band after 0.88 s, up to 2.4 bands; and each
+    /// gentle entry into it is answered by a pause.
+    #[test]
+    fn patience_widens_the_band_and_waits_for_a_swing() {
+        let rests_at = |off: i32, hunting: u32| {
+            let mut standstill = aimed();
+            states(&mut standstill, 60, 10, hunting);
+            states(&mut standstill, off, 0, 9).last() == Some(&State::Rest)
+        };
+        assert!(!rests_at(15, 200) && rests_at(15, 300));
+        assert!(rests_at(28, 500) && !rests_at(30, 500));
+        let mut standstill = aimed();
+        assert!(!states(&mut standstill, 60, 10, 99).contains(&State::Pause));
+        states(&mut standstill, 60, 10, 10);
+        // Entered at 10 mm/s: too fast to be caught.
+        let waits = states(&mut standstill, 5, 10, 300);
+        let swing = swing(&model(), 3 << 15);
+        assert_eq!(
+            waits.iter().filter(|s| **s == State::Pause).count(),
+            usize::from(swing)
+        );
+        // One that is fast, or has fled, is not waited for.
+        for (off, speed) in [(5, 41), (210, 10)] {
+            let mut other = standstill;
+            other.pause = 50;
+            assert_eq!(
+                states(&mut other, off, speed, 1),
+                [State::Servo],
+                "{off} {speed}"
+            );
         }
-        flips_one(&|rest| rest.inside ^= true);
-        flips_one(&|rest| rest.aimed ^= true);
-        flips_one(&|rest| rest.settled ^= true);
-        flips_one(&|rest| rest.fresh ^= true);
+    }
+
+    #[test]
+    fn friction_that_stops_the_piston_in_the_band_is_left_to_do_so() {
+        // 1.5 kg; 10 N of friction, of which 0.85 count; no net force: 8.5 N over the way.
+        let stops = |off: i32, speed: i32| {
+            seen(off, speed, |now| {
+                Approach { force: 0, ..*now }.stops_within(&model(), hundredths(12))
+            })
+        };
+        // v²/2 × 1.5 kg = 8.5 N × 1 mm: 106 mm/s; ± 0.12 mm are ± 6 %.
+        assert!(stops(-100, 106) && stops(100, -106) && stops(-100, 102) && stops(-100, 111));
+        assert!(!stops(-100, 98) && !stops(-100, 115) && !stops(100, 106));
+        assert!(!stops(-150, 130), "further than twelve bands away");
+    }
+
+    /// Near is within 24 bands of 0.12 mm, for more than four periods.
+    #[test]
+    fn patience_begins_within_24_bands() {
+        let near = |off: i32, periods: u32| {
+            let mut standstill = aimed();
+            states(&mut standstill, off, 50, periods);
+            standstill.is_near()
+        };
+        assert!(near(285, 5) && !near(285, 4) && !near(291, 50));
+    }
+
+    /// However wide the band of an axis, it widens to 0.4 mm at most; and one that has widened to 0.36 mm
+    /// is left at 0.45 mm, not at twice that.
+    #[test]
+    fn a_wide_band_is_released_within_the_bar() {
+        let banded = |hundredths: f64| {
+            let data = AxisData {
+                band: PositionMm::from_f64(hundredths / 100.0),
+                ..AxisData::default()
+            };
+            AxisModel::new(&data, Micros(1000)).expect("in range")
+        };
+        let rested = |model: &AxisModel, off: i32| {
+            let mut standstill = aimed();
+            states_of(model, &mut standstill, 60, 10, 500);
+            states_of(model, &mut standstill, off, 0, 9);
+            standstill
+        };
+        let wide = banded(20.0);
+        assert!(rested(&wide, 39).holds() && !rested(&wide, 41).holds());
+        let narrow = banded(15.0);
+        let leaves = |off: i32| {
+            let mut standstill = rested(&narrow, 30);
+            assert!(standstill.holds());
+            // Rest forgets how long it took; kept near, the band is still wide.
+            standstill.near = 400;
+            states_of(&narrow, &mut standstill, off, 0, 5).last() != Some(&State::Rest)
+        };
+        assert!(!leaves(44) && leaves(46));
+    }
+
+    /// A force that leaves less than a quarter of the friction is not to be counted on.
+    #[test]
+    fn friction_that_a_force_takes_away_stops_nothing() {
+        // Of 8.5 N there are 2.4 or 2.6 left.
+        let stops = |force: i32| {
+            seen(-100, 0, |now| {
+                // What the friction that is left stops just at the target.
+                let left = f64::from(8_500 - force) / 1e3;
+                let speed = (2.0 * left / 1.5 / 1e3).sqrt() * 1e3;
+                let motion = Motion {
+                    speed: (speed * 65_536.0) as i32,
+                    ..*now.motion
+                };
+                Approach {
+                    force,
+                    motion: &motion,
+                    ..*now
+                }
+                .stops_within(&model(), hundredths(12))
+            })
+        };
+        assert!(stops(5_900) && !stops(6_100));
+    }
+
+    /// Standing still beside the band, it does not wait for all of the swing.
+    #[test]
+    fn a_pause_beside_the_band_is_short() {
+        let waits = |speed: i32| {
+            let mut standstill = aimed();
+            states(&mut standstill, 60, 10, 109);
+            standstill.pause = 80;
+            let states = states(&mut standstill, 60, speed, 200);
+            states
+                .iter()
+                .filter(|state| **state == State::Pause)
+                .count()
+        };
+        assert_eq!((waits(0), waits(5)), (9, 79));
+    }
+
+    /// The friction that is fed forward fades over 0.5 s once patience is over.
+    #[test]
+    fn friction_fades_where_the_piston_does_not_come_to_rest() {
+        let faded = |periods: u32| {
+            let mut standstill = aimed();
+            states(&mut standstill, 60, 10, periods);
+            standstill.faded(10_000)
+        };
+        assert_eq!((faded(100), faded(130), faded(400)), (10_000, 10_000, 0));
+        assert!((4_000..6_000).contains(&faded(196)), "{}", faded(196));
+    }
+
+    #[test]
+    fn a_seat_is_a_state_of_its_own() {
+        let mut standstill = aimed();
+        standstill.seat(false);
+        assert!(!standstill.valves_closed() && !standstill.is_at_rest());
+        standstill.seat(true);
+        assert!(standstill.valves_closed() && standstill.holds());
     }
 
     /// Against the period of mass and air springs in SI units, on cylinders of this project.

@@ -5,7 +5,7 @@
 //! q = C ρ0 p₁ √(1 − ((p₂/p₁ − b)/(1 − b))²)   otherwise
 //! ```
 
-use crate::math::{part, square_root};
+use crate::math::{mul_shr, square_root};
 
 /// Subsonic flow of ISO 6358: constants of one critical ratio b.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,7 +26,7 @@ impl FlowCurve {
         let forward = from >= to;
         let (high, low) = if forward { (from, to) } else { (to, from) };
         // In 32 Pa: 17 bits.
-        let y = part(low, self.stretch, 32).wrapping_sub(part(high, self.choked, 32));
+        let y = mul_shr(low, self.stretch, 32).wrapping_sub(mul_shr(high, self.choked, 32));
         let drive = if y <= 0 {
             high
         } else {
@@ -49,5 +49,5 @@ impl FlowCurve {
 /// Below 2^28.
 #[inline]
 pub(crate) const fn power(pressure: i32, speed: i32) -> i32 {
-    part(pressure, speed, 32)
+    mul_shr(pressure, speed, 32)
 }

@@ -1,10 +1,25 @@
-//! The air of a cylinder: what was sent to the valves, followed into the chambers.
+//! Pressure observer: ISO 6358 flow into a polytropic chamber, with the bounds of what is known.
+//!
+//! ```text
+//! dp/dt = n (K p_s ψ(p/p_s) t_fill − K p ψ(p_a/p) t_vent − p v) / L        K = C ρ0 R T / A
+//! dp⁻/dt, dp⁺/dt: the same, from the lowest and the highest pressure that can be
+//! ```
+//!
+//! Open loop: there is no pressure sensor. `n` = 1.2 lies between isothermal (1) and adiabatic (1.4);
+//! volumes are lengths, `L` = volume / area, and flows speeds of the piston (Bobrow and McDonell 1998, Pandian
+//! et al. 2002 for the chamber; ISO 6358-1 for the flow). Errors die out by themselves: a filling chamber
+//! ends at the supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone
+//! in p, so both bounds keep their order, and their distance says how far the estimate can be off.
+//!
+//! Assumes: supply and atmosphere as told, tight seals, no flow but through the valves.
+//!
+//! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
 
 use super::flow::power;
-use super::valve_delay::{Ready, ValveTimes, ValveTrack};
+use super::valve_delay::ValveTrack;
 use crate::axis::AxisModel;
-use crate::math::{mix, part, scaled};
-use wheeleg_units::Duty;
+use crate::math::{mul_shr, mul_shr_sat};
+use crate::tuning::{CHAMBER_LENGTH_MIN, PRESSURE_MAX};
 
 /// Pressures of A and B in 1/256 Pa absolute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -15,33 +30,155 @@ pub struct Pressures {
     pub b: i32,
 }
 
-/// What flows through the valves of one chamber while they are open, as powers:
-/// pressure times a speed of the piston, in 2^8 Pa mm/s.
-///
-/// Neither the piston's place nor the time is in them, so that those of one period
-/// serve for that period and for the dead time ahead.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ChamberFlows {
-    /// Through the open fill valve; 0 until asked for.
-    pub fill: i32,
-    /// Through the open vent valve, positive lowers the pressure; 0 until asked for.
-    pub vent: i32,
+/// The present period on the clock of the valves, µs; wraps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Period {
+    /// When it begins.
+    pub(crate) begin: u32,
+    /// When the next one begins, up to which the coils are decided.
+    pub(crate) next: u32,
+    /// The moment for which pressures and motion are worked out: [`AxisModel::moment`] after the begin.
+    pub(crate) moment: u32,
 }
 
-impl ChamberFlows {
-    /// Those that are asked for, at `pressure`, for an open valve's `flow` as a speed of the
-    /// piston, raw mm/s.
-    #[inline]
-    pub(crate) fn of(model: &AxisModel, flow: i32, pressure: i32, fill: bool, vent: bool) -> Self {
-        let curve = &model.curve;
+/// A chamber's geometry, and what the piston does to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ChamberMotion {
+    /// Flow of an open valve as a speed of the piston, raw mm/s.
+    pub(crate) flow: i32,
+    /// Length of the chamber in the middle of the period that ends at the moment, and where the
+    /// dead time ends, raw mm.
+    pub(crate) lengths: [i32; 2],
+    /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
+    pub(crate) speeds: [i32; 2],
+}
+
+/// What the valves of a chamber sent, and for how long something else had them open.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sent {
+    /// On-times of the period from its begin, µs: fill, vent.
+    pub(crate) plan: [u16; 2],
+    /// Openings that others made in it, without their delays, µs: fill, vent.
+    pub(crate) external: [u16; 2],
+}
+
+/// Pulses under way and pressure of one chamber.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Chamber {
+    pub(crate) fill: ValveTrack,
+    pub(crate) vent: ValveTrack,
+    /// Pressure at the moment, 1/256 Pa.
+    pub(crate) pressure: i32,
+    /// The same at the end of the dead time, with what has been committed to by then.
+    pub(crate) expected: i32,
+    /// Bounds p⁻ and p⁺ of the pressure at the moment.
+    pub(crate) bounds: [i32; 2],
+}
+
+impl Chamber {
+    /// Valves shut, at `pressure`, which lies somewhere within `bounds` (1/256 Pa absolute).
+    pub(crate) const fn new(pressure: i32, bounds: [i32; 2]) -> Self {
         Self {
-            fill: if fill {
-                curve.power(model.supply, pressure, flow)
+            fill: ValveTrack::new(),
+            vent: ValveTrack::new(),
+            pressure,
+            expected: pressure,
+            bounds,
+        }
+    }
+
+    /// One period: pressures at its moment and at the end of the dead time.
+    pub(crate) fn update(
+        &mut self,
+        model: &AxisModel,
+        period: &Period,
+        motion: &ChamberMotion,
+        sent: Sent,
+    ) {
+        let times = &model.times;
+        let from = period.moment.wrapping_sub(times.period as u32);
+        let mut open = [0; 2];
+        let mut committed = [0; 2];
+        let tracks = [&mut self.fill, &mut self.vent];
+        for (valve, track) in tracks.into_iter().enumerate() {
+            let (plan, external) = (sent.plan.get(valve), sent.external.get(valve));
+            let external = external.map_or(0, |on| i32::from(*on));
+            track.energise(
+                period.begin,
+                plan.map_or(0, |on| i32::from(*on)),
+                times.period,
+                times,
+            );
+            if external > 0 {
+                // Nobody knows when its coil fell.
+                track.shuts(period.next);
+            }
+            let seen = track.passes(from, times.period).wrapping_add(external);
+            let later = track.committed(period.moment, period.next, times);
+            if let (Some(open), Some(committed)) = (open.get_mut(valve), committed.get_mut(valve)) {
+                *open = seen;
+                *committed = later;
+            }
+        }
+
+        let [length, length_ahead] = motion.lengths;
+        let [speed, speed_ahead] = motion.speeds;
+        let stiffness = model.stiffness(length);
+        let both = [open[0] | committed[0], open[1] | committed[1]];
+        let limits = limits(model, both);
+        // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
+        let mean = self.pressure.saturating_add(self.expected) >> 1;
+        let flows = Flows::at(model, motion.flow, mean, both);
+        let step = |p: i32, flows: &Flows, open, speed, span, stiffness| {
+            within_limits(
+                p.saturating_add(flows.change(open, power(p, speed), span, stiffness)),
+                limits,
+            )
+        };
+        self.pressure = step(self.pressure, &flows, open, speed, times.period, stiffness);
+        self.expected = step(
+            self.pressure,
+            &flows,
+            committed,
+            speed_ahead,
+            model.horizon_us,
+            model.stiffness(length_ahead),
+        );
+        self.bounds = self.bounds.map(|p| {
+            let flows = Flows::at(model, motion.flow, p, open);
+            step(p, &flows, open, speed, times.period, stiffness)
+        });
+    }
+
+    /// Everything that others have sent is over with the tick that ends at `end`: `plan` is what of
+    /// the period that began at `begin` was sent, fill and vent, µs.
+    pub(crate) fn release(&mut self, model: &AxisModel, begin: u32, end: u32, plan: [u16; 2]) {
+        let span = end.wrapping_sub(begin) as i32;
+        for (track, on) in [&mut self.fill, &mut self.vent].into_iter().zip(plan) {
+            track.energise(begin, i32::from(on), span, &model.times);
+            track.energise(end, 0, 1, &model.times);
+        }
+    }
+}
+
+/// Powers of the open valves of a chamber: pressure times a speed of the piston, in 2^8 Pa mm/s.
+#[derive(Clone, Copy, Debug, Default)]
+struct Flows {
+    fill: i32,
+    vent: i32,
+}
+
+impl Flows {
+    /// Of those that are `open` at all, at `pressure`.
+    fn at(model: &AxisModel, flow: i32, pressure: i32, [fill, vent]: [i32; 2]) -> Self {
+        Self {
+            fill: if fill > 0 {
+                model.fill_power(flow, pressure)
             } else {
                 0
             },
-            vent: if vent {
-                curve.power(pressure, model.ambient, flow)
+            vent: if vent > 0 {
+                model.vent_power(flow, pressure)
             } else {
                 0
             },
@@ -51,10 +188,7 @@ impl ChamberFlows {
     /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
     /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
     /// `stiffness` ([`AxisModel::stiffness`]).
-    #[inline]
-    #[must_use]
-    pub fn change(&self, open: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
-        let [fill, vent] = open;
+    fn change(&self, [fill, vent]: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
         let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
         // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
         let work = product(self.fill, fill)
@@ -63,33 +197,35 @@ impl ChamberFlows {
             .wrapping_add(1 << 15)
             .wrapping_shr(16) as i32;
         // × n/L: see `AxisModel::stiffness`.
-        scaled(work, stiffness, 10)
-    }
-
-    /// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa,
-    /// not negative).
-    #[inline]
-    #[must_use]
-    pub fn need(power: i32, change: i32, stiffness: i32) -> i32 {
-        // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
-        let rate = part(power, stiffness, 22).max(SLOWEST);
-        // Below 2^31.
-        let size = change.min(500_000 << 8).wrapping_shl(4);
-        size.checked_div(rate).unwrap_or(0)
+        mul_shr_sat(work, stiffness, 10)
     }
 }
 
-/// Shortest length of a chamber, 1/256 mm (4 mm; a line alone is longer).
-const SHORTEST: i32 = 4 << 8;
-/// Slowest change of pressure that is counted on, 1/256 Pa per 16 µs (50 Pa/ms).
-const SLOWEST: i32 = 205;
+/// Limits of a pressure while valves are open, or are to be. None fills beyond the supply or
+/// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
+/// half of that needs a motion of its own.
+const fn limits(model: &AxisModel, [fill, vent]: [i32; 2]) -> [i32; 2] {
+    [
+        if vent > 0 {
+            model.ambient
+        } else {
+            model.ambient.wrapping_shr(1)
+        },
+        if fill > 0 { model.supply } else { PRESSURE_MAX },
+    ]
+}
+
+/// `p` within them.
+fn within_limits(p: i32, [least, most]: [i32; 2]) -> i32 {
+    p.max(least).min(most)
+}
 
 impl AxisModel {
     /// Length of chamber A with the piston at `stroke`, raw mm.
     #[inline]
     #[must_use]
     pub(crate) const fn length_a(&self, stroke: i32) -> i32 {
-        stroke.saturating_add(self.lead_a)
+        stroke.saturating_add(self.dead_length_a)
     }
 
     /// Length of chamber B.
@@ -98,7 +234,7 @@ impl AxisModel {
     pub(crate) const fn length_b(&self, stroke: i32) -> i32 {
         self.stroke
             .saturating_sub(stroke)
-            .saturating_add(self.lead_b)
+            .saturating_add(self.dead_length_b)
     }
 
     /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:
@@ -106,351 +242,117 @@ impl AxisModel {
     #[inline]
     #[must_use]
     pub(crate) fn stiffness(&self, length: i32) -> i32 {
-        let short = length.wrapping_shr(8).max(SHORTEST);
+        let short = length.wrapping_shr(8).max(CHAMBER_LENGTH_MIN);
         self.exponent.checked_div(short).unwrap_or(0)
+    }
+
+    /// Power of an open fill valve of this `flow` (raw mm/s) into a chamber at `pressure`.
+    #[inline]
+    pub(crate) fn fill_power(&self, flow: i32, pressure: i32) -> i32 {
+        self.curve.power(self.supply, pressure, flow)
+    }
+
+    /// Power of an open vent valve; positive lowers the pressure.
+    #[inline]
+    pub(crate) fn vent_power(&self, flow: i32, pressure: i32) -> i32 {
+        self.curve.power(pressure, self.ambient, flow)
     }
 
     /// Force of the two pressures, mN, positive extending.
     #[inline]
     #[must_use]
     pub fn pressure_force(&self, p: Pressures) -> i32 {
-        part(p.a, self.force_a, 32)
-            .saturating_sub(part(p.b, self.force_b, 32))
+        mul_shr(p.a, self.force_a, 32)
+            .saturating_sub(mul_shr(p.b, self.force_b, 32))
             .saturating_sub(self.force_rod)
     }
+}
 
-    /// A force that the supply can give as a share of its largest, in steps of 2^-14.
-    #[inline]
-    pub(crate) fn duty(&self, force: i32) -> Duty {
-        let share = if force > 0 {
-            self.share_out
-        } else {
-            self.share_in
-        };
-        // Within ±2^14.
-        Duty::from_raw(part(force, share, 26).wrapping_shl(16))
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    use wheeleg_units::{Micros, PositionMm};
+
+    fn model() -> AxisModel {
+        AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
     }
-}
 
-/// Highest pressure that is followed, 1/256 Pa (2.1 MPa).
-const MOST: i32 = (1 << 29) - 1;
-
-/// A moment of the periods, µs; wraps.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Clock {
-    /// Begin of the present period.
-    pub(crate) now: u32,
-    /// Begin of the next one.
-    pub(crate) next: u32,
-    /// The moment for which pressures are worked out: [`AxisModel::moment`] after the begin.
-    pub(crate) moment: u32,
-}
-
-/// What a chamber is told of its geometry and of the piston.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Piston {
-    /// Flow of an open valve as a speed of the piston, raw mm/s.
-    pub(crate) flow: i32,
-    /// Length of the chamber in the middle of the period that ends at the moment, and where the
-    /// dead time ends, raw mm.
-    pub(crate) lengths: [i32; 2],
-    /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
-    pub(crate) speeds: [i32; 2],
-    /// Not 0: the stroke has time for the flows of valves that are shut.
-    pub(crate) all_flows: i32,
-}
-
-/// Pulses under way and pressure of one chamber.
-#[derive(Clone, Debug)]
-pub(crate) struct Chamber {
-    fill: ValveTrack,
-    vent: ValveTrack,
-    /// Sum of the pulses.
-    pulses_check: u32,
-    /// Pressure at the moment, 1/256 Pa.
-    pub(crate) pressure: i32,
-    /// The same at the end of the dead time, with what has been committed to by then.
-    pub(crate) expected: i32,
-    /// Sum of the pressures.
-    pressures_check: u32,
-    /// Flows at this pressure, as far as they are known.
-    flows: ChamberFlows,
-    /// Stiffness at the end of the dead time.
-    stiffness: i32,
-    /// What the valves can do in the next period.
-    ready: [Ready; 2],
-    /// Sum of these three.
-    means_check: u32,
-}
-
-impl Chamber {
-    /// Valves shut, at `pressure` (1/256 Pa absolute).
-    pub(crate) fn new(pressure: i32) -> Self {
-        let mut chamber = Self {
-            fill: ValveTrack::new(),
-            vent: ValveTrack::new(),
-            pulses_check: 0,
-            pressure,
-            expected: pressure,
-            pressures_check: 0,
-            flows: ChamberFlows::default(),
-            stiffness: 0,
-            ready: [Ready::default(); 2],
-            means_check: 0,
-        };
-        chamber.pulses_check = chamber.sum_of_pulses();
-        chamber.pressures_check = chamber.sum_of_pressures();
-        chamber.means_check = chamber.sum_of_means();
+    /// A chamber of `length_mm` whose valves are open for these shares of each period, and a piston that stands.
+    fn followed(model: &AxisModel, mut chamber: Chamber, open: [u16; 2], periods: u32) -> Chamber {
+        let length = model.length_a(90 << 16);
+        for number in 0..periods {
+            let begin = number * 4000;
+            let period = Period {
+                begin,
+                next: begin + 4000,
+                moment: begin + 2500,
+            };
+            let motion = ChamberMotion {
+                flow: model.flow_a,
+                lengths: [length; 2],
+                speeds: [0; 2],
+            };
+            let sent = Sent {
+                plan: [0; 2],
+                external: open,
+            };
+            chamber.update(model, &period, &motion, sent);
+        }
         chamber
     }
 
-    /// Flips a bit of one of the words that only this file sees, for tests of those who keep it.
-    #[cfg(test)]
-    pub(crate) const fn damage(&mut self, word: u32, bit: u32) {
-        let flip = 1 << bit;
-        match word {
-            0 => self.flows.fill ^= flip,
-            1 => self.flows.vent ^= flip,
-            2 => self.stiffness ^= flip,
-            3 => self.means_check ^= flip.cast_unsigned(),
-            4 => self.pressures_check ^= flip.cast_unsigned(),
-            _ => self.pulses_check ^= flip.cast_unsigned(),
+    /// Wherever the pressure was, filling ends at the supply and venting at the atmosphere; the bounds hold it
+    /// between them all the way, and close.
+    #[test]
+    fn errors_of_the_pressure_die_out_and_the_bounds_close() {
+        let model = model();
+        let unknown = [model.ambient, model.supply];
+        for (open, end) in [([4000, 0], model.supply), ([0, 4000], model.ambient)] {
+            for start in [model.ambient, model.mean, model.supply] {
+                let mut chamber = Chamber::new(start, unknown);
+                let mut width = model.supply - model.ambient;
+                for _ in 0..400 {
+                    chamber = followed(&model, chamber, open, 1);
+                    let [low, high] = chamber.bounds;
+                    assert!(low <= chamber.pressure + 256 && chamber.pressure <= high + 256);
+                    assert!(low <= high && high - low <= width);
+                    width = high - low;
+                }
+                assert!((chamber.pressure - end).abs() < 2_000 << 8, "{start}");
+                assert!(width < 5_000 << 8, "{width}");
+            }
         }
     }
 
-    /// Tracks of fill and vent, for tests of what is sent.
-    #[cfg(test)]
-    pub(crate) const fn tracks(&self) -> [ValveTrack; 2] {
-        [self.fill, self.vent]
-    }
-
-    #[inline]
-    fn sum_of_pulses(&self) -> u32 {
-        self.vent.sum(self.fill.sum(0))
-    }
-
-    #[inline]
-    const fn sum_of_pressures(&self) -> u32 {
-        mix(mix(0, self.pressure), self.expected)
-    }
-
-    #[inline]
-    const fn sum_of_means(&self) -> u32 {
-        let ChamberFlows { fill, vent } = self.flows;
-        let [first, second] = self.ready;
-        let sum = mix(mix(mix(0, fill), vent), self.stiffness);
-        mix(mix(sum, first.word()), second.word())
-    }
-
-    /// Whether the pulses under way are as they were left.
-    #[inline]
-    pub(crate) fn pulses_are_sound(&self) -> bool {
-        self.pulses_check == self.sum_of_pulses()
-    }
-
-    /// Whether the pressures are as they were left.
-    #[inline]
-    pub(crate) const fn pressures_are_sound(&self) -> bool {
-        self.pressures_check == self.sum_of_pressures()
-    }
-
-    /// Whether what the next pulses are made with is as it was left.
-    #[inline]
-    pub(crate) const fn means_are_sound(&self) -> bool {
-        self.means_check == self.sum_of_means()
-    }
-
-    /// Coils fall that are on, after these times from `now` on, fill and vent, µs, and nothing that
-    /// was planned for later happens. `plan` is what the present period began with, and when,
-    /// if it is not yet known here. What was damaged before keeps its broken seal.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn end(
-        &mut self,
-        now: u32,
-        on: [u16; 2],
-        plan: Option<(u32, [u16; 2])>,
-        times: &ValveTimes,
-    ) {
-        let sound = self.pulses_are_sound();
-        let [fill, vent] = on.map(i32::from);
-        if let Some((begun, plan)) = plan {
-            let [fill, vent] = plan.map(i32::from);
-            self.fill.energise(begun, fill, times.period, times);
-            self.vent.energise(begun, vent, times.period, times);
-        }
-        self.fill.end(now.wrapping_add(fill as u32), times);
-        self.vent.end(now.wrapping_add(vent as u32), times);
-        if sound {
-            self.pulses_check = self.sum_of_pulses();
-        }
-    }
-
-    /// Pressure at the moment, where somebody else than the law has had the valves open for these
-    /// times, fill and vent, µs. They come on top of what is left of the law's own pulses. Nothing
-    /// is foreseen.
-    #[inline(never)]
-    pub(crate) fn observe(
-        &mut self,
-        model: &AxisModel,
-        clock: &Clock,
-        piston: &Piston,
-        open: [u16; 2],
-    ) {
-        let Clock { next, moment, .. } = *clock;
-        let from = moment.wrapping_sub(model.times.period as u32);
-        let [fill_on, vent_on] = open.map(i32::from);
-        if fill_on | vent_on != 0 {
-            // The law waits until they have shut.
-            self.fill.shuts(next);
-            self.vent.shuts(next);
-        }
-        let fill = self
-            .fill
-            .passes(from, model.times.period)
-            .wrapping_add(fill_on);
-        let vent = self
-            .vent
-            .passes(from, model.times.period)
-            .wrapping_add(vent_on);
-        self.pulses_check = self.sum_of_pulses();
-
-        let [length, _] = piston.lengths;
-        let [speed, _] = piston.speeds;
-        let p = self.pressure;
-        let flows = ChamberFlows::of(model, piston.flow, p, fill > 0, vent > 0);
-        let stiffness = model.stiffness(length);
-        let change = flows.change([fill, vent], power(p, speed), model.times.period, stiffness);
-        let (least, most) = bounds(model, fill, vent);
-        self.pressure = p.saturating_add(change).max(least).min(most);
-        self.expected = self.pressure;
-        self.pressures_check = self.sum_of_pressures();
-    }
-
-    /// Pressures at the moment and at the end of the dead time, and what the next pulses are
-    /// made with.
-    // Called in one place.
-    #[inline(always)]
-    pub(crate) fn follow(
-        &mut self,
-        model: &AxisModel,
-        clock: &Clock,
-        piston: &Piston,
-        plan: [u16; 2],
-    ) {
-        let times = &model.times;
-        let Clock { now, next, moment } = *clock;
-        let from = moment.wrapping_sub(times.period as u32);
-        let Self { fill, vent, .. } = self;
-        let [fill_on, vent_on] = plan.map(i32::from);
-        fill.energise(now, fill_on, times.period, times);
-        vent.energise(now, vent_on, times.period, times);
-        let open = [
-            fill.passes(from, times.period),
-            vent.passes(from, times.period),
-        ];
-        let committed = [
-            fill.committed(moment, next, times),
-            vent.committed(moment, next, times),
-        ];
-        self.ready = [fill.ready(next, times), vent.ready(next, times)];
-        self.pulses_check = self.sum_of_pulses();
-
-        let Piston {
-            flow,
-            lengths,
-            speeds: [speed, speed_ahead],
-            all_flows,
-        } = *piston;
-        let [length, length_ahead] = lengths;
-        let stiffness = model.stiffness(length);
-        let ahead = model.stiffness(length_ahead);
-        let p = self.pressure;
-        let [[fill, vent], [more_fill, more_vent]] = [open, committed];
-        // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
-        let flows = ChamberFlows::of(
-            model,
-            flow,
-            p.saturating_add(self.expected) >> 1,
-            fill | more_fill | all_flows != 0,
-            vent | more_vent | all_flows != 0,
+    /// With the valves shut nothing is learnt.
+    #[test]
+    fn a_chamber_that_is_shut_keeps_its_pressure_and_its_bounds() {
+        let model = model();
+        let start = Chamber::new(model.mean, [model.ambient, model.supply]);
+        let chamber = followed(&model, start, [0, 0], 50);
+        assert_eq!(
+            (chamber.pressure, chamber.bounds),
+            (start.pressure, start.bounds)
         );
-        let change = flows.change(open, power(p, speed), times.period, stiffness);
-        // Those of the second step for both, which cost the tick too much apart: while a valve is
-        // about to open, the piston does not squeeze beyond what it will let.
-        let (least, most) = bounds(model, fill | more_fill, vent | more_vent);
-        let p = p.saturating_add(change).max(least).min(most);
-        let change = flows.change(committed, power(p, speed_ahead), model.horizon_us, ahead);
-        self.flows = flows;
-        self.stiffness = ahead;
-        self.means_check = self.sum_of_means();
-        self.pressure = p;
-        self.expected = p.saturating_add(change).max(least).min(most);
-        self.pressures_check = self.sum_of_pressures();
     }
 
-    /// On-times of the next period that bring the chamber from what is expected to `target`,
-    /// fill and vent, µs. The valve that would undo it shuts as soon as its pulse allows.
-    #[inline]
-    pub(crate) fn pulses(&self, model: &AxisModel, flow: i32, target: i32) -> [u16; 2] {
-        let change = target.saturating_sub(self.expected);
-        let [ready_fill, ready_vent] = self.ready;
-        let times = &model.times;
-        if change > 0 {
-            let power = match self.flows.fill {
-                0 => model.curve.power(model.supply, self.pressure, flow),
-                known => known,
-            };
-            let need = ChamberFlows::need(power, change, self.stiffness);
-            [
-                microseconds(ready_fill.on_time(need, ready_vent.coil(), times)),
-                microseconds(ready_vent.rest(times)),
-            ]
-        } else {
-            let power = match self.flows.vent {
-                0 => model.curve.power(self.pressure, model.ambient, flow),
-                known => known,
-            };
-            let need = ChamberFlows::need(power, change.saturating_neg(), self.stiffness);
-            [
-                microseconds(ready_fill.rest(times)),
-                microseconds(ready_vent.on_time(need, ready_fill.coil(), times)),
-            ]
-        }
+    /// The stiffness of a chamber without dead volume is that of 4 mm.
+    #[test]
+    fn a_chamber_is_never_shorter_than_its_line() {
+        let model = AxisModel::new(
+            &AxisData {
+                bore: PositionMm::from_int(100),
+                dead_a: PositionMm::from_f64(0.05),
+                ..AxisData::default()
+            },
+            Micros(1000),
+        )
+        .expect("in range");
+        let stiffness = |tenths: i32| model.stiffness((tenths << 16) / 10);
+        assert_eq!(stiffness(0), stiffness(39));
+        assert!(stiffness(42) < stiffness(39));
+        let exact = 1.2 * 1.048_576 * 2_f64.powi(22) / 4.0;
+        assert!((f64::from(stiffness(0)) / exact - 1.0).abs() < 1e-3);
     }
-
-    /// Whether both coils are off at the begin of the next period.
-    #[inline]
-    pub(crate) const fn idle(&self) -> bool {
-        let [fill, vent] = self.ready;
-        !fill.coil() && !vent.coil()
-    }
-
-    /// Everything shut as soon as the pulses under way allow.
-    #[inline]
-    pub(crate) fn shut(&self, model: &AxisModel) -> [u16; 2] {
-        let times = &model.times;
-        self.ready.map(|ready| microseconds(ready.rest(times)))
-    }
-}
-
-/// Bounds of a pressure while valves are open, or are to be, for `fill` and `vent` µs. None fills beyond the supply or
-/// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
-/// half of that needs a motion of its own.
-#[inline]
-fn bounds(model: &AxisModel, fill: i32, vent: i32) -> (i32, i32) {
-    (
-        if vent > 0 {
-            model.ambient
-        } else {
-            model.ambient.wrapping_shr(1)
-        },
-        if fill > 0 { model.supply } else { MOST },
-    )
-}
-
-/// An on-time, 0…period (at most 8000).
-#[inline]
-const fn microseconds(on: i32) -> u16 {
-    on as u16
 }
