@@ -136,3 +136,6 @@ impl ForceDemand<'_> {
             .saturating_sub(load)
     }
 }
+
+#[cfg(test)]
+mod tests;
