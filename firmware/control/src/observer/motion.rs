@@ -197,15 +197,16 @@ mod tests {
                 );
             }
         }
-        // One of 3 mm/s is stuck, and is slowed to less in a period; one of 5 slides.
-        let after = |speed: i32| {
-            let mut motion = at(90, speed);
+        // One of 3.9 mm/s is stuck, and is slowed to less in a period; one of 4.1 slides.
+        let after = |tenths: i32| {
+            let mut motion = at(90, 0);
+            motion.speed = (tenths << 16) / 10;
             motion.predict(&model, &Inertia::new(&model, 3 << 16), 12_000);
             (motion.stuck, f64::from(motion.speed) / 65_536.0)
         };
-        let (stuck, left) = after(3);
-        assert!(stuck && (1.6..1.9).contains(&left), "{left}");
-        assert!(!after(5).0);
+        let (stuck, left) = after(39);
+        assert!(stuck && (2.25..2.32).contains(&left), "{left}");
+        assert!(!after(41).0);
     }
 
     /// A force of 30 N on 3 kg: what is left beside 0.92 of 10 N, and what is viscous, accelerates.

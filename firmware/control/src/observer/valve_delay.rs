@@ -150,7 +150,8 @@ impl ValveTrack {
             since = at;
             self.open = !self.open;
             self.pending = self.pending.wrapping_sub(1);
-            self.edges.rotate_left(1);
+            let [first, second, third, fourth] = self.edges;
+            self.edges = [second, third, fourth, first];
         }
         if self.open {
             seen = seen.wrapping_add(span.wrapping_sub(since));
