@@ -1,6 +1,6 @@
 //! Start-up identification on the bench: the valves' delays, before the first move.
 
-use wheeleg_control::axis::probe::DelayProbe;
+use super::delay_probe::DelayProbe;
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
