@@ -11,6 +11,7 @@ mod direct;
 mod foot;
 mod motion;
 mod operator;
+mod orphan;
 mod parameters;
 mod questions;
 mod senses;
