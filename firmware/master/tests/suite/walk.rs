@@ -174,7 +174,7 @@ fn a_foot_rises_only_when_the_other_has_been_loaded_for_100_ms() {
                     .unwrap()
                     .reference_mm;
                 // A rise is asked for in one step.
-                if wanted.to_f64() < before[side.index()] - 15.0 {
+                if wanted.to_f64() < before[side.index()] - 12.5 {
                     rises[side.index()] += 1;
                     // The tenth cycle is this one.
                     assert!(loaded[side.other().index()] >= 9, "{side:?} {loaded:?}");
@@ -378,12 +378,12 @@ fn what_is_out_of_range_is_refused() {
 #[test]
 fn a_robot_that_is_stuck_backs_off_the_way_that_it_came() {
     for (speed, turn, way_mm) in [
-        (100, "0", [-15.0, -15.0]),
-        (-100, "0", [15.0, 15.0]),
-        (0, "0.08", [15.0, -15.0]),
-        (0, "-0.08", [-15.0, 15.0]),
+        (100, "0", [-12.5, -12.5]),
+        (-100, "0", [12.5, 12.5]),
+        (0, "0.08", [12.5, -12.5]),
+        (0, "-0.08", [-12.5, 12.5]),
         // The outer wheel is the faster one: 60 ± 20 mm/s.
-        (60, "0.0714", [-7.5, -15.0]),
+        (60, "0.0714", [-6.25, -12.5]),
     ] {
         let mut robot = Robot::new(order(speed, turn));
         robot.run(4.0);
@@ -400,9 +400,9 @@ fn a_robot_that_is_stuck_backs_off_the_way_that_it_came() {
         robot.cycle();
         assert!(robot.told.contains(&Act::BackOff), "{speed} {turn}");
         // It has to slow down first.
-        robot.run(0.6);
+        robot.run(0.35);
         let before = robot.wheels_mm;
-        robot.run(0.3);
+        robot.run(0.25);
         let way = [0, 1].map(|i| robot.wheels_mm[i] - before[i]);
         for (way, wanted) in way.into_iter().zip(way_mm) {
             let share = way / wanted;
