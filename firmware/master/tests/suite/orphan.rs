@@ -254,8 +254,11 @@ fn asks(walker: &mut Walker, command: Command) {
     walker.rig.submit(command);
 }
 
+/// A stop: name, how it comes about, the reason that is told.
+type Stop = (&'static str, fn(&mut Walker), Option<HoldReason>);
+
 /// What can stop a robot whose layer 1 stands still.
-const STOPS: [(&str, fn(&mut Walker), Option<HoldReason>); 8] = [
+const STOPS: [Stop; 8] = [
     (
         "E-stop",
         |w| asks(w, Command::EmergencyStop),
