@@ -17,28 +17,28 @@ const B5: usize = 1;
 const B6: usize = 2;
 
 /// A robot, whose feet may have nails.
-fn geometry(nailed: bool) -> WalkGeometry {
+pub(crate) fn geometry(nailed: bool) -> WalkGeometry {
     WalkGeometry {
         nail_m: if nailed { 0.06 } else { 0.0 },
         ..WalkGeometry::default()
     }
 }
 
-fn mm(mm: f64) -> PositionMm {
+pub(crate) fn mm(mm: f64) -> PositionMm {
     PositionMm::from_f64(mm)
 }
 
 /// A robot of which a test says all that its boards say.
-struct Robot {
-    behaving: Behaving,
-    senses: Senses,
-    setpoints: Setpoints,
-    told: Vec<Act>,
+pub(crate) struct Robot {
+    pub(crate) behaving: Behaving,
+    pub(crate) senses: Senses,
+    pub(crate) setpoints: Setpoints,
+    pub(crate) told: Vec<Act>,
     travel_mm: f64,
 }
 
 impl Robot {
-    fn new(legs: [LegPlan; 2], enabled: Behaviours) -> Self {
+    pub(crate) fn new(legs: [LegPlan; 2], enabled: Behaviours) -> Self {
         let joint = JointSense {
             stroke_mm: mm(100.0),
             ..JointSense::default()
@@ -59,38 +59,43 @@ impl Robot {
         }
     }
 
-    fn all(legs: [LegPlan; 2]) -> Self {
+    pub(crate) fn all(legs: [LegPlan; 2]) -> Self {
         Self::new(legs, Behaviours::ALL)
     }
 
-    fn joint(&mut self, index: usize) -> &mut JointSense {
+    pub(crate) fn joint(&mut self, index: usize) -> &mut JointSense {
         self.senses.joints[index].as_mut().expect("heard")
     }
 
-    fn touch(&mut self, feet: [bool; 2]) {
+    pub(crate) fn touch(&mut self, feet: [bool; 2]) {
         self.senses.feet = feet.map(|touches| Some(FootSwitches(if touches { 0x0F } else { 0 })));
     }
 
     /// Cycles; what is told in them.
-    fn run(&mut self, cycles: u32) -> Vec<Act> {
+    pub(crate) fn run(&mut self, cycles: u32) -> Vec<Act> {
         let mut told = Vec::new();
-        let mut events = Events::new();
         for _ in 0..cycles {
-            self.behaving
-                .observe(&self.senses, &self.setpoints, 0, &mut events);
-            while let Some((_, event)) = events.pop() {
-                match event {
-                    Event::Behaviour(act) => told.push(act),
-                    other => panic!("{other:?}"),
-                }
-            }
+            told.extend(self.observe());
             self.lead(self.speed(), true);
         }
         self.told.extend(&told);
         told
     }
 
-    fn acts(&self) -> &Acts {
+    /// The behaviours' part of a cycle; what is told in it.
+    pub(crate) fn observe(&mut self) -> Vec<Act> {
+        let mut events = Events::new();
+        self.behaving
+            .observe(&self.senses, &self.setpoints, 0, &mut events);
+        std::iter::from_fn(|| events.pop())
+            .map(|(_, event)| match event {
+                Event::Behaviour(act) => act,
+                other => panic!("{other:?}"),
+            })
+            .collect()
+    }
+
+    pub(crate) fn acts(&self) -> &Acts {
         self.behaving.acts()
     }
 
@@ -100,7 +105,7 @@ impl Robot {
     }
 
     /// Leads the wheels for a cycle at a speed, mm/s; gives the speed that they are led at.
-    fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
+    pub(crate) fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
         if fresh {
             self.travel_mm += 0.01 * mm_s;
         }
@@ -114,7 +119,7 @@ impl Robot {
         self.behaving.lead(travel, true, fresh)
     }
 
-    fn reference(&self, joint: usize, mm_asked: f64) -> f64 {
+    pub(crate) fn reference(&self, joint: usize, mm_asked: f64) -> f64 {
         let asked = JointSetpoint {
             reference_mm: mm(mm_asked),
             ..JointSetpoint::default()

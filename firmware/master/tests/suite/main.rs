@@ -14,6 +14,7 @@ mod operator;
 mod orphan;
 mod parameters;
 mod questions;
+mod references;
 mod senses;
 mod stops;
 mod walk;
