@@ -11,8 +11,7 @@ use wheeleg_master::setpoint::{Landing, LegPlan, Phase, WalkPlan};
 use wheeleg_units::{Duty, VelocityMmS};
 
 const STAND: [LegPlan; 2] = [LegPlan::Stance; 2];
-/// Left and right yaw, b5 and b6.
-const YAW: [usize; 2] = [0, 3];
+/// Left and right b5 and b6.
 const B5: [usize; 2] = [1, 4];
 const B6: [usize; 2] = [2, 5];
 
@@ -76,14 +75,23 @@ fn goes(robot: &mut Robot, wheels_mm: [f64; 2], slip: f64) {
     }
 }
 
-/// A robot that has gone so for some cycles, from legs set straight.
-fn gone(wheels_mm: [f64; 2], slip: f64, cycles: u32, yaw_mm: f64, b5_mm: f64) -> Robot {
+/// A robot that has gone so for some cycles, both feet at first so far ahead of their yaw axes and
+/// left of them, mm.
+fn gone(
+    geometry: WalkGeometry,
+    wheels_mm: [f64; 2],
+    slip: f64,
+    cycles: u32,
+    foot_mm: [f64; 2],
+) -> Robot {
     let mut robot = Robot::all(STAND);
-    for joint in YAW {
-        robot.joint(joint).stroke_mm = mm(yaw_mm);
-    }
-    for joint in B5 {
-        robot.joint(joint).stroke_mm = mm(b5_mm);
+    robot.behaving = Behaving::new(Behaviours::ALL, geometry);
+    for (side, first) in [(Side::Left, 0), (Side::Right, 3)] {
+        let [x, y] = foot_mm.map(|mm| (1e-3 * mm) as f32);
+        let strokes = mirror::strokes_of_foot(side, [x, y, -0.1], [0.0; 3]).expect("in reach");
+        for (i, stroke) in strokes.0.into_iter().take(2).enumerate() {
+            robot.joint(first + i).stroke_mm = mm(1e3 * f64::from(stroke));
+        }
     }
     for _ in 0..cycles {
         goes(&mut robot, wheels_mm, slip);
@@ -94,21 +102,16 @@ fn gone(wheels_mm: [f64; 2], slip: f64, cycles: u32, yaw_mm: f64, b5_mm: f64) ->
 
 #[test]
 fn a_turn_without_slip_is_none_and_one_with_slip_is_found() {
-    // 20 mm/s and 8 °/s; 60 mm/s and 4 °/s; a spin of 5 °/s; the same to the right and back.
-    for (wheels, yaw_mm) in [
-        ([-0.19, 0.59], 135.0),
-        ([0.59, -0.19], 45.0),
-        ([0.40, 0.80], 120.0),
-        ([-0.25, 0.25], 130.0),
-        ([0.25, -0.25], 50.0),
-        ([-0.40, -0.80], 60.0),
+    // 20 mm/s and 6 °/s; 60 mm/s and 4 °/s; a spin of 5 °/s; the same to the right and back.
+    for (wheels, foot) in [
+        ([-0.09, 0.49], [150.0, 38.0]),
+        ([0.49, -0.09], [150.0, -38.0]),
+        ([0.40, 0.80], [175.0, 30.0]),
+        ([-0.25, 0.25], [150.0, 35.0]),
+        ([0.25, -0.25], [150.0, -35.0]),
+        ([-0.40, -0.80], [70.0, -15.0]),
     ] {
-        let b5 = if wheels[0] + wheels[1] < 0.0 {
-            20.0
-        } else {
-            170.0
-        };
-        let told = |slip| gone(wheels, slip, 100, yaw_mm, b5).told;
+        let told = |slip| gone(geometry(false), wheels, slip, 75, foot).told;
         assert!(!told(0.0).contains(&Act::Slip), "{wheels:?}");
         assert!(!told(0.12).contains(&Act::Slip), "{wheels:?}");
         assert!(told(0.20).contains(&Act::Slip), "{wheels:?}");
@@ -117,20 +120,20 @@ fn a_turn_without_slip_is_none_and_one_with_slip_is_found() {
 
 #[test]
 fn legs_pull_the_way_that_their_wheels_go_each_for_itself() {
-    let lead = |wheels, b5| {
-        let robot = gone(wheels, 0.5, 160, 90.0, b5);
+    let lead = |wheels, foot| {
+        let robot = gone(geometry(false), wheels, 0.5, 160, foot);
         references(&robot, B5)
     };
-    assert_eq!(lead([0.8, 0.8], 170.0), [70.0, 70.0]);
-    assert_eq!(lead([-0.8, -0.8], 20.0), [130.0, 130.0]);
+    assert_eq!(lead([0.8, 0.8], [180.0, 0.0]), [70.0, 70.0]);
+    assert_eq!(lead([-0.8, -0.8], [30.0, 0.0]), [130.0, 130.0]);
     // Turning on the spot to the left, the left foot has to go ahead.
-    assert_eq!(lead([-0.4, 0.4], 90.0), [130.0, 70.0]);
+    assert_eq!(lead([-0.25, 0.25], [150.0, 35.0]), [130.0, 70.0]);
 }
 
 #[test]
 fn the_lead_of_a_pulling_leg_goes_by_half_a_millimetre_in_a_cycle() {
     let pulls = || {
-        let robot = gone([0.8, 0.8], 0.5, 160, 90.0, 170.0);
+        let robot = gone(geometry(false), [0.8, 0.8], 0.5, 160, [180.0, 0.0]);
         assert_eq!(references(&robot, B5), [70.0; 2]);
         robot
     };
@@ -303,16 +306,8 @@ fn a_robot_of_another_track_turns_otherwise() {
         track_m: 0.28,
         ..geometry(false)
     };
-    let told = |geometry: WalkGeometry| {
-        let mut robot = Robot::all(STAND);
-        robot.behaving = Behaving::new(Behaviours::ALL, geometry);
-        for joint in YAW {
-            robot.joint(joint).stroke_mm = mm(130.0);
-        }
-        for _ in 0..100 {
-            goes(&mut robot, [-0.25, 0.25], 0.0);
-            robot.run(1);
-        }
+    let told = |geometry| {
+        let robot = gone(geometry, [-0.25, 0.25], 0.0, 75, [150.0, 35.0]);
         robot.told.contains(&Act::Slip)
     };
     assert!(told(narrow) && !told(geometry(false)));
