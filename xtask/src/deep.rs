@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 15] = [
+const CHECKS: [Check; 16] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -87,6 +87,12 @@ const CHECKS: [Check; 15] = [
         "flipped bits in the state of emulated boards, 20 times as many as in the suite",
         10,
         pil::state_flips,
+    ),
+    Check(
+        "pil-walks",
+        "walks with eight emulated boards to their ends, bit for bit",
+        10,
+        pil::walks,
     ),
     Check(
         "pil-speed",
