@@ -2,6 +2,7 @@
 //! against the metric that it is there for. Three seeds here; `cargo xtask deep behaviours` runs
 //! twenty, with a sign test.
 
+mod every_walk;
 mod metrics;
 mod pairs;
 
@@ -191,6 +192,11 @@ fn a_walk_without_layer_1_comes_to_a_stand_and_its_behaviours_go_on() {
         let lost = told("lost_ground", 7.0).unwrap_or(f64::INFINITY);
         let tips = told("tip_guard", 7.0).unwrap_or(f64::INFINITY);
         println!("frozen seed {seed}: opens {opens:.3}, followed {lost:.3}, tip guard {tips:.3}");
+        // 50 ms and two cycles after it opens; one more to sense and one to log.
+        assert!(
+            opens.is_finite(),
+            "no foot loses the ground: {opens}\n{story}"
+        );
         assert!(
             lost.min(tips) - opens < 0.05 + 0.02 + 0.015,
             "{opens} {lost} {tips}\n{story}"

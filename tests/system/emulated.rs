@@ -13,3 +13,4 @@ mod pil_images;
 mod pil_memory;
 mod pil_mutants;
 mod pil_store;
+mod pil_walks;

@@ -100,3 +100,25 @@ fn the_robot_walks_over_rocks() {
 fn the_robot_walks_on_sand() {
     met(&builtin::scenario("sand-flat").expect("built in"), [1]);
 }
+
+/// Ice is ice below wheels, too: on a slope that the robot climbs it slides back although its
+/// wheels do not turn back.
+#[test]
+fn a_robot_whose_wheels_and_feet_slip_slides_down_a_slope() {
+    let slides = |fault: &str| {
+        let mut scenario = builtin::scenario("slope-10").expect("built in");
+        scenario.duration_s = 8.0;
+        scenario.bars.clear();
+        let fault = (!fault.is_empty()).then(|| fault.parse().expect("a fault"));
+        scenario.faults = fault.into_iter().collect();
+        let robot = builtin::robot(&scenario.robot).expect("built in");
+        let recording = sil::run(&scenario, &robot, 1);
+        let rows = sil::window(&recording.body, 5.0, 8.0);
+        let body_mm = rows[rows.len() - 1].v.x_mm - rows[0].v.x_mm;
+        println!("{fault:?}: {body_mm:.0} mm");
+        body_mm
+    };
+    assert!(slides("") > -1.0, "it stands or climbs");
+    // g (sin 10° - 0.05 cos 10°) = 1.2 m/s²: metres in 3 s.
+    assert!(slides("foot-slips=0.05@5s") < -500.0);
+}

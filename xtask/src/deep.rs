@@ -95,6 +95,12 @@ const CHECKS: [Check; 16] = [
         pil::state_flips,
     ),
     Check(
+        "pil-walks",
+        "walks with eight emulated boards to their ends, bit for bit",
+        10,
+        pil::walks,
+    ),
+    Check(
         "pil-speed",
         "three steps on eight emulated boards, times real time, while nobody else is at work",
         3,

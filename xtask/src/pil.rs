@@ -239,6 +239,19 @@ pub(crate) fn state_flips() -> StepResult<String> {
     Ok(format!("{joint}; {wheel}"))
 }
 
+/// The walks that the suite cuts short, to their ends: no bit may differ from the host.
+pub(crate) fn walks() -> StepResult<String> {
+    let (emulator, images) = boards()?;
+    let mut test = test_programs(&emulator, &images, &["emulated"]);
+    test.args(["pil_walks", "--", "--nocapture", "--test-threads", "1"])
+        .env("WHEELEG_PIL_WHOLE", "1");
+    let found = process::figures(&mut test, |line| line.contains(" bits compared, "))?;
+    if found.len() != 3 {
+        return Err(anyhow::anyhow!("a line for each of three walks, not {found:?}").into());
+    }
+    Ok(found.join("; "))
+}
+
 /// The whole suite with images of the second way of building: three steps, runs with
 /// faults, the predictive law, and boards of three kinds. It shares only the sources with the first: compiler,
 /// `core` and flags are others.

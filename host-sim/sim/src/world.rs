@@ -292,6 +292,7 @@ impl World {
 
     fn joint_tick(&mut self) -> Result<(), SimError> {
         self.advance_plant()?;
+        self.faults.sink(self.now_ns, &mut self.plant);
         self.bring_up()?;
         // A board outside answers with the outputs that act from this edge on
         // when it is told the inputs of the edge. Neither depends on the other.

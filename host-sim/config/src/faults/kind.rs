@@ -204,6 +204,8 @@ kinds! {
         "A force acts on a piston from one instant to the next.";
     FootLosesContact = "foot-loses-contact", Robot, value("m", 0.001, 0.2, 0.03, "how far the ground falls"),
         "The ground under the feet falls away.";
+    FootSinks = "foot-sinks", Robot, value("m", 0.001, 0.2, 0.03, "how far the ground gives way, at 30 mm/s"),
+        "The ground under the feet gives way.";
     FootSlips = "foot-slips", Robot, value("1", 0.0, 1.0, 0.05, "coefficient of friction from then on, below that of the robot"),
         "Feet and wheels stand on ice.";
     InvalidParameter = "invalid-parameter", Board, None,
@@ -264,12 +266,9 @@ impl FaultKind {
 const CONSOLE: &str =
     "in a run nobody is at a console; the row of the fault matrix has an operator";
 const UPDATE: &str = "there is no firmware update over the bus yet";
-const SOFT: &str =
-    "the ground does not change in mid-run; a scenario chooses its soil by [[terrain]]";
 
 /// Faults that cannot be injected yet, and why. They are refused by name.
 pub const NOT_IMPLEMENTED: &[(&str, &str)] = &[
-    ("foot-sinks", SOFT),
     ("brown-out/update", UPDATE),
     ("ui-link-lost", CONSOLE),
     ("ui-half-open", CONSOLE),

@@ -396,10 +396,6 @@ mod tests {
                 "not implemented: in a run nobody is at a console",
             ),
             (
-                "foot-sinks@1s",
-                "not implemented: the ground does not change in mid-run",
-            ),
-            (
                 "brown-out/update:joint3@1s",
                 "not implemented: there is no firmware update",
             ),

@@ -92,6 +92,15 @@ pub struct Touching {
     sunk_under_feet_m: f64,
 }
 
+/// A law whose friction is at most this.
+fn limited(mut law: ContactLaw, mu: Option<f64>) -> ContactLaw {
+    if let Some(mu) = mu {
+        law.mu_static = law.mu_static.min(mu);
+        law.mu_kinetic = law.mu_kinetic.min(mu);
+    }
+    law
+}
+
 /// Nothing touches any more.
 #[inline]
 fn release(all: &mut [Grips]) {
@@ -180,14 +189,14 @@ impl Touching {
         &self.terrain
     }
 
-    /// Limits the friction of both soles; `None` gives them their own again.
+    /// Limits the friction of both soles on hard ground; `None` gives them their own again.
     pub fn limit_foot_friction(&mut self, mu: Option<f64>) {
-        let mut law = self.params.foot.law;
-        if let Some(mu) = mu {
-            law.mu_static = law.mu_static.min(mu);
-            law.mu_kinetic = law.mu_kinetic.min(mu);
-        }
-        self.laws[0] = law.shared_by(SPHERES);
+        self.laws[0] = limited(self.params.foot.law, mu).shared_by(SPHERES);
+    }
+
+    /// The same for both wheels.
+    pub fn limit_wheel_friction(&mut self, mu: Option<f64>) {
+        self.laws[1] = limited(self.params.wheel.law, mu).shared_by(DISCS);
     }
 
     /// Lets the ground go down by `depth_m` under the feet alone; 0 brings it back.

@@ -4,6 +4,7 @@
 use crate::SimError;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_plant::contact::ContactLaw;
 use wheeleg_remote_host::{NodeKind, Nodes};
 
 /// Checks the faults of a scenario against its duration, the robot, each other, and
@@ -167,11 +168,12 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
             ("source pressure", " bar", supply_pa * 1e-5)
         }
         FaultKind::FootSlips => {
-            let contact = &plant.contacts.foot.law;
+            let laws = [&plant.contacts.foot.law, &plant.contacts.wheel.law];
+            let largest = |law: &ContactLaw| law.mu_static.max(law.mu_kinetic);
             (
                 "coefficient of friction",
                 "",
-                contact.mu_static.max(contact.mu_kinetic),
+                laws.map(largest).into_iter().fold(0.0, f64::max),
             )
         }
         _ => return Ok(()),
@@ -239,7 +241,7 @@ fn whole(kind: FaultKind) -> &'static str {
         F::MasterReset | F::LayerOneStall | F::CommandFlood | F::CycleJitter => "the master",
         F::ClientReset => "the user's program",
         F::TubeBurst => "the air supply",
-        F::FootLosesContact | F::FootSlips => "the ground",
+        F::FootLosesContact | F::FootSinks | F::FootSlips => "the ground",
         F::DiskFull => "the recorder",
         _ => "the robot",
     }
@@ -413,6 +415,7 @@ mod tests {
             ["encoder-lost:wheel7@1s", "node-silent:wheel7@2s..3s"],
             ["supply-sag=3@1s", "tube-burst@2s"],
             ["foot-slips=0.05@1s", "foot-loses-contact=0.03@2s..3s"],
+            ["foot-sinks=0.05@1s", "foot-loses-contact=0.03@2s..3s"],
             ["bit-errors=1e-4@1s", "bytes-lost=1e-3@1s..2s"],
             ["node-hang:joint1@1s", "brown-out:joint1=30@1.05s"],
             ["brown-out:joint1=30@1s", "brown-out:joint1=30@2s"],

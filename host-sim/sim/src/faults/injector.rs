@@ -19,6 +19,9 @@ use super::line::{LineErrors, record, rubbish};
 use rand::RngExt;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 
+/// Speed at which ground gives way \[m/s\].
+const SINKS_M_S: f64 = 0.03;
+
 /// The faults of one run.
 #[derive(Debug)]
 pub(crate) struct Injector {
@@ -29,6 +32,8 @@ pub(crate) struct Injector {
     encoder_at: [Option<i64>; 2],
     /// Simulated time at the begin of a clock fault, per board, ns.
     clock_from_ns: [u64; 8],
+    /// Simulated time at which the ground begins to give way, ns.
+    sinks_from_ns: u64,
     last_sync: Vec<u8>,
 }
 
@@ -41,6 +46,7 @@ impl Injector {
             line: LineErrors::default(),
             encoder_at: [None; 2],
             clock_from_ns: [0; 8],
+            sinks_from_ns: 0,
             last_sync: Vec::new(),
         }
     }
@@ -57,6 +63,9 @@ impl Injector {
         if let (FaultKind::ClockDrift, FaultTarget::Board(address)) = (fault.kind, fault.target) {
             self.clock_from_ns[usize::from(address) - 1] = now_ns;
         }
+        if begin && fault.kind == FaultKind::FootSinks {
+            self.sinks_from_ns = now_ns;
+        }
         if begin {
             self.active.push(*fault);
         } else {
@@ -71,6 +80,7 @@ impl Injector {
         on_sensors(fault, begin, plant, state);
         on_air(fault, begin, plant, state);
         on_ground(fault, begin, plant);
+        self.sink(now_ns, plant);
         if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, FaultTarget::Board(n)) =
             (fault.kind, fault.target)
         {
@@ -94,6 +104,15 @@ impl Injector {
     /// The value of a fault of which there is one at a time (`admission`); 0 without it.
     fn value(&self, kind: FaultKind) -> f64 {
         self.of(kind).next().map_or(0.0, |f| f.value)
+    }
+
+    /// Lets the ground under the feet be as low as it is now; to be called in every joint tick. The wheels'
+    /// stays.
+    pub(crate) fn sink(&self, now_ns: u64, plant: &mut Plant) {
+        let since_s = now_ns.saturating_sub(self.sinks_from_ns) as f64 * 1e-9;
+        let gives_way_m = self.value(FaultKind::FootSinks).min(SINKS_M_S * since_s);
+        let depth_m = self.value(FaultKind::FootLosesContact) + gives_way_m;
+        plant.assembly.mechanics.touching.sink_under_feet(depth_m);
     }
 
     /// What the master puts on the line in place of `sync`; `None`: nothing.
@@ -340,13 +359,10 @@ fn rebuild(plant: &mut Plant, joint: usize, begin: bool, change: impl FnOnce(&mu
 
 fn on_ground(fault: &FaultSpec, begin: bool, plant: &mut Plant) {
     let touching = &mut plant.assembly.mechanics.touching;
-    match fault.kind {
-        FaultKind::FootSlips => touching.limit_foot_friction(begin.then_some(fault.value)),
-        // The ground goes down under the feet alone; the wheels stay.
-        FaultKind::FootLosesContact => {
-            touching.sink_under_feet(if begin { fault.value } else { 0.0 });
-        }
-        _ => {}
+    if fault.kind == FaultKind::FootSlips {
+        let mu = begin.then_some(fault.value);
+        touching.limit_foot_friction(mu);
+        touching.limit_wheel_friction(mu);
     }
 }
 

@@ -214,7 +214,7 @@ pub const ROWS: &[Row] = &[
     row("load-step", &[at("load-step:joint3=60", 0.5)], Phase::Flight, goes_on(60.0), &[]),
     row("foot-loses-contact", &[at("foot-loses-contact=0.03", FOR_GOOD)], Phase::Push, goes_on(40.0), &[]),
     row("foot-slips", &[at("foot-slips=0.05", FOR_GOOD)], Phase::Push, goes_on(40.0), &[]),
-    missing("foot-sinks"),
+    row("foot-sinks", &[at("foot-sinks=0.03", FOR_GOOD)], Phase::Push, goes_on(40.0), &[]),
     // Brown-out.
     row("brown-out/motion", &[at("brown-out:joint2=30", FOR_GOOD)], Phase::Push,
         stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &[Lost(2), SaysReset(2, ResetCause::PowerUp)]),
