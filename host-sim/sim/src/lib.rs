@@ -37,6 +37,7 @@ mod provenance;
 mod rogue_nodes;
 mod session;
 mod setup;
+mod standing;
 mod unphysical;
 mod world;
 

@@ -31,7 +31,7 @@ use super::downtime::DownTimes;
 use super::rogue_nodes::RogueNodes;
 use crate::SimError;
 use crate::faults::Injector;
-use crate::unphysical;
+use crate::{standing, unphysical};
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
@@ -162,11 +162,7 @@ impl World {
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
         let state = plant.initial_state(seed).map_err(|e| match e {
-            PlantError::NotStanding => SimError::simulation(
-                e.to_string(),
-                "correct the scenario's [[terrain]]: a plane there is less steep than 22°, and \
-                 wheels and feet find no rock, edge or hole below them",
-            ),
+            PlantError::NotStanding => standing::refused(plant.params(), &e),
             other => refused("plant", &other),
         })?;
         let mut boards = Vec::new();
@@ -267,7 +263,7 @@ impl World {
     fn advance_plant(&mut self) -> Result<(), SimError> {
         self.plant
             .advance_to(&mut self.state, self.now_ns)
-            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))
+            .map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))
     }
 
     /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
@@ -312,7 +308,7 @@ impl World {
         self.inputs.dump = self.active_outputs(7).dump;
         self.plant
             .apply(&mut self.state, &self.inputs)
-            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))?;
+            .map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))?;
         self.outputs = self.plant.outputs(&self.state);
         let sensed = match sensed {
             Some(sensed) => sensed,

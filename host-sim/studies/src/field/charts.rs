@@ -7,8 +7,11 @@ use super::{SCENARIOS, Summary, Tried};
 const SPEED: &str = "speed";
 const HEIGHT: u32 = 130;
 
-/// A panel for each scenario that has a bar on its speed.
+/// A panel for each scenario that has a bar on its speed. Of one seed there is no curve to draw.
 pub(super) fn figures(summary: &Summary) -> Vec<Figure> {
+    if summary.seeds < 2 {
+        return Vec::new();
+    }
     let panels: Vec<Panel> = summary
         .scenarios
         .iter()
@@ -48,7 +51,7 @@ fn panel(summary: &Summary, tried: &Tried) -> Option<Panel> {
         ("speed [mm/s]", (low, 1.1 * high)),
         vec![line(tried.scenario, colour, 2, points)],
     );
-    let x_range = (1.0, f64::from(summary.seeds).max(2.0));
+    let x_range = (1.0, f64::from(summary.seeds));
     Some(Panel::new(
         tried.scenario,
         x_range,
