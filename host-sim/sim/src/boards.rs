@@ -13,7 +13,7 @@ use wheeleg_node::parameters::{JointParameters, WheelParameters};
 use wheeleg_node::snapshot::TickReport;
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{ConfigError, NodeIdentity, Transmission};
-use wheeleg_protocol::{Address, Fault, FaultBits, NackReason, ResetCause};
+use wheeleg_protocol::{Address, Fault, FaultBits, NackReason, Node, ResetCause};
 use wheeleg_units::Micros;
 
 use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
@@ -135,7 +135,7 @@ impl JointBoard {
             fill_b,
             vent_b,
         };
-        let application = if address.raw().is_multiple_of(3) {
+        let application = if address.node().is_some_and(Node::has_foot) {
             let [front, left, rear, right] = foot.clone();
             let switches = FootSwitches(front, left, rear, right);
             JointNode::from_store(who, parameters, bank, sensor.clone(), switches)
@@ -272,7 +272,7 @@ impl WheelBoard {
             pulse: pulse.clone(),
             sign: sign.clone(),
         };
-        let application = if address.raw() == 7 {
+        let application = if address.node() == Some(Node::WHEELS[0]) {
             let switch = SupplySwitch(supply.clone());
             let valve = DumpPin(dump.clone());
             WheelNode::from_store(who, parameters, bridge, encoder.clone(), switch, valve)

@@ -465,7 +465,8 @@ static CHANNELS: [ChannelDef; 26] = [
     channel::<LinkSample>("/link/6", 0, "Bus as heard by joint 6").written(Written::OnChange),
     channel::<LinkSample>("/link/7", 0, "Bus as heard by wheel 7").written(Written::OnChange),
     channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8").written(Written::OnChange),
-    channel::<BehaviourSample>("/behaviours", CYCLE_HZ, "Legs and behaviours of a walk").written(Written::InWalks),
+    channel::<BehaviourSample>("/behaviours", CYCLE_HZ, "Legs and behaviours of a walk")
+        .written(Written::InWalks),
 ];
 
 #[cfg(test)]

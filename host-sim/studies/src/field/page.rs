@@ -113,9 +113,9 @@ fn verdict(summary: &Summary) -> String {
     let runs = format!("{passed} of {} runs pass.", summary.runs.len());
     match summary.claims.len() {
         0 => runs,
-        claims => format!(
-            "{met} of {claims} claims of the paper are met on the assumed ground; {runs}"
-        ),
+        claims => {
+            format!("{met} of {claims} claims of the paper are met on the assumed ground; {runs}")
+        }
     }
 }
 

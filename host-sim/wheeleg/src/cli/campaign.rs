@@ -32,7 +32,7 @@ enum Command {
     Run(RunArgs),
     /// Give the shards of a campaign to Slurm, or print a job for Kubernetes.
     Submit(SubmitArgs),
-    /// How far a campaign is, from its folder alone.
+    /// Show the progress of a campaign, from its folder alone.
     Status(StatusArgs),
     /// Make one table of the parts in one or more folders.
     Merge(MergeArgs),

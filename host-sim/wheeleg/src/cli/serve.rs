@@ -34,10 +34,10 @@ pub(super) struct ServeArgs {
     /// rate than 1000000 bit/s /dev/ttyUSB0@115200.
     #[arg(long, value_name = "PORT[@RATE]", conflicts_with_all = ["speed", "paused"])]
     port: Option<String>,
-    /// Simulated time over time of the clock on the wall, 0.1 to 10, or `max`.
+    /// Simulated time per wall-clock time, 0.1 to 10, or `max`.
     #[arg(long, value_name = "SPEED", default_value = "1", value_parser = parse_speed)]
     speed: Speed,
-    /// Begin with the clock standing.
+    /// Start paused.
     #[arg(long)]
     paused: bool,
     /// Record from power-up on: log, and every command with its time, so that `wheeleg replay`
@@ -47,10 +47,10 @@ pub(super) struct ServeArgs {
     /// Folder in which each recording gets a folder of its own.
     #[arg(long, value_name = "DIR", default_value = FOLDER)]
     recordings: PathBuf,
-    /// Make new keys: the old ones open nothing any more.
+    /// Make new keys; the old ones no longer work.
     #[arg(long)]
     new_key: bool,
-    /// Folder of the page, instead of the one in this program: for who works on it.
+    /// Folder of the page, instead of the one in this program, for work on the page.
     #[arg(long, value_name = "DIR")]
     page_dir: Option<PathBuf>,
 }
