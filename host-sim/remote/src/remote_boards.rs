@@ -74,7 +74,7 @@ pub struct RemoteBoards {
     comparison: Comparison,
     requests: Vec<usize>,
     /// The first difference has been told.
-    told: bool,
+    printed: bool,
     /// Where boards run on cores of their own.
     cores: Option<Cores>,
 }
@@ -112,7 +112,7 @@ impl RemoteBoards {
             by_node: [None; 8],
             comparison: Comparison::default(),
             requests: Vec::new(),
-            told: false,
+            printed: false,
             cores: None,
         };
         let images = images::find(nodes)?;
@@ -408,8 +408,8 @@ impl RemoteBoards {
             self.take(number, reply)?;
         }
         self.requests = asked;
-        if let (Some(first), false) = (&self.comparison.first, self.told) {
-            self.told = true;
+        if let (Some(first), false) = (&self.comparison.first, self.printed) {
+            self.printed = true;
             // Told at once: the run may end before its summary.
             let _ = writeln!(std::io::stderr(), "a board differs from the host: {first}");
         }

@@ -251,10 +251,10 @@ pub(super) fn listen(
     master: &mut Master,
     t_ns: u64,
     recorder: &mut Recorder,
-    told: &mut dyn FnMut(u64, &Event),
+    on_event: &mut dyn FnMut(u64, &Event),
 ) {
     while let Some((time_us, event)) = master.take_event() {
-        told(time_us, &event);
+        on_event(time_us, &event);
         // Counters have channels of their own.
         if let Event::Link { node, record } = event {
             if let Some(node) = Node::new(node) {

@@ -2,9 +2,10 @@
 
 use wheeleg_report::plot::{Content, Figure, Panel, colour, line};
 
+use wheeleg_config::Measure;
+
 use super::{SCENARIOS, Summary, Tried};
 
-const SPEED: &str = "speed";
 const HEIGHT: u32 = 130;
 
 /// A panel for each scenario that has a bar on its speed. Of one seed there is no curve to draw.
@@ -29,13 +30,20 @@ pub(super) fn figures(summary: &Summary) -> Vec<Figure> {
 }
 
 fn panel(summary: &Summary, tried: &Tried) -> Option<Panel> {
-    let bar = tried.measured.iter().find(|m| m.measure == SPEED)?;
+    let bar = tried
+        .measured
+        .iter()
+        .find(|m| m.measure == Measure::Speed.name())?;
     let points: Vec<(f64, f64)> = summary
         .runs
         .iter()
         .filter(|run| run.scenario == tried.scenario)
         .filter_map(|run| {
-            let speed = run.bars.iter().find(|b| b.id == SPEED)?.value?;
+            let speed = run
+                .bars
+                .iter()
+                .find(|b| b.id == Measure::Speed.name())?
+                .value?;
             Some((run.seed as f64, speed))
         })
         .collect();
