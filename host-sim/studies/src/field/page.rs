@@ -177,3 +177,25 @@ pub(super) fn render(
     };
     Ok(page(TEMPLATE, values)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of scenarios that the paper says nothing about, and of one seed, nothing is empty.
+    #[test]
+    fn a_page_without_claims_has_no_section_of_them() {
+        let summary = Summary {
+            seeds: 1,
+            claims: Vec::new(),
+            scenarios: Vec::new(),
+            runs: Vec::new(),
+        };
+        let figures = super::super::charts::figures(&summary);
+        assert!(figures.is_empty());
+        let page = render(&summary, None, &[]).expect("a page");
+        assert!(page.contains("0 of 0 runs pass."), "{page}");
+        assert!(!page.contains("claims of the paper") && !page.contains("id=\"claims\""));
+        assert!(page.contains("What is assumed"));
+    }
+}
