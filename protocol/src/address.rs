@@ -10,6 +10,101 @@ pub const NODE_NAMES: [&str; NODES] = [
     "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8",
 ];
 
+/// A joint or wheel board, by its place in every list of eight: joints 1–6, wheels 7 and 8.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Node(u8);
+
+impl Node {
+    /// All nodes, in the order of their addresses.
+    pub const ALL: [Self; NODES] = [
+        Self(0),
+        Self(1),
+        Self(2),
+        Self(3),
+        Self(4),
+        Self(5),
+        Self(6),
+        Self(7),
+    ];
+    /// The joints: left yaw, horizontal and vertical, then right.
+    pub const JOINTS: [Self; 6] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
+    /// The wheels: left, right.
+    pub const WHEELS: [Self; 2] = [Self(6), Self(7)];
+
+    /// By its number, 1–8, which is its bus address; `None` for any other.
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Self> {
+        match number {
+            1..=8 => Some(Self(number.saturating_sub(1))),
+            _ => None,
+        }
+    }
+
+    /// By its name in files and commands, such as `joint3`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let names = Self::ALL.into_iter().zip(NODE_NAMES);
+        names
+            .into_iter()
+            .find_map(|(node, n)| (n == name).then_some(node))
+    }
+
+    /// Its place in a list of eight, 0–7; of joints, that in a list of six, too.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// Its number, 1–8.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.0.saturating_add(1)
+    }
+
+    /// Its bus address.
+    #[must_use]
+    pub const fn address(self) -> Address {
+        Address(self.number())
+    }
+
+    /// Its name in files and commands, such as `joint3`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        NODE_NAMES.get(self.index()).copied().unwrap_or_default()
+    }
+
+    /// Whether it is a joint board.
+    #[must_use]
+    pub const fn is_joint(self) -> bool {
+        self.0 < 6
+    }
+
+    /// Its place among the joints, 0–5.
+    #[must_use]
+    pub const fn joint(self) -> Option<usize> {
+        match self.0 {
+            0..=5 => Some(self.index()),
+            _ => None,
+        }
+    }
+
+    /// Whether the switches of a foot are wired to it: the vertical cylinders.
+    #[must_use]
+    pub const fn has_foot(self) -> bool {
+        matches!(self.0, 2 | 5)
+    }
+
+    /// Its place among the wheels, 0 left, 1 right.
+    #[must_use]
+    pub const fn wheel(self) -> Option<usize> {
+        match self.0 {
+            6 => Some(0),
+            7 => Some(1),
+            _ => None,
+        }
+    }
+}
+
 /// Bus address: master 0, joints 1–6, wheels 7–8, broadcast 255. No other value exists.
 ///
 /// Joints 1–3 are the left yaw, horizontal and vertical cylinder, 4–6 the
@@ -107,6 +202,12 @@ impl Address {
         matches!(self.0, 1..=8)
     }
 
+    /// The board at this address; `None` for master and broadcast.
+    #[must_use]
+    pub const fn node(self) -> Option<Node> {
+        Node::new(self.0)
+    }
+
     /// All nodes, in slot order.
     pub fn nodes() -> impl Iterator<Item = Self> {
         (0..NODES).filter_map(Self::of_slot)
@@ -141,5 +242,28 @@ impl core::fmt::Display for Address {
             7 | 8 => write!(f, "wheel {}", self.0),
             _ => f.write_str("broadcast"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_is_its_address_its_place_and_its_name() {
+        for (i, node) in Node::ALL.into_iter().enumerate() {
+            assert_eq!(node.index(), i);
+            assert_eq!(Some(node.address()), Address::of_slot(i));
+            assert_eq!(node.address().node(), Some(node));
+            assert_eq!(Node::named(node.name()), Some(node));
+            assert_eq!(node.is_joint(), node.address().is_joint());
+            assert_ne!(node.joint().is_some(), node.wheel().is_some());
+        }
+        assert_eq!(Node::JOINTS.map(Node::number), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(Node::WHEELS.map(Node::name), ["wheel7", "wheel8"]);
+        for none in [Address::MASTER, Address::BROADCAST] {
+            assert_eq!(none.node(), None);
+        }
+        assert_eq!(Node::named("joint7"), None);
     }
 }

@@ -68,7 +68,7 @@ pub mod schema;
 pub mod sync;
 pub mod wire;
 
-pub use address::{Address, NODE_NAMES, NODES};
+pub use address::{Address, NODE_NAMES, NODES, Node};
 pub use decoder::{Decoder, LinkQuality};
 pub use fault::{
     FAULTS, Fault, FaultBits, FaultClass, FaultCode, FaultSchema, LIMITS, Limit, LimitBits,

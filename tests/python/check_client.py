@@ -54,12 +54,11 @@ def main(program):
             assert error.code == 401, error
         with Robot(address, keys["control"]) as robot:
             robot.until(lambda state: state["ready"])
-            topics = [c["topic"] for c in robot.get("channels")["channels"]]
-            # Those on change, and that of walks.
-            quiet = ("/run", "/events", "/link", "/behaviours")
-            told = [topic for topic in topics if not topic.startswith(quiet)]
-            robot.subscribe(*topics)
-            for topic in told:
+            channels = robot.get("channels")["channels"]
+            robot.subscribe(*(c["topic"] for c in channels))
+            # Events and the head of the log came before.
+            steady = [c["topic"] for c in channels if c["written"] == "always" and c["rate_hz"] > 0]
+            for topic in steady:
                 assert robot.latest(topic)["t_ns"] > 0, topic
             refused("not_in_control", lambda: robot.command("Arm"))
             with robot.control():

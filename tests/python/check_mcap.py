@@ -4,7 +4,7 @@
 
 Every channel must have a topic, a schema (name, encoding `jsonschema`, one
 property per field, each with a type and a unit) and at least one message; only a
-channel that is written on change may be empty, but for those of events.
+channel whose metadata say that it is not `written` always may be empty.
 Every message must be JSON that fits its schema, and the time of a channel must
 never run backwards. A channel whose schema is one of Foxglove's has no units; its
 messages are held against that schema with all that it says. Ends with 0 if all of that holds, with 1 and one line per defect if
@@ -25,12 +25,6 @@ SHOWN = 40
 
 # Schemas that others publish.
 FOREIGN = "foxglove."
-
-# Written on change, and never empty.
-EVENTS = ("/events", "/run")
-
-# Written while the robot walks, and in no other run.
-OF_WALKS = ("/behaviours",)
 
 JSON_TYPES = {
     "number": lambda v: isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v),
@@ -163,8 +157,7 @@ def check(path):
     rows = []
     for channel in summary.channels.values():
         schema = summary.schemas.get(channel.schema_id)
-        on_change = channel.metadata.get("rate_hz") == "on change" and channel.topic not in EVENTS
-        if counts[channel.id] == 0 and not on_change and channel.topic not in OF_WALKS:
+        if counts[channel.id] == 0 and channel.metadata.get("written", "always") == "always":
             defects.append(f"{channel.topic}: no message")
         rows.append((channel.topic, schema.name if schema else "-", counts[channel.id]))
     return defects, sorted(rows)

@@ -74,10 +74,9 @@ class CheckMcap(unittest.TestCase):
 
     def test_messages(self):
         self.refused("no message", messages=())
-        self.refused("no message", messages=(), metadata={"rate_hz": "500"})
-        on_change = {"rate_hz": "on change"}
-        self.refused("no message", messages=(), metadata=on_change, topic="/events")
-        self.assertEqual(self.defects(messages=(), metadata=on_change, topic="/link/1"), [])
+        self.refused("no message", messages=(), metadata={"written": "always", "rate_hz": "on change"})
+        for written in ("on change", "in walks"):
+            self.assertEqual(self.defects(messages=(), metadata={"written": written}), [])
         self.refused("not JSON", raw=b"{")
         self.refused("not an object", raw=b"[1]")
         self.refused("fields differ", messages=((0, {"position_mm": 1.0}),))

@@ -99,7 +99,7 @@ const STAND: &str = "name = \"stand\"\ndescription = \"\"\nrobot = \"wheeleg\"\n
 
 /// Says what a user is told, and that it is told in words: what, where or what about it, and no
 /// value as a program prints it for itself.
-fn told(error: &dyn Diagnostic) -> String {
+fn messages(error: &dyn Diagnostic) -> String {
     let mut text = error.to_string();
     let mut remedy = error.help().is_some() || error.related().is_some();
     for problem in error.related().into_iter().flatten() {
@@ -165,13 +165,13 @@ fn played(options: &Options, stop: &Stop) -> Result<Fate, StudyError> {
     assert!(worst[0] < 100.1, "{} bar, and nobody said so", worst[0]);
     assert!(worst[1] < 1e5, "{} mm/s, and nobody said so", worst[1]);
     Ok(match finished.result.failure {
-        Some(failure) => Fate::Ended(told(&failure)),
+        Some(failure) => Fate::Ended(messages(&failure)),
         None => Fate::Ran,
     })
 }
 
 fn refused(error: &dyn Diagnostic) -> Fate {
-    Fate::Refused(told(error))
+    Fate::Refused(messages(error))
 }
 
 /// What the program makes of a file of a kind.

@@ -47,15 +47,11 @@ fn channels_page() {
     head(&mut body, &["channel", "rate", "schema", "what"]);
     let ours = channels()
         .iter()
-        .map(|c| (c.topic, c.rate_hz, c.schema, c.doc));
+        .map(|c| (c.topic, c.rate(), c.schema, c.doc));
     let others = derived()
         .iter()
-        .map(|c| (c.topic, c.rate_hz, c.schema, c.doc));
-    for (topic, rate_hz, schema, doc) in ours.chain(others) {
-        let rate = match rate_hz {
-            0 => "on change".to_owned(),
-            hz => format!("{hz} Hz"),
-        };
+        .map(|c| (c.topic, c.rate(), c.schema, c.doc));
+    for (topic, rate, schema, doc) in ours.chain(others) {
         row(&mut body, &[&format!("`{topic}`"), &rate, schema, doc]);
     }
     for channel in channels() {

@@ -99,7 +99,7 @@ fn a_fault_that_cannot_be_injected_is_refused() {
     inject(&fault("pot-short:joint3@0s"), true).expect("the wiper is free");
 
     let encoder = FaultSpec {
-        target: FaultTarget::Board(3),
+        target: FaultTarget::Board(wheeleg_protocol::Node::JOINTS[2]),
         ..fault("encoder-lost:wheel7@0s")
     };
     let no_wheel = inject(&encoder, true).expect_err("a joint has no encoder");

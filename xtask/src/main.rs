@@ -20,6 +20,7 @@ mod deep;
 mod docs;
 mod firmware;
 mod fuzz;
+mod hashes;
 mod machine;
 mod main_job;
 mod mcap;
@@ -80,6 +81,8 @@ enum Command {
     Vectors,
     /// Release build, then the main job twice in different folders: the hashes must be equal.
     MainJob,
+    /// The log hash of every built-in scenario, beside those of an earlier record.
+    Hashes(hashes::Options),
     /// Our own code beside the C references: times, ratios, targets.
     Bench(bench::Options),
     /// The Rust and the Python implementation of the bus must agree, both ways.
@@ -126,6 +129,7 @@ fn main() -> ExitCode {
         Command::MainJob => {
             main_job::steps(&mut report);
         }
+        Command::Hashes(options) => hashes::steps(&mut report, &options),
         Command::Bench(options) => bench::steps(&mut report, &options),
         Command::Conformance => conformance::steps(&mut report),
         Command::Fuzz(options) => fuzz::steps(&mut report, &options),

@@ -120,6 +120,21 @@ pub enum Sector {
 }
 
 impl Sector {
+    /// Its name inside a sentence.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Front => "front",
+            Self::FrontLeft => "front-left",
+            Self::Left => "left",
+            Self::RearLeft => "back-left",
+            Self::Rear => "back",
+            Self::RearRight => "back-right",
+            Self::Right => "right",
+            Self::FrontRight => "front-right",
+        }
+    }
+
     /// Sector that contains a bearing in rad, (−π, π].
     #[must_use]
     pub fn from_bearing(bearing_rad: f32) -> Self {

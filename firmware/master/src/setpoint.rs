@@ -107,7 +107,7 @@ impl Phase {
 
 /// Coming change of a reference, for control ahead of a known move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ahead {
+pub struct NextReference {
     /// Reference the next move leads to, mm.
     pub reference_mm: PositionMm,
     /// Bus cycles until that move begins, 1..=254.
@@ -145,7 +145,7 @@ pub struct JointSetpoint {
     /// Speed of the reference in mm/s (feed-forward; 0 for a square wave).
     pub velocity_mm_s: VelocityMmS,
     /// Next change of the reference, if within the horizon.
-    pub ahead: Option<Ahead>,
+    pub ahead: Option<NextReference>,
     /// Action on link loss.
     pub on_link_loss: OnLinkLoss,
     /// Reflex of layer 0.

@@ -96,7 +96,7 @@ impl<'a> Cases<'a> {
         for cell in 0..self.plan.cells().min(CELLS) {
             match self.case(cell * self.plan.replicates).setup {
                 Ok(_) => return Ok(()),
-                Err(told) => why = told,
+                Err(message) => why = message,
             }
         }
         Err(CampaignError::refused(

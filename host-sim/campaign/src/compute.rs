@@ -22,10 +22,10 @@ pub(crate) fn row(
     });
     match made {
         Ok((case, outcome)) => Some(row_of(cases, &case, block, outcome?)),
-        Err(told) => {
+        Err(message) => {
             // The case itself can be made: what panicked is its simulation.
             let case = caught(|| cases.case(index)).ok()?;
-            let outcome = Outcome::without(Status::Panic, told);
+            let outcome = Outcome::without(Status::Panic, message);
             Some(row_of(cases, &case, block, outcome))
         }
     }

@@ -61,8 +61,8 @@ pub(crate) fn isolate(
         return Ok(Isolated::Stopped);
     }
     if child.status.code() == Some(74) {
-        let told = String::from_utf8_lossy(&child.stderr).trim().to_owned();
-        let reason = std::io::Error::other(told);
+        let message = String::from_utf8_lossy(&child.stderr).trim().to_owned();
+        let reason = std::io::Error::other(message);
         return Err(CampaignError::output("write", file, reason));
     }
     Ok(Isolated::Ended(how(child.status)))

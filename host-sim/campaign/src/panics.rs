@@ -30,15 +30,15 @@ pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
                 let file = at.file().rsplit(['/', '\\']).next().unwrap_or_default();
                 format!(" ({file}:{})", at.line())
             });
-            let told = format!("{text}{}", place.unwrap_or_default());
-            CAUGHT.with_borrow_mut(|caught| *caught = Some(told));
+            let message = format!("{text}{}", place.unwrap_or_default());
+            CAUGHT.with_borrow_mut(|caught| *caught = Some(message));
         }));
     });
     CATCHING.with_borrow_mut(|catching| *catching = true);
     let result = panic::catch_unwind(AssertUnwindSafe(work));
     CATCHING.with_borrow_mut(|catching| *catching = false);
     result.map_err(|_| {
-        let told = CAUGHT.with_borrow_mut(Option::take);
-        told.unwrap_or_else(|| "a panic".to_owned())
+        let message = CAUGHT.with_borrow_mut(Option::take);
+        message.unwrap_or_else(|| "a panic".to_owned())
     })
 }

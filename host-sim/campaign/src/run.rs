@@ -94,7 +94,7 @@ pub fn run(
         first,
         program: options.program.as_deref(),
         found: &|cases| live.found(cases),
-        told: &|row| {
+        on_row: &|row| {
             live.computed(row);
             keep_log(store, cases, row, &options.stop)
         },

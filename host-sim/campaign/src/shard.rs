@@ -157,7 +157,7 @@ mod tests {
             ("SLURM_ARRAY_TASK_COUNT", "8"),
         ];
         let kubernetes = [("JOB_COMPLETION_INDEX", "2")];
-        for (given, shards, variables, told) in [
+        for (given, shards, variables, message) in [
             (Some("1/2"), None, &slurm[..], ["1/2", "3/8"]),
             (
                 None,
@@ -175,7 +175,7 @@ mod tests {
             ),
         ] {
             let error = choose(given, shards, variables).expect_err("refused");
-            assert!(told.iter().all(|word| error.contains(word)), "{error}");
+            assert!(message.iter().all(|word| error.contains(word)), "{error}");
         }
         for text in ["", "1", "2/2", "a/b", "-1/2", "0/0"] {
             assert!(text.parse::<Shard>().is_err(), "{text}");

@@ -51,7 +51,7 @@ pub(crate) struct Work<'a> {
     /// Told of cases that have a row already.
     pub(crate) found: &'a (dyn Fn(u64) + Sync),
     /// Told of every row that is computed.
-    pub(crate) told: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
+    pub(crate) on_row: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
     /// Told of a part that was set aside.
     pub(crate) aside: &'a (dyn Fn(&Path, &str) + Sync),
 }
@@ -190,7 +190,7 @@ impl Work<'_> {
         let Some(row) = self.attempt(block, index)? else {
             return Ok(false);
         };
-        (self.told)(&row)?;
+        (self.on_row)(&row)?;
         held(&block.efforts).push(Effort {
             index,
             wall_s: begun.elapsed().as_secs_f64(),
@@ -220,8 +220,8 @@ impl Work<'_> {
         loop {
             if known.proven >= ENDS {
                 let case = self.cases.case(index);
-                let told = format!("ended its process {ENDS} times: {last}");
-                let outcome = Outcome::without(Status::Crashed, told);
+                let message = format!("ended its process {ENDS} times: {last}");
+                let outcome = Outcome::without(Status::Crashed, message);
                 let size = self.store.plan().block;
                 return Ok(Some(row_of(self.cases, &case, size, outcome)));
             }

@@ -1,7 +1,7 @@
 //! Board parameters set by a robot file, by the names of the protocol's tables.
 
 use wheeleg_node::acceptance::accepts;
-use wheeleg_protocol::Address;
+use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
 use super::params::ParameterInfo;
@@ -19,12 +19,11 @@ pub struct NodeParams {
 }
 
 impl NodeParams {
-    /// Parameters of the board at an address; none for an address that is no node's.
+    /// Parameters of a board.
     #[must_use]
-    pub fn of(&self, address: Address) -> &[(u16, i32)] {
+    pub fn of(&self, node: Node) -> &[(u16, i32)] {
         let mut boards = self.joints.iter().chain(&self.wheels);
-        let of = address.slot().and_then(|slot| boards.nth(slot));
-        of.map_or(&[], Vec::as_slice)
+        boards.nth(node.index()).map_or(&[], Vec::as_slice)
     }
 }
 
@@ -69,13 +68,14 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
 fn contradictions(r: &mut Reader, params: &NodeParams) {
     let stored = params.joints.iter().chain(&params.wheels);
     // One board is enough: what its section sets, others have as well.
-    let mut refused = (Address::nodes().zip(stored)).filter(|(to, stored)| !accepts(*to, stored));
-    let Some((address, stored)) = refused.next() else {
+    let mut refused =
+        (Node::ALL.into_iter().zip(stored)).filter(|(to, stored)| !accepts(to.address(), stored));
+    let Some((node, stored)) = refused.next() else {
         return;
     };
-    let of_joint =
-        |(_, joints): &&(_, &[usize])| address.slot().is_some_and(|i| joints.contains(&i));
-    let sections: Vec<&str> = if address.is_joint() {
+    let address = node.address();
+    let of_joint = |(_, joints): &&(_, &[usize])| node.joint().is_some_and(|i| joints.contains(&i));
+    let sections: Vec<&str> = if node.is_joint() {
         let own = JOINT_SECTIONS.iter().rev().filter(of_joint);
         own.map(|(name, _)| *name).collect()
     } else {
@@ -126,8 +126,7 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
 /// The board that an event names, if there is one of this number.
 fn board(entry: &Entry) -> Option<u8> {
     let number = entry.get("board")?.1.as_integer()?;
-    let address = Address::new(u8::try_from(number).ok()?)?;
-    address.is_node().then_some(address.raw())
+    Node::new(u8::try_from(number).ok()?).map(Node::number)
 }
 
 /// Reads `parameter`, by its name in the table of the entry's `board`; nothing where there is

@@ -432,13 +432,13 @@ mod tests {
     fn the_document_has_every_route_and_no_other() {
         let document: Value = serde_json::from_str(OPENAPI).expect("JSON");
         let paths = document["paths"].as_object().expect("paths");
-        let told = paths.iter().flat_map(|(path, item)| {
+        let documented = paths.iter().flat_map(|(path, item)| {
             let methods = item.as_object().expect("methods").keys();
             methods.map(|method| (method.clone(), path.clone()))
         });
-        let told: BTreeSet<(String, String)> = told.collect();
+        let documented: BTreeSet<(String, String)> = documented.collect();
         let listed = api().listed.into_iter();
         let listed = listed.map(|(method, path)| (method.to_owned(), path.to_owned()));
-        assert_eq!(told, listed.collect());
+        assert_eq!(documented, listed.collect());
     }
 }

@@ -187,6 +187,7 @@ fn channel_list() -> Vec<Value> {
             "topic": channel.topic,
             "schema": channel.schema,
             "rate_hz": channel.rate_hz,
+            "written": channel.written.name(),
             "description": channel.doc,
             "fields": fields.collect::<Vec<_>>(),
         })

@@ -91,10 +91,10 @@ mod tests {
             "The interfaces are the same."
         );
         for (here, there) in [(SCHEMA_HASH, 0x1234), (0x1234, SCHEMA_HASH)] {
-            let told = message(here, there);
+            let text = message(here, there);
             assert!(
-                told.starts_with("0000000000001234 is not an interface"),
-                "{told}"
+                text.starts_with("0000000000001234 is not an interface"),
+                "{text}"
             );
         }
     }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use wheeleg_protocol::NODE_NAMES;
+use wheeleg_protocol::{NODE_NAMES, Node};
 
 use crate::RemoteError;
 
@@ -54,8 +54,8 @@ impl fmt::Display for NodeKind {
 /// One node's own choice: `joint3=pil`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NodeChoice {
-    /// Bus address, 1 to 8.
-    pub address: u8,
+    /// Which.
+    pub node: Node,
     /// Where it runs.
     pub kind: NodeKind,
 }
@@ -67,11 +67,10 @@ impl FromStr for NodeChoice {
         let (name, kind) = text
             .split_once('=')
             .ok_or_else(|| format!("`{text}` is not NODE=KIND, for example joint3=pil"))?;
-        let address = (1..).zip(NODE_NAMES).find(|(_, n)| *n == name);
-        let (address, _) = address
+        let node = Node::named(name)
             .ok_or_else(|| format!("no node `{name}`; the nodes are {}", NODE_NAMES.join(", ")))?;
         Ok(Self {
-            address,
+            node,
             kind: kind.parse()?,
         })
     }
@@ -88,10 +87,9 @@ impl Nodes {
     /// [`RemoteError`]: two choices for one node.
     pub fn new(kind: &NodeKind, choices: &[NodeChoice]) -> Result<Self, RemoteError> {
         let mut nodes: [Option<&NodeKind>; 8] = [None; 8];
-        for NodeChoice { address, kind } in choices {
-            let i = usize::from(*address) - 1;
-            if let Some(first) = nodes[i].replace(kind) {
-                let name = NODE_NAMES[i];
+        for NodeChoice { node, kind } in choices {
+            if let Some(first) = nodes[node.index()].replace(kind) {
+                let name = node.name();
                 return Err(RemoteError::new(
                     format!("{name} is given twice: `{name}={first}` and `{name}={kind}`"),
                     "leave one of them out",

@@ -10,15 +10,15 @@ use std::fmt;
 use wheeleg_remote_link::{Inputs, Outputs};
 
 use super::channel::{Channel, Count, Counts};
-use wheeleg_protocol::NODE_NAMES;
+use wheeleg_protocol::Node;
 
 /// The first thing that differed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
     /// Time since power-up, ns.
     pub at_ns: u64,
-    /// Bus address of the board.
-    pub address: u8,
+    /// The board.
+    pub node: Node,
     /// What differed.
     pub field: String,
     /// Value of the application in this process.
@@ -29,7 +29,7 @@ pub struct Difference {
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = NODE_NAMES[usize::from(self.address).clamp(1, 8) - 1];
+        let name = self.node.name();
         write!(
             f,
             "{:.6} s, {name}, {}: {} on the host, {} on the board",
@@ -44,7 +44,7 @@ impl fmt::Display for Difference {
 /// Counts of a comparison.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Comparison {
-    /// Bits by channel, for each address from 1.
+    /// Bits by channel, for each node.
     pub counts: [Counts; 8],
     /// Ticks compared.
     pub ticks: u64,
@@ -70,22 +70,22 @@ impl Comparison {
         self.by_channel().total()
     }
 
-    /// Bits of the board at `address` by channel.
-    pub(crate) fn of(&mut self, address: u8) -> &mut Counts {
-        &mut self.counts[usize::from(address).clamp(1, 8) - 1]
+    /// Bits of a board by channel.
+    pub(crate) fn of(&mut self, node: Node) -> &mut Counts {
+        &mut self.counts[node.index()]
     }
 
     /// Compares two values of `width` bits.
     fn value(
         &mut self,
-        address: u8,
+        node: Node,
         channel: Channel,
         width: u32,
         (here, there): (u64, u64),
         what: impl FnOnce() -> Difference,
     ) {
         let differing = (here ^ there).count_ones();
-        self.of(address)
+        self.of(node)
             .of(channel)
             .add(u64::from(width), u64::from(differing));
         if differing > 0 {
@@ -94,10 +94,10 @@ impl Comparison {
     }
 
     /// Compares two values of a board's pins at `at_ns`.
-    fn pins(&mut self, at_ns: u64, address: u8, channel: Channel, width: u32, pair: (u64, u64)) {
-        self.value(address, channel, width, pair, || Difference {
+    fn pins(&mut self, at_ns: u64, node: Node, channel: Channel, width: u32, pair: (u64, u64)) {
+        self.value(node, channel, width, pair, || Difference {
             at_ns,
-            address,
+            node,
             field: channel.name().to_owned(),
             here: pair.0.to_string(),
             there: pair.1.to_string(),
@@ -105,9 +105,9 @@ impl Comparison {
     }
 
     /// Outputs that act from the edge at `at_ns` on.
-    pub(crate) fn outputs(&mut self, at_ns: u64, address: u8, here: &Outputs, there: &Outputs) {
+    pub(crate) fn outputs(&mut self, at_ns: u64, node: Node, here: &Outputs, there: &Outputs) {
         self.ticks += 1;
-        if address <= 6 {
+        if node.is_joint() {
             const VALVES: [Channel; 4] = [
                 Channel::FillA,
                 Channel::VentA,
@@ -117,7 +117,7 @@ impl Comparison {
             let pairs = here.valve_on_us.iter().zip(there.valve_on_us);
             for (channel, (here, there)) in VALVES.into_iter().zip(pairs) {
                 let pair = (u64::from(*here), u64::from(there));
-                self.pins(at_ns, address, channel, 16, pair);
+                self.pins(at_ns, node, channel, 16, pair);
             }
             return;
         }
@@ -127,32 +127,32 @@ impl Comparison {
             u64::from(o.bridge_percent) | u64::from(backward) << 8
         };
         let pair = (signed(here), signed(there));
-        self.pins(at_ns, address, Channel::Bridge, 9, pair);
+        self.pins(at_ns, node, Channel::Bridge, 9, pair);
         let pair = (u64::from(here.dump), u64::from(there.dump));
-        self.pins(at_ns, address, Channel::Dump, 1, pair);
+        self.pins(at_ns, node, Channel::Dump, 1, pair);
     }
 
     /// Inputs of the tick at `at_ns`: latched here, and as seen there.
-    pub(crate) fn inputs(&mut self, at_ns: u64, address: u8, here: &Inputs, there: &Inputs) {
-        if address <= 6 {
+    pub(crate) fn inputs(&mut self, at_ns: u64, node: Node, here: &Inputs, there: &Inputs) {
+        if node.is_joint() {
             let pair = (u64::from(here.adc), u64::from(there.adc));
-            self.pins(at_ns, address, Channel::Converter, 16, pair);
-            if address.is_multiple_of(3) {
+            self.pins(at_ns, node, Channel::Converter, 16, pair);
+            if node.has_foot() {
                 let foot =
                     |i: &Inputs| u64::from(i.switches.0 & wheeleg_remote_link::Switches::FOOT);
                 let pair = (foot(here), foot(there));
-                self.pins(at_ns, address, Channel::Feet, 4, pair);
+                self.pins(at_ns, node, Channel::Feet, 4, pair);
             }
             return;
         }
         // The hardware's counter has 16 bits; the driver extends it.
         let count = |i: &Inputs| u64::from(i.encoder as u16);
         let pair = (count(here), count(there));
-        self.pins(at_ns, address, Channel::Encoder, 16, pair);
-        if address == 7 {
+        self.pins(at_ns, node, Channel::Encoder, 16, pair);
+        if node == Node::WHEELS[0] {
             let supply = |i: &Inputs| u64::from(i.switches.supply());
             let pair = (supply(here), supply(there));
-            self.pins(at_ns, address, Channel::Supply, 1, pair);
+            self.pins(at_ns, node, Channel::Supply, 1, pair);
         }
     }
 
@@ -160,7 +160,7 @@ impl Comparison {
     pub(crate) fn frame(
         &mut self,
         at_ns: u64,
-        address: u8,
+        node: Node,
         here: Option<(u64, &[u8])>,
         there: Option<(u64, &[u8])>,
     ) {
@@ -174,7 +174,7 @@ impl Comparison {
         };
         let what = || Difference {
             at_ns,
-            address,
+            node,
             field: "transmission".to_owned(),
             here: text(here),
             there: text(there),
@@ -182,18 +182,18 @@ impl Comparison {
         let (Some((start, bytes)), Some((start_there, bytes_there))) = (here, there) else {
             // All bits of what the other side lacks.
             let bits = 8 * here.or(there).map_or(0, |(_, b)| b.len() as u64);
-            self.of(address).of(Channel::FrameStart).add(64, 64);
-            self.of(address).of(Channel::FrameBytes).add(bits, bits);
+            self.of(node).of(Channel::FrameStart).add(64, 64);
+            self.of(node).of(Channel::FrameBytes).add(bits, bits);
             self.first.get_or_insert_with(what);
             return;
         };
         let starts = (start, start_there);
-        self.value(address, Channel::FrameStart, 64, starts, what);
+        self.value(node, Channel::FrameStart, 64, starts, what);
         let longest = bytes.len().max(bytes_there.len());
         let byte = |b: &[u8], i: usize| b.get(i).map_or(0x100, |b| u64::from(*b));
         for i in 0..longest {
             let pair = (byte(bytes, i), byte(bytes_there, i));
-            self.value(address, Channel::FrameBytes, 8, pair, what);
+            self.value(node, Channel::FrameBytes, 8, pair, what);
         }
     }
 }
@@ -210,11 +210,11 @@ mod tests {
             ..Outputs::default()
         };
         let mut there = here;
-        comparison.outputs(1_000_000, 3, &here, &there);
+        comparison.outputs(1_000_000, Node::JOINTS[2], &here, &there);
         let counted = |c: &Comparison| (c.total().bits, c.total().differing);
         assert_eq!(counted(&comparison), (64, 0));
         there.valve_on_us[1] ^= 2;
-        comparison.outputs(2_000_000, 3, &here, &there);
+        comparison.outputs(2_000_000, Node::JOINTS[2], &here, &there);
         assert_eq!(counted(&comparison), (128, 1));
         let vent = comparison.counts[2].figures();
         assert_eq!(vent[1].channel, "on-time of vent A in µs");
@@ -227,7 +227,7 @@ mod tests {
             assert!(text.contains(part), "{text}");
         }
         there.valve_on_us[0] = 1;
-        comparison.outputs(3_000_000, 3, &here, &there);
+        comparison.outputs(3_000_000, Node::JOINTS[2], &here, &there);
         assert_eq!(comparison.first, Some(first), "the first one stays");
     }
 
@@ -235,7 +235,7 @@ mod tests {
     fn frames_differ_in_bytes_length_time_or_presence() {
         let differing = |here, there| {
             let mut comparison = Comparison::default();
-            comparison.frame(0, 8, here, there);
+            comparison.frame(0, Node::WHEELS[1], here, there);
             comparison.total().differing
         };
         let frame: &[u8] = &[1, 2, 0];
@@ -254,7 +254,7 @@ mod tests {
             bridge_backward: true,
             ..here
         };
-        comparison.outputs(0, 7, &here, &there);
+        comparison.outputs(0, Node::WHEELS[0], &here, &there);
         assert_eq!(comparison.total().differing, 0);
         let driven = Outputs {
             bridge_percent: 40,
@@ -264,7 +264,7 @@ mod tests {
             bridge_backward: false,
             ..driven
         };
-        comparison.outputs(0, 7, &forward, &driven);
+        comparison.outputs(0, Node::WHEELS[0], &forward, &driven);
         assert_eq!(comparison.total().differing, 1);
     }
 }

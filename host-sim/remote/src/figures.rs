@@ -5,7 +5,7 @@ use serde::Serialize;
 use wheeleg_remote_link::{Figures, Hello};
 
 use super::channel::{ChannelFigures, Count};
-use wheeleg_protocol::NODE_NAMES;
+use wheeleg_protocol::Node;
 
 /// Figures of one board.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -63,7 +63,7 @@ fn median(sorted: &[u32]) -> Option<u32> {
 
 impl BoardFigures {
     pub(crate) fn new(
-        address: u8,
+        node: Node,
         hello: &Hello,
         figures: &Figures,
         ticks: &[u32],
@@ -77,7 +77,7 @@ impl BoardFigures {
         let mut sorted = ticks.to_vec();
         sorted.sort_unstable();
         Self {
-            node: NODE_NAMES[usize::from(address) - 1].to_owned(),
+            node: node.name().to_owned(),
             image: hello.image.name.to_string(),
             digest: hello
                 .image

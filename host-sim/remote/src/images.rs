@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use wheeleg_protocol::SCHEMA_HASH;
+use wheeleg_protocol::{Node, SCHEMA_HASH};
 use wheeleg_remote_link::image::{Digest, Identity, Kind, identify};
 
 use super::choice::{NodeKind, Nodes};
@@ -31,8 +31,8 @@ pub(super) struct Image {
 /// another kind or interface than is wanted.
 pub(super) fn find(nodes: &Nodes) -> Result<Vec<Image>, RemoteError> {
     let mut images: Vec<Image> = Vec::new();
-    for (address, node) in (1..).zip(&nodes.0) {
-        if let Some(kind) = kind(node, address)
+    for (node, place) in Node::ALL.into_iter().zip(&nodes.0) {
+        if let Some(kind) = kind(place, node)
             && images.iter().all(|image| image.kind != kind)
         {
             images.push(look_at(kind)?);
@@ -41,14 +41,14 @@ pub(super) fn find(nodes: &Nodes) -> Result<Vec<Image>, RemoteError> {
     Ok(images)
 }
 
-/// The image for the board at `address`; `None` for one that needs none here.
-pub(super) fn kind(node: &NodeKind, address: u8) -> Option<Kind> {
-    match (node, address) {
+/// The image for a board that runs at `place`; `None` for one that needs none here.
+pub(super) fn kind(place: &NodeKind, node: Node) -> Option<Kind> {
+    match (place, node.is_joint()) {
         (NodeKind::Sil | NodeKind::Hil(_), _) => None,
-        (NodeKind::Pil, ..=6) => Some(Kind::Joint),
-        (NodeKind::Pil, _) => Some(Kind::Wheel),
-        (NodeKind::Qemu, ..=6) => Some(Kind::QemuJoint),
-        (NodeKind::Qemu, _) => Some(Kind::QemuWheel),
+        (NodeKind::Pil, true) => Some(Kind::Joint),
+        (NodeKind::Pil, false) => Some(Kind::Wheel),
+        (NodeKind::Qemu, true) => Some(Kind::QemuJoint),
+        (NodeKind::Qemu, false) => Some(Kind::QemuWheel),
     }
 }
 

@@ -28,14 +28,14 @@ use super::transport::unexpected;
 use super::unicorn::{Place, Unicorn};
 use crate::RemoteError;
 use wheeleg_config::RobotConfig;
-use wheeleg_protocol::NODE_NAMES;
+use wheeleg_protocol::Node;
 
 /// A byte on the line: end of its last bit in ns, and its value.
 pub(crate) type Heard = (u64, u8);
 
 /// One board outside.
 struct Board {
-    address: u8,
+    node: Node,
     line: usize,
     index: u8,
     name: String,
@@ -69,12 +69,12 @@ pub struct RemoteBoards {
     nodes: Nodes,
     lines: Vec<Box<dyn Line>>,
     boards: Vec<Board>,
-    /// Board of each address from 1, as an index.
-    by_address: [Option<usize>; 8],
+    /// Board of each node, as an index.
+    by_node: [Option<usize>; 8],
     comparison: Comparison,
     requests: Vec<usize>,
     /// The first difference has been told.
-    told: bool,
+    printed: bool,
     /// Where boards run on cores of their own.
     cores: Option<Cores>,
 }
@@ -82,13 +82,13 @@ pub struct RemoteBoards {
 /// Of eight boards, those that run on the simulator's core: it has enough to do itself.
 const NEAR: usize = 4;
 
-/// The image of the board at `address`, among those that were found.
-fn image_of(images: &[Image], kind: &NodeKind, address: u8) -> Result<PathBuf, RemoteError> {
-    let wanted = images::kind(kind, address);
+/// The image of a board, among those that were found.
+fn image_of(images: &[Image], kind: &NodeKind, node: Node) -> Result<PathBuf, RemoteError> {
+    let wanted = images::kind(kind, node);
     let found = images.iter().find(|image| Some(image.kind) == wanted);
     found.map(|image| image.path.clone()).ok_or_else(|| {
         RemoteError::new(
-            format!("there is no image for node {address} as {kind}"),
+            format!("there is no image for {} as {kind}", node.name()),
             "",
         )
     })
@@ -109,32 +109,32 @@ impl RemoteBoards {
             nodes: nodes.clone(),
             lines: Vec::new(),
             boards: Vec::new(),
-            by_address: [None; 8],
+            by_node: [None; 8],
             comparison: Comparison::default(),
             requests: Vec::new(),
-            told: false,
+            printed: false,
             cores: None,
         };
         let images = images::find(nodes)?;
         images.iter().for_each(Image::warn);
         // Before cores are chosen: a process inherits what its starter is bound to.
-        for (address, kind) in (1..).zip(&nodes.0) {
+        for (node, kind) in Node::ALL.into_iter().zip(&nodes.0) {
             match kind {
                 NodeKind::Sil | NodeKind::Pil => {}
                 NodeKind::Qemu => {
-                    let image = image_of(&images, kind, address)?;
+                    let image = image_of(&images, kind, node)?;
                     let options = QemuOptions::new(image);
                     let line = outside.lines.len();
                     outside.lines.push(Box::new(Qemu::transport(&options)?));
-                    outside.adopt(address, line, 0)?;
+                    outside.adopt(node, line, 0)?;
                 }
                 NodeKind::Hil(port) => {
                     let line = outside.lines.len();
                     let options = HilOptions::parse(&port.display().to_string())?;
-                    let application = if address <= 6 { "joint" } else { "wheel" };
+                    let application = if node.is_joint() { "joint" } else { "wheel" };
                     let (transport, _) = hil::connect(&options, application)?;
                     outside.lines.push(Box::new(transport));
-                    outside.adopt(address, line, 0)?;
+                    outside.adopt(node, line, 0)?;
                 }
             }
         }
@@ -147,26 +147,27 @@ impl RemoteBoards {
 
     /// Spreads the byte-identical images over two cores, where there are two.
     fn start_pil(&mut self, nodes: &Nodes, images: &[Image]) -> Result<(), RemoteError> {
-        let pil = (1..).zip(&nodes.0).filter(|(_, k)| **k == NodeKind::Pil);
-        let mut addresses: Vec<u8> = pil.map(|(address, _)| address).collect();
+        let all = Node::ALL.into_iter().zip(&nodes.0);
+        let pil = all.filter(|(_, kind)| **kind == NodeKind::Pil);
+        let mut pil: Vec<Node> = pil.map(|(node, _)| node).collect();
         // The wheels are near: their edges come twice as often as the joints' and at
         // the same instant, when nobody else has anything to do.
-        addresses.sort_by_key(|address| *address <= 6);
-        if addresses.len() > NEAR {
+        pil.sort_by_key(|node| node.is_joint());
+        if pil.len() > NEAR {
             self.cores = Cores::choose();
         }
         let near = match &self.cores {
-            Some(_) => addresses.len() * NEAR / nodes.0.len(),
-            None => addresses.len(),
+            Some(_) => pil.len() * NEAR / nodes.0.len(),
+            None => pil.len(),
         };
-        let (near, far) = addresses.split_at(near);
+        let (near, far) = pil.split_at(near);
         for (mine, place) in [(far, Place::Far), (near, Place::Near)] {
             if mine.is_empty() {
                 continue;
             }
             let paths = mine
                 .iter()
-                .map(|address| image_of(images, &NodeKind::Pil, *address))
+                .map(|node| image_of(images, &NodeKind::Pil, *node))
                 .collect::<Result<Vec<_>, _>>()?;
             let start = || Unicorn::start(&paths, place);
             let started = match (&self.cores, place) {
@@ -175,8 +176,8 @@ impl RemoteBoards {
             };
             let line = self.lines.len();
             self.lines.push(Box::new(started?));
-            for (index, address) in (0..).zip(mine) {
-                self.adopt(*address, line, index)?;
+            for (index, node) in (0..).zip(mine) {
+                self.adopt(*node, line, index)?;
             }
         }
         Ok(())
@@ -189,8 +190,8 @@ impl RemoteBoards {
         line.receive().map(|(_, reply)| reply)
     }
 
-    fn adopt(&mut self, address: u8, line: usize, index: u8) -> Result<(), RemoteError> {
-        let name = NODE_NAMES[usize::from(address) - 1].to_owned();
+    fn adopt(&mut self, node: Node, line: usize, index: u8) -> Result<(), RemoteError> {
+        let name = node.name().to_owned();
         let version = LINK_VERSION;
         let hello = match self.ask(line, index, &Request::Hello { version })? {
             Reply::Hello(hello) if hello.version == version => hello,
@@ -205,9 +206,9 @@ impl RemoteBoards {
             }
             other => return Err(unexpected(&name, &other)),
         };
-        self.by_address[usize::from(address) - 1] = Some(self.boards.len());
+        self.by_node[node.index()] = Some(self.boards.len());
         self.boards.push(Board {
-            address,
+            node,
             line,
             index,
             name,
@@ -230,23 +231,19 @@ impl RemoteBoards {
     }
 
     fn power_up(&mut self, number: usize, robot: &RobotConfig) -> Result<(), RemoteError> {
-        let (address, line, index) = {
+        let (node, line, index) = {
             let board = &self.boards[number];
-            (board.address, board.line, board.index)
+            (board.node, board.line, board.index)
         };
-        let stored = match address {
-            1..=6 => &robot.node.joints[usize::from(address) - 1],
-            _ => &robot.node.wheels[usize::from(address) - 7],
-        };
-        for stretch in store::stretches(stored) {
+        for stretch in store::stretches(robot.node.of(node)) {
             match self.ask(line, index, &Request::Store(stretch))? {
                 Reply::Done => {}
                 other => return Err(unexpected(&self.boards[number].name, &other)),
             }
         }
         let straps = Straps {
-            address,
-            unique_id: [address; 12],
+            address: node.number(),
+            unique_id: [node.number(); 12],
             crystal: true,
         };
         match self.ask(line, index, &Request::PowerUp(straps))? {
@@ -258,69 +255,66 @@ impl RemoteBoards {
         }
     }
 
-    fn number(&self, address: u8) -> Option<usize> {
-        self.by_address
-            .get(usize::from(address).wrapping_sub(1))
-            .copied()
-            .flatten()
+    fn number(&self, node: Node) -> Option<usize> {
+        self.by_node[node.index()]
     }
 
-    /// Whether the board at `address` is outside.
-    pub fn has(&self, address: u8) -> bool {
-        self.number(address).is_some()
+    /// Whether a board is outside.
+    pub fn has(&self, node: Node) -> bool {
+        self.number(node).is_some()
     }
 
-    /// Outputs of the board at `address`, if it is outside.
-    pub fn outputs(&self, address: u8) -> Option<Outputs> {
-        self.number(address).map(|n| self.boards[n].ran.outputs)
+    /// Outputs of a board, if it is outside.
+    pub fn outputs(&self, node: Node) -> Option<Outputs> {
+        self.number(node).map(|n| self.boards[n].ran.outputs)
     }
 
-    /// First tick edge of the board at `address` since its newest start, ns, if it is
+    /// First tick edge of a board since its newest start, ns, if it is
     /// outside and not down.
-    pub fn running_from_ns(&self, address: u8) -> Option<u64> {
-        self.boards[self.number(address)?].running_from_ns
+    pub fn running_from_ns(&self, node: Node) -> Option<u64> {
+        self.boards[self.number(node)?].running_from_ns
     }
 
-    /// The newest edge of the board at `address`, ns; `None` for one that runs here.
-    pub fn edge_ns(&self, address: u8) -> Option<u64> {
-        self.boards[self.number(address)?].edge_ns
+    /// The newest edge of a board, ns; `None` for one that runs here.
+    pub fn edge_ns(&self, node: Node) -> Option<u64> {
+        self.boards[self.number(node)?].edge_ns
     }
 
-    /// The reset of the board at `address` since the last call.
-    pub fn take_trip(&mut self, address: u8) -> Option<Trip> {
-        let n = self.number(address)?;
+    /// The reset of a board since the last call.
+    pub fn take_trip(&mut self, node: Node) -> Option<Trip> {
+        let n = self.number(node)?;
         self.boards[n].tripped.take()
     }
 
-    /// First tick of the board at `address` after a start that is known since the last
+    /// First tick of a board after a start that is known since the last
     /// call, ns.
-    pub fn take_first_edge(&mut self, address: u8) -> Option<u64> {
-        let n = self.number(address)?;
+    pub fn take_first_edge(&mut self, node: Node) -> Option<u64> {
+        let n = self.number(node)?;
         self.boards[n].started_ns.take()
     }
 
-    /// The counter of the wheel board at `address`, if that is outside, stood at 0 at
+    /// The counter of a wheel board, if that is outside, stood at 0 at
     /// `edges` quadrature edges.
-    pub fn counts_from(&mut self, address: u8, edges: i64) {
-        if let Some(n) = self.number(address) {
+    pub fn counts_from(&mut self, node: Node, edges: i64) {
+        if let Some(n) = self.number(node) {
             // The counter wraps, as the board's does.
             self.boards[n].count_zero = edges as i32;
         }
     }
 
-    /// Supply of the board at `address` from its next run on.
-    pub fn set_power(&mut self, address: u8, power: Power) {
-        if let Some(n) = self.number(address) {
+    /// Supply of a board from its next run on.
+    pub fn set_power(&mut self, node: Node, power: Power) {
+        if let Some(n) = self.number(node) {
             self.boards[n].power = power;
         }
     }
 
-    /// Provokes a fault in the board at `address`; does nothing to one that runs here.
+    /// Provokes a fault in a board; does nothing to one that runs here.
     ///
     /// # Errors
     /// [`RemoteError`] if the board refuses.
-    pub fn hook(&mut self, address: u8, hook: Hook) -> Result<(), RemoteError> {
-        let Some(n) = self.number(address) else {
+    pub fn hook(&mut self, node: Node, hook: Hook) -> Result<(), RemoteError> {
+        let Some(n) = self.number(node) else {
             return Ok(());
         };
         let (line, index) = (self.boards[n].line, self.boards[n].index);
@@ -391,13 +385,13 @@ impl RemoteBoards {
     pub fn run(
         &mut self,
         now_ns: u64,
-        boards: &[(u8, Option<Inputs>)],
+        boards: &[(Node, Option<Inputs>)],
         byte_ns: u64,
-        heard: impl Fn(u8, u64) -> Vec<Heard>,
+        heard: impl Fn(Node, u64) -> Vec<Heard>,
     ) -> Result<(), RemoteError> {
-        for (address, edge) in boards {
-            if let Some(number) = self.number(*address) {
-                let bytes = heard(*address, self.boards[number].heard_ns);
+        for (node, edge) in boards {
+            if let Some(number) = self.number(*node) {
+                let bytes = heard(*node, self.boards[number].heard_ns);
                 self.queue(number, now_ns, *edge, &bytes, byte_ns)?;
             }
         }
@@ -414,8 +408,8 @@ impl RemoteBoards {
             self.take(number, reply)?;
         }
         self.requests = asked;
-        if let (Some(first), false) = (&self.comparison.first, self.told) {
-            self.told = true;
+        if let (Some(first), false) = (&self.comparison.first, self.printed) {
+            self.printed = true;
             // Told at once: the run may end before its summary.
             let _ = writeln!(std::io::stderr(), "a board differs from the host: {first}");
         }
@@ -455,7 +449,7 @@ impl RemoteBoards {
                     ..*inputs
                 };
                 self.comparison
-                    .inputs(*edge_ns, board.address, &latched, &ran.seen);
+                    .inputs(*edge_ns, board.node, &latched, &ran.seen);
                 board.tick_instructions.push(ran.figures.tick_instructions);
             }
             board.latched.pop_front();
@@ -466,23 +460,23 @@ impl RemoteBoards {
 
     /// Compares the outputs that act from `now_ns` on with those of the native
     /// application.
-    pub fn compare_outputs(&mut self, now_ns: u64, address: u8, here: &Outputs) {
-        if let Some(n) = self.number(address) {
+    pub fn compare_outputs(&mut self, now_ns: u64, node: Node, here: &Outputs) {
+        if let Some(n) = self.number(node) {
             let there = &self.boards[n].ran.outputs;
-            self.comparison.outputs(now_ns, address, here, there);
+            self.comparison.outputs(now_ns, node, here, there);
         }
     }
 
-    /// A transmission of the native application beside the board at `address`.
-    pub fn expect_frame(&mut self, address: u8, start_ns: u64, bytes: Vec<u8>) {
-        if let Some(n) = self.number(address) {
+    /// A transmission of the native application beside a board.
+    pub fn expect_frame(&mut self, node: Node, start_ns: u64, bytes: Vec<u8>) {
+        if let Some(n) = self.number(node) {
             self.boards[n].here.push_back((start_ns, bytes));
         }
     }
 
-    /// What the board at `address` has scheduled to send since the last call.
-    pub fn take_frames(&mut self, address: u8) -> Vec<(u64, Vec<u8>)> {
-        let Some(n) = self.number(address) else {
+    /// What a board has scheduled to send since the last call.
+    pub fn take_frames(&mut self, node: Node) -> Vec<(u64, Vec<u8>)> {
+        let Some(n) = self.number(node) else {
             return Vec::new();
         };
         let board = &mut self.boards[n];
@@ -496,7 +490,7 @@ impl RemoteBoards {
                 .as_ref()
                 .map(|(start, bytes)| (*start, bytes.as_slice()));
             let out = Some((pair.1.0, pair.1.1.as_slice()));
-            self.comparison.frame(there.0, address, here, out);
+            self.comparison.frame(there.0, node, here, out);
             frames.push(there);
         }
         frames
@@ -509,7 +503,7 @@ impl RemoteBoards {
                 // One that is due later need not stand ready yet.
                 if start + 1_000_000 < now_ns {
                     let here = Some((start, bytes.as_slice()));
-                    self.comparison.frame(start, board.address, here, None);
+                    self.comparison.frame(start, board.node, here, None);
                 }
             }
         }
@@ -521,15 +515,15 @@ impl RemoteBoards {
         let compared = &mut self.comparison;
         let mut figures = |b: &Board| {
             BoardFigures::new(
-                b.address,
+                b.node,
                 &b.hello,
                 &b.ran.figures,
                 &b.tick_instructions,
                 b.late_frames,
-                compared.of(b.address).total(),
+                compared.of(b.node).total(),
             )
         };
-        let in_order = self.by_address.iter().flatten();
+        let in_order = self.by_node.iter().flatten();
         let boards = in_order.map(|n| figures(&self.boards[*n])).collect();
         let total = self.comparison.total();
         PilSummary {

@@ -237,7 +237,7 @@ export function topView(picture, g, terrain) {
   };
 }
 
-const SWITCHES = ["front", "rear", "left", "right"];
+const SWITCHES = ["front", "back", "left", "right"];
 const DIRECTIONS = [[1, 0], [-1, 0], [0, -1], [0, 1]];
 
 /** A sole from above with its four switches (closed is filled) and its load.

@@ -1,5 +1,6 @@
 //! `/tf`, `/joint_states`, `/log`.
 
+use wheeleg_protocol::Node;
 use wheeleg_telemetry::{EventSample, push_fixed};
 
 use super::frames::{Frames, Pose};
@@ -96,11 +97,8 @@ pub(super) fn log(out: &mut Vec<u8>, t_ns: u64, event: &EventSample) {
     );
     put_text(out, &event.text);
     put(out, ",\"name\":");
-    let name = match event.board {
-        0 => event.kind.clone(),
-        board @ 1..=6 => format!("joint {board}"),
-        board => format!("wheel {board}"),
-    };
+    let board = Node::new(event.board).map(|node| node.address().to_string());
+    let name = board.unwrap_or_else(|| event.kind.clone());
     put_text(out, &name);
     put(out, ",\"file\":\"\",\"line\":0}");
 }

@@ -3,7 +3,7 @@
 //! and in nothing else that the simulation asks of them.
 
 use wheeleg_node::{NodeIdentity, Transmission};
-use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_protocol::{Node, ResetCause};
 use wheeleg_remote_link::Outputs;
 use wheeleg_units::Micros;
 
@@ -121,15 +121,15 @@ pub(super) struct Board {
 }
 
 impl Board {
-    /// The board at an address, as power comes on for the first time; `stored` are its
+    /// A board, as power comes on for the first time; `stored` are its
     /// commissioned parameters.
     ///
     /// # Errors
     /// As [`Application::new`].
-    pub(super) fn new(address: Address, stored: &[(u16, i32)]) -> Result<Self, SimError> {
+    pub(super) fn new(node: Node, stored: &[(u16, i32)]) -> Result<Self, SimError> {
         let cause = ResetCause::PowerUp;
         Ok(Self {
-            application: Application::new(identity(address), Some(stored), cause)?,
+            application: Application::new(identity(node.address()), Some(stored), cause)?,
             memory: Memory::new(stored),
             down: Down::No,
             clock_zero_ns: 0,
@@ -156,9 +156,9 @@ impl Board {
     ///
     /// # Errors
     /// As [`Application::new`].
-    pub(super) fn restart(&mut self, address: Address, cause: ResetCause) -> Result<(), SimError> {
+    pub(super) fn restart(&mut self, node: Node, cause: ResetCause) -> Result<(), SimError> {
         let stored = self.memory.records();
-        self.application = Application::new(identity(address), stored.as_deref(), cause)?;
+        self.application = Application::new(identity(node.address()), stored.as_deref(), cause)?;
         Ok(())
     }
 

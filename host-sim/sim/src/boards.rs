@@ -13,7 +13,7 @@ use wheeleg_node::parameters::{JointParameters, WheelParameters};
 use wheeleg_node::snapshot::TickReport;
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{ConfigError, NodeIdentity, Transmission};
-use wheeleg_protocol::{Address, Fault, FaultBits, NackReason, ResetCause};
+use wheeleg_protocol::{Address, Fault, FaultBits, NackReason, Node, ResetCause};
 use wheeleg_units::Micros;
 
 use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
@@ -172,7 +172,7 @@ impl JointBoard {
         let valves: [PwmChannel; 4] = std::array::from_fn(|_| PwmChannel::new(VALVE_COUNTS));
         let foot: [Line; 4] = std::array::from_fn(|_| Line::default());
         let valve_bank = bank(&valves);
-        let application = if address.raw().is_multiple_of(3) {
+        let application = if address.node().is_some_and(Node::has_foot) {
             JointNode::from_store(who, parameters, valve_bank, sensor.clone(), feet(&foot))
                 .map(JointApplication::WithFoot)
         } else {
@@ -307,7 +307,7 @@ impl WheelBoard {
             pulse: pulse.clone(),
             sign: sign.clone(),
         };
-        let application = if address.raw() == 7 {
+        let application = if address.node() == Some(Node::WHEELS[0]) {
             let switch = SupplySwitch(supply.clone());
             let valve = DumpPin(dump.clone());
             WheelNode::from_store(who, parameters, bridge, encoder.clone(), switch, valve)

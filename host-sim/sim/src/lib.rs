@@ -37,6 +37,7 @@ mod provenance;
 mod rogue_nodes;
 mod session;
 mod setup;
+mod standing;
 mod unphysical;
 mod world;
 
@@ -48,7 +49,7 @@ use wheeleg_master::event::Event;
 use wheeleg_node::joint::MotionAccount;
 use wheeleg_node::snapshot::JointSnapshot;
 use wheeleg_plant::assembly::CylinderOutputs;
-use wheeleg_protocol::LinkQuality;
+use wheeleg_protocol::{LinkQuality, Node};
 
 pub use self::audit::LineAudit;
 pub use self::boards::{JointBoard, identity};
@@ -323,7 +324,9 @@ pub fn commission(
         while let Some((_, event)) = world.master().take_event() {
             match event {
                 Event::Commissioned { node, unique_id } => {
-                    ids[usize::from(node) - 1] = unique_id;
+                    if let Some(node) = Node::new(node) {
+                        ids[node.index()] = unique_id;
+                    }
                 }
                 Event::Done(ticket) if ticket.code == CommandCode::Commission => return Ok(ids),
                 Event::Link { .. } | Event::Log { .. } | Event::NodeReady(_) => {}

@@ -10,7 +10,7 @@ use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
 use wheeleg_plant::body::{ContactPoint, Toucher};
 use wheeleg_plant::robot::Outputs;
-use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality};
+use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality, Node};
 
 use super::boards::WheelBoard;
 use super::world::World;
@@ -348,8 +348,9 @@ impl Observer {
             alive,
             step: u32::from(self.step),
             phase,
-            link_loss_action: (1..=6)
-                .filter_map(|n| record.slots.joint(Address::joint(n)?))
+            link_loss_action: Node::JOINTS
+                .into_iter()
+                .filter_map(|node| record.slots.joint(node.address()))
                 .map(|slot| u8::from(slot.on_link_loss != LinkLossAction::Hold))
                 .max()
                 .unwrap_or(0),

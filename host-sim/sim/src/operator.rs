@@ -7,7 +7,7 @@ use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::Reject;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
-use wheeleg_protocol::LinkRecord;
+use wheeleg_protocol::{LinkRecord, Node};
 use wheeleg_units::PositionMm;
 
 use super::world::World;
@@ -236,7 +236,7 @@ impl Operator {
     pub(super) fn flood(&mut self, world: &mut World, t_ns: u64, recorder: &mut Recorder) {
         let now_us = world.now_ns() / 1000;
         for i in 0..world.faults().flood() {
-            let joint = (i % 6) as u8 + 1;
+            let joint = Node::JOINTS[i % Node::JOINTS.len()].number();
             let command = Command::TransmitPosition { joint };
             let answer = world.master().submit(command, now_us);
             if let (Err(reason), false) = (answer, self.flood_refused) {
@@ -252,14 +252,15 @@ pub(super) fn listen(
     master: &mut Master,
     t_ns: u64,
     recorder: &mut Recorder,
-    told: &mut dyn FnMut(u64, &Event),
+    on_event: &mut dyn FnMut(u64, &Event),
 ) {
     while let Some((time_us, event)) = master.take_event() {
-        told(time_us, &event);
+        on_event(time_us, &event);
         // Counters have channels of their own.
         if let Event::Link { node, record } = event {
-            let node = usize::from(node) - 1;
-            recorder.link(t_ns, node, link_sample(&record));
+            if let Some(node) = Node::new(node) {
+                recorder.link(t_ns, node.index(), link_sample(&record));
+            }
             continue;
         }
         recorder.event(t_ns, Cause::Master(event));

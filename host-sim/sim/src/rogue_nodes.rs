@@ -6,8 +6,8 @@ use wheeleg_node::Transmission;
 use wheeleg_protocol::frame::{VERSION, encode};
 use wheeleg_protocol::param::{ParamInfo, params_at};
 use wheeleg_protocol::{
-    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, ParamGet, ParamSet,
-    ParamValue, ResetCause,
+    Address, Decoder, Envelope, Header, MAX_ENCODED, Message, MessageType, Node, ParamGet,
+    ParamSet, ParamValue, ResetCause,
 };
 
 use super::board::{Application, BoardInputs};
@@ -44,49 +44,46 @@ const NO_PARAMETER: u16 = 0x7FFF;
 #[derive(Default)]
 pub(super) struct RogueNodes {
     /// Boards with the address of another one.
-    boards: Vec<(Address, Application)>,
+    boards: Vec<(Node, Application)>,
     service: Option<Service>,
     notes: Vec<Cause>,
 }
 
 impl RogueNodes {
-    /// Another board with the straps of `address` is plugged in, on the bench
+    /// Another board with the straps of another is plugged in, on the bench
     /// side of its sensors and valves.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the board refuses its parameters.
-    pub(super) fn plug_in(&mut self, address: u8, stored: &NodeParams) -> Result<(), SimError> {
-        let Some(address) = Address::new(address) else {
-            return Ok(());
-        };
-        let (who, stored) = (duplicate_identity(address), stored.of(address));
-        let board = Application::new(who, Some(stored), ResetCause::PowerUp)?;
-        self.boards.push((address, board));
+    pub(super) fn plug_in(&mut self, node: Node, stored: &NodeParams) -> Result<(), SimError> {
+        let who = duplicate_identity(node.address());
+        let board = Application::new(who, Some(stored.of(node)), ResetCause::PowerUp)?;
+        self.boards.push((node, board));
         Ok(())
     }
 
     /// It is unplugged.
-    pub(super) fn unplug(&mut self, address: u8) {
-        self.boards.retain(|(own, _)| own.raw() != address);
+    pub(super) fn unplug(&mut self, node: Node) {
+        self.boards.retain(|(own, _)| *own != node);
     }
 
-    /// The service tool begins to write parameters of the board at `address`.
-    pub(super) fn write_parameters(&mut self, address: u8) {
-        self.service = Address::new(address).map(Service::new);
+    /// The service tool begins to write parameters of the board.
+    pub(super) fn write_parameters(&mut self, node: Node) {
+        self.service = Some(Service::new(node.address()));
     }
 
     /// One tick of the joints among the second boards.
     pub(super) fn joint_tick(&mut self, now_ns: u64) {
-        self.tick(now_ns, Address::is_joint);
+        self.tick(now_ns, Node::is_joint);
     }
 
-    /// One sample of the wheels among the second boards that stand for `address`.
-    pub(super) fn wheel_sample(&mut self, address: u8, now_ns: u64) {
-        self.tick(now_ns, |own| own.raw() == address);
+    /// One sample of the wheels among the second boards that stand for `node`.
+    pub(super) fn wheel_sample(&mut self, node: Node, now_ns: u64) {
+        self.tick(now_ns, |own| own == node);
     }
 
     /// One tick of the second boards that `due` names, on the bench side of their sensors.
-    fn tick(&mut self, now_ns: u64, due: impl Fn(Address) -> bool) {
+    fn tick(&mut self, now_ns: u64, due: impl Fn(Node) -> bool) {
         let inputs = BoardInputs {
             code: BENCH_CODE,
             supply: true,
@@ -99,8 +96,8 @@ impl RogueNodes {
 
     /// Hears a delivery.
     pub(super) fn hear(&mut self, bus: &Bus, delivery: &Delivery) {
-        for (address, board) in &mut self.boards {
-            if let Some((bytes, end_ns)) = bus.heard_by(DUPLICATE | address.raw(), delivery) {
+        for (node, board) in &mut self.boards {
+            if let Some((bytes, end_ns)) = bus.heard_by(DUPLICATE | node.number(), delivery) {
                 board.on_bus_bytes(&bytes, micros(end_ns));
             }
         }
@@ -114,8 +111,8 @@ impl RogueNodes {
     /// What a second board wants to send.
     pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
         let boards = self.boards.iter_mut();
-        let mut sent =
-            boards.filter_map(|(a, board)| Some((DUPLICATE | a.raw(), board.take_transmission()?)));
+        let mut sent = boards
+            .filter_map(|(n, board)| Some((DUPLICATE | n.number(), board.take_transmission()?)));
         sent.next()
     }
 

@@ -11,7 +11,6 @@ use wheeleg_master::layer1::params::Pattern;
 use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
-use wheeleg_protocol::Address;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::board::Board;
@@ -136,7 +135,6 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
 /// # Errors
 /// [`SimError`] if the board refuses them.
 pub(super) fn wheel_sample_us(robot: &RobotConfig) -> Result<u32, SimError> {
-    let address = Address::of_slot(LEFT_WHEEL).unwrap_or(Address::MASTER);
-    let board = Board::new(address, robot.node.of(address))?;
+    let board = Board::new(LEFT_WHEEL, robot.node.of(LEFT_WHEEL))?;
     Ok((board.application.tick_ns() / NS_PER_US) as u32)
 }

@@ -104,7 +104,7 @@ fn likely(name: &str, part: Part) -> &'static str {
 }
 
 /// What the user is told; `last` are the plant's values of the last tick that was sound.
-pub(crate) fn told(now_ns: u64, error: &PlantError, last: &Outputs) -> SimError {
+pub(crate) fn failed(now_ns: u64, error: &PlantError, last: &Outputs) -> SimError {
     let (name, part) = match error {
         PlantError::NonFinite { name, index, .. } | PlantError::OutOfBounds { name, index, .. } => {
             (*name, Part::of(name, *index))
@@ -147,7 +147,7 @@ mod tests {
             min: 1e3,
             max: 2e6,
         };
-        let SimError::Unphysical { what, help } = told(2_000_000_000, &error, &last) else {
+        let SimError::Unphysical { what, help } = failed(2_000_000_000, &error, &last) else {
             panic!("another error");
         };
         for part in [

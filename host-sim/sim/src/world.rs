@@ -17,7 +17,7 @@ use wheeleg_master::{Master, MasterConfig};
 use wheeleg_plant::PlantError;
 use wheeleg_plant::body::ContactPoint;
 use wheeleg_plant::robot::{Inputs, Outputs, Plant, PlantParams, PlantState};
-use wheeleg_protocol::Address;
+use wheeleg_protocol::Node;
 use wheeleg_remote_link as link;
 
 use super::Boards;
@@ -31,7 +31,7 @@ use super::downtime::DownTimes;
 use super::rogue_nodes::RogueNodes;
 use crate::SimError;
 use crate::faults::Injector;
-use crate::unphysical;
+use crate::{standing, unphysical};
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::JOINT_TICK_NS;
 use wheeleg_config::{NodeParams, RobotConfig};
@@ -123,8 +123,8 @@ impl TickInputs {
 
 const VALVE_TICK_US: u16 = 1000;
 
-/// Index of the left wheel's board, which has the dump valve and the supply switch.
-pub(super) const LEFT_WHEEL: usize = 6;
+/// The board that has the dump valve and the supply switch.
+pub(super) const LEFT_WHEEL: Node = Node::WHEELS[0];
 
 /// Duty of a bridge, −1..=1.
 fn duty(outputs: &link::Outputs) -> f64 {
@@ -162,16 +162,12 @@ impl World {
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
         let state = plant.initial_state(seed).map_err(|e| match e {
-            PlantError::NotStanding => SimError::simulation(
-                e.to_string(),
-                "correct the scenario's [[terrain]]: a plane there is less steep than 22°, and \
-                 wheels and feet find no rock, edge or hole below them",
-            ),
+            PlantError::NotStanding => standing::refused(plant.params(), &e),
             other => refused("plant", &other),
         })?;
         let mut boards = Vec::new();
-        for address in Address::nodes() {
-            boards.push(Board::new(address, robot.node.of(address))?);
+        for node in Node::ALL {
+            boards.push(Board::new(node, robot.node.of(node))?);
         }
         let count = boards.len();
         let boards: [Board; 8] = boards
@@ -184,7 +180,7 @@ impl World {
         }
         // Both ends count speeds per sample, so the master must know the board's.
         let master = MasterConfig {
-            wheel_sample_us: (boards[LEFT_WHEEL].application.tick_ns() / NS_PER_US) as u32,
+            wheel_sample_us: (boards[LEFT_WHEEL.index()].application.tick_ns() / NS_PER_US) as u32,
             ..master
         };
         let mut brain = Master::new(master).map_err(|e| refused("master", &e.to_string()))?;
@@ -212,9 +208,9 @@ impl World {
             next_cycle_ns: 0,
             tick_inputs: TickInputs::default(),
             faults: Injector::new(seed),
-            down_times: DownTimes::new(std::array::from_fn(|i| {
+            down_times: DownTimes::new(Node::ALL.map(|node| {
                 let there = remote.as_ref();
-                there.is_some_and(|o| o.has(i as u8 + 1))
+                there.is_some_and(|o| o.has(node))
             })),
             replayed,
             remote,
@@ -267,13 +263,13 @@ impl World {
     fn advance_plant(&mut self) -> Result<(), SimError> {
         self.plant
             .advance_to(&mut self.state, self.now_ns)
-            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))
+            .map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))
     }
 
     /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
-    fn active_outputs(&self, address: u8) -> link::Outputs {
-        let remote = self.remote.as_ref().and_then(|o| o.outputs(address));
-        remote.unwrap_or_else(|| self.board(address).outputs())
+    fn active_outputs(&self, node: Node) -> link::Outputs {
+        let remote = self.remote.as_ref().and_then(|o| o.outputs(node));
+        remote.unwrap_or_else(|| self.board(node).outputs())
     }
 
     /// Positions and foot contacts as the joint boards read them now.
@@ -304,23 +300,23 @@ impl World {
         } else {
             None
         };
-        for (i, address) in (0..6).zip(1..) {
-            let on_us = self.active_outputs(address).valve_on_us;
+        for (i, node) in Node::JOINTS.into_iter().enumerate() {
+            let on_us = self.active_outputs(node).valve_on_us;
             self.tick_inputs.take(i, on_us);
             self.inputs.valve_on_us[i] = on_us;
         }
         // The dump valve shuts without current: air stays on.
-        self.inputs.dump = self.active_outputs(7).dump;
+        self.inputs.dump = self.active_outputs(LEFT_WHEEL).dump;
         self.plant
             .apply(&mut self.state, &self.inputs)
-            .map_err(|e| unphysical::told(self.now_ns, &e, &self.outputs))?;
+            .map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))?;
         self.outputs = self.plant.outputs(&self.state);
         let sensed = match sensed {
             Some(sensed) => sensed,
             None => self.sense(),
         };
-        for (address, inputs) in (1..).zip(&sensed) {
-            self.tick_board(address, inputs);
+        for (node, inputs) in Node::JOINTS.into_iter().zip(&sensed) {
+            self.tick_board(node, inputs);
         }
         self.rogue_nodes.joint_tick(self.now_ns);
         self.next_joint_ns += JOINT_TICK_NS;
@@ -331,11 +327,11 @@ impl World {
     }
 
     /// The tick of a board's application that starts now, if the board runs.
-    fn tick_board(&mut self, address: u8, inputs: &BoardInputs) {
-        let now = self.clock(address, self.now_ns);
-        if self.runs(address) {
-            self.board_mut(address).application.tick(now, inputs);
-            self.store(address);
+    fn tick_board(&mut self, node: Node, inputs: &BoardInputs) {
+        let now = self.clock(node, self.now_ns);
+        if self.runs(node) {
+            self.board_mut(node).application.tick(now, inputs);
+            self.store(node);
         }
     }
 
@@ -359,25 +355,25 @@ impl World {
         let inputs = self.wheel_inputs(wheel);
         self.wheel_edge_remote(wheel)?;
         self.wheel_edges[wheel] = [inputs.edges, self.wheel_edges[wheel][0]];
-        let address = wheel as u8 + 7;
+        let node = Node::WHEELS[wheel];
         // Only the bridge takes new inputs here: the valves keep their tick.
-        let drives = self.drives(address);
-        let remote = self.remote.as_ref().and_then(|o| o.outputs(address));
+        let drives = self.drives(node);
+        let remote = self.remote.as_ref().and_then(|o| o.outputs(node));
         self.inputs.bridge_duty[wheel] = match remote {
             Some(outputs) => duty(&outputs),
             None if !drives => 0.0,
             // The program hands its newest output over at the next edge; stopped, it does not.
-            None if self.hangs(address) => self.inputs.bridge_duty[wheel],
-            None => duty(&self.board(address).application.active_outputs()),
+            None if self.hangs(node) => self.inputs.bridge_duty[wheel],
+            None => duty(&self.board(node).application.active_outputs()),
         };
         // A board that does not drive lets its wheel coast, wherever it runs.
         self.inputs.bridge_enabled[wheel] = drives;
         let motor = &mut self.state.core.motion.motors[wheel];
         motor.duty = self.inputs.bridge_duty[wheel];
         motor.enabled = self.inputs.bridge_enabled[wheel];
-        self.tick_board(address, &inputs);
-        self.rogue_nodes.wheel_sample(address, self.now_ns);
-        self.next_wheel_ns[wheel] += self.board(address).application.tick_ns();
+        self.tick_board(node, &inputs);
+        self.rogue_nodes.wheel_sample(node, self.now_ns);
+        self.next_wheel_ns[wheel] += self.board(node).application.tick_ns();
         self.collect_transmissions();
         Ok(())
     }
@@ -395,14 +391,14 @@ impl World {
         let (plant, state) = (&mut self.plant, &mut self.state);
         self.faults.inject(fault, begin, self.now_ns, plant, state);
         match (fault.kind, fault.target) {
-            (FaultKind::DuplicateAddress, FaultTarget::Board(address)) if begin => {
-                self.rogue_nodes.plug_in(address, &self.stored)?;
+            (FaultKind::DuplicateAddress, FaultTarget::Board(node)) if begin => {
+                self.rogue_nodes.plug_in(node, &self.stored)?;
             }
-            (FaultKind::DuplicateAddress, FaultTarget::Board(address)) => {
-                self.rogue_nodes.unplug(address);
+            (FaultKind::DuplicateAddress, FaultTarget::Board(node)) => {
+                self.rogue_nodes.unplug(node);
             }
-            (FaultKind::InvalidParameter, FaultTarget::Board(address)) if begin => {
-                self.rogue_nodes.write_parameters(address);
+            (FaultKind::InvalidParameter, FaultTarget::Board(node)) if begin => {
+                self.rogue_nodes.write_parameters(node);
             }
             _ => {}
         }
@@ -480,14 +476,14 @@ impl World {
         &self.tick_inputs
     }
 
-    /// The board at a node's address, 1 to 8.
-    pub(super) fn board(&self, address: u8) -> &Board {
-        &self.boards[usize::from(address) - 1]
+    /// The board of a node.
+    pub(super) fn board(&self, node: Node) -> &Board {
+        &self.boards[node.index()]
     }
 
     /// As [`Self::board`].
-    pub(super) fn board_mut(&mut self, address: u8) -> &mut Board {
-        &mut self.boards[usize::from(address) - 1]
+    pub(super) fn board_mut(&mut self, node: Node) -> &mut Board {
+        &mut self.boards[node.index()]
     }
 
     /// The joint boards, addresses 1 to 6.

@@ -2,6 +2,7 @@
 //! programs. They are no part of the hash, of the tables or of the console.
 
 use super::contact::Contact;
+use super::registry::{Written, rate};
 use super::sink::Taken;
 
 /// A channel that follows from others.
@@ -32,6 +33,23 @@ pub struct DerivedDef {
     pub rate_hz: u32,
     /// Meaning.
     pub doc: &'static str,
+}
+
+impl DerivedDef {
+    /// In which runs it has messages.
+    #[must_use]
+    pub const fn written(&self) -> Written {
+        match self.rate_hz {
+            0 => Written::OnChange,
+            _ => Written::Always,
+        }
+    }
+
+    /// How often it has messages, for people.
+    #[must_use]
+    pub fn rate(&self) -> String {
+        rate(self.rate_hz, self.written())
+    }
 }
 
 /// Messages per second of what moves. A drawing between two of them errs by less than its line.

@@ -57,7 +57,7 @@ pub use memory::{Keep, Memory, Recording, Row};
 pub use read::{Logged, Read, Scalar, TakeDerived, read, read_derived, read_from};
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};
-pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, json_schema};
+pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, Written, json_schema};
 pub use ring::{Message, Ring};
 pub use samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,

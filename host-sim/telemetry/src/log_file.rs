@@ -106,6 +106,7 @@ impl LogFile {
             let metadata = BTreeMap::from([
                 ("description".into(), def.doc.into()),
                 ("rate_hz".into(), rate(def.rate_hz)),
+                ("written".into(), def.written().name().into()),
             ]);
             let id = add_channel(log, def.topic, (def.schema, def.json_schema), metadata)?;
             self.file.headers.push(header(id));
@@ -254,5 +255,6 @@ fn metadata(def: &ChannelDef) -> BTreeMap<String, String> {
     }
     metadata.insert("description".into(), def.doc.into());
     metadata.insert("rate_hz".into(), rate(def.rate_hz));
+    metadata.insert("written".into(), def.written.name().into());
     metadata
 }

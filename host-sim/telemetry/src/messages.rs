@@ -8,7 +8,7 @@ use std::fmt;
 use wheeleg_interface::{Side, first_difference};
 use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::config::UniqueId;
-use wheeleg_master::contact::Side as FootSide;
+use wheeleg_master::contact::{Sector, Side as FootSide};
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
 use wheeleg_master::finding::Finding;
 use wheeleg_protocol::param::params_at;
@@ -229,7 +229,13 @@ fn master(event: &MasterEvent) -> String {
         MasterEvent::GaitDone { steps } => format!("gait over after {steps} steps"),
         MasterEvent::TrajectoryDone => "foot trajectory over".to_owned(),
         MasterEvent::TouchDown { side, sector } => match sector {
-            Some(sector) => format!("{} foot touches with its {} side", word(side), word(sector)),
+            Some(sector) => {
+                format!(
+                    "{} foot touches with its {} side",
+                    word(side),
+                    sector.name()
+                )
+            }
             None => format!("{} foot stands flat", word(side)),
         },
         MasterEvent::FootSwitch {
@@ -237,7 +243,7 @@ fn master(event: &MasterEvent) -> String {
             sector,
             warning,
         } => {
-            let place = sector.map_or_else(String::new, word);
+            let place = sector.map_or("", Sector::name);
             format!("{} foot, {place} switch: {warning}", word(side))
         }
         MasterEvent::LiftOff(side) => format!("{} foot leaves the ground", word(side)),
@@ -289,9 +295,12 @@ fn act(act: Behaves) -> String {
     }
 }
 
-/// Name of a side or sector inside a sentence.
-fn word(name: impl std::fmt::Debug) -> String {
-    format!("{name:?}").to_lowercase()
+/// Name of a side inside a sentence.
+fn word(side: FootSide) -> &'static str {
+    match side {
+        FootSide::Left => "left",
+        FootSide::Right => "right",
+    }
 }
 
 /// Name of a board by its bus address.

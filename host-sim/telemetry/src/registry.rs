@@ -107,6 +107,29 @@ pub struct FieldDef {
     pub doc: &'static str,
 }
 
+/// In which runs a channel has samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Written {
+    /// In every run.
+    Always,
+    /// When something changes, which need not happen.
+    OnChange,
+    /// While the robot walks.
+    InWalks,
+}
+
+impl Written {
+    /// As the channel's metadata and the list of channels have it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Always => "always",
+            Self::OnChange => "on change",
+            Self::InWalks => "in walks",
+        }
+    }
+}
+
 /// One log channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelDef {
@@ -116,10 +139,29 @@ pub struct ChannelDef {
     pub schema: &'static str,
     /// Logged samples per second; 0 for a channel written on change.
     pub rate_hz: u32,
+    /// In which runs it has samples.
+    pub written: Written,
     /// Meaning.
     pub doc: &'static str,
     /// Signals in payload order.
     pub fields: &'static [FieldDef],
+}
+
+impl ChannelDef {
+    /// How often it has samples, for people.
+    #[must_use]
+    pub fn rate(&self) -> String {
+        rate(self.rate_hz, self.written)
+    }
+}
+
+/// How often a channel has samples, for people.
+pub(crate) fn rate(rate_hz: u32, written: Written) -> String {
+    match (rate_hz, written) {
+        (0, _) => "on change".to_owned(),
+        (hz, Written::InWalks) => format!("{hz} Hz in walks"),
+        (hz, _) => format!("{hz} Hz"),
+    }
 }
 
 /// A typed telemetry sample; implemented by the declarations in [`crate::samples`].

@@ -1,7 +1,7 @@
 //! The declaration of every telemetry signal.
 
 use super::encode::{push_fixed, push_i64, push_json_string, push_u64};
-use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire};
+use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, Written};
 
 /// A Rust type that can be a signal.
 trait Value {
@@ -407,13 +407,23 @@ samples! {
     }
 }
 
+/// A channel with samples in every run.
 const fn channel<S: Sample>(topic: &'static str, rate_hz: u32, doc: &'static str) -> ChannelDef {
     ChannelDef {
         topic,
         schema: S::SCHEMA,
         rate_hz,
+        written: Written::Always,
         doc,
         fields: S::FIELDS,
+    }
+}
+
+impl ChannelDef {
+    /// The same with samples in some runs.
+    const fn written(mut self, written: Written) -> Self {
+        self.written = written;
+        self
     }
 }
 
@@ -447,15 +457,16 @@ static CHANNELS: [ChannelDef; 26] = [
     channel::<StateSample>("/state", 10, "Fingerprint of the simulated state"),
     channel::<EventSample>("/events", 0, "Events"),
     channel::<ProvenanceSample>("/run", 0, "Scenario, robot and seed of this log, at time 0"),
-    channel::<LinkSample>("/link/1", 0, "Bus as heard by joint 1"),
-    channel::<LinkSample>("/link/2", 0, "Bus as heard by joint 2"),
-    channel::<LinkSample>("/link/3", 0, "Bus as heard by joint 3"),
-    channel::<LinkSample>("/link/4", 0, "Bus as heard by joint 4"),
-    channel::<LinkSample>("/link/5", 0, "Bus as heard by joint 5"),
-    channel::<LinkSample>("/link/6", 0, "Bus as heard by joint 6"),
-    channel::<LinkSample>("/link/7", 0, "Bus as heard by wheel 7"),
-    channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8"),
-    channel::<BehaviourSample>("/behaviours", CYCLE_HZ, "Legs and behaviours of a walk"),
+    channel::<LinkSample>("/link/1", 0, "Bus as heard by joint 1").written(Written::OnChange),
+    channel::<LinkSample>("/link/2", 0, "Bus as heard by joint 2").written(Written::OnChange),
+    channel::<LinkSample>("/link/3", 0, "Bus as heard by joint 3").written(Written::OnChange),
+    channel::<LinkSample>("/link/4", 0, "Bus as heard by joint 4").written(Written::OnChange),
+    channel::<LinkSample>("/link/5", 0, "Bus as heard by joint 5").written(Written::OnChange),
+    channel::<LinkSample>("/link/6", 0, "Bus as heard by joint 6").written(Written::OnChange),
+    channel::<LinkSample>("/link/7", 0, "Bus as heard by wheel 7").written(Written::OnChange),
+    channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8").written(Written::OnChange),
+    channel::<BehaviourSample>("/behaviours", CYCLE_HZ, "Legs and behaviours of a walk")
+        .written(Written::InWalks),
 ];
 
 #[cfg(test)]

@@ -54,6 +54,27 @@ fn the_first_documents_are_short() {
     }
 }
 
+/// No sentence of the README has more than 30 words.
+#[test]
+fn the_readme_has_short_sentences() {
+    let readme = fs::read_to_string(root().join("README.md")).expect("README.md");
+    let is_text = |paragraph: &&str| !paragraph.starts_with(['#', '|', '!', ' ']);
+    let (mut sentences, mut longest) = (0, (0, String::new()));
+    for paragraph in readme.split("\n\n").filter(is_text) {
+        let mut words = Vec::new();
+        for word in paragraph.split_whitespace() {
+            words.push(word);
+            if word.trim_end_matches(['*', ')']).ends_with(['.', '!', '?']) {
+                sentences += 1;
+                longest = longest.max((words.len(), words.join(" ")));
+                words.clear();
+            }
+        }
+    }
+    assert!(sentences > 30, "{sentences} sentences");
+    assert!(longest.0 <= 30, "{} words: {}", longest.0, longest.1);
+}
+
 #[test]
 fn continuous_integration_runs_the_command_of_the_readme() {
     let readme = fs::read_to_string(root().join("README.md")).expect("README.md");

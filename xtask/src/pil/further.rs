@@ -59,7 +59,7 @@ const NO_MOTION: &str = "(44)";
 const RESTARTED: &str = "it has started anew";
 
 /// A run in which nothing happens says nothing about the ticks in which something does.
-fn ensure_told(messages: &str, what: &str) -> anyhow::Result<()> {
+fn ensure_printed(messages: &str, what: &str) -> anyhow::Result<()> {
     ensure!(messages.contains(what), "nobody has told `{what}`");
     Ok(())
 }
@@ -87,7 +87,7 @@ fn with_faults(emulator: &Path, images: &Path, folder: &str, robot: &str) -> Ste
         ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
         let told = run["messages"].to_string();
         for code in codes {
-            ensure_told(&told, code).with_context(|| format!("{scenario} {faults:?}"))?;
+            ensure_printed(&told, code).with_context(|| format!("{scenario} {faults:?}"))?;
         }
         let pil = run["pil"].take();
         for image in ["joint", "wheel"] {

@@ -11,6 +11,7 @@ use pac::Interrupt;
 use wheeleg_node::hardware::HBridge;
 use wheeleg_node::snapshot::TickReport;
 use wheeleg_node::{JOINT_TICK, Transmission};
+use wheeleg_protocol::Node;
 use wheeleg_units::Micros;
 
 /// Priority of all handlers but the supply's: below it, and equal.
@@ -24,7 +25,8 @@ impl Start {
         tick::configure(JOINT_TICK);
         let fitted = self
             .identity
-            .is_some_and(|identity| identity.address.raw().is_multiple_of(3));
+            .and_then(|identity| identity.address.node())
+            .is_some_and(Node::has_foot);
         (
             super::valves::configure(),
             latch::Potentiometer,

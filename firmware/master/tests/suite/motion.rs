@@ -4,7 +4,7 @@ use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{GaitParams, Pattern};
 use wheeleg_master::layer1::square::SquareGait;
 use wheeleg_master::setpoint::{
-    Ahead, Cylinder, Feedback, JointSetpoint, OnLinkLoss, Phase, Reflex, Setpoints,
+    Cylinder, Feedback, JointSetpoint, NextReference, OnLinkLoss, Phase, Reflex, Setpoints,
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -171,7 +171,7 @@ fn look_ahead_counts_down_to_the_very_cycle() {
         for (n, s) in samples.iter().enumerate() {
             for j in 0..6 {
                 let now = s.setpoints.joints[j].unwrap();
-                let Some(Ahead {
+                let Some(NextReference {
                     reference_mm,
                     cycles,
                 }) = now.ahead

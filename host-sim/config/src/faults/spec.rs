@@ -6,6 +6,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use thiserror::Error;
+use wheeleg_protocol::Node;
 
 use super::kind::{FaultKind, KINDS, NOT_IMPLEMENTED, Place, ValueSpec};
 
@@ -14,8 +15,8 @@ use super::kind::{FaultKind, KINDS, NOT_IMPLEMENTED, Place, ValueSpec};
 pub enum FaultTarget {
     /// The only one there is.
     Robot,
-    /// A board by its bus address, 1 to 8.
-    Board(u8),
+    /// A board.
+    Board(Node),
     /// A joint, 0 to 5, and its valve, 0 to 3: fill A, vent A, fill B, vent B.
     Valve(usize, usize),
     /// A foot, 0 left, 1 right, and its switch, 0 to 3: front, left, back, right.
@@ -137,9 +138,9 @@ impl Place {
     pub fn accepts(self, target: FaultTarget) -> bool {
         match (self, target) {
             (Self::Robot, FaultTarget::Robot) => true,
-            (Self::Board, FaultTarget::Board(n)) => (1..=8).contains(&n),
-            (Self::Joint, FaultTarget::Board(n)) => (1..=6).contains(&n),
-            (Self::Wheel, FaultTarget::Board(n)) => (7..=8).contains(&n),
+            (Self::Board, FaultTarget::Board(_)) => true,
+            (Self::Joint, FaultTarget::Board(node)) => node.is_joint(),
+            (Self::Wheel, FaultTarget::Board(node)) => !node.is_joint(),
             (Self::Valve, FaultTarget::Valve(joint, valve)) => joint < 6 && valve < 4,
             (Self::FootSwitch, FaultTarget::FootSwitch(leg, switch)) => leg < 2 && switch < 4,
             _ => false,
@@ -151,24 +152,17 @@ impl Place {
             return target.is_none().then_some(FaultTarget::Robot);
         }
         let target = target?;
-        let board = |text: &str| -> Option<u8> {
-            let number = |prefix: &str| text.strip_prefix(prefix)?.parse::<u8>().ok();
-            let joint = number("joint").filter(|n| (1..=6).contains(n));
-            joint.or_else(|| number("wheel").filter(|n| (7..=8).contains(n)))
-        };
         let index = |names: &[&str; 4], text: &str| names.iter().position(|n| *n == text);
         match self {
             Self::Robot => None,
-            Self::Board => board(target).map(FaultTarget::Board),
-            Self::Joint => board(target).filter(|n| *n <= 6).map(FaultTarget::Board),
-            Self::Wheel => board(target).filter(|n| *n >= 7).map(FaultTarget::Board),
+            Self::Board | Self::Joint | Self::Wheel => {
+                let board = Node::named(target).map(FaultTarget::Board);
+                board.filter(|target| self.accepts(*target))
+            }
             Self::Valve => {
                 let (joint, valve) = target.split_once('.')?;
-                let joint = board(joint).filter(|n| *n <= 6)?;
-                Some(FaultTarget::Valve(
-                    usize::from(joint) - 1,
-                    index(&VALVES, valve)?,
-                ))
+                let joint = Node::named(joint)?.joint()?;
+                Some(FaultTarget::Valve(joint, index(&VALVES, valve)?))
             }
             Self::FootSwitch => {
                 let (leg, switch) = target.split_once('.')?;
@@ -304,9 +298,10 @@ impl fmt::Display for FaultTarget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Robot => Ok(()),
-            Self::Board(n @ 1..=6) => write!(f, ":joint{n}"),
-            Self::Board(n) => write!(f, ":wheel{n}"),
-            Self::Valve(joint, valve) => write!(f, ":joint{}.{}", joint + 1, VALVES[valve]),
+            Self::Board(node) => write!(f, ":{}", node.name()),
+            Self::Valve(joint, valve) => {
+                write!(f, ":{}.{}", Node::JOINTS[joint].name(), VALVES[valve])
+            }
             Self::FootSwitch(leg, switch) => write!(f, ":{}.{}", LEGS[leg], SWITCHES[switch]),
         }
     }

@@ -35,20 +35,20 @@ impl Files {
             Self::Below(folder) => folder,
         };
         let path = folder.join(name);
-        let told = |what: &dyn std::fmt::Display| format!("{}: {what}", path.display());
-        let about = std::fs::metadata(&path).map_err(|e| told(&e))?;
+        let reason = |what: &dyn std::fmt::Display| format!("{}: {what}", path.display());
+        let about = std::fs::metadata(&path).map_err(|e| reason(&e))?;
         if !about.is_file() {
-            return Err(told(&"not a file"));
+            return Err(reason(&"not a file"));
         }
         if about.len() > LARGEST {
             let size = about.len() >> 20;
             let most = LARGEST >> 20;
-            return Err(told(&format!("{size} MiB; allowed are {most} MiB")));
+            return Err(reason(&format!("{size} MiB; allowed are {most} MiB")));
         }
         let mut bytes = Vec::new();
-        let file = File::open(&path).map_err(|e| told(&e))?;
+        let file = File::open(&path).map_err(|e| reason(&e))?;
         let read = file.take(LARGEST).read_to_end(&mut bytes);
-        read.map_err(|e| told(&e))?;
+        read.map_err(|e| reason(&e))?;
         Ok(bytes)
     }
 }

@@ -54,7 +54,7 @@ pub(super) fn height_map(
     let (_, item) = fields.entry.get("file")?;
     let span = item.span();
     let path = fields.entry.field_path("file");
-    let told = |r: &mut Reader, what: &str, help: Option<String>| {
+    let problem = |r: &mut Reader, what: &str, help: Option<String>| {
         let message = format!("`{path}` = \"{name}\": {what}");
         r.problem(span.clone(), message, "this file", help);
     };
@@ -69,7 +69,7 @@ pub(super) fn height_map(
             let help = "a table has one row of the map in a line, its numbers parted by commas, \
                         semicolons or blanks; a picture is a grey PNG with 8 or 16 bits";
             for what in wrong {
-                told(r, &what, Some(help.into()));
+                problem(r, &what, Some(help.into()));
             }
             return None;
         }
@@ -83,14 +83,14 @@ pub(super) fn height_map(
             at % values.columns + 1,
             pretty(heights[at])
         );
-        told(r, &what, None);
+        problem(r, &what, None);
         return None;
     }
     match HeightMap::new(&heights, values.columns, cell, origin) {
         Ok(map) => Some(vec![Shape::HeightMap(Arc::new(map))]),
         Err(error) => {
             let help = "is `cell` right, and `scale`? A wall is a part of its own: `block`";
-            told(r, &error.to_string(), Some(help.into()));
+            problem(r, &error.to_string(), Some(help.into()));
             None
         }
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use wheeleg_config::NodeParams;
-use wheeleg_protocol::Address;
+use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{Format, ParamInfo, params_at};
 
 /// Name under which viewers look for the robot.
@@ -31,9 +31,9 @@ pub(crate) struct Parameters {
 impl Parameters {
     /// Parameters of boards that a robot's file has set up.
     pub(crate) fn new(stored: &NodeParams, urdf: String) -> Self {
-        let boards = Address::nodes().flat_map(|address| {
-            let board = address.raw();
-            let stored = stored.of(address);
+        let boards = Node::ALL.into_iter().flat_map(|node| {
+            let board = node.number();
+            let stored = stored.of(node);
             params_at(board).iter().map(move |info| {
                 let set = stored.iter().find(|(id, _)| *id == info.id);
                 let parameter = Parameter {
@@ -41,7 +41,7 @@ impl Parameters {
                     info,
                     raw: set.map_or(info.default, |(_, raw)| *raw),
                 };
-                (name(address, info), parameter)
+                (name(node, info), parameter)
             })
         });
         Self {
@@ -103,9 +103,9 @@ impl Parameters {
     }
 }
 
-fn name(address: Address, info: &ParamInfo) -> String {
-    let kind = if address.is_joint() { "joint" } else { "wheel" };
-    format!("/{kind}/{}/{}", address.raw(), info.name)
+fn name(node: Node, info: &ParamInfo) -> String {
+    let kind = if node.is_joint() { "joint" } else { "wheel" };
+    format!("/{kind}/{}/{}", node.number(), info.name)
 }
 
 fn scale(format: Format) -> f64 {

@@ -131,7 +131,7 @@ impl Board {
         let started = machine.state_mut().soc.started.take();
         let armed = machine.state().soc.armed(cycle);
         for (start, address, length) in started.into_iter().chain(armed) {
-            if self.announced.back().is_some_and(|told| told.0 == start) {
+            if self.announced.back().is_some_and(|first| first.0 == start) {
                 continue;
             }
             let mut bytes = vec![0; length as usize];
@@ -147,18 +147,22 @@ impl Board {
         }
         for frame in std::mem::take(&mut machine.state_mut().soc.gone) {
             // Told before it: replaced, or cut off by the driver's time limit.
-            while self.announced.front().is_some_and(|told| told.0 < frame.0) {
+            while self
+                .announced
+                .front()
+                .is_some_and(|first| first.0 < frame.0)
+            {
                 self.announced.pop_front();
             }
-            let told = self.announced.front();
-            if told != Some(&frame) {
+            let first = self.announced.front();
+            if first != Some(&frame) {
                 let text = |(start, bytes): &(u64, Vec<u8>)| {
                     format!("{} bytes at {} ns", bytes.len(), time.ns_of(*start))
                 };
                 return Err(format!(
                     "a frame left ({}) that did not stand ready in hardware like that ({})",
                     text(&frame),
-                    told.map_or_else(|| "nothing".to_owned(), text)
+                    first.map_or_else(|| "nothing".to_owned(), text)
                 ));
             }
         }

@@ -149,11 +149,11 @@ fn an_access_that_nothing_models_ends_the_run_by_its_name_on_every_bus() {
         ),
     ];
     for (address, name, read, write) in places {
-        let told = accesses(address);
-        for (told, what) in told.iter().zip([read, write]) {
+        let text = accesses(address);
+        for (text, what) in text.iter().zip([read, write]) {
             assert!(
-                told.contains(name) && told.contains(what),
-                "{address:#010x}: {told}"
+                text.contains(name) && text.contains(what),
+                "{address:#010x}: {text}"
             );
         }
     }
@@ -161,7 +161,7 @@ fn an_access_that_nothing_models_ends_the_run_by_its_name_on_every_bus() {
 
 #[test]
 fn the_program_in_flash_and_the_unique_id_are_read_and_never_written() {
-    for (address, told) in [
+    for (address, text) in [
         (FLASH_BASE + 0x100, "WRITE_PROT"),
         (0x1FFF_7590, "write to no peripheral at 0x1fff7590"),
         (
@@ -176,7 +176,7 @@ fn the_program_in_flash_and_the_unique_id_are_read_and_never_written() {
         let error = machine
             .run(10_000, Until::Cycle, true)
             .expect_err("refused");
-        assert!(error.contains(told), "{address:#010x}: {error}");
+        assert!(error.contains(text), "{address:#010x}: {error}");
     }
 }
 

@@ -73,13 +73,13 @@ impl Soc {
 
     /// The crystal stops; whether the processor is told.
     pub(crate) fn crystal_stops(&mut self, cycle: u64) -> bool {
-        let told = self.rcc.crystal_stops();
-        if told {
+        let stops = self.rcc.crystal_stops();
+        if stops {
             self.time.clock(cycle, self.rcc.hclk_hz());
             self.plan_bite();
             self.raise_break(BreakSource::Crystal);
         }
-        told
+        stops
     }
 
     /// The supply falls below the level of the voltage detector.

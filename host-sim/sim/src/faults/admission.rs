@@ -5,6 +5,7 @@ use crate::SimError;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_plant::contact::ContactLaw;
+use wheeleg_protocol::Node;
 use wheeleg_remote_host::{NodeKind, Nodes};
 
 /// Checks the faults of a scenario against its duration, the robot, each other, and
@@ -94,13 +95,10 @@ fn cannot_begin(fault: &FaultSpec) -> SimError {
 /// clock, a transmitter and an interface of its own; a board on QEMU has no watchdog that
 /// would end a stopped program, and a bench board a supply that nobody here can cut.
 fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
-    let FaultTarget::Board(address) = fault.target else {
+    let FaultTarget::Board(node) = fault.target else {
         return Ok(());
     };
-    let number = usize::from(address).checked_sub(1);
-    let Some(there) = number.and_then(|i| nodes.0.get(i)) else {
-        return Ok(());
-    };
+    let there = &nodes.0[node.index()];
     use FaultKind as F;
     let (why, elsewhere) = match (there, fault.kind) {
         (NodeKind::Sil, _) => return Ok(()),
@@ -209,7 +207,7 @@ fn parts(fault: &FaultSpec) -> Vec<(&'static str, FaultTarget)> {
     };
     let mut parts = vec![(part, fault.target)];
     if let (F::ValveSlow, FaultTarget::Valve(joint, _)) = (fault.kind, fault.target) {
-        parts.push(("cylinder", FaultTarget::Board(joint as u8 + 1)));
+        parts.push(("cylinder", FaultTarget::Board(Node::JOINTS[joint])));
     }
     parts
 }

@@ -12,6 +12,7 @@ use wheeleg_plant::noise::Normal;
 use wheeleg_plant::robot::{Plant, PlantState};
 use wheeleg_plant::sensors::{SensorFault, signal_rng};
 use wheeleg_plant::valve::ValveFault;
+use wheeleg_protocol::Node;
 use wheeleg_protocol::link::SlotTiming;
 
 use super::interface::of_other;
@@ -60,8 +61,8 @@ impl Injector {
         plant: &mut Plant,
         state: &mut PlantState,
     ) {
-        if let (FaultKind::ClockDrift, FaultTarget::Board(address)) = (fault.kind, fault.target) {
-            self.clock_from_ns[usize::from(address) - 1] = now_ns;
+        if let (FaultKind::ClockDrift, FaultTarget::Board(node)) = (fault.kind, fault.target) {
+            self.clock_from_ns[node.index()] = now_ns;
         }
         if begin && fault.kind == FaultKind::FootSinks {
             self.sinks_from_ns = now_ns;
@@ -81,10 +82,11 @@ impl Injector {
         on_air(fault, begin, plant, state);
         on_ground(fault, begin, plant);
         self.sink(now_ns, plant);
-        if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, FaultTarget::Board(n)) =
+        if let (FaultKind::EncoderLost | FaultKind::EncoderReversed, FaultTarget::Board(node)) =
             (fault.kind, fault.target)
+            && let Some(wheel) = node.wheel()
         {
-            self.encoder_at[usize::from(n) - 7] = None;
+            self.encoder_at[wheel] = None;
         }
     }
 
@@ -96,9 +98,8 @@ impl Injector {
         self.of(kind).next().is_some()
     }
 
-    fn affects(&self, kind: FaultKind, address: u8) -> bool {
-        self.of(kind)
-            .any(|f| f.target == FaultTarget::Board(address))
+    fn affects(&self, kind: FaultKind, node: Node) -> bool {
+        self.of(kind).any(|f| f.target == FaultTarget::Board(node))
     }
 
     /// The value of a fault of which there is one at a time (`admission`); 0 without it.
@@ -154,31 +155,31 @@ impl Injector {
     }
 
     /// What the board's driver puts on the line of a frame; `None`: nothing.
-    pub(crate) fn board_sends(&mut self, address: u8, bytes: Vec<u8>) -> Option<Vec<u8>> {
-        if self.affects(FaultKind::NodeSilent, address)
-            || self.affects(FaultKind::BabbleUnguarded, address)
+    pub(crate) fn board_sends(&mut self, node: Node, bytes: Vec<u8>) -> Option<Vec<u8>> {
+        if self.affects(FaultKind::NodeSilent, node)
+            || self.affects(FaultKind::BabbleUnguarded, node)
         {
             return None;
         }
-        if self.affects(FaultKind::Babble, address) {
+        if self.affects(FaultKind::Babble, node) {
             // A byte more would end behind the limit.
             let limit = SlotTiming::DEFAULT.driver_limit_us() / SlotTiming::DEFAULT.bytes_us(1);
             return Some(rubbish(limit as usize, &mut self.rng));
         }
-        if self.affects(FaultKind::OtherInterface, address) {
+        if self.affects(FaultKind::OtherInterface, node) {
             return Some(of_other(bytes));
         }
         Some(bytes)
     }
 
     /// Whether the guard of the board's driver cuts its transmissions off.
-    pub(crate) fn cuts_off(&self, address: u8) -> bool {
-        self.affects(FaultKind::Babble, address)
+    pub(crate) fn cuts_off(&self, node: Node) -> bool {
+        self.affects(FaultKind::Babble, node)
     }
 
     /// What a driver that is stuck on sends in the time of so many bytes.
-    pub(crate) fn babble(&mut self, address: u8, bytes: usize) -> Option<Vec<u8>> {
-        let stuck = self.affects(FaultKind::BabbleUnguarded, address);
+    pub(crate) fn babble(&mut self, node: Node, bytes: usize) -> Option<Vec<u8>> {
+        let stuck = self.affects(FaultKind::BabbleUnguarded, node);
         stuck.then(|| rubbish(bytes, &mut self.rng))
     }
 
@@ -203,10 +204,10 @@ impl Injector {
 
     /// Converter code as the board reads it.
     pub(crate) fn position_code(&mut self, joint: usize, code: u16, full_scale_m: f64) -> u16 {
-        let address = joint as u8 + 1;
+        let node = Node::JOINTS[joint];
         let noise_mm: f64 = self
             .of(FaultKind::PotNoisy)
-            .filter(|f| f.target == FaultTarget::Board(address))
+            .filter(|f| f.target == FaultTarget::Board(node))
             .map(|f| f.value)
             .sum();
         if noise_mm == 0.0 {
@@ -230,9 +231,9 @@ impl Injector {
 
     /// Encoder edges as the board counts them.
     pub(crate) fn edges(&mut self, wheel: usize, edges: i64) -> i64 {
-        let address = wheel as u8 + 7;
-        let lost = self.affects(FaultKind::EncoderLost, address);
-        if !lost && !self.affects(FaultKind::EncoderReversed, address) {
+        let node = Node::WHEELS[wheel];
+        let lost = self.affects(FaultKind::EncoderLost, node);
+        if !lost && !self.affects(FaultKind::EncoderReversed, node) {
             return edges;
         }
         let at = *self.encoder_at[wheel].get_or_insert(edges);
@@ -240,23 +241,23 @@ impl Injector {
     }
 
     /// A board's own clock at simulated time `now_ns`, ns.
-    pub(crate) fn clock_ns(&self, address: u8, now_ns: u64) -> u64 {
+    pub(crate) fn clock_ns(&self, node: Node, now_ns: u64) -> u64 {
         let drift = self
             .of(FaultKind::ClockDrift)
-            .filter(|f| f.target == FaultTarget::Board(address));
+            .filter(|f| f.target == FaultTarget::Board(node));
         // The drift begins with the fault; before it the clock was right.
-        let since_ns = now_ns.saturating_sub(self.clock_from_ns[usize::from(address) - 1]);
+        let since_ns = now_ns.saturating_sub(self.clock_from_ns[node.index()]);
         drift.fold(now_ns, |t, f| {
             t.saturating_add_signed((since_ns as f64 * f.value * 1e-6) as i64)
         })
     }
 
     /// How long a board's clock takes for `ahead_us` on it, ns.
-    pub(crate) fn duration_ns(&self, address: u8, ahead_us: u32) -> u64 {
+    pub(crate) fn duration_ns(&self, node: Node, ahead_us: u32) -> u64 {
         let ahead_ns = u64::from(ahead_us) * 1_000;
         let drift = self
             .of(FaultKind::ClockDrift)
-            .filter(|f| f.target == FaultTarget::Board(address));
+            .filter(|f| f.target == FaultTarget::Board(node));
         drift.fold(ahead_ns, |ns, f| {
             (ns as f64 / (1.0 + f.value * 1e-6)).round() as u64
         })
@@ -269,10 +270,12 @@ impl Injector {
 }
 
 fn on_sensors(fault: &FaultSpec, begin: bool, plant: &Plant, state: &mut PlantState) {
-    let FaultTarget::Board(address @ 1..=6) = fault.target else {
+    let FaultTarget::Board(node) = fault.target else {
         return;
     };
-    let joint = usize::from(address) - 1;
+    let Some(joint) = node.joint() else {
+        return;
+    };
     let defect = match fault.kind {
         FaultKind::PotOpen => SensorFault::Open,
         FaultKind::PotShort => SensorFault::Short,
@@ -307,8 +310,8 @@ fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantSt
                 c.timing_spread[valve] *= fault.value
             });
         }
-        (FaultKind::ValveLeak, FaultTarget::Board(address @ 1..=6)) => {
-            rebuild(plant, usize::from(address) - 1, begin, |c| {
+        (FaultKind::ValveLeak, FaultTarget::Board(node)) if node.is_joint() => {
+            rebuild(plant, node.index(), begin, |c| {
                 c.piston_leak_m3_s_pa *= fault.value;
                 c.rod_leak_m3_s_pa *= fault.value;
             });
@@ -335,9 +338,9 @@ fn on_air(fault: &FaultSpec, begin: bool, plant: &mut Plant, state: &mut PlantSt
                 ValveFault::None
             };
         }
-        (FaultKind::LoadStep, FaultTarget::Board(address @ 1..=6)) => {
+        (FaultKind::LoadStep, FaultTarget::Board(node)) if node.is_joint() => {
             let force_n = if begin { fault.value } else { 0.0 };
-            plant.assembly.mechanics.load_n[usize::from(address) - 1] = force_n;
+            plant.assembly.mechanics.load_n[node.index()] = force_n;
         }
         _ => {}
     }

@@ -2,10 +2,8 @@
 //! What no board tells stays without a value.
 
 use wheeleg_master::telemetry::Record;
-use wheeleg_protocol::{Address, SlotReply};
+use wheeleg_protocol::{Address, Node, SlotReply};
 use wheeleg_telemetry::{BusSample, FootSample, JointSample, Recorder, WheelSample};
-
-use crate::world::LEFT_WHEEL;
 
 use super::{Observer, behaviours, switch_bits};
 
@@ -56,20 +54,25 @@ impl Observer {
     pub(crate) fn heard(&mut self, record: &Record, counts_to_mm: f64, recorder: &mut Recorder) {
         let t_ns = record.time_us * 1_000;
         self.last = Some(*record);
-        for (index, reply) in record.replies.iter().enumerate() {
-            let (Some(board), Some(reply)) = (Address::of_slot(index), reply) else {
+        for (node, reply) in Node::ALL.into_iter().zip(&record.replies) {
+            let Some(reply) = reply else {
                 continue;
             };
-            if board.is_joint() {
-                recorder.joint(t_ns, index, joint(record, board, reply));
-            } else {
-                recorder.wheel(
-                    t_ns,
-                    index - LEFT_WHEEL,
-                    wheel(record, board, reply, counts_to_mm),
-                );
+            let board = node.address();
+            if let Some(place) = node.joint() {
+                recorder.joint(t_ns, place, joint(record, board, reply));
             }
-            self.record_mode(index, reply.mode, reply.active_faults, t_ns, recorder);
+            if let Some(side) = node.wheel() {
+                let sample = wheel(record, board, reply, counts_to_mm);
+                recorder.wheel(t_ns, side, sample);
+            }
+            self.record_mode(
+                node.index(),
+                reply.mode,
+                reply.active_faults,
+                t_ns,
+                recorder,
+            );
         }
         for (foot, vertical) in [2, 5].into_iter().enumerate() {
             if let Some(reply) = record.replies[vertical] {

@@ -1,6 +1,6 @@
 //! Faults that stop boards or programs: what they do at the instant at which they begin.
 
-use wheeleg_protocol::ResetCause;
+use wheeleg_protocol::{Node, ResetCause};
 use wheeleg_remote_link as link;
 
 use super::World;
@@ -25,7 +25,7 @@ impl World {
             FaultKind::ClientReset if begin => self.client = Client::connect(&mut self.master),
             _ => {}
         }
-        let FaultTarget::Board(address) = fault.target else {
+        let FaultTarget::Board(node) = fault.target else {
             return Ok(());
         };
         let down = match fault.kind {
@@ -40,47 +40,47 @@ impl World {
             FaultKind::NodeHang if begin => Down::Hung {
                 until_ns: self.now_ns.saturating_add(WATCHDOG_NS),
             },
-            FaultKind::ProcessorFault if begin => return self.fault_processor(address),
+            FaultKind::ProcessorFault if begin => return self.fault_processor(node),
             _ => return Ok(()),
         };
         if let Down::Off { .. } = down {
             let now_ns = self.now_ns;
-            self.board_mut(address).memory.power_fails(now_ns);
+            self.board_mut(node).memory.power_fails(now_ns);
         }
-        self.board_mut(address).down = down;
+        self.board_mut(node).down = down;
         let Some(remote) = &mut self.remote else {
             return Ok(());
         };
         match down {
-            Down::Hung { .. } => Ok(remote.hook(address, link::Hook::StopProcessor)?),
+            Down::Hung { .. } => Ok(remote.hook(node, link::Hook::StopProcessor)?),
             _ => {
-                remote.set_power(address, link::Power::BrownOut);
+                remote.set_power(node, link::Power::BrownOut);
                 // At once: it may be back before the board is run otherwise.
-                self.run_remote(&[(address, None)])
+                self.run_remote(&[(node, None)])
             }
         }
     }
 
     /// The processor of a board faults: its handler turns the outputs off and resets it.
-    fn fault_processor(&mut self, address: u8) -> Result<(), SimError> {
+    fn fault_processor(&mut self, node: Node) -> Result<(), SimError> {
         let now_ns = self.now_ns;
-        self.board_mut(address).memory.power_fails(now_ns);
+        self.board_mut(node).memory.power_fails(now_ns);
         match &mut self.remote {
-            Some(remote) if remote.has(address) => {
+            Some(remote) if remote.has(node) => {
                 // Until its own reset.
-                remote.hook(address, link::Hook::FaultProcessor)?;
-                self.board_mut(address).down = Down::Hung {
+                remote.hook(node, link::Hook::FaultProcessor)?;
+                self.board_mut(node).down = Down::Hung {
                     until_ns: now_ns.saturating_add(JOINT_TICK_NS),
                 };
-                self.run_remote(&[(address, None)])
+                self.run_remote(&[(node, None)])
             }
             // How long its start takes is known from the run that this one repeats.
-            _ if self.replayed.is_replayed(address) => {
-                self.board_mut(address).down = Down::Off { until_ns: u64::MAX };
+            _ if self.replayed.is_replayed(node) => {
+                self.board_mut(node).down = Down::Off { until_ns: u64::MAX };
                 Ok(())
             }
             _ => {
-                self.begin_start(address, ResetCause::ProcessorFault);
+                self.begin_start(node, ResetCause::ProcessorFault);
                 Ok(())
             }
         }

@@ -2,7 +2,7 @@
 //! and a master or a user's program that starts anew.
 
 use wheeleg_master::{Master, MasterConfig};
-use wheeleg_protocol::{Address, ResetCause};
+use wheeleg_protocol::{Node, ResetCause};
 use wheeleg_remote_link as link;
 use wheeleg_units::Micros;
 
@@ -23,61 +23,61 @@ pub const BOARD_START_UP_NS: [u64; 2] = [3_201_000, 2_248_000];
 const SEQUENCE_STEP: u16 = 0x2F35;
 
 impl World {
-    /// Whether the board at `address` works: here unless it is down, outside
+    /// Whether a board works: here unless it is down, outside
     /// unless it is in reset.
-    pub(super) fn runs(&self, address: u8) -> bool {
-        self.first_edge_ns(address)
+    pub(super) fn runs(&self, node: Node) -> bool {
+        self.first_edge_ns(node)
             .is_some_and(|edge_ns| edge_ns <= self.now_ns)
     }
 
-    /// Whether the board at `address` drives its bridge: from its first tick edge on, and
+    /// Whether a board drives its bridge: from its first tick edge on, and
     /// on with what it was told last when its program has stopped.
-    pub(super) fn drives(&self, address: u8) -> bool {
-        let started = self.started_ns(address);
-        !self.board(address).down.is_off() && started.is_some_and(|ns| ns <= self.now_ns)
+    pub(super) fn drives(&self, node: Node) -> bool {
+        let started = self.started_ns(node);
+        !self.board(node).down.is_off() && started.is_some_and(|ns| ns <= self.now_ns)
     }
 
-    /// Whether the program of the board at `address` has stopped.
-    pub(super) fn hangs(&self, address: u8) -> bool {
-        matches!(self.board(address).down, Down::Hung { .. })
+    /// Whether the program of a board has stopped.
+    pub(super) fn hangs(&self, node: Node) -> bool {
+        matches!(self.board(node).down, Down::Hung { .. })
     }
 
-    /// First tick edge of the board at `address` since its processor has started, ns;
+    /// First tick edge of a board since its processor has started, ns;
     /// `None` while it is down.
-    fn first_edge_ns(&self, address: u8) -> Option<u64> {
-        let runs = self.board(address).down == Down::No;
-        self.started_ns(address).filter(|_| runs)
+    fn first_edge_ns(&self, node: Node) -> Option<u64> {
+        let runs = self.board(node).down == Down::No;
+        self.started_ns(node).filter(|_| runs)
     }
 
-    /// First tick edge of the board at `address` since its newest start, ns; `None` if
+    /// First tick edge of a board since its newest start, ns; `None` if
     /// that is not known yet.
-    fn started_ns(&self, address: u8) -> Option<u64> {
-        match self.remote.as_ref().filter(|o| o.has(address)) {
-            Some(remote) => remote.running_from_ns(address),
-            None => Some(self.board(address).clock_zero_ns),
+    fn started_ns(&self, node: Node) -> Option<u64> {
+        match self.remote.as_ref().filter(|o| o.has(node)) {
+            Some(remote) => remote.running_from_ns(node),
+            None => Some(self.board(node).clock_zero_ns),
         }
     }
 
-    /// From when on the board at `address` hears the line, ns: its tick timer is started
+    /// From when on a board hears the line, ns: its tick timer is started
     /// a tick before its first edge.
-    pub(super) fn hears_from_ns(&self, address: u8) -> Option<u64> {
-        let edge_ns = self.first_edge_ns(address)?;
-        Some(edge_ns.saturating_sub(self.tick_ns(address)))
+    pub(super) fn hears_from_ns(&self, node: Node) -> Option<u64> {
+        let edge_ns = self.first_edge_ns(node)?;
+        Some(edge_ns.saturating_sub(self.tick_ns(node)))
     }
 
     /// Tick of a board, ns.
-    fn tick_ns(&self, address: u8) -> u64 {
-        self.board(address).application.tick_ns()
+    fn tick_ns(&self, node: Node) -> u64 {
+        self.board(node).application.tick_ns()
     }
 
-    /// The clock of the board at `address` at `ns`: it counts from the first tick edge
+    /// The clock of a board at `ns`: it counts from the first tick edge
     /// after its processor has started.
-    pub(super) fn clock(&self, address: u8, ns: u64) -> Micros {
+    pub(super) fn clock(&self, node: Node, ns: u64) -> Micros {
         let remote = self.remote.as_ref();
-        let there = remote.and_then(|o| o.running_from_ns(address));
-        let zero_ns = there.unwrap_or(self.board(address).clock_zero_ns);
-        let now = micros(self.faults.clock_ns(address, ns));
-        let zero = micros(self.faults.clock_ns(address, zero_ns));
+        let there = remote.and_then(|o| o.running_from_ns(node));
+        let zero_ns = there.unwrap_or(self.board(node).clock_zero_ns);
+        let now = micros(self.faults.clock_ns(node, ns));
+        let zero = micros(self.faults.clock_ns(node, zero_ns));
         Micros(now.get().wrapping_sub(zero.get()))
     }
 
@@ -90,23 +90,21 @@ impl World {
         let now_ns = self.now_ns;
         loop {
             let boards = &self.boards;
-            let affected = |address: u8| match boards[usize::from(address) - 1].down {
+            let affected = |node: Node| match boards[node.index()].down {
                 Down::Off { .. } | Down::Starting { .. } | Down::Hung { .. } => true,
                 Down::No | Down::Storing { .. } => false,
             };
             match self.replayed.next(now_ns, affected) {
                 None => return Ok(()),
-                Some(Due::Reset(raw, cause)) => {
-                    if let Some(address) = Address::new(raw) {
-                        self.start_anew(address, cause)?;
-                    }
-                    self.board_mut(raw).down = Down::Starting {
+                Some(Due::Reset(node, cause)) => {
+                    self.start_anew(node, cause)?;
+                    self.board_mut(node).down = Down::Starting {
                         until_ns: u64::MAX,
                         cause,
                     };
                 }
-                Some(Due::FirstEdge(raw, until_ns)) => {
-                    let down = &mut self.board_mut(raw).down;
+                Some(Due::FirstEdge(node, until_ns)) => {
+                    let down = &mut self.board_mut(node).down;
                     let cause = match *down {
                         Down::Starting { cause, .. } => cause,
                         // Hit once more while it started.
@@ -124,32 +122,28 @@ impl World {
     }
 
     /// The application of a board from its reset by `cause` on.
-    pub(super) fn start_anew(
-        &mut self,
-        address: Address,
-        cause: ResetCause,
-    ) -> Result<(), SimError> {
+    pub(super) fn start_anew(&mut self, node: Node, cause: ResetCause) -> Result<(), SimError> {
         let remote = self.remote.as_ref();
-        let remote = remote.is_some_and(|o| o.has(address.raw()));
+        let remote = remote.is_some_and(|o| o.has(node));
         let now_ns = self.now_ns;
-        let board = self.board_mut(address.raw());
+        let board = self.board_mut(node);
         // A board outside that has lost its power stays without until it is given back.
         if !(remote && matches!(board.down, Down::Off { .. })) {
             board.down = Down::No;
         }
-        board.restart(address, cause)?;
+        board.restart(node, cause)?;
         board.clock_zero_ns = now_ns + board.application.tick_ns();
         Ok(())
     }
 
     /// A board that wants to stores its parameters, once it has nothing to send, and
     /// stands still meanwhile.
-    pub(super) fn store(&mut self, address: u8) {
-        if self.bus.is_driven_by(address) {
+    pub(super) fn store(&mut self, node: Node) {
+        if self.bus.is_driven_by(node.number()) {
             return;
         }
-        let (now_ns, now) = (self.now_ns, self.clock(address, self.now_ns));
-        let board = self.board_mut(address);
+        let (now_ns, now) = (self.now_ns, self.clock(node, self.now_ns));
+        let board = self.board_mut(node);
         if let Some(records) = board.application.take_save(now) {
             let until_ns = board.memory.begin(records, now_ns);
             board.down = Down::Storing { until_ns };
@@ -159,42 +153,42 @@ impl World {
     /// Boards whose time without power, or in a stopped program, is over; a
     /// master that has been reset.
     pub(super) fn bring_up(&mut self) -> Result<(), SimError> {
-        for raw in 1..=8_u8 {
-            let down = self.board(raw).down;
+        for node in Node::ALL {
+            let down = self.board(node).down;
             let until_ns = match down {
                 Down::No => continue,
                 // It begins with an edge of its own.
-                Down::Starting { .. } if raw > 6 => continue,
+                Down::Starting { .. } if !node.is_joint() => continue,
                 Down::Starting { until_ns, .. } => until_ns.saturating_sub(JOINT_TICK_NS),
                 // How long that takes is known from the run that this one repeats.
-                Down::Off { .. } | Down::Hung { .. } if self.replayed.is_replayed(raw) => continue,
+                Down::Off { .. } | Down::Hung { .. } if self.replayed.is_replayed(node) => continue,
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
                 // The tick of the last edge before the end is worked off then.
                 Down::Storing { until_ns } => {
                     if until_ns < self.now_ns.saturating_add(JOINT_TICK_NS) {
-                        self.board_mut(raw).memory.end();
-                        self.board_mut(raw).down = Down::No;
+                        self.board_mut(node).memory.end();
+                        self.board_mut(node).down = Down::No;
                     }
                     continue;
                 }
             };
-            let Some(address) = Address::new(raw).filter(|_| until_ns <= self.now_ns) else {
+            if until_ns > self.now_ns {
                 continue;
-            };
+            }
             match &mut self.remote {
                 // Its own watchdog and its own start-up end the fault.
-                Some(remote) if remote.has(raw) => {
-                    remote.set_power(raw, link::Power::Good);
+                Some(remote) if remote.has(node) => {
+                    remote.set_power(node, link::Power::Good);
                     if matches!(down, Down::Off { .. }) {
-                        self.board_mut(raw).down = Down::No;
+                        self.board_mut(node).down = Down::No;
                     }
                     // From this very instant on.
-                    self.run_remote(&[(raw, None)])?;
+                    self.run_remote(&[(node, None)])?;
                 }
                 _ => match down {
-                    Down::Starting { cause, .. } => self.start_anew(address, cause)?,
-                    Down::Hung { .. } => self.begin_start(raw, ResetCause::Watchdog),
-                    _ => self.begin_start(raw, ResetCause::PowerUp),
+                    Down::Starting { cause, .. } => self.start_anew(node, cause)?,
+                    Down::Hung { .. } => self.begin_start(node, ResetCause::Watchdog),
+                    _ => self.begin_start(node, ResetCause::PowerUp),
                 },
             }
         }
@@ -206,9 +200,9 @@ impl World {
     }
 
     /// The processor of a board leaves its reset.
-    pub(super) fn begin_start(&mut self, address: u8, cause: ResetCause) {
-        let start_up_ns = BOARD_START_UP_NS[usize::from(address > 6)];
-        self.board_mut(address).down = Down::Starting {
+    pub(super) fn begin_start(&mut self, node: Node, cause: ResetCause) {
+        let start_up_ns = BOARD_START_UP_NS[usize::from(!node.is_joint())];
+        self.board_mut(node).down = Down::Starting {
             until_ns: self.now_ns.saturating_add(start_up_ns),
             cause,
         };
@@ -216,14 +210,10 @@ impl World {
 
     /// A wheel board begins with the next sample, if it has started by then.
     pub(super) fn start_wheel(&mut self, wheel: usize) -> Result<(), SimError> {
-        let Some(address) = Address::new(wheel as u8 + 7) else {
-            return Ok(());
-        };
-        match self.board(address.raw()).down {
-            Down::Starting { until_ns, cause }
-                if until_ns <= self.now_ns + self.tick_ns(address.raw()) =>
-            {
-                self.start_anew(address, cause)
+        let node = Node::WHEELS[wheel];
+        match self.board(node).down {
+            Down::Starting { until_ns, cause } if until_ns <= self.now_ns + self.tick_ns(node) => {
+                self.start_anew(node, cause)
             }
             _ => Ok(()),
         }
@@ -233,15 +223,15 @@ impl World {
     /// counted since their start-up, between the two samples before this one.
     pub(super) fn start_counters(&mut self) {
         for wheel in 0..2 {
-            let address = wheel as u8 + 7;
+            let node = Node::WHEELS[wheel];
             let due = self.next_wheel_ns[wheel] == self.now_ns;
-            if due && self.first_edge_ns(address) == Some(self.now_ns) {
+            if due && self.first_edge_ns(node) == Some(self.now_ns) {
                 let [_, edges] = self.wheel_edges[wheel];
-                if let Application::Wheel(board) = &mut self.board_mut(address).application {
+                if let Application::Wheel(board) = &mut self.board_mut(node).application {
                     board.counts_from(edges);
                 }
                 if let Some(remote) = &mut self.remote {
-                    remote.counts_from(address, edges);
+                    remote.counts_from(node, edges);
                 }
             }
         }

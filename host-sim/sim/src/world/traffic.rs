@@ -1,6 +1,6 @@
 //! What goes on the line and who hears it.
 
-use wheeleg_protocol::Address;
+use wheeleg_protocol::{Address, Node};
 use wheeleg_units::Micros;
 
 use super::{Elsewhere, World};
@@ -81,12 +81,12 @@ impl World {
         // next run, which saves most of the ways to them and back.
         let mut answerable = false;
         while let Some(delivery) = self.bus.take_due(self.now_ns) {
-            answerable |= !(1..=8).contains(&delivery.from);
-            for address in 1..=8_u8 {
-                let Some(from_ns) = self.hears_from_ns(address) else {
+            answerable |= Node::new(delivery.from).is_none();
+            for node in Node::ALL {
+                let Some(from_ns) = self.hears_from_ns(node) else {
                     continue;
                 };
-                let Some((bytes, end_ns)) = self.bus.heard_by(address, &delivery) else {
+                let Some((bytes, end_ns)) = self.bus.heard_by(node.number(), &delivery) else {
                     continue;
                 };
                 // A board that starts hears the end of a frame.
@@ -96,8 +96,8 @@ impl World {
                 if bytes.is_empty() {
                     continue;
                 }
-                let t_end = self.clock(address, end_ns);
-                let board = self.board_mut(address);
+                let t_end = self.clock(node, end_ns);
+                let board = self.board_mut(node);
                 board.application.on_bus_bytes(bytes, t_end);
             }
             let master = Address::MASTER.raw();
@@ -127,12 +127,12 @@ impl World {
     /// Puts on the line what the boards want to send, at the times they chose.
     pub(super) fn collect_transmissions(&mut self) {
         let now_ns = self.now_ns;
-        let clocks: [Micros; 8] = std::array::from_fn(|i| self.clock(i as u8 + 1, now_ns));
-        let clock = |address: u8| clocks[usize::from(address) - 1];
+        let clocks: [Micros; 8] = Node::ALL.map(|node| self.clock(node, now_ns));
+        let clock = |node: Node| clocks[node.index()];
         let (bus, audit) = (&mut self.bus, &mut self.audit);
         let (faults, remote) = (&mut self.faults, &mut self.remote);
         // True if the guard of the board's driver cut it off.
-        let mut send = |from: u8, t: wheeleg_node::Transmission| {
+        let mut send = |from: Node, t: wheeleg_node::Transmission| {
             // Start times are on the board's own clock.
             let ahead_us = ahead_us(clock(from), t.start_at);
             let start_ns = now_ns + faults.duration_ns(from, ahead_us);
@@ -147,15 +147,15 @@ impl World {
                     let Some(bytes) = faults.board_sends(from, t.bytes.to_vec()) else {
                         return false;
                     };
-                    transmit(bus, audit, faults, from, start_ns, bytes);
+                    transmit(bus, audit, faults, from.number(), start_ns, bytes);
                     faults.cuts_off(from)
                 }
             }
         };
-        for (board, address) in self.boards.iter_mut().zip(1..) {
+        for (board, node) in self.boards.iter_mut().zip(Node::ALL) {
             while let Some(t) = board.application.take_transmission() {
-                if send(address, t) {
-                    board.application.driver_cut_off(clock(address));
+                if send(node, t) {
+                    board.application.driver_cut_off(clock(node));
                 }
             }
         }
@@ -165,10 +165,10 @@ impl World {
             transmit(bus, audit, faults, from, start_ns, t.bytes.to_vec());
         }
         if let Some(remote) = remote {
-            for address in 1..=8 {
-                for (start_ns, bytes) in remote.take_frames(address) {
-                    if let Some(bytes) = faults.board_sends(address, bytes) {
-                        transmit(bus, audit, faults, address, start_ns, bytes);
+            for node in Node::ALL {
+                for (start_ns, bytes) in remote.take_frames(node) {
+                    if let Some(bytes) = faults.board_sends(node, bytes) {
+                        transmit(bus, audit, faults, node.number(), start_ns, bytes);
                     }
                 }
             }
@@ -203,11 +203,11 @@ impl World {
     /// What boards whose driver is stuck on send in the tick that begins now.
     pub(super) fn babble(&mut self, tick_ns: u64) {
         let bytes = (tick_ns / self.bus.byte_ns()) as usize;
-        for address in 1..=8_u8 {
-            if self.runs(address)
-                && let Some(rubbish) = self.faults.babble(address, bytes)
+        for node in Node::ALL {
+            if self.runs(node)
+                && let Some(rubbish) = self.faults.babble(node, bytes)
             {
-                self.transmit(address, self.now_ns, rubbish);
+                self.transmit(node.number(), self.now_ns, rubbish);
             }
         }
     }

@@ -25,6 +25,7 @@ use rest::StandMeter;
 use safe_state::SafeStateMeter;
 pub(crate) use safe_state::commanded_open;
 use sinusoid::SinusoidMeter;
+pub(crate) use target::band_text;
 pub use target::{Judgement, Target};
 use three_step::ThreeStepMeter;
 use travel::TravelMeter;

@@ -51,6 +51,17 @@ pub struct Target {
     pub required: bool,
 }
 
+/// A band as every page and the terminal show it.
+pub(crate) fn band_text(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(a), Some(b)) if a == b => format!("= {a}"),
+        (Some(a), Some(b)) => format!("{a} … {b}"),
+        (Some(a), None) => format!("≥ {a}"),
+        (None, Some(b)) => format!("≤ {b}"),
+        (None, None) => "–".into(),
+    }
+}
+
 impl Target {
     /// A required target. A value that could not be measured, or is not a
     /// number, fails.
@@ -87,13 +98,7 @@ impl Target {
     /// The band as text.
     #[must_use]
     pub fn band_text(&self) -> String {
-        match (self.min, self.max) {
-            (Some(a), Some(b)) if a == b => format!("= {a}"),
-            (Some(a), Some(b)) => format!("{a} … {b}"),
-            (Some(a), None) => format!("≥ {a}"),
-            (None, Some(b)) => format!("≤ {b}"),
-            (None, None) => "–".into(),
-        }
+        band_text(self.min, self.max)
     }
 
     /// The value as text, four significant digits.

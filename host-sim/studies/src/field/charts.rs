@@ -2,13 +2,17 @@
 
 use wheeleg_report::plot::{Content, Figure, Panel, colour, line};
 
+use wheeleg_config::Measure;
+
 use super::{SCENARIOS, Summary, Tried};
 
-const SPEED: &str = "speed";
 const HEIGHT: u32 = 130;
 
-/// A panel for each scenario that has a bar on its speed.
+/// A panel for each scenario that has a bar on its speed. Of one seed there is no curve to draw.
 pub(super) fn figures(summary: &Summary) -> Vec<Figure> {
+    if summary.seeds < 2 {
+        return Vec::new();
+    }
     let panels: Vec<Panel> = summary
         .scenarios
         .iter()
@@ -26,13 +30,20 @@ pub(super) fn figures(summary: &Summary) -> Vec<Figure> {
 }
 
 fn panel(summary: &Summary, tried: &Tried) -> Option<Panel> {
-    let bar = tried.measured.iter().find(|m| m.measure == SPEED)?;
+    let bar = tried
+        .measured
+        .iter()
+        .find(|m| m.measure == Measure::Speed.name())?;
     let points: Vec<(f64, f64)> = summary
         .runs
         .iter()
         .filter(|run| run.scenario == tried.scenario)
         .filter_map(|run| {
-            let speed = run.bars.iter().find(|b| b.id == SPEED)?.value?;
+            let speed = run
+                .bars
+                .iter()
+                .find(|b| b.id == Measure::Speed.name())?
+                .value?;
             Some((run.seed as f64, speed))
         })
         .collect();
@@ -48,7 +59,7 @@ fn panel(summary: &Summary, tried: &Tried) -> Option<Panel> {
         ("speed [mm/s]", (low, 1.1 * high)),
         vec![line(tried.scenario, colour, 2, points)],
     );
-    let x_range = (1.0, f64::from(summary.seeds).max(2.0));
+    let x_range = (1.0, f64::from(summary.seeds));
     Some(Panel::new(
         tried.scenario,
         x_range,

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{Measured, Met, Summary};
 use crate::StudyError;
+use crate::analysis::band_text;
 use crate::study::Stopped;
 use wheeleg_report::number::fixed;
 use wheeleg_report::{Picture, page, pictures, plot::Figure};
@@ -40,6 +41,7 @@ struct ClaimRow<'a> {
     word: &'static str,
     value: String,
     interval: String,
+    share: String,
 }
 
 #[derive(Serialize)]
@@ -96,12 +98,7 @@ fn unit(m: &Measured) -> &str {
 }
 
 fn bar(m: &Measured) -> String {
-    let band = match (m.min, m.max) {
-        (Some(min), Some(max)) => format!("{min} to {max}"),
-        (Some(min), None) => format!("at least {min}"),
-        (None, Some(max)) => format!("at most {max}"),
-        (None, None) => return String::new(),
-    };
+    let band = band_text(m.min, m.max);
     format!("{band} {}", unit(m)).trim_end().to_owned()
 }
 
@@ -109,15 +106,17 @@ fn interval([low, high]: [f64; 2]) -> String {
     format!("{} to {} %", fixed(1e2 * low, 0), fixed(1e2 * high, 0))
 }
 
-/// The page's first sentence.
+/// The page's first sentence. Scenarios may be chosen of which the paper claims nothing.
 fn verdict(summary: &Summary) -> String {
     let met = summary.claims.iter().filter(|c| c.met == Met::Met).count();
     let passed = summary.runs.iter().filter(|run| run.passed).count();
-    format!(
-        "{met} of {} claims of the paper are met on the assumed ground; {passed} of {} runs pass.",
-        summary.claims.len(),
-        summary.runs.len()
-    )
+    let runs = format!("{passed} of {} runs pass.", summary.runs.len());
+    match summary.claims.len() {
+        0 => runs,
+        claims => {
+            format!("{met} of {claims} claims of the paper are met on the assumed ground; {runs}")
+        }
+    }
 }
 
 pub(super) fn render(
@@ -135,6 +134,7 @@ pub(super) fn render(
         word: claim.met.word(),
         value: value(&claim.measured),
         interval: interval(claim.interval),
+        share: format!("{} %", fixed(1e2 * claim.share, 0)),
     });
     let scenarios = summary.scenarios.iter().map(|tried| ScenarioRow {
         tried,
@@ -176,4 +176,26 @@ pub(super) fn render(
         assumed: ASSUMED,
     };
     Ok(page(TEMPLATE, values)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of scenarios that the paper says nothing about, and of one seed, nothing is empty.
+    #[test]
+    fn a_page_without_claims_has_no_section_of_them() {
+        let summary = Summary {
+            seeds: 1,
+            claims: Vec::new(),
+            scenarios: Vec::new(),
+            runs: Vec::new(),
+        };
+        let figures = super::super::charts::figures(&summary);
+        assert!(figures.is_empty());
+        let page = render(&summary, None, &[]).expect("a page");
+        assert!(page.contains("0 of 0 runs pass."), "{page}");
+        assert!(!page.contains("claims of the paper") && !page.contains("id=\"claims\""));
+        assert!(page.contains("What is assumed"));
+    }
 }

@@ -7,7 +7,7 @@ use super::ran::Ran;
 use super::row::{Expect, Row, Stop};
 use wheeleg_config::RobotConfig;
 use wheeleg_config::faults::FaultKind;
-use wheeleg_protocol::NodeMode;
+use wheeleg_protocol::{Node, NodeMode};
 use wheeleg_sim::SimError;
 use wheeleg_telemetry::event::{Cause, ServiceOutcome};
 
@@ -264,7 +264,7 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, after_all: &AfterAll, m: &
 
 fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
     f.check(!m.drives, || "an axis drives".to_owned());
-    let rows = ran.recording.joints.get(usize::from(board) - 1);
+    let rows = Node::new(board).and_then(|node| ran.recording.joints.get(node.index()));
     let last = rows.and_then(|rows| rows.last()).map(|row| row.v.mode);
     f.check(last == Some(NodeMode::Idle.code()), || {
         let last = last.and_then(NodeMode::from_code);

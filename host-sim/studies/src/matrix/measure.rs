@@ -8,7 +8,7 @@ use super::ran::Ran;
 use super::row::{Expect, Row, Since};
 use crate::analysis::{commanded_open, window};
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
-use wheeleg_protocol::NodeMode;
+use wheeleg_protocol::{Node, NodeMode};
 use wheeleg_telemetry::{Event, EventKind, JointSample, Recording, Row as Sample};
 
 const TICK_S: f64 = 1e-3;
@@ -96,8 +96,8 @@ impl Blind {
                     | FaultKind::NodeHang
                     | FaultKind::ProcessorFault
                     | FaultKind::BrownOut,
-                    FaultTarget::Board(address),
-                ) => blind.dark[usize::from(address) - 1] = true,
+                    FaultTarget::Board(node),
+                ) => blind.dark[node.index()] = true,
                 (FaultKind::ValveStuckOpen, FaultTarget::Valve(joint, valve)) => {
                     blind.stuck[joint] |= 1 << valve;
                 }
@@ -179,8 +179,9 @@ fn since(row: &Row, at_s: f64, r: &Recording, baseline: Option<&Recording>) -> f
     };
     match (stop.since, baseline) {
         (Since::Motion(joint), Some(baseline)) => {
-            let joint = usize::from(joint) - 1;
-            missing_s(&r.joints[joint], &baseline.joints[joint], at_s).unwrap_or(begin_s)
+            let joint = Node::new(joint).and_then(Node::joint);
+            let missing = |i: usize| missing_s(&r.joints[i], &baseline.joints[i], at_s);
+            joint.and_then(missing).unwrap_or(begin_s)
         }
         _ => begin_s,
     }

@@ -32,7 +32,7 @@ enum Command {
     Run(RunArgs),
     /// Give the shards of a campaign to Slurm, or print a job for Kubernetes.
     Submit(SubmitArgs),
-    /// How far a campaign is, from its folder alone.
+    /// Show the progress of a campaign, from its folder alone.
     Status(StatusArgs),
     /// Make one table of the parts in one or more folders.
     Merge(MergeArgs),
@@ -62,7 +62,7 @@ struct RunArgs {
     /// Threads [default: all cores].
     #[arg(long, value_name = "N", value_parser = whole(1_u64, 4096))]
     threads: Option<u64>,
-    /// Only the first cases, as a pilot; going on takes them up.
+    /// Only the first cases, as a pilot; a later run continues from them.
     #[arg(long, value_name = "N", value_parser = whole(1_u64, u64::MAX))]
     first: Option<u64>,
     /// Print the cases instead of running them.

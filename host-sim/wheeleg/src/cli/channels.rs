@@ -45,6 +45,7 @@ pub(super) fn text(json: bool) -> String {
                     "topic": c.topic,
                     "schema": c.schema,
                     "rate_hz": c.rate_hz,
+                    "written": c.written.name(),
                     "description": c.doc,
                     "fields": fields,
                 })
@@ -57,6 +58,7 @@ pub(super) fn text(json: bool) -> String {
                     "topic": d.topic,
                     "schema": d.schema,
                     "rate_hz": d.rate_hz,
+                    "written": d.written().name(),
                     "description": d.doc,
                 })
             })
@@ -66,13 +68,9 @@ pub(super) fn text(json: bool) -> String {
     }
     let mut out = String::new();
     let mut described: Vec<&str> = Vec::new();
-    let rate = |rate_hz| match rate_hz {
-        0 => "on change".to_owned(),
-        r => format!("{r} Hz"),
-    };
     for c in channels() {
-        let rate = rate(c.rate_hz);
-        let _ = writeln!(out, "{:13} {rate:10} {:16} {}", c.topic, c.schema, c.doc);
+        let rate = c.rate();
+        let _ = writeln!(out, "{:13} {rate:15} {:18} {}", c.topic, c.schema, c.doc);
         if described.contains(&c.schema) {
             continue;
         }
@@ -91,7 +89,7 @@ pub(super) fn text(json: bool) -> String {
     }
     // For viewers; their fields are those of Foxglove's schemas.
     for d in derived() {
-        let rate = rate(d.rate_hz);
+        let rate = d.rate();
         let _ = writeln!(out, "{:16} {rate:10} {:24} {}", d.topic, d.schema, d.doc);
     }
     out

@@ -25,11 +25,11 @@ pub(super) struct CompareArgs {
     /// Controller; may be given several times [default: all].
     #[arg(long = "controller", value_name = "NAME", value_parser = controller)]
     controllers: Vec<Kind>,
-    /// Move; may be given several times [default: all as on the sheet, step-100 and
-    /// s-curve with factors changed].
+    /// Move; may be given several times [default: all with the data-sheet values;
+    /// step-100 and s-curve with changed factors].
     #[arg(long = "move", value_name = "MOVE", value_parser = motion)]
     moves: Vec<Move>,
-    /// Number of seeds for the cases as on the sheet.
+    /// Number of seeds for the cases with the data-sheet values.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
     seeds: u64,
     /// The first seed.

@@ -53,7 +53,7 @@ impl CtlArgs {
 
 #[derive(Debug, Subcommand)]
 enum CtlCommand {
-    /// Print how the robot is.
+    /// Print the state of the robot.
     Status,
     /// Print samples and events as they come.
     Watch {
@@ -79,27 +79,27 @@ enum CtlCommand {
     },
     /// End a fault.
     EndFault {
-        /// As it was begun.
+        /// Fault and target, as it was begun.
         fault: String,
     },
     /// Stop the clock.
     Pause,
-    /// Let the clock go on.
+    /// Resume the clock.
     Resume,
     /// Simulate some bus cycles of a paused robot.
     Step {
-        /// How many, 10 ms each.
+        /// Number of cycles, 10 ms each.
         #[arg(default_value_t = 1, value_parser = whole(1_u32, 1_000))]
         cycles: u32,
     },
     /// Set the pace.
     Speed {
-        /// Simulated time over time of the clock on the wall, 0.1 to 10.
+        /// Simulated time per wall-clock time, 0.1 to 10.
         speed: f64,
     },
     /// Record: log, and every command with its time, so that `wheeleg replay` can repeat it.
     Rec {
-        /// Begin or end.
+        /// Start or stop.
         #[arg(value_enum)]
         what: Recording,
     },

@@ -26,10 +26,10 @@ enum FaultsCommand {
         #[arg(long)]
         json: bool,
     },
-    /// List the rows of the fault matrix: what goes wrong, when, what must come of it.
+    /// List the rows of the fault matrix: what goes wrong, when, and what must follow.
     Rows,
-    /// Run rows of the fault matrix and hold them against what must come of them; writes
-    /// report and summary. Exit code 1 if a row does not come out as it must.
+    /// Run rows of the fault matrix and judge them by what must follow; writes report and
+    /// summary. Exit code 1 if a row fails.
     Run(RunArgs),
 }
 

@@ -84,19 +84,19 @@ enum Command {
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
     Params(params::ParamsArgs),
-    /// Faults that can be injected, what they affect and which are not implemented yet.
+    /// List the faults that can be injected, and run the fault matrix.
     Faults(faults::FaultsArgs),
     /// Print the telemetry channels: signals, units, rates, meaning.
     Channels(channels::ChannelsArgs),
     /// Print the commands that a scenario can give: arguments, units, ranges.
     Commands(commands::CommandsArgs),
-    /// Write the robot for other programs.
+    /// Write the robot, or a log, for other programs.
     Export(export::ExportArgs),
     /// Print the unique ids of a robot's boards, as a section for its file.
     Commission(commission::CommissionArgs),
     /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
     Figures(figures::FiguresArgs),
-    /// Try the walks over terrain on several seeds, beside what the paper claims.
+    /// Run the walks over terrain on several seeds, beside what the paper claims.
     Field(field::FieldArgs),
     /// Measure and explain the start delay of a pneumatic joint; writes a report.
     Delay(delay::DelayArgs),
@@ -114,7 +114,7 @@ enum Command {
     View(view::ViewArgs),
     /// Recover the log of a run that was killed.
     Log(log::LogArgs),
-    /// Tell in what the bus interface of this program differs from another.
+    /// Show how the bus interface of this program differs from another.
     Interface(interface::InterfaceArgs),
 }
 

@@ -23,7 +23,7 @@ pub(super) struct ReplayArgs {
     /// Write the log, from power-up on, to this file.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// Print what came of it as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }

@@ -50,10 +50,10 @@ pub(super) struct ServeArgs {
     /// Serve beyond this computer without TLS: then one may look and stop, and nobody may drive.
     #[arg(long, conflicts_with = "tls_cert")]
     plain_http: bool,
-    /// Simulated time over time of the clock on the wall, 0.1 to 10, or `max`.
+    /// Simulated time per wall-clock time, 0.1 to 10, or `max`.
     #[arg(long, value_name = "SPEED", default_value = "1", value_parser = parse_speed)]
     speed: Speed,
-    /// Begin with the clock standing.
+    /// Start paused.
     #[arg(long)]
     paused: bool,
     /// Record from power-up on: log, and every command with its time, so that `wheeleg replay`
@@ -63,7 +63,7 @@ pub(super) struct ServeArgs {
     /// Folder in which each recording gets a folder of its own.
     #[arg(long, value_name = "DIR", default_value = FOLDER)]
     recordings: PathBuf,
-    /// Make new keys: the old ones open nothing any more.
+    /// Make new keys; the old ones no longer work.
     #[arg(long)]
     new_key: bool,
     /// Page that may look by the protocol of Foxglove and Lichtblick, such as
@@ -75,6 +75,7 @@ pub(super) struct ServeArgs {
     #[arg(long)]
     foxglove_write: bool,
     /// Folder of the page, instead of the one in this program: for who works on it.
+    /// Folder of the page, instead of the one in this program, for work on the page.
     #[arg(long, value_name = "DIR")]
     page_dir: Option<PathBuf>,
 }

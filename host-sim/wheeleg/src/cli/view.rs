@@ -13,10 +13,10 @@ use super::{print, stop_on_signals, tell};
 /// Arguments of `wheeleg view`.
 #[derive(Debug, Args)]
 pub(super) struct ViewArgs {
-    /// A log, `log.mcap` of a run or of a recording; two are laid over each other.
+    /// A log, `log.mcap` of a run or of a recording; two are overlaid.
     #[arg(required = true, num_args = 1..=2, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Begin of the part to look at, in seconds of the log.
+    /// Start of the part to show, in seconds of the log.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     from: f64,
     /// Its end [default: that of the log].
@@ -26,7 +26,7 @@ pub(super) struct ViewArgs {
     /// `wheeleg channels` lists them.
     #[arg(long = "signal", value_name = "CHANNEL.FIELD")]
     signals: Vec<String>,
-    /// Robot by whose sizes it is drawn (built in, or path of a TOML file), instead of the log's.
+    /// Robot whose dimensions the drawing uses (built in, or path of a TOML file), instead of the log's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
     /// The page [default: beside the first log, log.html].

@@ -5,14 +5,19 @@ use wheeleg_units::PositionMm;
 use super::{Instant, SquareGait};
 use crate::contact::Side;
 use crate::layer1::CYCLE_US;
-use crate::setpoint::{Ahead, Cylinder};
+use crate::setpoint::{Cylinder, NextReference};
 
 impl SquareGait {
     /// Next move of a joint after `at`, if it begins within 254 cycles.
     ///
     /// For a square wave the reference jumps to the given value when the count
     /// runs out; for the push it begins to move towards it.
-    pub(super) fn ahead(&self, side: Side, cylinder: Cylinder, at: Instant) -> Option<Ahead> {
+    pub(super) fn ahead(
+        &self,
+        side: Side,
+        cylinder: Cylinder,
+        at: Instant,
+    ) -> Option<NextReference> {
         let p = &self.params;
         let up = PositionMm::ZERO;
         // The present step and the two after it: an alternating leg moves at
@@ -49,7 +54,7 @@ impl SquareGait {
                     .saturating_sub(at.elapsed_us);
                 if wait > 0 {
                     let cycles = u8::try_from(wait.div_ceil(CYCLE_US)).ok()?;
-                    return (cycles < u8::MAX).then_some(Ahead {
+                    return (cycles < u8::MAX).then_some(NextReference {
                         reference_mm,
                         cycles,
                     });

@@ -15,8 +15,8 @@ use crate::layer1::params::{STROKE_MM, in_stroke};
 use crate::layer1::units::metres;
 use crate::mirror;
 use crate::setpoint::{
-    APPROACH_MM, Acts, Ahead, Cylinder, Feedback, JointSetpoint, Landing, LegPlan, NO_GROUND,
-    OnLinkLoss, PRESS_MM,
+    APPROACH_MM, Acts, Cylinder, Feedback, JointSetpoint, Landing, LegPlan, NO_GROUND,
+    NextReference, OnLinkLoss, PRESS_MM,
 };
 
 /// A foot is clear of hard ground after half of the lift, or after so much of it, mm.
@@ -359,7 +359,7 @@ impl Leg {
         let rises = rises.filter(|cycles| (1..=ANNOUNCED).contains(cycles));
         let mut vertical = JointSetpoint {
             reference_mm: stroke_mm(height_mm),
-            ahead: rises.map(|cycles| Ahead {
+            ahead: rises.map(|cycles| NextReference {
                 reference_mm: stroke_mm(height_mm - lift_mm),
                 cycles,
             }),
