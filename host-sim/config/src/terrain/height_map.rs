@@ -29,7 +29,7 @@ struct Values {
 pub(super) fn height_map(
     r: &mut Reader,
     fields: &mut Fields<'_>,
-    files: &Files,
+    files: &Files<'_>,
 ) -> Option<Vec<Shape>> {
     let cell = length("cell", [1e-3, 1e3], "distance between neighbouring values");
     let scale = length("scale", [-1e3, 1e3], "height of one unit of the file");
