@@ -84,6 +84,11 @@ fn driven() -> Vec<Driven> {
         Box::new(LogError::output("read", path(), full())),
         file(),
     );
+    let unread = LogError::Read {
+        path: path(),
+        reason: full(),
+    };
+    add("LogError::Read", Box::new(unread), file());
     let mcap = || mcap::McapError::Io(full());
     add(
         "LogError::Log",

@@ -1,8 +1,19 @@
-//! A plant that leaves physics says so at once, with the variable that did.
+//! A plant that leaves physics says so at once: when, which part, what most likely did it, and what
+//! was last known of it.
 
+use std::fs;
+use std::ops::ControlFlow;
+
+use miette::Diagnostic as _;
+use wheeleg_config::{AxisConfig, LegChoice};
 use wheeleg_plant::robot::Inputs;
+use wheeleg_sim::SimError;
+use wheeleg_studies::axis_sim::suite::{AxisSimError, TestRig};
+use wheeleg_studies::axis_sim::{Kind, design, plant_check};
+use wheeleg_studies::run::run_read;
+use wheeleg_studies::study::Settings;
 
-use crate::sil::robot;
+use crate::sil::{gait, robot};
 
 /// A pressure that the supply cannot have made is none, long before it is a strange number.
 #[test]
@@ -19,4 +30,117 @@ fn four_times_the_supply_is_too_much() {
         .tick(&mut state, &Inputs::default())
         .expect_err("too much");
     assert!(error.to_string().contains("pressure_a_pa[2]"), "{error}");
+}
+
+/// A whole run of a robot whose pistons, once they slide, swing up in every step: bristles that no
+/// file may have on a leg so light.
+#[test]
+fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
+    let mut robot = robot();
+    robot.plant.step_ns = 1_000_000;
+    for cylinder in &mut robot.plant.cylinders {
+        cylinder.friction.bristle_damping_n_s_m = 2000.0;
+        cylinder.friction.viscous_n_s_m = 1000.0;
+    }
+    let scenario = gait(LegChoice::Left, 6.0, &[]);
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let finished = run_read(&scenario, &robot, 1, &Settings::new(&out)).expect("a run");
+    let failure = finished.result.failure.expect("it explodes");
+    println!("{failure}; {:?}", failure.help().map(|h| h.to_string()));
+    assert!(matches!(failure, SimError::Unphysical { .. }), "{failure}");
+    let (said, help) = (failure.to_string(), failure.help().expect("a cause"));
+    for part in [
+        "the plant left its range at ",
+        " s after power-up, in ",
+        "last sound values, at ",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let help = help.to_string();
+    assert!(
+        help.contains("most likely `") && help.contains("`numerics.step`"),
+        "{help}"
+    );
+    // At once: no run of six seconds, and no number that a reader would have to doubt.
+    let summary = &finished.result.summary;
+    assert_eq!(summary.failure.as_deref(), Some(&*said));
+    assert!(
+        !summary.complete && summary.simulated_s < 5.9,
+        "{} s",
+        summary.simulated_s
+    );
+    let kept = fs::read_to_string(out.join("summary.json")).expect("a summary");
+    let kept: serde_json::Value = serde_json::from_str(&kept).expect("JSON");
+    assert_eq!(kept["failure"], said);
+    let page = fs::read_to_string(&finished.report).expect("a page");
+    assert!(page.contains("the run failed; nothing is judged."));
+    // The log ends whole, with values of this world.
+    let (mut samples, mut worst) = (0, 0.0_f64);
+    let read = wheeleg_telemetry::read(&out.join("log.mcap"), &mut |logged| {
+        for name in ["pressure_a_bar", "pressure_b_bar"] {
+            worst = worst.max(logged.number(name).unwrap_or(0.0));
+        }
+        samples += 1;
+        ControlFlow::Continue(())
+    });
+    assert!(read.expect("a log").whole);
+    assert!(
+        samples > 0 && worst < 45.0,
+        "{samples} samples, {worst} bar"
+    );
+}
+
+/// The same of one cylinder: a hundred kilograms on a piston of 32 mm run through its stop or press
+/// the air before it to many times the supply. Every field is within its range.
+#[test]
+fn an_axis_that_explodes_names_time_cause_and_the_last_values() {
+    let text = include_str!("../../host-sim/axes/heavy-40x250.toml");
+    let heavy = crate::axis_text::changed(
+        text,
+        &[
+            ("cylinder.bore", 32.0, "mm"),
+            ("cylinder.rod", 8.0, "mm"),
+            ("cylinder.stroke", 80.0, "mm"),
+            ("cylinder.dead_volume_a", 1.6, "cm3"),
+            ("cylinder.dead_volume_b", 1.6, "cm3"),
+            ("friction.coulomb", 14.0, "N"),
+            ("friction.static", 21.0, "N"),
+            ("moving.mass", 100.0, "kg"),
+            ("start.stroke", 16.0, "mm"),
+            ("sensor.potentiometer.electrical_stroke", 88.0, "mm"),
+            ("sensor.potentiometer.offset", 4.0, "mm"),
+            ("line.volume", 0.3, "cm3"),
+        ],
+    );
+    let axis = AxisConfig::parse("heavy.toml", &heavy)
+        .expect("within all ranges")
+        .axis;
+    let told = |error: &AxisSimError| {
+        let AxisSimError::Unphysical { what, help } = error else {
+            panic!("another error: {error}");
+        };
+        for part in [
+            "within 1 ms of ",
+            " s: ",
+            "last sound values: stroke ",
+            " bar",
+        ] {
+            assert!(what.contains(part), "{part}: {what}");
+        }
+        assert!(!what.contains("..=") && what.len() < 400, "{what}");
+        assert!(help.contains("most likely `moving.mass`"), "{help}");
+    };
+    told(&plant_check::check(&axis).expect_err("it explodes"));
+    // A board that pushes it from stop to stop.
+    let mut rig = TestRig::new(&axis, &design(&axis, Kind::OnOff), 1).expect("a rig");
+    let ends = [0.079, 0.001];
+    let moved = ends
+        .iter()
+        .cycle()
+        .take(20)
+        .try_for_each(|to_m| rig.step(*to_m, 2.0).map(drop));
+    if let Err(error) = moved {
+        told(&error);
+    }
 }

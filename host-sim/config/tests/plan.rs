@@ -311,7 +311,7 @@ fn a_plan_may_stand_on_a_height_map() {
         let put = |name: &str, text: &str| {
             fs::write(folder.path().join(name), text).expect("written");
         };
-        let text = include_str!("../scenarios/height-map.toml");
+        let text = include_str!("../../scenarios/height-map.toml");
         put("ground/mine.toml", text);
         put("ground/height-map.csv", rows);
         put("plan.toml", &format!("{ON_A_MAP}\"ground/mine.toml\"\n"));

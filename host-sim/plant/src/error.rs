@@ -84,12 +84,13 @@ pub enum PlantError {
     Mechanics(String),
 }
 
-/// A value in few digits: one that has exploded has hundreds.
+/// A value in six digits: one that has exploded has hundreds.
 fn shown(value: f64) -> String {
-    if value == 0.0 || (1e-4..1e9).contains(&value.abs()) {
-        return value.to_string();
+    let short = format!("{value:.5e}");
+    match short.parse::<f64>() {
+        Ok(v) if v == 0.0 || (1e-4..1e9).contains(&v.abs()) => v.to_string(),
+        _ => short,
     }
-    format!("{value:.3e}")
 }
 
 /// Checks a parameter against its valid range; NaN is always outside.
@@ -138,7 +139,13 @@ mod tests {
         let said = check_state("velocity_m_s", 0, 1.5e60, -100.0, 100.0).expect_err("too fast");
         assert_eq!(
             said.to_string(),
-            "velocity_m_s[0] = 1.500e60 is outside -100 to 100: the plant state exploded"
+            "velocity_m_s[0] = 1.50000e60 is outside -100 to 100: the plant state exploded"
+        );
+        let said = check_state("stroke_m", 0, 0.011_030_916_378_739_838, -0.001, 0.011);
+        let said = said.expect_err("beyond its stop").to_string();
+        assert!(
+            said.starts_with("stroke_m[0] = 0.0110309 is outside -0.001 to 0.011:"),
+            "{said}"
         );
         let said = check("moving_mass_kg", 0.002, 0.01, 1000.0).expect_err("too light");
         assert_eq!(

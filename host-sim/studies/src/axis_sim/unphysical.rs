@@ -45,12 +45,13 @@ pub(super) fn tick(
 fn likely(name: &str) -> &'static str {
     match name {
         "bristle_m" => "`friction.bristle_damping`, `friction.bristle_stiffness`",
-        "stroke_m" => "`end_stop.stiffness`, `end_stop.damping`",
+        // What moves is too heavy for its stop, or for the air before the piston.
+        "stroke_m" => "`moving.mass`, `end_stop.stiffness`, `end_stop.damping`",
         "pressure_a_pa" | "mass_a_kg" => {
-            "`cylinder.dead_volume_a`, `line.volume`, `fill_valve.conductance`"
+            "`moving.mass`, `cylinder.dead_volume_a`, `line.volume`, `fill_valve.conductance`"
         }
         "pressure_b_pa" | "mass_b_kg" => {
-            "`cylinder.dead_volume_b`, `line.volume`, `fill_valve.conductance`"
+            "`moving.mass`, `cylinder.dead_volume_b`, `line.volume`, `fill_valve.conductance`"
         }
         "supply_pressure_pa" => "`supply.reservoir`, `regulator.conductance`",
         _ => "`friction.bristle_damping`, `end_stop.stiffness`, `moving.mass`",

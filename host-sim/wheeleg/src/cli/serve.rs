@@ -98,6 +98,7 @@ fn parse_speed(text: &str) -> Result<Speed, String> {
 pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let live = Live::load(&args.scenario, args.robot.as_deref())?;
+    stop.begin();
     let folder = keys::folder().map_err(refused)?;
     let open = if args.new_key {
         Keys::renew
