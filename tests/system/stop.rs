@@ -15,7 +15,7 @@ use crate::{cli, program};
 const HUNG: Duration = Duration::from_secs(120);
 
 /// A study in the folder `out`.
-fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> Child {
+pub(crate) fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> Child {
     Command::new(program::path())
         .args(arguments)
         .arg("--out")
@@ -48,7 +48,7 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
-fn end(mut child: Child) -> Output {
+pub(crate) fn end(mut child: Child) -> Output {
     let asked = Instant::now();
     while child.try_wait().expect("status").is_none() {
         if asked.elapsed() > HUNG {
@@ -284,7 +284,7 @@ fn every_long_command_can_be_stopped_at_any_time() {
 }
 
 /// Paths of all files below a folder, from it.
-fn files_below(folder: &Path) -> Vec<String> {
+pub(crate) fn files_below(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
@@ -339,7 +339,6 @@ fn a_folder_that_vanishes_in_the_first_milliseconds_costs_no_verdict() {
         let [told, said] = [&output.stdout, &output.stderr].map(|t| String::from_utf8_lossy(t));
         assert_eq!(output.status.code(), Some(2), "{delay_ms} ms: {said}");
         assert!(!said.contains("panicked"), "{delay_ms} ms: {said}");
-        assert!(said.contains(&*out.to_string_lossy().replace(' ', "")) || said.contains("out"));
         if told.contains("required targets met") {
             assert!(said.contains("log.mcap"), "{delay_ms} ms: {said}");
             lost += 1;
@@ -349,124 +348,6 @@ fn a_folder_that_vanishes_in_the_first_milliseconds_costs_no_verdict() {
         }
     }
     assert!(lost > 0, "no run outlived its folder");
-}
-
-/// A folder that nobody may write into, and one on a disk that is mounted to be read: refused by
-/// its name before anything is computed, and nothing in it changes. In a mount name space of its own.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
-    let dir = tempfile::tempdir().expect("temporary folder");
-    let log = dir.path().join("run/log.mcap");
-    let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
-    assert!(end(run).status.success());
-    let disk = dir.path().join("disk");
-    fs::create_dir(&disk).expect("created");
-    let log = log.to_string_lossy();
-    for (arguments, code) in [
-        (&["run", "three-step"][..], 2),
-        (&["tune", "bench-vq110u"], 2),
-        (&["compare", "--axis", "bench-vq110u", "--quick"], 2),
-        (&["delay"], 2),
-        (&["figures"], 2),
-        (&["field", "sand-flat"], 2),
-        (&["faults", "run", "--all"], 2),
-        (&["view", &log], 2),
-        (&["log", "recover", &log], 2),
-        (&["export", "parquet", &log], 2),
-        (&["export", "ros2", &log], 2),
-        (&["export", "urdf"], 2),
-        (&["plant", "export"], 2),
-        (&["campaign", "run", "three-step-spread"], 74),
-    ] {
-        let script = "mount -t tmpfs -o size=64k,ro tmpfs \"$1\" || exit 77\n\
-                      disk=\"$1\"; shift; exec \"$0\" \"$@\" --out \"$disk/out\"";
-        let begin = Instant::now();
-        let output = Command::new("unshare")
-            .args(["--mount", "--map-root-user", "bash", "-c", script])
-            .arg(program::path())
-            .arg(&disk)
-            .args(arguments)
-            .env("NO_COLOR", "1")
-            .output()
-            .expect("unshare of util-linux");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-        // Messages are wrapped to the width of a terminal.
-        let said = said.replace("\n  │ ", " ");
-        for word in ["disk/", "Read-only file system", "help: "] {
-            assert!(said.contains(word), "{arguments:?}, {word}: {said}");
-        }
-        let took = begin.elapsed();
-        assert!(
-            took < Duration::from_secs(30),
-            "{arguments:?} took {took:?}"
-        );
-    }
-    assert_eq!(files_below(&disk), [""; 0]);
-}
-
-/// The disk fills while other studies write: what is there is whole or named, and nothing claims
-/// to be done.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_disk_that_fills_under_any_study_is_told() {
-    let dir = tempfile::tempdir().expect("temporary folder");
-    let log = dir.path().join("run/log.mcap");
-    let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
-    assert!(end(run).status.success());
-    let disk = dir.path().join("disk");
-    fs::create_dir(&disk).expect("created");
-    let log = log.to_string_lossy();
-    let commands: [&[&str]; 7] = [
-        &["tune", "bench-vq110u"],
-        &["figures"],
-        &["view", &log],
-        &["log", "recover", &log],
-        &["export", "parquet", &log],
-        &["export", "ros2", &log],
-        &["export", "urdf"],
-    ];
-    let mut filled = 0;
-    for (number, kib) in [4, 12, 32, 64, 128, 256, 512, 1000, 2000, 4000]
-        .into_iter()
-        .enumerate()
-    {
-        for arguments in [commands[number % 7], commands[(number + 3) % 7]] {
-            // What is left is listed before it goes with the name space.
-            let script = format!(
-                "mount -t tmpfs -o size={kib}k tmpfs \"$1\" || exit 77\n\
-                 disk=\"$1\"; shift; \"$0\" \"$@\" --out \"$disk/out\"; code=$?\n\
-                 echo left: $(find \"$disk\" -type f) >&2; exit $code"
-            );
-            let output = Command::new("unshare")
-                .args(["--mount", "--map-root-user", "bash", "-c", &script])
-                .arg(program::path())
-                .arg(&disk)
-                .args(arguments)
-                .env("NO_COLOR", "1")
-                .output()
-                .expect("unshare of util-linux");
-            let said = String::from_utf8_lossy(&output.stderr);
-            let told = format!("{arguments:?} on {kib} KiB: {said}");
-            let full = said.contains("No space left on device");
-            let code = output.status.code().expect("a code");
-            assert_eq!(code == 2, full, "{code}: {told}");
-            assert!(matches!(code, 0..=2), "{code}: {told}");
-            let left = said.rsplit("left:").next().unwrap_or_default();
-            assert!(
-                !left.contains(".part") && !left.contains("recovered"),
-                "{told}"
-            );
-            if full {
-                filled += 1;
-                // The one file that was to be made is not there in part.
-                let single = ["view", "log"].contains(&arguments[0]) || arguments.contains(&"urdf");
-                assert!(!single || left.trim().is_empty(), "{told}");
-            }
-        }
-    }
-    assert!(filled >= 10, "{filled} of 20 filled their disk");
 }
 
 /// Both signals reach the program at once, before it could have ended by itself.

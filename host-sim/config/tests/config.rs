@@ -327,7 +327,7 @@ fn a_pure_number_is_told_without_a_unit() {
     let text = robot_with(ratio, &ratio.replace("1.4", "14.0"));
     assert_all(
         &text,
-        &["`gas.heat_capacity_ratio` = 14 is out of range: allowed 1 to 2 | "],
+        &["`gas.heat_capacity_ratio` = 14 is out of range: allowed 1.01 to 1.7 | "],
     );
     let text = robot_with("heat_capacity_ratio   =", "unknown               =");
     assert_all(&text, &["[gas] lacks heat_capacity_ratio | "]);

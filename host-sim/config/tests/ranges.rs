@@ -4,7 +4,9 @@
 mod common;
 
 use common::{assert_all, report};
-use wheeleg_config::{AxisConfig, ConfigError, ParameterInfo, RobotConfig, axis, builtin, pretty};
+use wheeleg_config::{
+    AxisConfig, ConfigError, Dimension, ParameterInfo, RobotConfig, axis, builtin, pretty,
+};
 use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Address;
 use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
@@ -132,12 +134,13 @@ fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
         }
     };
     // Those of the boards are above.
-    for p in plant.filter(|p| !p.path.starts_with("node.")) {
+    let yes_or_no = |p: &&ParameterInfo| p.dimension == Some(Dimension::Flag);
+    for p in plant.filter(|p| !p.path.starts_with("node.") && !yes_or_no(p)) {
         ensure(FIELD, p, &|text| RobotConfig::parse("my.toml", text).err());
     }
     for (_, file, text) in axis::AXES {
         let config = AxisConfig::parse(file, text).expect("built in");
-        for p in &config.parameters {
+        for p in config.parameters.iter().filter(|p| !yes_or_no(p)) {
             ensure(text, p, &|text| AxisConfig::parse("my.toml", text).err());
         }
     }
