@@ -362,3 +362,55 @@ fn a_pipe_that_nobody_writes_to_ends_with_the_first_signal() {
         assert!(!out.exists(), "{arguments:?}");
     }
 }
+
+/// The table of a campaign and its page take nobody's place: a file is set aside, what is no file is
+/// refused and stays.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_table_takes_no_place_of_a_file_or_a_pipe_unseen() {
+    use std::os::unix::fs::FileTypeExt as _;
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let plan = "name = \"short\"\nroot = 1\nlimit = \"0.05 s\"\n[base]\nscenario = \"stand\"\n";
+    fs::write(path("plan.toml"), plan).expect("written");
+    let (code, text) = said(&["campaign", "run", &path("plan.toml"), "--out", &path("out")]);
+    assert_eq!(code, Some(0), "{text}");
+    let merge = |name: &str| said(&["campaign", "merge", &path("out"), "--out", &path(name)]);
+
+    let made = std::process::Command::new("mkfifo")
+        .arg(path("pipe"))
+        .status();
+    assert!(made.expect("mkfifo").success());
+    let (code, text) = merge("pipe");
+    assert_eq!(code, Some(74), "{text}");
+    assert!(
+        text.contains("pipe") && text.contains("not a file"),
+        "{text}"
+    );
+    let about = fs::metadata(path("pipe")).expect("still there");
+    assert!(about.file_type().is_fifo());
+
+    for (write, name) in [("merge", "cases.parquet"), ("report", "page.html")] {
+        let out = path(name);
+        fs::write(&out, "mine").expect("written");
+        let give = || match write {
+            "merge" => merge(name),
+            _ => said(&["campaign", "report", &path("cases.parquet"), "--out", &out]),
+        };
+        let (code, text) = give();
+        assert_eq!(code, Some(0), "{write}: {text}");
+        let kept = fs::read_to_string(format!("{out}.previous"));
+        assert_eq!(kept.expect("set aside"), "mine", "{write}");
+        // The same once more is no change.
+        let before = fs::read(&out).expect("written");
+        assert_eq!(give().0, Some(0));
+        assert_eq!(fs::read(&out).expect("written"), before);
+        assert!(!Path::new(&format!("{out}.previous-2")).exists(), "{write}");
+    }
+    let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().contains("tmp");
+    let left = fs::read_dir(folder.path())
+        .expect("readable")
+        .flatten()
+        .filter(hidden);
+    assert_eq!(left.count(), 0);
+}

@@ -89,6 +89,7 @@ fn likely(name: &str, part: Part) -> &'static str {
         ("pressure_b_pa" | "mass_b_kg", _) => {
             "`cylinder.dead_volume_b`, `line.volume`, `fill_valve.conductance`"
         }
+        ("motor_current_a", _) => "`motor.resistance`, `motor.supply`",
         (_, Part::Joint(_)) => {
             "`friction.bristle_damping`, `end_stop.stiffness` or a mass of [link] that is too small"
         }
