@@ -170,7 +170,7 @@ fn run_with(
     // What is refused costs no earlier results, and leaves no folder.
     let scene = Scene::new(robot, scenario)?;
     if boards.are_here() {
-        Session::new(Boards::default(), scenario, robot, seed)?;
+        ensure_possible(scenario, robot, seed)?;
     }
     let job = Job::begin(&scenario.name, settings)?;
     announce(scenario.duration_s);
@@ -237,6 +237,13 @@ fn run_with(
         down_times: outcome.down_times,
     };
     Ok(report::write(job, &source, run, stopped))
+}
+
+/// Builds the robot for once. A simulated robot is large: this one is gone from the stack before
+/// the one that runs.
+#[inline(never)]
+fn ensure_possible(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Result<(), SimError> {
+    Session::new(Boards::default(), scenario, robot, seed).map(drop)
 }
 
 /// Longest run whose phases the page shows, s.
