@@ -102,7 +102,8 @@ fn a_disk_that_fills_under_any_study_is_told() {
                 .env("NO_COLOR", "1")
                 .output()
                 .expect("unshare of util-linux");
-            let said = String::from_utf8_lossy(&output.stderr);
+            // Messages are wrapped to the width of a terminal.
+            let said = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
             let told = format!("{arguments:?} on {kib} KiB: {said}");
             let full = said.contains("No space left on device");
             let code = output.status.code().expect("a code");

@@ -253,7 +253,7 @@ fn said(arguments: &[&str]) -> (Option<i32>, String) {
 const NO_PLACE: &str = "name = \"no-place\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
     duration = \"1 s\"\nseed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n[[terrain]]\n\
     kind = \"block\"\nx = { value = [-0.1, 0.1], unit = \"m\" }\n\
-    y = { value = [-1.0, 1.0], unit = \"m\" }\nheight = \"30 cm\"\n";
+    y = { value = [-1.0, 1.0], unit = \"m\" }\nheight = \"1 m\"\n";
 
 #[test]
 fn a_run_that_is_refused_leaves_no_folder_and_costs_no_earlier_results() {
