@@ -84,6 +84,11 @@ fn driven() -> Vec<Driven> {
         Box::new(LogError::output("read", path(), full())),
         file(),
     );
+    let unread = LogError::Read {
+        path: path(),
+        reason: full(),
+    };
+    add("LogError::Read", Box::new(unread), file());
     let mcap = || mcap::McapError::Io(full());
     add(
         "LogError::Log",
@@ -195,6 +200,11 @@ fn driven() -> Vec<Driven> {
         Box::new(AxisSimError::Plant(bore())),
         vec!["bore_m", "9"],
     );
+    let exploded = AxisSimError::Unphysical {
+        what: text(),
+        help: text(),
+    };
+    add("AxisSimError::Unphysical", Box::new(exploded), vec![]);
     let design = ConfigError::OutOfRange(JointParameter::Stroke);
     add(
         "AxisSimError::Design",
@@ -303,7 +313,7 @@ fn driven() -> Vec<Driven> {
 }
 
 /// Values as a program prints them for itself.
-const DEBUG: [&str; 7] = ["Some(", "None", "Ok(", "Err(", " { ", "::", "Error"];
+const DEBUG: [&str; 8] = ["Some(", "None", "Ok(", "Err(", " { ", "::", "..=", "Error"];
 
 #[test]
 fn every_error_has_a_code_its_subject_and_a_remedy_in_words() {

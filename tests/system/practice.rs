@@ -238,3 +238,179 @@ fn names_of_axes_are_checked_before_anything_is_played() {
         assert!(!out.exists());
     }
 }
+
+/// Runs a command with its arguments; exit code and what it says, without line breaks of a terminal.
+fn said(arguments: &[&str]) -> (Option<i32>, String) {
+    let mut command = Command::new(program::path());
+    command.env("NO_COLOR", "1").args(arguments);
+    let told = command.timeout(std::time::Duration::from_secs(60));
+    let told = told.output().expect("start");
+    let text = String::from_utf8_lossy(&[told.stderr, told.stdout].concat()).into_owned();
+    (told.status.code(), text.replace("\n  │ ", " "))
+}
+
+/// A scenario of the robot's that its plant refuses: a block stands where the robot does.
+const NO_PLACE: &str = "name = \"no-place\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
+    duration = \"1 s\"\nseed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n[[terrain]]\n\
+    kind = \"block\"\nx = { value = [-0.1, 0.1], unit = \"m\" }\n\
+    y = { value = [-1.0, 1.0], unit = \"m\" }\nheight = \"1 m\"\n";
+
+#[test]
+fn a_run_that_is_refused_leaves_no_folder_and_costs_no_earlier_results() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let scenario = folder.path().join("no-place.toml");
+    fs::write(&scenario, NO_PLACE).expect("written");
+    let out = folder.path().join("runs/out");
+    let run = || {
+        let (code, text) = said(&[
+            "run",
+            &scenario.to_string_lossy(),
+            "--out",
+            &out.to_string_lossy(),
+        ]);
+        assert_eq!(code, Some(2), "{text}");
+        assert!(
+            text.contains("does not stand") && text.contains("help: "),
+            "{text}"
+        );
+    };
+    run();
+    assert!(!folder.path().join("runs").exists());
+    fs::create_dir_all(&out).expect("created");
+    fs::write(out.join("summary.json"), "earlier").expect("written");
+    run();
+    let kept = fs::read_to_string(out.join("summary.json"));
+    assert_eq!(kept.expect("kept"), "earlier");
+    let left = fs::read_dir(&out).expect("readable").count();
+    assert_eq!(left, 1, "nothing beside it");
+}
+
+/// Pipes that nobody writes to, devices without an end and folders, in the place of a log: refused at
+/// once, by name, with what to give instead.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_no_file_is_no_log() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let pipe = path("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("mkfifo").success());
+    let out = path("out");
+    let missing = path("missing.mcap");
+    let empty = path("empty");
+    fs::create_dir(&empty).expect("created");
+    for log in [&pipe, &missing, &empty, "/dev/zero", "/dev/null"] {
+        for command in [
+            &["view"][..],
+            &["log", "recover"],
+            &["export", "parquet"],
+            &["export", "ros2"],
+        ] {
+            let (code, text) = said(&[command, &[log, "--out", &out]].concat());
+            assert_eq!(code, Some(2), "{command:?} {log}: {text}");
+            for part in [log, "log.mcap"] {
+                assert!(text.contains(part), "{command:?} {log}: {text}");
+            }
+            assert!(!Path::new(&out).exists(), "{command:?} {log}");
+        }
+    }
+    let mut left: Vec<_> = fs::read_dir(folder.path())
+        .expect("readable")
+        .flatten()
+        .collect();
+    left.retain(|entry| {
+        ![path("pipe"), path("empty")].contains(&entry.path().to_string_lossy().into_owned())
+    });
+    assert!(left.is_empty(), "{left:?}");
+}
+
+/// A scenario may come from a pipe. One that nobody writes to is waited for until a signal comes,
+/// and then at once.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pipe_that_nobody_writes_to_ends_with_the_first_signal() {
+    use std::os::unix::process::ExitStatusExt as _;
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let pipe = folder.path().join("pipe.toml");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("mkfifo").success());
+    let out = folder.path().join("out");
+    for arguments in [&["run"][..], &["tune"], &["campaign", "run"], &["serve"]] {
+        let mut command = std::process::Command::new(program::path());
+        command.args(arguments).arg(&pipe);
+        if arguments != ["serve"] {
+            command.arg("--out").arg(&out);
+        }
+        let mut child = command.spawn().expect("start");
+        std::thread::sleep(std::time::Duration::from_millis(400));
+        let sent = std::process::Command::new("kill")
+            .args(["-TERM", &child.id().to_string()])
+            .status();
+        assert!(sent.expect("kill").success());
+        let begin = std::time::Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().expect("status") {
+                break status;
+            }
+            if begin.elapsed().as_secs() > 20 {
+                let _ = child.kill();
+                panic!("{arguments:?} still waits");
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        };
+        assert_eq!(status.signal(), Some(15), "{arguments:?}: {status}");
+        assert!(!out.exists(), "{arguments:?}");
+    }
+}
+
+/// The table of a campaign and its page take nobody's place: a file is set aside, what is no file is
+/// refused and stays.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_table_takes_no_place_of_a_file_or_a_pipe_unseen() {
+    use std::os::unix::fs::FileTypeExt as _;
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let plan = "name = \"short\"\nroot = 1\nlimit = \"0.05 s\"\n[base]\nscenario = \"stand\"\n";
+    fs::write(path("plan.toml"), plan).expect("written");
+    let (code, text) = said(&["campaign", "run", &path("plan.toml"), "--out", &path("out")]);
+    assert_eq!(code, Some(0), "{text}");
+    let merge = |name: &str| said(&["campaign", "merge", &path("out"), "--out", &path(name)]);
+
+    let made = std::process::Command::new("mkfifo")
+        .arg(path("pipe"))
+        .status();
+    assert!(made.expect("mkfifo").success());
+    let (code, text) = merge("pipe");
+    assert_eq!(code, Some(74), "{text}");
+    assert!(
+        text.contains("pipe") && text.contains("not a file"),
+        "{text}"
+    );
+    let about = fs::metadata(path("pipe")).expect("still there");
+    assert!(about.file_type().is_fifo());
+
+    for (write, name) in [("merge", "cases.parquet"), ("report", "page.html")] {
+        let out = path(name);
+        fs::write(&out, "mine").expect("written");
+        let give = || match write {
+            "merge" => merge(name),
+            _ => said(&["campaign", "report", &path("cases.parquet"), "--out", &out]),
+        };
+        let (code, text) = give();
+        assert_eq!(code, Some(0), "{write}: {text}");
+        let kept = fs::read_to_string(format!("{out}.previous"));
+        assert_eq!(kept.expect("set aside"), "mine", "{write}");
+        // The same once more is no change.
+        let before = fs::read(&out).expect("written");
+        assert_eq!(give().0, Some(0));
+        assert_eq!(fs::read(&out).expect("written"), before);
+        assert!(!Path::new(&format!("{out}.previous-2")).exists(), "{write}");
+    }
+    let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().contains("tmp");
+    let left = fs::read_dir(folder.path())
+        .expect("readable")
+        .flatten()
+        .filter(hidden);
+    assert_eq!(left.count(), 0);
+}

@@ -155,3 +155,66 @@ fn a_full_disk_ends_the_recording_is_told_and_the_robot_goes_on() {
     assert_eq!(code, Some(0), "{told}");
     assert_eq!(told["same"], true, "{told}");
 }
+
+/// What the command line gives of a wrong command is told whole, and takes the control from nobody.
+#[test]
+fn a_wrong_command_is_told_with_every_value_and_range() {
+    let served = Served::new("");
+    let long = "x".repeat(5000);
+    for (arguments, code, parts) in [
+        (
+            &["take", "--", "Walk", "speed=30", "pattern=trot"][..],
+            1,
+            &[
+                "`pattern` is \"trot\"; allowed: alternate, tandem",
+                "`turn` is missing",
+                "`nose` is missing",
+            ][..],
+        ),
+        (
+            &["take", "--", "SetGait", "push=-1"],
+            1,
+            &["`push` is -1; allowed: 0 to 60 s"],
+        ),
+        (
+            &[
+                "take",
+                "--",
+                "JointReference",
+                "joint=3",
+                "joint=4",
+                "stroke=10",
+            ],
+            2,
+            &["`joint` is given twice"],
+        ),
+        (
+            &["take", "--", &long],
+            2,
+            &["5002 bytes", "allowed are 3840"],
+        ),
+        (&["inject", &long], 2, &["bytes: allowed are 3840"]),
+        (
+            &["inject", "bogus@0s"],
+            1,
+            &["\"bogus@0s\"", "write \"bogus\""],
+        ),
+        (
+            &["inject", "pot-open:joint9"],
+            1,
+            &["`:joint1` to `:joint6`"],
+        ),
+        (&["speed", "50"], 2, &["'50'", "0.1 to 10"]),
+        (&["speed", "-1"], 2, &["'-1'", "0.1 to 10"]),
+        (&["speed", "nan"], 2, &["'nan'", "0.1 to 10"]),
+    ] {
+        let output = served.ctl(arguments);
+        let said = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
+        for part in parts {
+            assert!(said.contains(part), "{arguments:?}: no {part} in {said}");
+        }
+        assert_eq!(served.state()["control"], Value::Null, "{arguments:?}");
+    }
+    assert_eq!(served.end("TERM").0, Some(143));
+}

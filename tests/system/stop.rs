@@ -15,7 +15,7 @@ use crate::{cli, program};
 const HUNG: Duration = Duration::from_secs(120);
 
 /// A study in the folder `out`.
-fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> Child {
+pub(crate) fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> Child {
     Command::new(program::path())
         .args(arguments)
         .arg("--out")
@@ -48,7 +48,7 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
-fn end(mut child: Child) -> Output {
+pub(crate) fn end(mut child: Child) -> Output {
     let asked = Instant::now();
     while child.try_wait().expect("status").is_none() {
         if asked.elapsed() > HUNG {
@@ -221,7 +221,10 @@ fn every_long_command_can_be_stopped_at_any_time() {
     let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
     assert!(end(run).status.success());
     let log = log.to_string_lossy();
-    let commands: [&[&str]; 8] = [
+    let commands: [&[&str]; 11] = [
+        &["field", "sand-flat"],
+        &["export", "parquet", &log],
+        &["export", "ros2", &log],
         &["compare", "--axis", "bench-vq110u", "--quick"],
         &["delay"],
         &["faults", "run", "--all"],
@@ -233,7 +236,7 @@ fn every_long_command_can_be_stopped_at_any_time() {
     ];
     let signals = [("TERM", 143), ("HUP", 129), ("INT", 130)];
     let mut stopped = 0;
-    for instant in 0..20 {
+    for instant in 0..22 {
         let arguments = commands[instant % commands.len()];
         let (name, code) = signals[instant % signals.len()];
         let folder = tempfile::tempdir().expect("temporary folder");
@@ -264,19 +267,24 @@ fn every_long_command_can_be_stopped_at_any_time() {
         );
         assert!(!stderr.contains("panicked"), "{told}");
         stopped += u32::from(ended == expected);
-        let half = |file: &&String| file.contains(".tmp") || file.contains("recovered");
+        let half = |file: &&String| {
+            ["tmp", "recovered", ".part"]
+                .iter()
+                .any(|end| file.contains(end))
+        };
         let half: Vec<&String> = left.iter().filter(half).collect();
         assert!(half.is_empty() || ended == 0, "{half:?}, {told}");
-        if !campaign && out.is_dir() {
+        let study = !campaign && arguments[0] != "export";
+        if study && out.is_dir() {
             assert_valid(&summary(&out), arguments[0]);
             assert!(out.join("report.html").exists(), "{told}");
         }
     }
-    assert!(stopped >= 8, "{stopped} of 20 were stopped on their way");
+    assert!(stopped >= 8, "{stopped} of 22 were stopped on their way");
 }
 
 /// Paths of all files below a folder, from it.
-fn files_below(folder: &Path) -> Vec<String> {
+pub(crate) fn files_below(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
@@ -312,6 +320,34 @@ fn a_folder_that_vanishes_costs_no_verdict() {
         said.contains("summary.json") && !said.contains("panicked"),
         "{said}"
     );
+}
+
+/// It goes as soon as it is there: whatever of it is made anew, the verdict is told, and that the
+/// log is gone.
+#[test]
+fn a_folder_that_vanishes_in_the_first_milliseconds_costs_no_verdict() {
+    let mut lost = 0;
+    for delay_ms in [0, 1, 3, 10, 30] {
+        let dir = tempfile::tempdir().expect("temporary folder");
+        let out = dir.path().join("out");
+        let mut child = start(&out, &["run", "three-step"], Stdio::piped);
+        wait_until(&mut child, "the folder", || out.join(".lock").exists());
+        std::thread::sleep(Duration::from_millis(delay_ms));
+        // A file that appears meanwhile keeps a folder.
+        while out.exists() && fs::remove_dir_all(&out).is_err() {}
+        let output = end(child);
+        let [told, said] = [&output.stdout, &output.stderr].map(|t| String::from_utf8_lossy(t));
+        assert_eq!(output.status.code(), Some(2), "{delay_ms} ms: {said}");
+        assert!(!said.contains("panicked"), "{delay_ms} ms: {said}");
+        if told.contains("required targets met") {
+            assert!(said.contains("log.mcap"), "{delay_ms} ms: {said}");
+            lost += 1;
+        } else {
+            // It could not even begin, and says of which file.
+            assert!(said.contains("cannot "), "{delay_ms} ms: {said}");
+        }
+    }
+    assert!(lost > 0, "no run outlived its folder");
 }
 
 /// Both signals reach the program at once, before it could have ended by itself.

@@ -15,6 +15,8 @@ mod compare;
 mod control_bars;
 mod cylinders;
 mod delay;
+#[cfg(target_os = "linux")]
+mod disks;
 mod errors;
 mod explosion;
 mod fault_matrix;

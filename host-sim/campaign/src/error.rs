@@ -121,6 +121,10 @@ impl From<ConfigError> for CampaignError {
 
 impl From<StudyError> for CampaignError {
     fn from(e: StudyError) -> Self {
-        Self::Study(Box::new(e))
+        match e {
+            // Its exit code is that of a file that cannot be written.
+            StudyError::Report(e) => Self::from(e),
+            other => Self::Study(Box::new(other)),
+        }
     }
 }

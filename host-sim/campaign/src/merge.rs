@@ -1,7 +1,10 @@
 //! One table of all parts.
 
 use std::fs::File;
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
+
+use wheeleg_studies::export::make_room;
 
 use crate::columns::{Columns, FACT};
 use crate::part::{PLAN, PROGRAM};
@@ -69,6 +72,11 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
         [&plan_text, &first.plan().program],
     )
     .and_then(|merged| {
+        if is_same(&temporary, out) {
+            let _ = std::fs::remove_file(&temporary);
+            return Ok(merged);
+        }
+        make_room(out)?;
         let renamed = std::fs::rename(&temporary, out);
         renamed.map_err(|e| CampaignError::output("write", out, e))?;
         Ok(merged)
@@ -77,6 +85,23 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
         let _ = std::fs::remove_file(&temporary);
     }
     result
+}
+
+/// Whether two files have the same bytes; false where one cannot be read.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let open = |path: &Path| {
+        let about = std::fs::metadata(path)
+            .ok()
+            .filter(std::fs::Metadata::is_file)?;
+        Some((about.len(), BufReader::new(File::open(path).ok()?)))
+    };
+    let (Some((a_len, a)), Some((b_len, b))) = (open(one), open(other)) else {
+        return false;
+    };
+    a_len == b_len
+        && a.bytes()
+            .zip(b.bytes())
+            .all(|(a, b)| a.is_ok_and(|a| b.is_ok_and(|b| a == b)))
 }
 
 /// Which of the folders has the part of each block.

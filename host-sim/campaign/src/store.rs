@@ -17,7 +17,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use wheeleg_config::plan::{Plan, Sources};
+use wheeleg_config::plan::{Plan, Sources, Text};
 
 use crate::part::NotAPart;
 use crate::row::Row;
@@ -114,6 +114,7 @@ impl PlanFile {
                 plan,
                 scenarios,
                 robots,
+                data,
                 ..
             } = of.sources.clone();
             let named = scenarios
@@ -121,9 +122,17 @@ impl PlanFile {
                 .map(|(n, t)| (format!("scenario {n}"), t));
             let robots = robots.into_iter().map(|(n, t)| (format!("robot {n}"), t));
             let plan = [("plan".to_owned(), plan)];
+            let files = data.into_iter().flat_map(|(scenario, files)| {
+                files.into_iter().map(move |(file, data)| {
+                    let text = data.digest();
+                    let name = format!("data file {file} of the scenario {scenario}");
+                    (name, Text { file, text })
+                })
+            });
             plan.into_iter()
                 .chain(named)
                 .chain(robots)
+                .chain(files)
                 .collect::<Vec<_>>()
         };
         if self.program != other.program {
@@ -168,6 +177,14 @@ fn hash(sources: &Sources, block: u64) -> String {
             add(kind);
             add(name);
             add(&source.text);
+        }
+    }
+    for (scenario, files) in &sources.data {
+        for (name, data) in files {
+            add("data");
+            add(scenario);
+            add(name);
+            add(&data.digest());
         }
     }
     hasher.finalize().to_hex()[..32].to_owned()

@@ -244,6 +244,7 @@ fn check_relations(r: &mut Reader, axis: &AxisParams) {
         cylinder.initial_pressure_b_pa,
     ];
     relations::check_start(r, "start", start_pa, axis.supply.set_pressure_pa);
+    relations::check_start_stroke(r, "start", axis.initial_stroke_m, cylinder.stroke_m);
     let step_s = axis.step_ns as f64 * 1e-9;
     relations::check_supply(r, &axis.supply, &axis.gas, step_s);
     let moved = Moved {

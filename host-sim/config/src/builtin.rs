@@ -137,6 +137,14 @@ pub fn scenario_on_ground(name: &str, seed: u64) -> Result<Scenario, ConfigError
     parse_built_in(&file, &text)
 }
 
+/// Where the data files of a scenario are, by its name or path and the name of its file.
+pub(crate) fn files_of(name_or_path: &str, file: &str) -> Files<'static> {
+    match SCENARIOS.iter().any(|(name, ..)| *name == name_or_path) {
+        true => Files::BuiltIn(DATA),
+        false => Files::beside(file),
+    }
+}
+
 fn parse_built_in(file: &str, text: &str) -> Result<Scenario, ConfigError> {
     let read = Scenario::parse_with(file, text, &Files::BuiltIn(DATA));
     read.map(|(scenario, _)| scenario)

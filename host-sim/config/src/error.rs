@@ -72,7 +72,7 @@ impl Problem {
             message: shortened(message),
             label: label.into(),
             span: shown.then_some(span),
-            help,
+            help: help.map(shortened),
         }
     }
 
@@ -82,10 +82,10 @@ impl Problem {
             source: None,
             file: file.to_owned(),
             line: None,
-            message,
+            message: shortened(message),
             label: String::new(),
             span: None,
-            help,
+            help: help.map(shortened),
         }
     }
 

@@ -137,6 +137,11 @@ fn check_relations(r: &mut Reader, plant: &PlantParams) {
         let section = format!("start.{name}");
         relations::check_start(r, &section, start_pa, plant.supply.set_pressure_pa);
     }
+    for (i, name) in ["yaw", "horizontal", "vertical"].iter().enumerate() {
+        let (start_m, stroke_m) = (plant.initial_stroke_m[i], plant.cylinders[i].stroke_m);
+        relations::check_start_stroke(r, &format!("start.{name}"), start_m, stroke_m);
+    }
+    relations::check_contacts(r, &plant.contacts);
     let step_s = plant.step_ns as f64 * 1e-9;
     relations::check_supply(r, &plant.supply, &plant.gas, step_s);
     // The vertical cylinder moves the least: its rod.

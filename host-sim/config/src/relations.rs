@@ -9,6 +9,11 @@
 //! | a chamber outlasts its stop | bore, dead volume, end stop, supply | volume > 0 at twice the static depth |
 //! | break-away holds what slides | static and Coulomb friction | Stribeck curve falls |
 //! | air comes from the supply | start pressures, set pressure | |
+//! | a piston starts in its cylinder | start stroke, stroke | |
+//! | what sticks holds what slides | static and kinetic friction of each contact | |
+//! | a sole holds its spheres | radii of sole and sphere | |
+//! | a box has a size | its corners | |
+//! | a leg closes its loop | crank, p4, joint lengths, start stroke | geometry |
 //! | a body can have its inertias | three of a body | triangle inequality |
 //! | the ground is below | gravity | |
 //!
@@ -22,6 +27,7 @@
 //! ```
 
 use wheeleg_plant::PlantError;
+use wheeleg_plant::body::RobotContacts;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
 use wheeleg_plant::flow::GasParams;
 use wheeleg_plant::supply::SupplyParams;
@@ -285,6 +291,68 @@ pub(crate) fn check_start(r: &mut Reader, section: &str, pressures_pa: [f64; 2],
     }
 }
 
+/// A piston starts between the stops.
+pub(crate) fn check_start_stroke(r: &mut Reader, section: &str, start_m: f64, stroke_m: f64) {
+    if start_m <= stroke_m * (1.0 + 1e-9) {
+        return;
+    }
+    r.contradiction(
+        &[&format!("{section}.stroke"), "cylinder.stroke"],
+        "the piston starts beyond its stop",
+        &format!(
+            "allowed up to {} mm, which is `cylinder.stroke`",
+            pretty(stroke_m * 1e3)
+        ),
+    );
+}
+
+/// What the soles, the wheels and the chassis touch the ground with.
+pub(crate) fn check_contacts(r: &mut Reader, contacts: &RobotContacts) {
+    let RobotContacts {
+        foot,
+        wheel,
+        chassis,
+    } = contacts;
+    for (section, law) in [
+        ("contact", &foot.law),
+        ("wheel_contact", &wheel.law),
+        ("chassis_contact", &chassis.law),
+    ] {
+        if law.mu_kinetic > law.mu_static {
+            r.contradiction(
+                &[
+                    &format!("{section}.mu_kinetic"),
+                    &format!("{section}.mu_static"),
+                ],
+                "what slides would hold more than what sticks",
+                &format!(
+                    "allowed from 0 to {}, which is `{section}.mu_static`",
+                    pretty(law.mu_static)
+                ),
+            );
+        }
+    }
+    if foot.sphere_radius_m > foot.sole_radius_m {
+        r.contradiction(
+            &["contact.sphere_radius", "contact.sole_radius"],
+            "the spheres reach beyond the sole that they are part of",
+            &format!(
+                "allowed up to {} mm, which is `contact.sole_radius`",
+                pretty(foot.sole_radius_m * 1e3)
+            ),
+        );
+    }
+    let corners = chassis.from_m.iter().zip(&chassis.to_m);
+    if corners.into_iter().any(|(from, to)| from > to) {
+        r.contradiction(
+            &["chassis_contact.from", "chassis_contact.to"],
+            "the corners make no box",
+            "each value of `from` is at most that of `to`: rear to front, right to left, lower to \
+             upper",
+        );
+    }
+}
+
 /// Of the three principal inertias of a body none exceeds the sum of the others: each is a
 /// sum of two of ∫x² dm, ∫y² dm, ∫z² dm.
 pub(crate) fn check_inertias(r: &mut Reader, fields: &[&str], inertia_kg_m2: [f64; 3]) {
@@ -318,16 +386,33 @@ pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
             max,
         } => {
             let field = r.listed(name).unwrap_or_else(|| name.to_owned());
+            // In the unit of the file, where the field is one of it.
+            let (factor, unit) = r.unit_of(&field).unwrap_or((1.0, "in SI units".to_owned()));
             r.contradiction(
                 &[&field],
-                &format!("the plant refuses {name} = {}", pretty(value)),
                 &format!(
-                    "allowed from {} to {}, in SI units",
-                    pretty(min),
-                    pretty(max)
+                    "with the other values of this file {} is too much or too little",
+                    brief(value / factor)
+                ),
+                &format!(
+                    "allowed with the masses, sizes and step of this file: {} to {} {unit}",
+                    pretty(min / factor),
+                    pretty(max / factor)
                 ),
             );
         }
+        PlantError::Mechanics(why) => r.contradiction(
+            &[
+                "body.crank",
+                "body.p4",
+                "body.stroke_zero",
+                "start.yaw.stroke",
+                "body.min_cos_theta3",
+            ],
+            &format!("they make no leg ({why})"),
+            "a yaw cylinder of `body.stroke_zero` + `start.yaw.stroke` closes a triangle with \
+             `body.crank`, which is the shorter, and `body.p4`",
+        ),
         other => r.problem(
             None,
             format!("the plant cannot be built: {other}"),

@@ -166,7 +166,7 @@ impl Scenario {
     pub(crate) fn parse_with(
         file: &str,
         text: &str,
-        files: &Files,
+        files: &Files<'_>,
     ) -> Result<(Self, Vec<ParameterInfo>), ConfigError> {
         let what = format!("the scenario file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
@@ -175,7 +175,7 @@ impl Scenario {
     }
 }
 
-fn read(r: &mut Reader, files: &Files) -> Option<Scenario> {
+fn read(r: &mut Reader, files: &Files<'_>) -> Option<Scenario> {
     let top = r.table("")?;
     r.reject_unknown(&top, &TOP);
     let name = r.name(&top, "name");

@@ -327,7 +327,7 @@ fn a_pure_number_is_told_without_a_unit() {
     let text = robot_with(ratio, &ratio.replace("1.4", "14.0"));
     assert_all(
         &text,
-        &["`gas.heat_capacity_ratio` = 14 is out of range: allowed 1 to 2 | "],
+        &["`gas.heat_capacity_ratio` = 14 is out of range: allowed 1.01 to 1.7 | "],
     );
     let text = robot_with("heat_capacity_ratio   =", "unknown               =");
     assert_all(&text, &["[gas] lacks heat_capacity_ratio | "]);
@@ -502,6 +502,11 @@ fn scenario_mistakes() {
 
     let text = scenario_with("value = 10.0, unit = \"s\"", "value = 0.0, unit = \"s\"");
     assert_all(&text, &["`duration` = 0 s", "0.01 to 9000000 s"]);
+    for negative in ["-1.0", "-1e308", "-0.0"] {
+        let value = format!("value = {negative}, unit = \"s\"");
+        let text = scenario_with("value = 10.0, unit = \"s\"", &value);
+        assert_all(&text, &["my.toml:", "`duration` = ", "0.01 to 9000000 s"]);
+    }
 
     let service = "targets = \"none\"\n[[events]]\nat = { value = 1.0, unit = \"s\" }\n\
                    action = \"command\"\ncommand = \"WriteParameter\"\nboard = 1\n\
@@ -652,7 +657,7 @@ fn a_name_is_one_part_of_a_path_and_no_way_out_of_its_folder() {
     };
     let long = "x".repeat(300);
     for bad in [
-        "", ".", "..", "../../x", "a/b", "a\\b", ".x", "a b", "ä", "a\nb", &long,
+        "", ".", "..", "../../x", "a/b", "a\\b", ".x", "a b", "ä", "a\nb", "-x", "--help", &long,
     ] {
         let said = [
             report(&RobotConfig::parse("my.toml", &named(ROBOT, bad)).expect_err(bad)),
@@ -668,7 +673,7 @@ fn a_name_is_one_part_of_a_path_and_no_way_out_of_its_folder() {
         }
     }
     let longest = "x".repeat(64);
-    for good in ["a", "My_axis-2.b", "0", "-", &longest] {
+    for good in ["a", "My_axis-2.b", "0", "_-", "con", &longest] {
         let scenario = Scenario::parse("my.toml", &named(SCENARIO, good)).expect(good);
         assert_eq!(scenario.name, good);
     }
@@ -695,6 +700,21 @@ fn of_very_many_problems_the_first_twenty_are_shown() {
         .expect("problems")
         .count();
     assert_eq!(shown, 20);
+}
+
+/// What a file quotes of itself may be long; what is said of it is not.
+#[test]
+fn what_is_said_is_short_however_long_the_value_is() {
+    let long = "q".repeat(100_000);
+    for text in [
+        format!("{long} = 1\n{SCENARIO}"),
+        SCENARIO.replacen("seed = 1", &format!("seed = 1{}", "0".repeat(100_000)), 1),
+        SCENARIO.replacen("seed = 1", &format!("seed = 1\nfaults = [\"{long}\"]"), 1),
+        format!("{SCENARIO}\n[behaviours]\noff = [\"{long}\"]\n"),
+    ] {
+        let said = report(&Scenario::parse("my.toml", &text).expect_err("must be rejected"));
+        assert!(said.len() < 8000, "{} bytes", said.len());
+    }
 }
 
 /// Every seed that the command line takes; TOML has numbers for half of them.

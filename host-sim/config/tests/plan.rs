@@ -289,3 +289,56 @@ fn a_plan_needs_its_head() {
     let error = Plan::of(missing).expect_err("no such scenario");
     assert!(format!("{:?}", error.problems()).contains("three-steps"));
 }
+
+const ON_A_MAP: &str = "name = \"test\"\nroot = 1\n[base]\nscenario = ";
+
+/// A plan holds the table of heights that its scenario stands on, beside the texts.
+#[test]
+fn a_plan_may_stand_on_a_height_map() {
+    let built_in = Plan::of(sources(&format!("{ON_A_MAP}\"height-map\"\n"))).expect("usable");
+    let resolve = |plan: &Plan| {
+        let resolver = Resolver::new(plan).expect("read");
+        resolver.resolve(&[]).expect("a case")
+    };
+    let ground = resolve(&built_in).scenario.ground;
+    let own = wheeleg_config::builtin::scenario("height-map").expect("built in");
+    assert_eq!(ground.fingerprint(), own.ground.fingerprint());
+
+    // A scenario of one's own: the map lies beside it, and is needed no more once the plan is read.
+    let with_map = |rows: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::create_dir(folder.path().join("ground")).expect("created");
+        let put = |name: &str, text: &str| {
+            fs::write(folder.path().join(name), text).expect("written");
+        };
+        let text = include_str!("../../scenarios/height-map.toml");
+        put("ground/mine.toml", text);
+        put("ground/height-map.csv", rows);
+        put("plan.toml", &format!("{ON_A_MAP}\"ground/mine.toml\"\n"));
+        let plan = folder.path().join("plan.toml");
+        Sources::load(&plan.to_string_lossy())
+    };
+    let level = "0,0,0\n0,0,0\n0,0,0\n";
+    let sources = with_map(level).expect("read");
+    let json = serde_json::to_string(&sources).expect("JSON");
+    let again: Sources = serde_json::from_str(&json).expect("the same");
+    assert_eq!(again, sources);
+    let level = resolve(&Plan::of(again).expect("usable"));
+    // Another map of the same name is another case.
+    let other = with_map("0,0,0\n0,0,0\n0,0,0.01\n").expect("read");
+    let other = resolve(&Plan::of(other).expect("usable"));
+    assert_ne!(level.scenario_json, other.scenario_json);
+
+    // A wrong one is told as in a run: with the scenario's file, line and field.
+    let wrong = with_map("0,x\n").and_then(Plan::of).expect_err("no number");
+    let said = format!("{:?}", miette::Report::new(wrong));
+    for part in ["mine.toml:", "`terrain[0].file`", "row 1, column 2"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let gone = Sources {
+        data: BTreeMap::new(),
+        ..sources
+    };
+    let error = Plan::of(gone).expect_err("without its map");
+    assert!(format!("{:?}", error.problems()).contains("does not hold this file"));
+}

@@ -4,7 +4,9 @@
 mod common;
 
 use common::{assert_all, report};
-use wheeleg_config::{RobotConfig, builtin, pretty};
+use wheeleg_config::{
+    AxisConfig, ConfigError, Dimension, ParameterInfo, RobotConfig, axis, builtin, pretty,
+};
 use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Address;
 use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS};
@@ -78,4 +80,69 @@ fn file_board_listing_and_refusals_have_the_same_range() {
         }
     }
     assert!(edges > 100, "{edges}");
+}
+
+/// A file with the value of one parameter changed.
+fn with(text: &str, parameter: &ParameterInfo, value: f64) -> Option<String> {
+    let (section, key) = parameter.path.rsplit_once('.')?;
+    let begin = text.find(&format!("\n[{section}]\n"))?;
+    let line = text[begin..].lines().skip(2).find(|line| {
+        let (name, _) = line.split_once('=').unwrap_or_default();
+        name.trim() == key
+    })?;
+    let at = begin + text[begin..].find(line)?;
+    let numbers = vec![format!("{value:?}"); parameter.value.len()].join(", ");
+    let value = match parameter.value.len() {
+        1 => numbers,
+        _ => format!("[{numbers}]"),
+    };
+    let unit = &parameter.unit;
+    let field = format!("{key} = {{ value = {value}, unit = \"{unit}\", source = \"ASSUMED\" }}");
+    let mut changed = text.to_owned();
+    changed.replace_range(at..at + line.len(), &field);
+    Some(changed)
+}
+
+/// At the ends of its range a parameter is accepted, or contradicts others, which are named. What
+/// the plant has ranges for, too, never comes out as its own refusal.
+#[test]
+fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
+    const FIELD: &str = include_str!("../../robots/wheeleg-field.toml");
+    let robot = builtin::robot("wheeleg-field").expect("built in");
+    let plant = robot.parameters.iter();
+    let mut tried = 0;
+    let mut ensure = |text: &str, p: &ParameterInfo, read: &dyn Fn(&str) -> Option<ConfigError>| {
+        for limit in [p.min, p.max] {
+            let Some(changed) = with(text, p, limit) else {
+                continue;
+            };
+            tried += 1;
+            let Some(error) = read(&changed) else {
+                continue;
+            };
+            for problem in error.problems() {
+                let said = problem.to_string();
+                let named = said.split('`').nth(1).unwrap_or_default();
+                let section = named.split('.').next().unwrap_or_default();
+                assert!(
+                    text.contains(&format!("\n[{section}")),
+                    "{} = {limit}: `{named}` is no field of the file: {said}",
+                    p.path
+                );
+                assert!(problem.help_text().is_some(), "{}: {said}", p.path);
+            }
+        }
+    };
+    // Those of the boards are above.
+    let yes_or_no = |p: &&ParameterInfo| p.dimension == Some(Dimension::Flag);
+    for p in plant.filter(|p| !p.path.starts_with("node.") && !yes_or_no(p)) {
+        ensure(FIELD, p, &|text| RobotConfig::parse("my.toml", text).err());
+    }
+    for (_, file, text) in axis::AXES {
+        let config = AxisConfig::parse(file, text).expect("built in");
+        for p in config.parameters.iter().filter(|p| !yes_or_no(p)) {
+            ensure(text, p, &|text| AxisConfig::parse("my.toml", text).err());
+        }
+    }
+    assert!(tried > 700, "{tried}");
 }

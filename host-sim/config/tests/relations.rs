@@ -149,4 +149,70 @@ fn relations_between_fields_are_answered_like_single_fields() {
     );
     let text = robot(&[("body.gravity", &quantity("[0.0, 0.0, 9.81]", "m/s2"))]);
     assert_all(&text, &["`body.gravity` = [0, 0, 9.81]", "does not stand"]);
+
+    let number = |value: &str| quantity(value, "1");
+    for section in ["contact", "wheel_contact", "chassis_contact"] {
+        let text = robot(&[(&format!("{section}.mu_kinetic"), &number("9.0"))]);
+        let fields = [
+            &*format!("`{section}.mu_kinetic` = 9 (line "),
+            &format!("`{section}.mu_static`"),
+            "allowed from 0 to ",
+        ];
+        assert_all(&text, &fields);
+        assert_eq!(text.lines().count(), 1, "told once: {text}");
+    }
+    let text = robot(&[("contact.sphere_radius", &quantity("90.0", "mm"))]);
+    assert_all(
+        &text,
+        &[
+            "`contact.sphere_radius` = 90 mm",
+            "`contact.sole_radius`",
+            "allowed up to ",
+        ],
+    );
+    let text = robot(&[("chassis_contact.from", &quantity("[9.0, 9.0, 9.0]", "m"))]);
+    assert_all(
+        &text,
+        &[
+            "`chassis_contact.from` = [9, 9, 9] m",
+            "`chassis_contact.to`",
+        ],
+    );
+    let text = robot(&[("cylinder.stroke", &quantity("50.0", "mm"))]);
+    assert_all(
+        &text,
+        &[
+            "`start.yaw.stroke` = 90 mm",
+            "`cylinder.stroke` = 50 mm",
+            "allowed up to 50 mm",
+        ],
+    );
+    // Of a leg that cannot be, in the robot's own words.
+    let text = robot(&[("body.crank", &quantity("1.9", "m"))]);
+    let fields = [
+        "`body.crank` = 1.9 m (line ",
+        "`body.p4`",
+        "`body.stroke_zero`",
+        "`start.yaw.stroke`",
+    ];
+    assert_all(&text, &fields);
+    // Of what the step cannot follow, in the unit of the file.
+    let text = robot(&[("contact.stiffness", &quantity("1000000.0", "N/mm"))]);
+    assert_all(
+        &text,
+        &[
+            "`contact.stiffness` = 1000000 N/mm (line ",
+            "step of this file: 0.001 to ",
+        ],
+    );
+    assert!(text.trim_end().ends_with(" N/mm"), "{text}");
+    let text = axis(&[("start.stroke", &quantity("1.9", "m"))]);
+    assert_all(
+        &text,
+        &[
+            "`start.stroke` = 1.9 m",
+            "`cylinder.stroke`",
+            "allowed up to ",
+        ],
+    );
 }

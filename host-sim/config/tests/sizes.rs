@@ -58,3 +58,22 @@ fn a_hundred_thousand_events_and_blocks_are_read_in_time_that_grows_as_they_do()
     let scenario = Scenario::parse("large.toml", &events(1000)).expect("accepted");
     assert!(scenario.events.is_sorted_by(|a, b| a.at_s <= b.at_s));
 }
+
+/// A plan with as many wrong factors as that: each is told once.
+#[test]
+fn two_thousand_factors_are_judged_in_a_moment() {
+    const COUNT: usize = 2000;
+    let mut text = "name = \"many\"\nroot = 1\n[base]\nscenario = \"stand\"\n".to_owned();
+    for i in 0..COUNT {
+        text += &format!("[factor.f{i}]\nparameter = \"robot.nothing\"\ngrid = [1]\n");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("many.toml");
+    std::fs::write(&path, text).expect("written");
+    let begun = Instant::now();
+    let error = wheeleg_config::plan::Plan::load(&path.to_string_lossy()).expect_err("wrong");
+    let seconds = begun.elapsed().as_secs_f64();
+    // That there is no such parameter, and of all but the first that another sets it.
+    assert_eq!(error.problems().len(), 2 * COUNT - 1);
+    assert!(seconds < 20.0, "{seconds} s");
+}

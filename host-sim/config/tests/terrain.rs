@@ -334,3 +334,170 @@ fn soils_are_materials_with_a_name() {
         &["volcanic-sand", "loose-ash", "rock"],
     );
 }
+
+/// Every quantity of every kind of part has a unit: it may be written short, and a bare number is
+/// refused with the units that there are.
+#[test]
+fn every_quantity_of_a_part_has_a_unit() {
+    let map = "kind = \"heightmap\"\nfile = \"map.csv\"\n";
+    let (place, box_) = (
+        "origin = { value = [-1.0, -1.0], unit = \"m\" }\n",
+        "x = { value = [2.0, 3.0], unit = \"m\" }\ny = { value = [0.0, 1.0], unit = \"m\" }\n",
+    );
+    let rocks = "kind = \"rocks\"\nseed = 1\ncover = \"10 %\"\n";
+    let sizes = "size = { value = [5.0, 9.0], unit = \"cm\" }\n";
+    let heights = "height = { value = [0.0, 0.1], unit = \"m\" }\n";
+    let stairs = "kind = \"stairs\"\ncount = 3\n";
+    // What stands in the part beside the field, the field, its value, its unit.
+    let scalars = [
+        ("kind = \"plane\"\n", "slope", "5", "deg"),
+        (
+            "kind = \"plane\"\nslope = \"5 deg\"\n",
+            "azimuth",
+            "1.5",
+            "rad",
+        ),
+        ("kind = \"plane\"\n", "height", "10", "mm"),
+        (&format!("kind = \"block\"\n{box_}"), "height", "10", "mm"),
+        (
+            &format!("kind = \"block\"\n{box_}height = \"1 cm\"\n"),
+            "turn",
+            "10",
+            "deg",
+        ),
+        (
+            &format!("kind = \"ramp\"\n{box_}{heights}"),
+            "turn",
+            "10",
+            "deg",
+        ),
+        ("kind = \"step\"\nheight = \"1 cm\"\n", "at", "1", "m"),
+        ("kind = \"step\"\nat = \"1 m\"\n", "height", "10", "mm"),
+        (
+            "kind = \"step\"\nat = \"1 m\"\nheight = \"1 cm\"\n",
+            "azimuth",
+            "9",
+            "deg",
+        ),
+        (
+            &format!("{stairs}rise = \"1 cm\"\nrun = \"30 cm\"\n"),
+            "at",
+            "1",
+            "m",
+        ),
+        (
+            &format!("{stairs}at = \"1 m\"\nrun = \"30 cm\"\n"),
+            "rise",
+            "5",
+            "cm",
+        ),
+        (
+            &format!("{stairs}at = \"1 m\"\nrise = \"1 cm\"\n"),
+            "run",
+            "300",
+            "mm",
+        ),
+        (
+            &format!("{stairs}at = \"1 m\"\nrise = \"1 cm\"\nrun = \"30 cm\"\n"),
+            "width",
+            "2",
+            "m",
+        ),
+        (
+            &format!("{stairs}at = \"1 m\"\nrise = \"1 cm\"\nrun = \"30 cm\"\n"),
+            "landing",
+            "1",
+            "m",
+        ),
+        (&format!("{map}{place}"), "cell", "100", "mm"),
+        (
+            &format!("{map}{place}cell = \"10 cm\"\n"),
+            "scale",
+            "1",
+            "m",
+        ),
+        (
+            &format!("{map}{place}cell = \"10 cm\"\n"),
+            "offset",
+            "-3",
+            "mm",
+        ),
+    ];
+    let pairs = [
+        (
+            format!(
+                "kind = \"block\"\nheight = \"1 cm\"\ny = {{ value = [0.0, 1.0], unit = \"m\" }}\n"
+            ),
+            "x",
+            "[2.0, 3.0]",
+            "m",
+        ),
+        (
+            format!(
+                "kind = \"block\"\nheight = \"1 cm\"\nx = {{ value = [2.0, 3.0], unit = \"m\" }}\n"
+            ),
+            "y",
+            "[-20, 30]",
+            "cm",
+        ),
+        (
+            format!("kind = \"ramp\"\n{box_}"),
+            "height",
+            "[0.0, 100.0]",
+            "mm",
+        ),
+        (format!("{rocks}{box_}"), "size", "[50.0, 90.0]", "mm"),
+        (
+            format!("{map}cell = \"10 cm\"\n"),
+            "origin",
+            "[-1.0, -1.0]",
+            "m",
+        ),
+    ];
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("map.csv"), "0,0,0\n0,0,0\n0,0,0.01\n").expect("written");
+    let file = folder.path().join("my.toml");
+    let read = |part: &str| {
+        let head = "name = \"t\"\ndescription = \"d\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+                    seed = 1\ntargets = \"none\"\n\n[motion]\nkind = \"stand\"\n\n";
+        let text = format!("{head}[[terrain]]\n{part}");
+        Scenario::parse(&file.to_string_lossy(), &text).map_err(|e| report(&e))
+    };
+    let ensure = |beside: &str, key: &str, value: &str, unit: &str| {
+        let long = format!("{beside}{key} = {{ value = {value}, unit = \"{unit}\" }}\n");
+        let bare = format!("{beside}{key} = {value}\n");
+        let other = format!("{beside}{key} = {{ value = {value}, unit = \"bar\" }}\n");
+        let long = read(&long).unwrap_or_else(|said| panic!("{key}: {said}"));
+        let field = format!("`terrain[0].{key}`");
+        let accepted = format!("\"{unit}\"");
+        for wrong in [bare, other] {
+            let said = read(&wrong).expect_err(&wrong);
+            assert_all(&said, &["my.toml:", &field, "accepted: ", &accepted]);
+        }
+        long.ground
+    };
+    for (beside, key, value, unit) in scalars {
+        let long = ensure(beside, key, value, unit);
+        let short = format!("{beside}{key} = \"{value} {unit}\"\n");
+        let short = read(&short).unwrap_or_else(|said| panic!("{key}: {said}"));
+        assert_eq!(short.ground.fingerprint(), long.fingerprint(), "{key}");
+    }
+    for (beside, key, value, unit) in &pairs {
+        ensure(beside, key, value, unit);
+    }
+    assert!(read(&format!("{rocks}{box_}{sizes}exposed = \"50 %\"\n")).is_ok());
+}
+
+/// A map whose heights are all the same is none.
+#[test]
+fn a_map_without_heights_is_refused() {
+    let said = with_map(b"0,1\n1,0\n", "map.csv", "scale = \"0 m\"\n").map(drop);
+    let said = report(&said.expect_err("no heights"));
+    assert_all(
+        &said,
+        &[
+            "`terrain[0].scale` = 0",
+            "allowed -1000 to 1000 m without 0",
+        ],
+    );
+}

@@ -59,7 +59,7 @@ pub struct HostInfo {
 /// Most bus cycles of one `Step`.
 pub(crate) const STEP_MAX: u32 = 1_000;
 /// Slowest and fastest pace.
-pub(crate) const SPEED: (f64, f64) = (0.1, 10.0);
+pub const SPEED: (f64, f64) = (0.1, 10.0);
 /// Fastest pace at which somebody may be in control.
 pub(crate) const SPEED_OF_CONTROL: f64 = 2.0;
 

@@ -40,7 +40,7 @@ mod session;
 mod tls;
 
 pub use api::SUBPROTOCOL;
-pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, command_list};
+pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, command_list};
 pub use error::ConsoleError;
 pub use live::{Live, Port};
 pub use mac::Key;

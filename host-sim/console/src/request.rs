@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::argument::{Argument, ArgumentKind, Value};
-use wheeleg_master::command::{Command, CommandCode, Given};
+use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given};
 use wheeleg_telemetry::channels;
 
 use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
@@ -304,7 +304,44 @@ fn robot(code: CommandCode, args: &Map<String, Json>) -> Result<Command, BadRequ
             .map_or(Value::Flag(false), |argument| value(argument, json)),
     });
     let given: Vec<Given> = given.collect();
-    Command::build(code, &given).map_err(bad_argument)
+    Command::build(code, &given).map_err(|error| {
+        let wrong = wrong_arguments(&info, args);
+        match wrong.is_empty() {
+            // Values that contradict each other.
+            true => bad_argument(error),
+            false => bad_argument(wrong.join("; ")),
+        }
+    })
+}
+
+/// All that is wrong with single arguments, in words; values as their sender wrote them.
+fn wrong_arguments(info: &CommandInfo, args: &Map<String, Json>) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for name in args.keys().filter(|name| info.argument(name).is_none()) {
+        let names: Vec<&str> = info.arguments.iter().map(|a| a.name).collect();
+        let takes = match names.is_empty() {
+            true => "it takes none".to_owned(),
+            false => format!("it takes: {}", names.join(", ")),
+        };
+        wrong.push(format!("{} takes no {name:?}; {takes}", info.name));
+    }
+    for argument in info.arguments {
+        let (name, range) = (argument.name, argument.range());
+        match args.get(name) {
+            None => wrong.push(format!("`{name}` is missing; allowed: {range}")),
+            Some(json) => match argument.kind.admits(value(argument, json)) {
+                Some(true) => {}
+                Some(false) => wrong.push(format!("`{name}` is {json}; allowed: {range}")),
+                None => {
+                    let kind = argument.kind.name();
+                    wrong.push(format!(
+                        "`{name}` is {json}, not a {kind}; allowed: {range}"
+                    ));
+                }
+            },
+        }
+    }
+    wrong
 }
 
 /// The value of an argument; one of another kind where the JSON is of another kind.
@@ -326,10 +363,11 @@ fn value(argument: &Argument, json: &Json) -> Value {
         | ArgumentKind::Rate(_) => json
             .as_f64()
             .map_or(wrong, |v| Value::Fixed(I16F16::saturating_from_num(v))),
-        // The cast saturates.
-        ArgumentKind::Time(_) => json
-            .as_f64()
-            .map_or(wrong, |s| Value::Micros((s * 1e6).round() as u32)),
+        // The cast saturates; a time before now is as far out of range as there is.
+        ArgumentKind::Time(_) => json.as_f64().map_or(wrong, |s| match s < 0.0 {
+            true => Value::Micros(u32::MAX),
+            false => Value::Micros((s * 1e6).round() as u32),
+        }),
         ArgumentKind::Choice(words) => {
             let place = json
                 .as_str()
@@ -356,12 +394,14 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
         args.get(name).ok_or_else(missing)
     };
     let fault = || {
-        let text = given("fault")?.as_str();
-        let text = text.ok_or_else(|| bad_argument("`fault` must be a text"))?;
-        if text.contains('@') {
-            return Err(bad_argument(
-                "`fault` takes no time: it begins now, and ends with EndFault",
-            ));
+        let json = given("fault")?;
+        let no_text = || bad_argument(format!("`fault` is {json}, and must be a text"));
+        let text = json.as_str().ok_or_else(no_text)?;
+        if let Some((before, _)) = text.split_once('@') {
+            return Err(bad_argument(format!(
+                "`fault` is {text:?}, and takes no time: it begins now, and ends with EndFault; \
+                 write {before:?}"
+            )));
         }
         format!("{text}@0s")
             .parse::<FaultSpec>()
@@ -371,22 +411,22 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
         HostCode::Pause => HostCommand::Pause,
         HostCode::Resume => HostCommand::Resume,
         HostCode::Step => {
-            let cycles = given("cycles")?.as_u64();
-            let cycles = cycles.filter(|n| (1..=u64::from(STEP_MAX)).contains(n));
+            let json = given("cycles")?;
+            let cycles = json.as_u64().and_then(|n| u32::try_from(n).ok());
+            let cycles = cycles.filter(|n| (1..=STEP_MAX).contains(n));
             HostCommand::Step(cycles.ok_or_else(|| {
                 bad_argument(format!(
-                    "`cycles`: allowed are whole numbers from 1 to {STEP_MAX}"
+                    "`cycles` is {json}; allowed: whole numbers from 1 to {STEP_MAX}"
                 ))
-            })? as u32)
+            })?)
         }
         HostCode::Speed => {
             let (min, max) = SPEED;
-            let speed = given("speed")?.as_f64();
-            let speed = speed.filter(|v| (min..=max).contains(v));
-            HostCommand::Speed(
-                speed
-                    .ok_or_else(|| bad_argument(format!("`speed`: allowed are {min} to {max}")))?,
-            )
+            let json = given("speed")?;
+            let speed = json.as_f64().filter(|v| (min..=max).contains(v));
+            HostCommand::Speed(speed.ok_or_else(|| {
+                bad_argument(format!("`speed` is {json}; allowed: {min} to {max}"))
+            })?)
         }
         HostCode::Inject => HostCommand::Inject(fault()?),
         HostCode::EndFault => HostCommand::EndFault(fault()?),
@@ -500,6 +540,75 @@ mod tests {
         for valid in [0, 1001] {
             let (_, text) = refused("Arm", "{}", valid);
             assert!(text.contains("valid_ms"), "{text}");
+        }
+    }
+
+    /// Every argument that is wrong is told, with what was written and what is allowed.
+    #[test]
+    fn all_that_is_wrong_is_told_with_value_and_range() {
+        for (cmd, args, parts) in [
+            (
+                "Walk",
+                r#"{"speed":30,"pattern":"trot"}"#,
+                &[
+                    "`pattern` is \"trot\"; allowed: alternate, tandem",
+                    "`turn` is missing; allowed: ",
+                    "`lift` is missing; allowed: ",
+                    "`nose` is missing; allowed: ",
+                ][..],
+            ),
+            (
+                "JointReference",
+                r#"{"joint":-1e99,"stroke":1e300,"now":1}"#,
+                &[
+                    "`joint` is -1e99",
+                    "1 to 6",
+                    "`stroke` is 1e300",
+                    "0 to 180 mm",
+                    "takes no \"now\"",
+                ],
+            ),
+            (
+                "JointReference",
+                "{}",
+                &["`joint` is missing", "`stroke` is missing"],
+            ),
+            (
+                "SetGait",
+                r#"{"push":-1}"#,
+                &["`push` is -1; allowed: 0 to 60 s"],
+            ),
+            (
+                "Speed",
+                r#"{"speed":50}"#,
+                &["`speed` is 50; allowed: 0.1 to 10"],
+            ),
+            (
+                "Step",
+                r#"{"cycles":1e9}"#,
+                &["`cycles` is 1000000000.0", "1 to 1000"],
+            ),
+            (
+                "Inject",
+                r#"{"fault":"bogus@0s"}"#,
+                &["\"bogus@0s\"", "write \"bogus\""],
+            ),
+            ("Inject", r#"{"fault":"bogus"}"#, &["bogus"]),
+            ("Inject", r#"{"fault":7}"#, &["`fault` is 7"]),
+        ] {
+            let json =
+                format!(r#"{{"n":1,"seen_us":0,"valid_ms":500,"cmd":"{cmd}","args":{args}}}"#);
+            let Body::Refused(bad) = give(&json) else {
+                panic!("{cmd} {args}: accepted");
+            };
+            assert_eq!(bad.reason, Reason::BadArgument);
+            for part in parts {
+                assert!(
+                    bad.text.contains(part),
+                    "{cmd} {args}: no {part} in {}",
+                    bad.text
+                );
+            }
         }
     }
 

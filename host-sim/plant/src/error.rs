@@ -14,7 +14,10 @@ pub enum PlantError {
         value: f64,
     },
     /// A state variable left the range in which the model means anything.
-    #[error("{name}[{index}] = {value} is outside {min}..={max}: the plant state exploded")]
+    #[error(
+        "{name}[{index}] = {} is outside {} to {}: the plant state exploded",
+        shown(*.value), shown(*.min), shown(*.max)
+    )]
     OutOfBounds {
         /// State variable, with its unit suffix.
         name: &'static str,
@@ -28,7 +31,7 @@ pub enum PlantError {
         max: f64,
     },
     /// A parameter is outside its valid range.
-    #[error("parameter {name} = {value} is outside {min}..={max}")]
+    #[error("parameter {name} = {} is outside {} to {}", shown(*.value), shown(*.min), shown(*.max))]
     Parameter {
         /// Field path in [`crate::robot::PlantParams`] or a part of it.
         name: &'static str,
@@ -40,7 +43,10 @@ pub enum PlantError {
         max: f64,
     },
     /// An input of one tick is outside its valid range.
-    #[error("input {name}[{index}] = {value} is outside {min}..={max}")]
+    #[error(
+        "input {name}[{index}] = {} is outside {} to {}",
+        shown(*.value), shown(*.min), shown(*.max)
+    )]
     Input {
         /// Input field.
         name: &'static str,
@@ -78,6 +84,15 @@ pub enum PlantError {
     Mechanics(String),
 }
 
+/// A value in six digits: one that has exploded has hundreds.
+fn shown(value: f64) -> String {
+    let short = format!("{value:.5e}");
+    match short.parse::<f64>() {
+        Ok(v) if v == 0.0 || (1e-4..1e9).contains(&v.abs()) => v.to_string(),
+        _ => short,
+    }
+}
+
 /// Checks a parameter against its valid range; NaN is always outside.
 pub(crate) fn check(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), PlantError> {
     if value >= min && value <= max {
@@ -112,5 +127,30 @@ pub(crate) fn check_state(
         })
     } else {
         Err(PlantError::NonFinite { name, index, value })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exploded_value_is_told_in_few_digits() {
+        let said = check_state("velocity_m_s", 0, 1.5e60, -100.0, 100.0).expect_err("too fast");
+        assert_eq!(
+            said.to_string(),
+            "velocity_m_s[0] = 1.50000e60 is outside -100 to 100: the plant state exploded"
+        );
+        let said = check_state("stroke_m", 0, 0.011_030_916_378_739_838, -0.001, 0.011);
+        let said = said.expect_err("beyond its stop").to_string();
+        assert!(
+            said.starts_with("stroke_m[0] = 0.0110309 is outside -0.001 to 0.011:"),
+            "{said}"
+        );
+        let said = check("moving_mass_kg", 0.002, 0.01, 1000.0).expect_err("too light");
+        assert_eq!(
+            said.to_string(),
+            "parameter moving_mass_kg = 0.002 is outside 0.01 to 1000"
+        );
     }
 }

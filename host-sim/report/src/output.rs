@@ -4,6 +4,9 @@
 //! in `previous`, or `previous-2` and so on where that is taken. Nothing is
 //! deleted, and files with other names stay untouched.
 //!
+//! A run that ends without a result leaves nothing: the folder that it made goes, and what it set
+//! aside comes back.
+//!
 //! A run holds its folder ([`Folder`]) until it is done, so that a second run at the same
 //! time cannot move the results of the first from under it. The lock is the operating
 //! system's, on the file `.lock`: it ends with the process, however that ends.
@@ -46,8 +49,11 @@ fn free_place(folder: &Path) -> PathBuf {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// Locked while it is open. The file stays: to remove it would take the lock from under
-    /// a run that has just opened it.
+    /// Folders that were not there before, the innermost first.
+    made: Vec<PathBuf>,
+    /// Where the results of the run before went.
+    previous: Option<PathBuf>,
+    /// Locked while it is open.
     _lock: File,
 }
 
@@ -58,12 +64,19 @@ impl Folder {
     /// [`ReportError::InUse`] if another run holds it, [`ReportError::Output`] if a folder or
     /// its lock cannot be created or a result not moved.
     pub fn prepare(path: &Path) -> Result<Self, ReportError> {
+        let above = path.ancestors().filter(|p| !p.as_os_str().is_empty());
+        let made = above.take_while(|p| !p.exists());
+        let made: Vec<PathBuf> = made.map(Path::to_owned).collect();
+        let gone = |_: &ReportError| remove_empty(&made);
         std::fs::create_dir_all(path)
-            .map_err(|e| ReportError::output("create the folder", path, e))?;
-        let lock = lock(&path.join(LOCK))?;
-        set_aside(path)?;
+            .map_err(|e| ReportError::output("create the folder", path, e))
+            .inspect_err(gone)?;
+        let lock = lock(&path.join(LOCK)).inspect_err(gone)?;
+        let previous = set_aside(path)?;
         Ok(Self {
             path: path.to_owned(),
+            made,
+            previous,
             _lock: lock,
         })
     }
@@ -75,26 +88,56 @@ impl Folder {
     }
 }
 
+impl Drop for Folder {
+    /// Of a run that has written nothing, nothing is left.
+    fn drop(&mut self) {
+        if RESULTS.iter().any(|name| self.path.join(name).exists()) {
+            return;
+        }
+        if let Some(previous) = &self.previous {
+            for name in RESULTS {
+                // What is not there does not come back.
+                let _ = std::fs::rename(previous.join(name), self.path.join(name));
+            }
+            let _ = std::fs::remove_dir(previous);
+        } else if !self.made.is_empty() {
+            // It is still locked; who has opened it meanwhile finds another file in its place.
+            let _ = std::fs::remove_file(self.path.join(LOCK));
+            remove_empty(&self.made);
+        }
+    }
+}
+
+/// Removes folders as far as they are empty, the innermost first.
+fn remove_empty(folders: &[PathBuf]) {
+    for folder in folders {
+        // One that holds something stays.
+        let _ = std::fs::remove_dir(folder);
+    }
+}
+
 /// Opens the lock file and locks it; who holds it stands in it, for the message to others.
 fn lock(path: &Path) -> Result<File, ReportError> {
     let failed = |e: std::io::Error| ReportError::output("lock", path, e);
-    let mut file = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .read(true)
-        .write(true)
-        .open(path)
-        .map_err(failed)?;
-    match take(&file) {
-        Ok(true) => {}
-        Ok(false) => {
+    let open = || {
+        let mut options = OpenOptions::new();
+        options.create(true).truncate(false).read(true).write(true);
+        options.open(path).map_err(failed)
+    };
+    let mut file = open()?;
+    loop {
+        if !take(&file).map_err(failed)? {
             return Err(ReportError::InUse {
                 folder: path.parent().unwrap_or(path).to_owned(),
                 lock: path.to_owned(),
                 holder: holder(&mut file),
             });
         }
-        Err(e) => return Err(failed(e)),
+        // A run without results may have removed it in between.
+        if is_at(&file, path) {
+            break;
+        }
+        file = open()?;
     }
     // Written in any case: the time of the file is the start of the run.
     file.set_len(0).map_err(failed)?;
@@ -130,17 +173,32 @@ fn take(file: &File) -> std::io::Result<bool> {
     }
 }
 
+/// Whether an open file is the one that a path leads to.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let number = |m: std::fs::Metadata| (m.dev(), m.ino());
+    let there = std::fs::metadata(path).map(number);
+    there.is_ok_and(|there| file.metadata().map(number).is_ok_and(|own| own == there))
+}
+
+/// Without a lock nobody removes it.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
 /// Only Unix has the lock that this program uses.
 #[cfg(not(unix))]
 fn take(_: &File) -> std::io::Result<bool> {
     Ok(true)
 }
 
-/// Moves the results in a folder to the next free `previous`.
-fn set_aside(folder: &Path) -> Result<(), ReportError> {
+/// Moves the results in a folder to the next free `previous`, if there are any; where they are.
+fn set_aside(folder: &Path) -> Result<Option<PathBuf>, ReportError> {
     let old = RESULTS.map(|name| folder.join(name));
     if !old.iter().any(|path| path.exists()) {
-        return Ok(());
+        return Ok(None);
     }
     let previous = free_place(folder);
     std::fs::create_dir_all(&previous)
@@ -158,7 +216,7 @@ fn set_aside(folder: &Path) -> Result<(), ReportError> {
         folder.display(),
         previous.display()
     );
-    Ok(())
+    Ok(Some(previous))
 }
 
 #[cfg(test)]
@@ -170,7 +228,12 @@ mod tests {
     fn results_of_two_runs_never_mix_and_other_files_stay() {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let folder = temporary.path().join("a/b");
-        let prepare = || Folder::prepare(&folder).map(drop);
+        // Each run draws its first figure while it holds the folder.
+        let prepare = || {
+            Folder::prepare(&folder).map(|_held| {
+                fs::create_dir_all(folder.join("figures")).expect("created");
+            })
+        };
         prepare().expect("created");
         assert!(folder.is_dir() && !folder.join("previous").exists());
 
@@ -185,7 +248,8 @@ mod tests {
         fs::write(folder.join("notes.txt"), "mine").expect("written");
         prepare().expect("set aside");
         let previous = folder.join("previous");
-        assert!(!folder.join("log.mcap").exists() && !folder.join("figures").exists());
+        assert!(!folder.join("log.mcap").exists());
+        assert!(!folder.join("figures/event.png").exists());
         assert_eq!(fs::read(previous.join("log.mcap")).expect("kept"), [1]);
         assert!(previous.join("figures/event.png").exists());
         assert!(folder.join("notes.txt").exists());
@@ -231,5 +295,30 @@ mod tests {
         assert!(folder.join(LOCK).exists());
         let _second = Folder::prepare(folder).expect("free again");
         assert!(folder.join("previous/log.mcap").exists());
+    }
+
+    #[test]
+    fn a_run_without_a_result_leaves_nothing_and_what_it_set_aside_comes_back() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path().join("runs/a");
+        drop(Folder::prepare(&folder).expect("prepared"));
+        assert!(!temporary.path().join("runs").exists());
+
+        // A folder of somebody else's stays, with what is in it.
+        fs::create_dir_all(&folder).expect("created");
+        fs::write(folder.join("notes.txt"), "mine").expect("written");
+        fs::write(folder.join("summary.json"), "earlier").expect("written");
+        let held = Folder::prepare(&folder).expect("prepared");
+        assert!(folder.join("previous/summary.json").exists());
+        drop(held);
+        let kept = fs::read_to_string(folder.join("summary.json"));
+        assert_eq!(kept.expect("it came back"), "earlier");
+        assert!(folder.join("notes.txt").exists() && !folder.join("previous").exists());
+
+        // With a result all stays where it went.
+        let held = Folder::prepare(&folder).expect("prepared");
+        fs::write(folder.join("log.mcap"), "new").expect("written");
+        drop(held);
+        assert!(folder.join("previous/summary.json").exists());
     }
 }

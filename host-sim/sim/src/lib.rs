@@ -216,6 +216,12 @@ impl Boards {
         })
     }
 
+    /// Whether all are here.
+    #[must_use]
+    pub const fn are_here(&self) -> bool {
+        self.remote.is_none()
+    }
+
     /// All here, and down when the boards of another run were.
     pub fn native_with(replayed: DownTimes) -> Self {
         Self {

@@ -82,13 +82,14 @@ impl Part {
 fn likely(name: &str, part: Part) -> &'static str {
     match (name, part) {
         ("bristle_m", _) => "`friction.bristle_damping`, `friction.bristle_stiffness`",
-        ("stroke_m", _) => "`end_stop.stiffness`, `end_stop.damping`",
+        ("stroke_m", _) => "a mass of [link] or [body], `end_stop.stiffness`, `end_stop.damping`",
         ("pressure_a_pa" | "mass_a_kg", _) => {
             "`cylinder.dead_volume_a`, `line.volume`, `fill_valve.conductance`"
         }
         ("pressure_b_pa" | "mass_b_kg", _) => {
             "`cylinder.dead_volume_b`, `line.volume`, `fill_valve.conductance`"
         }
+        ("motor_current_a", _) => "`motor.resistance`, `motor.supply`",
         (_, Part::Joint(_)) => {
             "`friction.bristle_damping`, `end_stop.stiffness` or a mass of [link] that is too small"
         }

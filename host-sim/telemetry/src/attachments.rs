@@ -1,6 +1,5 @@
 //! The files that a log carries.
 
-use std::fs::File;
 use std::io::{BufReader, Read as _};
 use std::path::Path;
 
@@ -8,7 +7,7 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::derived::Attached;
-use super::log_file::begins_as_log;
+use super::log_file::{begins_as_log, opened};
 use crate::LogError;
 
 /// Largest record that is read, bytes.
@@ -17,10 +16,10 @@ const MAX_RECORD: usize = 64 << 20;
 /// The files in a log, up to where it breaks off.
 ///
 /// # Errors
-/// [`LogError::Output`] if the log cannot be read, [`LogError::NotALog`] if it is none.
+/// [`LogError::Read`] if the log cannot be read, [`LogError::NotALog`] if it is none.
 pub fn attachments(path: &Path) -> Result<Vec<Attached>, LogError> {
-    let unreadable = |e| LogError::output("read the log", path, e);
-    let mut source = BufReader::new(File::open(path).map_err(unreadable)?);
+    let unreadable = |e| LogError::read(path, e);
+    let mut source = BufReader::new(opened(path)?);
     begins_as_log(&mut source, path)?;
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)

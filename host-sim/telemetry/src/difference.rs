@@ -72,10 +72,9 @@ fn message(here: Option<Logged>, there: Option<Logged>) -> String {
 /// differs.
 ///
 /// # Errors
-/// [`LogError::Output`] if a log cannot be read, [`LogError::Log`] if it is none.
+/// [`LogError::Read`] if a log cannot be read, [`LogError::Log`] if it is none.
 pub fn first_difference(here: &Path, there: &Path) -> Result<Option<String>, LogError> {
-    let read =
-        |path: &Path| std::fs::read(path).map_err(|e| LogError::output("read the log", path, e));
+    let read = |path: &Path| std::fs::read(path).map_err(|e| LogError::read(path, e));
     let (here, there) = (read(here)?, read(there)?);
     let (mut here, mut there) = (messages(&here)?, messages(&there)?);
     loop {

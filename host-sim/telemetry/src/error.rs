@@ -23,6 +23,19 @@ pub enum LogError {
         reason: std::io::Error,
     },
 
+    /// A log that could not be read.
+    #[error("cannot read the log `{}`: {reason}", path.display())]
+    #[diagnostic(
+        code(wheeleg::log),
+        help("give the folder of a run, or the file log.mcap in it, that this user may read")
+    )]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: std::io::Error,
+    },
+
     /// The log writer failed after the file had been opened.
     #[error("cannot write the log: {}", message(.0))]
     #[diagnostic(
@@ -117,6 +130,14 @@ fn message(error: &mcap::McapError) -> String {
 }
 
 impl LogError {
+    /// A log at `path` that could not be read.
+    pub(crate) fn read(path: impl Into<PathBuf>, reason: std::io::Error) -> Self {
+        Self::Read {
+            path: path.into(),
+            reason,
+        }
+    }
+
     /// An output error for `path`.
     pub fn output(action: &'static str, path: impl Into<PathBuf>, reason: std::io::Error) -> Self {
         Self::Output {

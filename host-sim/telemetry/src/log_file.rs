@@ -32,16 +32,33 @@ pub(crate) fn options() -> mcap::WriteOptions {
         .library(concat!("wheeleg ", env!("CARGO_PKG_VERSION")))
 }
 
+/// Opens a log to read it.
+///
+/// # Errors
+/// [`LogError::Read`] if it cannot be opened or is no file: a pipe may have no writer, a device no
+/// end.
+pub(crate) fn opened(path: &Path) -> Result<File, LogError> {
+    let failed = |e| LogError::read(path, e);
+    let about = std::fs::metadata(path).map_err(failed)?;
+    if about.is_dir() {
+        return Err(failed(std::io::ErrorKind::IsADirectory.into()));
+    }
+    if !about.is_file() {
+        return Err(failed(std::io::Error::other("it is not a file")));
+    }
+    File::open(path).map_err(failed)
+}
+
 /// Takes the first bytes of a log.
 ///
 /// # Errors
-/// [`LogError::NotALog`] if they are others, [`LogError::Output`] if they cannot be read.
+/// [`LogError::NotALog`] if they are others, [`LogError::Read`] if they cannot be read.
 pub(crate) fn begins_as_log(source: &mut impl Read, path: &Path) -> Result<(), LogError> {
     let mut magic = Vec::new();
     let mut begin = source.take(MAGIC.len() as u64);
     begin
         .read_to_end(&mut magic)
-        .map_err(|e| LogError::output("read the log", path, e))?;
+        .map_err(|e| LogError::read(path, e))?;
     if magic != MAGIC {
         return Err(LogError::NotALog { path: path.into() });
     }

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::File;
 use std::io::{BufReader, Read as _};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -14,7 +13,7 @@ use mcap::{MAGIC, McapError};
 use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
 
 use super::derived::{Derived, derived};
-use super::log_file::begins_as_log;
+use super::log_file::{begins_as_log, opened};
 use super::samples::channels;
 use crate::LogError;
 
@@ -48,14 +47,14 @@ pub struct Read {
 /// Reads `path` and gives its messages in their order, until `take` breaks.
 ///
 /// # Errors
-/// [`LogError::Output`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log,
+/// [`LogError::Read`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log,
 /// [`LogError::Foreign`] if it has messages, and none of a channel of this program,
 /// [`LogError::Empty`] if it has none.
 pub fn read(
     path: &Path,
     take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
 ) -> Result<Read, LogError> {
-    let file = File::open(path).map_err(|e| LogError::output("read the log", path, e))?;
+    let file = opened(path)?;
     read_from(BufReader::new(file), path, take)
 }
 
@@ -106,9 +105,9 @@ pub type TakeDerived<'a> = dyn FnMut(Derived, u64, &[u8]) -> ControlFlow<()> + '
 /// breaks. True: the log has its end.
 ///
 /// # Errors
-/// [`LogError::Output`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log.
+/// [`LogError::Read`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log.
 pub fn read_derived(path: &Path, take: &mut TakeDerived<'_>) -> Result<bool, LogError> {
-    let file = File::open(path).map_err(|e| LogError::output("read the log", path, e))?;
+    let file = opened(path)?;
     each(
         &mut BufReader::new(file),
         path,
@@ -135,7 +134,7 @@ fn each(
             Ok(message) if take(&message).is_break() => break,
             Ok(_) => {}
             Err(McapError::Io(e)) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
-                return Err(LogError::output("read the log", path, e));
+                return Err(LogError::read(path, e));
             }
             // The place where it breaks off.
             Err(_) => return Ok(false),
@@ -213,6 +212,7 @@ impl<'de> Visitor<'de> for Fields<'_> {
 mod tests {
     use super::*;
     use crate::{BodySample, FootSample, Recorder};
+    use std::fs::File;
 
     fn log(path: &Path) {
         let mut recorder = Recorder::create(path).expect("created");

@@ -9,7 +9,7 @@ use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
 use super::attachments::attachments;
-use super::log_file::{attach, begins_as_log, options};
+use super::log_file::{attach, begins_as_log, opened, options};
 use crate::LogError;
 
 /// What [`recover`] made.
@@ -39,7 +39,7 @@ fn checked() -> LinearReaderOptions {
 /// then, either.
 ///
 /// # Errors
-/// [`LogError::Output`] if `from` cannot be read, or `to` exists or cannot be written;
+/// [`LogError::Output`] if `to` exists or cannot be written, [`LogError::Read`] if `from` cannot be read;
 /// [`LogError::NotALog`] if `from` is none, [`LogError::Empty`] if it has no whole chunk;
 /// [`LogError::Log`] if the new file cannot be written, [`LogError::Unreadable`] and
 /// [`LogError::Unsound`] if it cannot be read back. `to` is not
@@ -49,8 +49,8 @@ pub fn recover(
     to: &Path,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Recovered>, LogError> {
-    let unreadable = |e| LogError::output("read the log", from, e);
-    let mut source = File::open(from).map_err(unreadable)?;
+    let unreadable = |e| LogError::read(from, e);
+    let mut source = opened(from)?;
     begins_as_log(&mut source, from)?;
     source.rewind().map_err(unreadable)?;
     let target =
@@ -101,7 +101,7 @@ fn copy(
                     return Ok(None);
                 }
             }
-            Err(McapError::Io(e)) => return Err(LogError::output("read the log", from, e)),
+            Err(McapError::Io(e)) => return Err(LogError::read(from, e)),
             // The place where it breaks off.
             Err(_) => recovered.was_whole = false,
         }
@@ -120,7 +120,7 @@ fn copy(
 
 /// Messages of a whole log; a log with any defect is an error.
 fn count(path: &Path) -> Result<u64, LogError> {
-    let file = File::open(path).map_err(|e| LogError::output("read the log", path, e))?;
+    let file = opened(path)?;
     let strict = checked()
         .with_check_finishes_after_end_magic(true)
         .with_validate_data_section_crc(true)

@@ -62,7 +62,7 @@ impl AxisSim {
         &mut self,
         reference_m: f64,
         speed_m_s: f64,
-    ) -> Result<Timed, wheeleg_plant::PlantError> {
+    ) -> Result<Timed, wheeleg_studies::axis_sim::suite::AxisSimError> {
         let time_s = self.bench.state.core.time_ns as f64 * 1e-9;
         let (action, row) = self.bench.tick(reference_m, speed_m_s)?;
         self.action = action;
@@ -88,7 +88,7 @@ impl AxisSim {
         };
         let (node, commissioned) = board::built(&known, law, parameters)?;
         Ok(Self {
-            bench: Bench::new(&real, seed, node).map_err(|e| error::plant(&e))?,
+            bench: Bench::new(&real, seed, node).map_err(|e| error::bench(&e))?,
             action: Action::default(),
             commissioned,
         })
@@ -108,7 +108,7 @@ impl AxisSim {
         let [min, max] = SPEEDS_M_S;
         let speed_m_s = input::within(&"velocity_m_s", velocity_m_s, min, max)?;
         let row = self.step(reference_m, speed_m_s);
-        columns::row(py, COLUMNS, &row.map_err(|e| error::plant(&e))?)
+        columns::row(py, COLUMNS, &row.map_err(|e| error::bench(&e))?)
     }
 
     /// A tick per reference (n, m), with its speed (n, m/s) and the load on the rod (n, N) if they
@@ -136,7 +136,7 @@ impl AxisSim {
             rows.push(self.step(references[k], speed_m_s)?);
             Ok(())
         };
-        input::unlocked(py, ticks, tick, error::plant)?;
+        input::unlocked(py, ticks, tick, error::bench)?;
         columns::rows(py, COLUMNS, &rows)
     }
 

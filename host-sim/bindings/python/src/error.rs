@@ -6,6 +6,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use wheeleg_plant::PlantError;
 use wheeleg_studies::axis_sim::Kind;
+use wheeleg_studies::axis_sim::suite::AxisSimError;
 
 create_exception!(
     wheeleg,
@@ -54,6 +55,14 @@ pub(crate) fn plant(error: &PlantError) -> PyErr {
     match error {
         PlantError::Parameter { .. } | PlantError::Input { .. } => value(error.to_string()),
         _ => SimulationError::new_err(error.to_string()),
+    }
+}
+
+/// Of an axis with its board: of the plant's parameters as [`plant`]; else it ended.
+pub(crate) fn bench(error: &AxisSimError) -> PyErr {
+    match error {
+        AxisSimError::Plant(error) => plant(error),
+        other => simulation(other),
     }
 }
 

@@ -8,9 +8,11 @@ mod pairs;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use wheeleg_studies::export::write_new;
+
 use crate::columns::Columns;
 use crate::part::PROGRAM;
-use crate::store::{PlanFile, write_whole};
+use crate::store::PlanFile;
 use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 
@@ -71,6 +73,6 @@ pub fn write(
         None => None,
     };
     let page = page::render(&merged, &findings, pairs.as_ref())?;
-    write_whole(out, page.as_bytes())?;
+    write_new(out, &page)?;
     Ok((findings, pairs))
 }

@@ -1,6 +1,7 @@
 //! Every value that a factor can have, against the ranges of the files: all that is wrong is
 //! told at once, before the first case.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::distribution::Distribution;
@@ -18,8 +19,9 @@ use crate::suggest::closest;
 /// contradict themselves.
 pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
     let resolver = Resolver::new(plan)?;
+    let mut earlier = BTreeMap::new();
     for factor in &plan.factors {
-        twice(r, plan, factor);
+        twice(r, factor, &mut earlier);
         let Sets::Fields { scenario, robot } = &factor.sets else {
             continue;
         };
@@ -45,9 +47,9 @@ fn span_of(r: &Reader, factor: &Factor) -> Option<Range<usize>> {
     span.or(Some(entry.span))
 }
 
-/// Two factors that set one field: the later would win, unseen.
-fn twice(r: &mut Reader, plan: &Plan, factor: &Factor) {
-    let fields = |factor: &Factor| match &factor.sets {
+/// What a factor sets, by its path in a plan.
+fn set_by(factor: &Factor) -> Vec<String> {
+    match &factor.sets {
         Sets::Scenario => vec!["scenario".to_owned()],
         Sets::Robot => vec!["robot".to_owned()],
         Sets::Fault(_) => Vec::new(),
@@ -56,19 +58,25 @@ fn twice(r: &mut Reader, plan: &Plan, factor: &Factor) {
             let robot = robot.iter().map(|path| format!("robot.{path}"));
             scenario.chain(robot).collect()
         }
-    };
-    let own = fields(factor);
-    let earlier = plan.factors.iter().take_while(|f| f.name != factor.name);
-    for other in earlier {
-        let shared = fields(other).into_iter().find(|path| own.contains(path));
-        if let Some(path) = shared {
-            let span = span_of(r, factor);
-            let message = format!(
-                "`factor.{}` and `factor.{}` both set `{path}`",
-                other.name, factor.name
-            );
-            r.problem(span, message, "set twice", None);
-        }
+    }
+}
+
+/// Two factors that set one field: the later would win, unseen. `earlier` knows who sets what so far.
+fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, &'a str>) {
+    let own = set_by(factor);
+    let found = own
+        .iter()
+        .find_map(|path| Some((path, *earlier.get(path)?)));
+    if let Some((path, other)) = found {
+        let span = span_of(r, factor);
+        let message = format!(
+            "`factor.{other}` and `factor.{}` both set `{path}`",
+            factor.name
+        );
+        r.problem(span, message, "set twice", None);
+    }
+    for path in own {
+        earlier.entry(path).or_insert(&factor.name);
     }
 }
 

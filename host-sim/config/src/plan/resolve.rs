@@ -12,6 +12,7 @@ use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
 use crate::quantity::Dimension;
+use crate::terrain::{Data, Files};
 use crate::{LawChoice, RobotConfig, Scenario};
 
 /// A file that factors change: its name, its text, and every quantity in it.
@@ -19,6 +20,8 @@ pub(super) struct Base {
     pub(super) file: String,
     pub(super) document: DocumentMut,
     pub(super) listing: Vec<ParameterInfo>,
+    /// Data files of a scenario.
+    data: BTreeMap<String, Data>,
 }
 
 impl Base {
@@ -32,6 +35,7 @@ impl Base {
             file: source.file.clone(),
             document,
             listing,
+            data: BTreeMap::new(),
         })
     }
 
@@ -86,8 +90,11 @@ impl<'a> Resolver<'a> {
     pub fn new(plan: &'a Plan) -> Result<Self, ConfigError> {
         let (mut scenarios, mut robots) = (BTreeMap::new(), BTreeMap::new());
         for (name, source) in &plan.sources.scenarios {
-            let (_, listing) = Scenario::parse_listed(&source.file, &source.text)?;
-            scenarios.insert(name.as_str(), Base::read(source, listing)?);
+            let data = plan.sources.data.get(name).cloned().unwrap_or_default();
+            let files = Files::Held(&data);
+            let (_, listing) = Scenario::parse_with(&source.file, &source.text, &files)?;
+            let base = Base::read(source, listing)?;
+            scenarios.insert(name.as_str(), Base { data, ..base });
         }
         for (name, source) in &plan.sources.robots {
             let robot = RobotConfig::parse(&source.file, &source.text)?;
@@ -149,8 +156,15 @@ impl<'a> Resolver<'a> {
                 }
             }
         }
-        let scenario_json = without_notes(&scenario_text);
-        let scenario = Scenario::parse(&scenario.file, &scenario_text.to_string())?;
+        let mut scenario_json = without_notes(&scenario_text);
+        if !scenario.data.is_empty() {
+            // Two maps of one name are two grounds.
+            let digests = scenario.data.iter().map(|(n, d)| (n.clone(), d.digest()));
+            scenario_json["data"] = digests.collect::<BTreeMap<_, _>>().into_iter().collect();
+        }
+        let files = Files::Held(&scenario.data);
+        let (scenario, _) =
+            Scenario::parse_with(&scenario.file, &scenario_text.to_string(), &files)?;
         let robot = RobotConfig::parse(&robot.file, &robot_text.to_string())?;
         Ok(Resolved {
             robot_json: robot_json(&robot),

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use toml_edit::Document;
+use toml_edit::{Document, TableLike};
 
+use crate::Scenario;
 use crate::builtin::{self, Source};
 use crate::error::ConfigError;
+use crate::terrain::Data;
 
 /// A file: its name for messages, and what is in it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +31,9 @@ pub struct Sources {
     pub robots: BTreeMap<String, Text>,
     /// Robot of each scenario, by their names.
     pub robot_of: BTreeMap<String, String>,
+    /// Data files of each scenario, by the names that it has for them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub data: BTreeMap<String, BTreeMap<String, Data>>,
 }
 
 impl Sources {
@@ -46,6 +51,7 @@ impl Sources {
             scenarios: BTreeMap::new(),
             robots: BTreeMap::new(),
             robot_of: BTreeMap::new(),
+            data: BTreeMap::new(),
         };
         // A plan that is no TOML, or names nothing, is told of when it is read.
         let Ok(document) = Document::parse(sources.plan.text.clone()) else {
@@ -85,8 +91,52 @@ impl Sources {
             self.robots.insert(place.clone(), Text { file, text });
             self.robot_of.insert(name.to_owned(), place);
         }
+        let data = data_of(name, &file, &text)?;
+        if !data.is_empty() {
+            self.data.insert(name.to_owned(), data);
+        }
         self.scenarios.insert(name.to_owned(), Text { file, text });
         Ok(())
+    }
+}
+
+/// The data files of a scenario.
+///
+/// # Errors
+/// [`ConfigError`] of the scenario if one of them cannot be read.
+fn data_of(name: &str, file: &str, text: &str) -> Result<BTreeMap<String, Data>, ConfigError> {
+    let files = builtin::files_of(name, file);
+    let mut data = BTreeMap::new();
+    for named in named_files(text) {
+        match files.read(&named) {
+            Ok(bytes) => {
+                data.insert(named, Data(bytes));
+            }
+            // The reader says it with its line.
+            Err(_) => {
+                Scenario::parse_with(file, text, &files)?;
+            }
+        }
+    }
+    Ok(data)
+}
+
+/// The files that the ground of a scenario is made from.
+fn named_files(text: &str) -> Vec<String> {
+    let Ok(document) = Document::parse(text) else {
+        return Vec::new();
+    };
+    let Some(terrain) = document.get("terrain") else {
+        return Vec::new();
+    };
+    let file = |part: &dyn TableLike| Some(part.get("file")?.as_str()?.to_owned());
+    match (terrain.as_array_of_tables(), terrain.as_array()) {
+        (Some(parts), _) => parts.iter().filter_map(|part| file(part)).collect(),
+        (None, Some(parts)) => {
+            let tables = parts.iter().filter_map(|part| part.as_inline_table());
+            tables.filter_map(|part| file(part)).collect()
+        }
+        _ => Vec::new(),
     }
 }
 

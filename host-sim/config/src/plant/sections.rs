@@ -7,9 +7,9 @@ params! {
     /// Gas and atmosphere.
     GasSection {
         /// Specific gas constant.
-        gas_constant: f64, "gas_constant", SpecificHeat, 1.0, 5000.0;
+        gas_constant: f64, "gas_constant", SpecificHeat, 50.0, 5000.0;
         /// Ratio of specific heats.
-        heat_capacity_ratio: f64, "heat_capacity_ratio", Number, 1.0, 2.0;
+        heat_capacity_ratio: f64, "heat_capacity_ratio", Number, 1.01, 1.7;
         /// Density at the reference atmosphere (ANR).
         reference_density: f64, "reference_density", Density, 0.01, 10.0;
         /// Temperature of the reference atmosphere (ANR).
@@ -17,7 +17,7 @@ params! {
         /// Pressure of the reference atmosphere (ANR).
         reference_pressure: f64, "reference_pressure", Pressure, 5e4, 2e5;
         /// Ambient pressure, absolute.
-        ambient_pressure: f64, "ambient_pressure", Pressure, 3e4, 2e5;
+        ambient_pressure: f64, "ambient_pressure", Pressure, 3e4, 1.2e5;
         /// Temperature of surroundings, walls and supply.
         ambient_temperature: f64, "ambient_temperature", Temperature, 230.0, 340.0;
     }
@@ -58,7 +58,7 @@ params! {
         /// Subsonic exponent m.
         subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
         /// Pressure ratio above which the flow is taken as linear.
-        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+        linear_ratio: f64, "linear_ratio", Number, 0.900_001, 0.999_99;
     }
 
     /// An on/off valve.
@@ -70,7 +70,7 @@ params! {
         /// Subsonic exponent m.
         subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
         /// Pressure ratio above which the flow is taken as linear.
-        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+        linear_ratio: f64, "linear_ratio", Number, 0.900_001, 0.999_99;
         /// From energising to open.
         t_on: f64, "t_on", Time, 0.0, 0.1;
         /// From de-energising to shut.
@@ -92,7 +92,7 @@ params! {
         /// Subsonic exponent of the tube.
         subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
         /// Pressure ratio above which the flow is taken as linear.
-        linear_ratio: f64, "linear_ratio", Number, 0.9, 0.99999;
+        linear_ratio: f64, "linear_ratio", Number, 0.900_001, 0.999_99;
     }
 
     /// A cylinder.
@@ -210,7 +210,7 @@ params! {
         /// O4 seen from O1: forward, left.
         p4: [f64; 2], "p4", Length, -2.0, 2.0;
         /// Smallest accepted moment arm of the yaw cylinder, as a share of the crank.
-        min_cos_theta3: f64, "min_cos_theta3", Number, 0.0, 1.0;
+        min_cos_theta3: f64, "min_cos_theta3", Number, 0.001, 0.999;
         /// Joint lengths b2, b5, b6 at stroke zero.
         stroke_zero: [f64; 3], "stroke_zero", Length, 0.0, 10.0;
         /// O4 of the left leg from the middle of the wheel axle: forward, left, up.

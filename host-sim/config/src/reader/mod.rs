@@ -133,6 +133,13 @@ impl Reader {
         paths.last().map(|path| (*path).to_owned())
     }
 
+    /// Unit in which a parameter is written, and its size in SI.
+    pub(crate) fn unit_of(&self, path: &str) -> Option<(f64, String)> {
+        let info = self.parameters.iter().find(|p| p.path == path)?;
+        let factor = info.dimension?.factor(&info.unit)?;
+        Some((factor, info.unit.clone()))
+    }
+
     /// Whether nothing is wrong so far.
     pub(crate) fn is_clean(&self) -> bool {
         self.problems.is_empty()

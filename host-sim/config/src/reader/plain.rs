@@ -14,7 +14,9 @@ const LARGEST_OF_TOML: u64 = i64::MAX as u64;
 /// Whether a name can stand in a path, in TOML and in a page as it is.
 fn is_name(text: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-    (1..=NAME_LENGTH).contains(&text.len()) && text.chars().all(allowed) && !text.starts_with('.')
+    (1..=NAME_LENGTH).contains(&text.len())
+        && text.chars().all(allowed)
+        && !text.starts_with(['.', '-'])
 }
 
 impl Reader {
@@ -33,7 +35,7 @@ impl Reader {
             span,
             format!(
                 "`{}` = {shown:?}{more} is not a name: allowed are 1 to {NAME_LENGTH} of the \
-                 characters A-Z, a-z, 0-9, `.`, `_` and `-`, not beginning with a dot",
+                 characters A-Z, a-z, 0-9, `.`, `_` and `-`, not beginning with a dot or a minus",
                 entry.field_path(key)
             ),
             "not a name",

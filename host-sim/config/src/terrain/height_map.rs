@@ -29,7 +29,7 @@ struct Values {
 pub(super) fn height_map(
     r: &mut Reader,
     fields: &mut Fields<'_>,
-    files: &Files,
+    files: &Files<'_>,
 ) -> Option<Vec<Shape>> {
     let cell = length("cell", [1e-3, 1e3], "distance between neighbouring values");
     let scale = length("scale", [-1e3, 1e3], "height of one unit of the file");
@@ -58,11 +58,18 @@ pub(super) fn height_map(
         let message = format!("`{path}` = \"{name}\": {what}");
         r.problem(span.clone(), message, "this file", help);
     };
-    let read = files.read(&name).map_err(|what| vec![what]);
-    let values = read.and_then(|bytes| match is_picture {
+    let bytes = match files.read(&name) {
+        Ok(bytes) => bytes,
+        Err(what) => {
+            let help = "a path counts from the folder of the scenario's file";
+            told(r, &what, Some(help.into()));
+            return None;
+        }
+    };
+    let values = match is_picture {
         true => picture(&bytes).map_err(|what| vec![what]),
         false => table(&bytes),
-    });
+    };
     let values = match values {
         Ok(values) => values,
         Err(wrong) => {
@@ -75,6 +82,16 @@ pub(super) fn height_map(
         }
     };
     let (cell, origin, offset, scale) = (cell?, origin?, offset?, scale?);
+    if scale == 0.0 {
+        let span = fields.entry.get("scale").and_then(|(_, item)| item.span());
+        let message = format!(
+            "`{}` = 0 makes all heights of the map equal: allowed -1000 to 1000 m without 0",
+            fields.entry.field_path("scale")
+        );
+        let help = "level ground is a part of its own: `kind = \"plane\"`";
+        r.problem(span, message, "no heights", Some(help.into()));
+        return None;
+    }
     let heights: Vec<f64> = values.values.iter().map(|v| v * scale + offset).collect();
     if let Some(at) = heights.iter().position(|h| h.abs() > HIGHEST_M) {
         let what = format!(
@@ -173,13 +190,24 @@ fn picture(bytes: &[u8]) -> Result<Values, String> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     // Grey with fewer than eight bits comes as eight.
     decoder.set_transformations(png::Transformations::IDENTITY);
-    let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
+    // The decoder names what it has found as programs name it.
+    let no_picture = |e: png::DecodingError| match e {
+        png::DecodingError::LimitsExceeded => "the picture is too large".to_owned(),
+        _ => "it is no whole PNG picture".to_owned(),
+    };
+    let mut reader = decoder.read_info().map_err(no_picture)?;
     let info = reader.info();
     let (wide, high) = (info.width as usize, info.height as usize);
     if info.color_type != png::ColorType::Grayscale {
+        let found = match info.color_type {
+            png::ColorType::Grayscale => "grey",
+            png::ColorType::GrayscaleAlpha => "grey with transparency",
+            png::ColorType::Rgb => "in colours",
+            png::ColorType::Rgba => "in colours with transparency",
+            png::ColorType::Indexed => "in the colours of a palette",
+        };
         return Err(format!(
-            "the picture is {:?}; allowed is grey without transparency",
-            info.color_type
+            "the picture is {found}; allowed is grey without transparency"
         ));
     }
     let bytes_each = match info.bit_depth {
@@ -198,7 +226,7 @@ fn picture(bytes: &[u8]) -> Result<Values, String> {
         ));
     }
     let mut pixels = vec![0; wide * high * bytes_each];
-    reader.next_frame(&mut pixels).map_err(|e| e.to_string())?;
+    reader.next_frame(&mut pixels).map_err(no_picture)?;
     let values = pixels
         .chunks_exact(bytes_each)
         .map(|value| value.iter().fold(0.0, |sum, b| 256.0 * sum + f64::from(*b)));
@@ -263,9 +291,14 @@ mod tests {
         let colour = picture(&grey(BitDepth::Eight, ColorType::Rgb, &[0; 12]));
         let said = colour.map(drop).unwrap_err();
         assert!(
-            said.contains("Rgb") && said.contains("allowed is grey"),
+            said.contains("in colours") && said.contains("allowed is grey"),
             "{said}"
         );
-        assert!(picture(b"not a picture").is_err());
+        let mut broken = grey(BitDepth::Eight, ColorType::Grayscale, &[0; 4]);
+        broken[12..16].copy_from_slice(&[0; 4]);
+        for bytes in [&b"not a picture"[..], &broken, &broken[..20], &[]] {
+            let said = picture(bytes).map(drop).unwrap_err();
+            assert_eq!(said, "it is no whole PNG picture");
+        }
     }
 }

@@ -15,6 +15,7 @@ use wheeleg_plant::terrain::{Material, Part, Plane, Shape, Terrain};
 
 use super::reader::{Entry, Reader};
 use fields::{Fields, angle, length};
+pub use files::Data;
 pub(crate) use files::Files;
 
 /// The ground of a scenario.
@@ -66,7 +67,7 @@ impl Kind {
 }
 
 /// Reads all parts; `top` are the fields at the top of the file.
-pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files) -> Ground {
+pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
     let mut parts = Vec::new();
     let mut entries = Vec::new();
     for i in 0..r.array_len("terrain") {
@@ -105,7 +106,7 @@ fn part(
     r: &mut Reader,
     kind: Kind,
     entry: &Entry,
-    (below, files): (&Terrain, &Files),
+    (below, files): (&Terrain, &Files<'_>),
     top: &[&str],
 ) -> Option<Vec<Part>> {
     let mut fields = Fields::new(entry, top);

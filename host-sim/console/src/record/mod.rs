@@ -216,7 +216,7 @@ pub(crate) fn start(
         writer.begin(1, 0).map_err(|what| {
             ConsoleError::other(
                 format!("nothing can be recorded: {what}"),
-                "give a folder that can be written with --record DIR, or leave it out",
+                "give a folder that can be written with --recordings DIR, or leave out --record",
             )
         })?;
     }

@@ -7,7 +7,16 @@ use wheeleg_plant::PlantError;
 /// An experiment could not be made.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum AxisSimError {
-    /// The plant refused its parameters or left its range.
+    /// The plant left the range of its model.
+    #[error("{what}")]
+    #[diagnostic(code(wheeleg::bench::unphysical), help("{help}"))]
+    Unphysical {
+        /// When and how, and the last values that were sound.
+        what: String,
+        /// What most likely did it.
+        help: String,
+    },
+    /// The plant refused its parameters.
     #[error("the plant of the axis: {0}")]
     #[diagnostic(
         code(wheeleg::bench::plant),

@@ -1,11 +1,11 @@
 //! Start-up identification on the bench: the valves' delays, before the first move.
 
-use super::delay_probe::DelayProbe;
-use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
 use wheeleg_units::Micros;
 
+use super::delay_probe::DelayProbe;
+use super::error::AxisSimError;
 use super::firmware::{Design, Firmware};
 use super::run::{Action, AxisSim, Board, Sample};
 use super::{Kind, Motion, design};
@@ -47,12 +47,12 @@ pub struct Delays {
 /// `None` if the piston cannot be moved.
 ///
 /// # Errors
-/// Any [`PlantError`].
+/// [`AxisSimError`].
 pub fn identify(
     real: &AxisParams,
     sheet: &AxisParams,
     seed: u64,
-) -> Result<Option<Delays>, PlantError> {
+) -> Result<Option<Delays>, AxisSimError> {
     let Ok(firmware) = Firmware::new(&design(sheet, Kind::PwmP)) else {
         return Ok(None);
     };

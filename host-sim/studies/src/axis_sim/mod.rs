@@ -43,6 +43,7 @@ mod refusal;
 mod run;
 pub mod suite;
 mod textbook;
+mod unphysical;
 pub mod valve_resolution;
 
 pub use design::{Kind, axis_data, design, longest_stroke_m};

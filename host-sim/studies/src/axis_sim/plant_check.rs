@@ -14,7 +14,9 @@ use wheeleg_plant::chamber::GasModel;
 use wheeleg_plant::flow::Restrictor;
 use wheeleg_plant::supply::SupplyParams;
 
+use super::error::AxisSimError;
 use super::textbook::{Commands, Textbook};
+use super::unphysical;
 
 /// What is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -124,8 +126,8 @@ impl Made<'_> {
         }
     }
 
-    fn tick(&self, axis: &Axis, state: &mut AxisState, on: [u16; 4]) -> Result<(), PlantError> {
-        axis.tick(state, on)?;
+    fn tick(&self, axis: &Axis, state: &mut AxisState, on: [u16; 4]) -> Result<(), AxisSimError> {
+        unphysical::tick(axis, state, on)?;
         (self.after_tick)(state);
         Ok(())
     }
@@ -134,16 +136,16 @@ impl Made<'_> {
 /// Checks an axis.
 ///
 /// # Errors
-/// Any [`PlantError`].
-pub fn check(params: &AxisParams) -> Result<PlantCheck, PlantError> {
+/// [`AxisSimError`].
+pub fn check(params: &AxisParams) -> Result<PlantCheck, AxisSimError> {
     check_made(params, &Made::as_it_is())
 }
 
 /// The same of a plant that is made in another way.
 ///
 /// # Errors
-/// Any [`PlantError`].
-pub fn check_made(params: &AxisParams, made: &Made<'_>) -> Result<PlantCheck, PlantError> {
+/// [`AxisSimError`].
+pub fn check_made(params: &AxisParams, made: &Made<'_>) -> Result<PlantCheck, AxisSimError> {
     let mut findings = balances(params, made)?.to_vec();
     findings.extend(textbook(params, made)?);
     findings.extend(convergence(params, made)?);
@@ -173,7 +175,7 @@ impl Finding {
     }
 }
 
-fn balances(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 2], PlantError> {
+fn balances(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 2], AxisSimError> {
     let axis = (made.build)(params)?;
     let start = axis.initial_state(1);
     let mut state = start.clone();
@@ -265,7 +267,7 @@ impl Manoeuvre {
 }
 
 /// Agreement with the text book, polytropic and with heat exchange.
-fn textbook(params: &AxisParams, made: &Made<'_>) -> Result<Vec<Finding>, PlantError> {
+fn textbook(params: &AxisParams, made: &Made<'_>) -> Result<Vec<Finding>, AxisSimError> {
     let mut polytropic = plain(params);
     let exponent = match params.cylinder.gas_model {
         GasModel::Polytropic { exponent } => exponent,
@@ -304,7 +306,7 @@ fn textbook(params: &AxisParams, made: &Made<'_>) -> Result<Vec<Finding>, PlantE
 }
 
 /// Largest difference of plant and text book in pressure and stroke, as shares of their changes.
-fn difference(params: &AxisParams, made: &Made<'_>) -> Result<[f64; 2], PlantError> {
+fn difference(params: &AxisParams, made: &Made<'_>) -> Result<[f64; 2], AxisSimError> {
     let manoeuvre = Manoeuvre::new(params);
     let at_s: Vec<f64> = (1..=manoeuvre.ticks.len())
         .map(|k| k as f64 * 1e-3)
@@ -333,7 +335,7 @@ fn difference(params: &AxisParams, made: &Made<'_>) -> Result<[f64; 2], PlantErr
 
 /// Order of convergence on a smooth stretch of sliding, valves open throughout, and the error of
 /// the file's step there.
-fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], PlantError> {
+fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], AxisSimError> {
     let mut smooth = params.clone();
     // Away from the stops' cushions, and no bristle that breaks.
     smooth.initial_stroke_m = 0.25 * params.cylinder.stroke_m;
@@ -347,7 +349,7 @@ fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], Pla
         (valve.t_on_s, valve.t_off_s) = (2e-3, 2e-3);
     }
     smooth.cylinder.line_delay_s = 0.0;
-    let run = |step_ns: u64| -> Result<Vec<[f64; 2]>, PlantError> {
+    let run = |step_ns: u64| -> Result<Vec<[f64; 2]>, AxisSimError> {
         let mut p = smooth.clone();
         p.step_ns = step_ns;
         let axis = (made.build)(&p)?;
@@ -364,7 +366,7 @@ fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], Pla
     };
     let fine = run(1_250)?;
     // Root mean square over the ticks, of stroke and pressure.
-    let errors = |step_ns: u64| -> Result<[f64; 2], PlantError> {
+    let errors = |step_ns: u64| -> Result<[f64; 2], AxisSimError> {
         let rows = run(step_ns)?;
         Ok(std::array::from_fn(|i| {
             let squares = rows.iter().zip(&fine).map(|(a, b)| (a[i] - b[i]).powi(2));

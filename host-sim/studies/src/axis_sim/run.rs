@@ -1,12 +1,13 @@
 //! One axis in closed loop: controller, converter, plant, tick by tick.
 
 use wheeleg_control::pwm::OnTimes;
-use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
 use wheeleg_protocol::FaultBits;
 use wheeleg_units::{AdcCode, PositionMm, VelocityMmS};
 
+use super::error::AxisSimError;
 use super::motion::{LoadEvent, Motion};
+use super::unphysical;
 
 /// What a board latches at the start of a tick.
 #[derive(Debug, Clone, Copy)]
@@ -100,8 +101,8 @@ impl<B: Board> AxisSim<B> {
     /// the converter.
     ///
     /// # Errors
-    /// [`PlantError::Parameter`] names a parameter outside its range.
-    pub fn new(params: &AxisParams, seed: u64, board: B) -> Result<Self, PlantError> {
+    /// [`AxisSimError::Plant`] names a parameter outside its range.
+    pub fn new(params: &AxisParams, seed: u64, board: B) -> Result<Self, AxisSimError> {
         let axis = Axis::new(params)?;
         Ok(Self {
             state: axis.initial_state(seed),
@@ -121,27 +122,27 @@ impl<B: Board> AxisSim<B> {
     /// Runs `motion` for `duration_s`, with the loads changed at their times.
     ///
     /// # Errors
-    /// Any [`PlantError`]; the bench is not usable after one.
+    /// [`AxisSimError::Unphysical`]; the bench is not usable after one.
     pub fn run(
         &mut self,
         motion: &Motion,
         loads: &[LoadEvent],
         duration_s: f64,
-    ) -> Result<Trace, PlantError> {
+    ) -> Result<Trace, AxisSimError> {
         self.watch(motion, loads, duration_s, |_, _| {})
     }
 
     /// As [`AxisSim::run`], and shows each row and the board to `watch`.
     ///
     /// # Errors
-    /// Any [`PlantError`]; the bench is not usable after one.
+    /// [`AxisSimError::Unphysical`]; the bench is not usable after one.
     pub fn watch(
         &mut self,
         motion: &Motion,
         loads: &[LoadEvent],
         duration_s: f64,
         mut watch: impl FnMut(&Row, &B),
-    ) -> Result<Trace, PlantError> {
+    ) -> Result<Trace, AxisSimError> {
         let ticks = (duration_s * 1000.0).round() as usize;
         let mut rows = Vec::with_capacity(ticks);
         let (mut faults, mut drove) = (FaultBits::NONE, true);
@@ -187,8 +188,8 @@ impl<B: Board> AxisSim<B> {
     /// board did, and the row of the tick's start; switches and air count from power-up.
     ///
     /// # Errors
-    /// Any [`PlantError`]; the bench is not usable after one.
-    pub fn tick(&mut self, reference_m: f64, rate_m_s: f64) -> Result<(Action, Row), PlantError> {
+    /// [`AxisSimError`]; the bench is not usable after one.
+    pub fn tick(&mut self, reference_m: f64, rate_m_s: f64) -> Result<(Action, Row), AxisSimError> {
         let mut row = Row::default();
         let action = self.tick_with(reference_m, rate_m_s, None, |now, _| row = *now)?;
         Ok((action, row))
@@ -201,7 +202,7 @@ impl<B: Board> AxisSim<B> {
         rate_m_s: f64,
         announced: Option<(PositionMm, u32)>,
         show: impl FnOnce(&Row, &B),
-    ) -> Result<Action, PlantError> {
+    ) -> Result<Action, AxisSimError> {
         let action = self.board.tick(&Sample {
             code: AdcCode::new(self.axis.read_position(&mut self.state)),
             reference: PositionMm::from_f64(reference_m * 1e3),
@@ -223,7 +224,7 @@ impl<B: Board> AxisSim<B> {
             settled: action.settled,
         };
         show(&row, &self.board);
-        self.axis.tick(&mut self.state, self.pending)?;
+        unphysical::tick(&self.axis, &mut self.state, self.pending)?;
         self.pending = action.on_us;
         Ok(action)
     }

@@ -107,10 +107,11 @@ impl study::Summary for Cases<'_> {
 
 /// An axis that cannot be compared: names the file, field, value and range.
 pub(crate) fn axis_error(file: &str, e: &AxisSimError) -> StudyError {
-    StudyError::refused(
-        format!("the axis `{file}` cannot be used: {e}"),
-        "change the axis file to data within these limits",
-    )
+    let help = match e {
+        AxisSimError::Unphysical { help, .. } => help,
+        _ => "change the axis file to data within these limits",
+    };
+    StudyError::refused(format!("the axis `{file}` cannot be used: {e}"), help)
 }
 
 /// Loads an axis and has its gains derived for every controller.

@@ -30,31 +30,46 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), StudyError> {
     if path.is_file() && std::fs::read(path).is_ok_and(|old| old == text.as_bytes()) {
         return Ok(());
     }
-    if path.is_dir() {
-        let reason = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-        return Err(StudyError::output("write the file", path, reason));
-    }
-    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| StudyError::output("create the folder", folder, e))?;
-    }
     // A device or a pipe is written to, not moved away.
-    if path.exists() && !path.is_file() {
+    if path.exists() && !path.is_file() && !path.is_dir() {
         return std::fs::write(path, text)
             .map_err(|e| StudyError::output("write the file", path, e));
     }
-    if path.exists() {
-        let previous = free_place(path);
-        std::fs::rename(path, &previous).map_err(|e| StudyError::output("set aside", path, e))?;
-        let told = format!("earlier {} moved to {}", path.display(), previous.display());
-        // Standard error may be closed or full.
-        let _ = writeln!(std::io::stderr(), "{told}");
-    }
+    make_room(path)?;
     std::fs::write(path, text).map_err(|e| {
         // A part of a file would be taken for the whole.
         let _ = std::fs::remove_file(path);
         StudyError::output("write the file", path, e)
     })
+}
+
+/// Makes room for a file: one of the same name is set aside, a missing folder is created.
+///
+/// # Errors
+/// [`StudyError::Report`] with the path if it is a folder or a device, or cannot be moved or made.
+pub fn make_room(path: &Path) -> Result<(), StudyError> {
+    let kind = match std::fs::metadata(path) {
+        Err(_) => None,
+        Ok(about) if about.is_dir() => Some(std::io::ErrorKind::IsADirectory.into()),
+        Ok(about) if !about.is_file() => Some(std::io::Error::other("it is not a file")),
+        Ok(_) => {
+            let previous = free_place(path);
+            std::fs::rename(path, &previous)
+                .map_err(|e| StudyError::output("set aside", path, e))?;
+            let told = format!("earlier {} moved to {}", path.display(), previous.display());
+            // Standard error may be closed or full.
+            let _ = writeln!(std::io::stderr(), "{told}");
+            return Ok(());
+        }
+    };
+    if let Some(reason) = kind {
+        return Err(StudyError::output("write the file", path, reason));
+    }
+    match path.parent().filter(|f| !f.as_os_str().is_empty()) {
+        Some(folder) => std::fs::create_dir_all(folder)
+            .map_err(|e| StudyError::output("create the folder", folder, e)),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

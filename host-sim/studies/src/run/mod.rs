@@ -26,7 +26,7 @@ use wheeleg_config::{EventAction, LawChoice, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_scene::Scene;
 use wheeleg_sim::faults;
-use wheeleg_sim::{Boards, DownTimes, SimError};
+use wheeleg_sim::{Boards, DownTimes, Session, SimError};
 use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
 
 /// What to run.
@@ -167,12 +167,17 @@ fn run_with(
     boards: Boards,
     settings: &Settings,
 ) -> Result<Finished<Run>, StudyError> {
+    // What is refused costs no earlier results, and leaves no folder.
+    let scene = Scene::new(robot, scenario)?;
+    if boards.are_here() {
+        ensure_possible(scenario, robot, seed)?;
+    }
     let job = Job::begin(&scenario.name, settings)?;
     announce(scenario.duration_s);
     let reserve = reserve(job.folder());
-    let scene = Scene::new(robot, scenario)?;
+    let log = job.folder().join("log.mcap");
     let recorder = Recorder::new(keep(scenario))
-        .with(LogFile::create(&job.folder().join("log.mcap"))?.with(scene)?)
+        .with(LogFile::create(&log)?.with(scene)?)
         .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?);
     let duration_ms = (scenario.duration_s * 1e3).round() as u64;
     job.progress.begin(
@@ -195,7 +200,12 @@ fn run_with(
         analysis,
         failed,
     } = simulated;
-    let unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
+    let mut unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
+    if !log.exists() {
+        // What is written to a file that was removed goes nowhere, and no error tells of it.
+        let removed = std::io::Error::from(std::io::ErrorKind::NotFound);
+        unwritten.push(StudyError::output("find again", &log, removed));
+    }
 
     let info = RunInfo {
         seed,
@@ -227,6 +237,13 @@ fn run_with(
         down_times: outcome.down_times,
     };
     Ok(report::write(job, &source, run, stopped))
+}
+
+/// Builds the robot for once. A simulated robot is large: this one is gone from the stack before
+/// the one that runs.
+#[inline(never)]
+fn ensure_possible(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Result<(), SimError> {
+    Session::new(Boards::default(), scenario, robot, seed).map(drop)
 }
 
 /// Longest run whose phases the page shows, s.

@@ -104,6 +104,7 @@ impl Job {
     /// # Errors
     /// [`StudyError::Report`] if the folder is in use or cannot be written.
     pub fn begin(name: &str, settings: &Settings) -> Result<Self, StudyError> {
+        settings.stop.begin();
         Ok(Self {
             folder: Folder::prepare(&settings.out)?,
             png: settings.png,

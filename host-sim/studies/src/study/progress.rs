@@ -65,6 +65,7 @@ impl Progress {
     /// Nothing done yet.
     #[must_use]
     pub fn new(name: &str, stop: Stop) -> Self {
+        stop.begin();
         let bar = ProgressBar::new(0);
         let style = ProgressStyle::with_template("{prefix} {wide_bar} {percent:>3} %  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));

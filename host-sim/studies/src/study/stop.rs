@@ -61,17 +61,23 @@ impl Signal {
 pub struct Stop {
     /// Number of the signal; 0: none.
     signal: Arc<AtomicUsize>,
+    /// Nothing has begun: a signal ends the program as if it had no handler.
+    idle: Arc<AtomicBool>,
 }
 
 impl Stop {
-    /// One that the program's signals set. The first asks; a second Ctrl-C or TERM ends the
-    /// program at once. A hang-up that whoever started the program has it ignore (`nohup`)
+    /// One that the program's signals set. Until [`begin`](Self::begin) they end the program at
+    /// once: there is nothing to finish, and a pipe that is read may never end. From then on the
+    /// first asks; a second Ctrl-C or TERM ends the program. A hang-up that whoever started the program has it ignore (`nohup`)
     /// stays ignored.
     ///
     /// # Errors
     /// What the operating system says if a handler cannot be set.
     pub fn on_signals() -> std::io::Result<Self> {
-        let stop = Self::default();
+        let stop = Self {
+            idle: Arc::new(AtomicBool::new(true)),
+            ..Self::default()
+        };
         let asked = Arc::new(AtomicBool::new(false));
         for signal in Signal::ALL {
             let number = signal.number();
@@ -83,10 +89,16 @@ impl Stop {
                 // A terminal that closes may hang up twice, so only these.
                 flag::register_conditional_default(number, Arc::clone(&asked))?;
             }
+            flag::register_conditional_default(number, Arc::clone(&stop.idle))?;
             flag::register(number, Arc::clone(&asked))?;
             flag::register_usize(number, Arc::clone(&stop.signal), number as usize)?;
         }
         Ok(stop)
+    }
+
+    /// From here on there is something to finish.
+    pub fn begin(&self) {
+        self.idle.store(false, Ordering::SeqCst);
     }
 
     /// Asks to stop, as the signal does.

@@ -197,7 +197,7 @@ fn load(file: &str) -> Result<AxisConfig, StudyError> {
 /// The delays of its valves, as a board looks for them at start-up.
 fn delays(file: &str, config: &AxisConfig, seed: u64) -> Result<Option<Delays>, StudyError> {
     let plant = &config.axis;
-    identify(plant, plant, seed).map_err(|e| axis_error(file, &e.into()))
+    identify(plant, plant, seed).map_err(|e| axis_error(file, &e))
 }
 
 /// A board as it comes, told no more than where its piston is and how long its

@@ -18,6 +18,7 @@ use wheeleg_config::{Drawing, builtin};
 use self::content::{Content, Span};
 use self::signals::Signal;
 use crate::StudyError;
+use crate::export::write_new;
 use crate::study::Progress;
 
 /// What to look at.
@@ -108,13 +109,11 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
             "give another file with --out FILE",
         ));
     }
-    std::fs::write(&page, text).map_err(|e| {
-        // A part of a page would be taken for the whole.
-        if page.is_file() {
-            let _ = std::fs::remove_file(&page);
-        }
-        StudyError::output("write", &page, e)
-    })?;
+    // The page of a log is made anew; somebody's own file is kept.
+    if options.out.is_none() {
+        let _ = std::fs::remove_file(&page);
+    }
+    write_new(&page, &text)?;
     progress.clear();
     let broken_off = options.logs.iter().zip(&logs);
     let broken_off = broken_off.filter(|(_, log)| !log.content.end.whole);

@@ -220,6 +220,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     let store = Store::create(&out, file)?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let stop = stop_on_signals()?;
+    stop.begin();
     let options = Options {
         shard,
         threads: args.threads.map_or(cores, |n| n as usize),
@@ -279,6 +280,7 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
     let store = Store::open(&args.dir)?;
     let shard = args.shard.unwrap_or(Shard::ALL);
     let stop = stop_on_signals()?;
+    stop.begin();
     loop {
         let state = status(&store, shard)?;
         let text = if args.json {
@@ -329,6 +331,7 @@ fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
 
 fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
+    stop.begin();
     let out = args.out.as_deref();
     let replayed = replay(&args.from, &args.case, out, args.drawing.png, &stop)?;
     let stopped = || stop.signal().map_or(2, Signal::exit_code);
@@ -358,6 +361,7 @@ fn case_command(args: &CaseArgs) -> Result<ExitCode, CampaignError> {
     let store = Store::open(&args.dir)?;
     let limit_s = store.plan().plan()?.limit_s;
     let stop = stop_on_signals()?;
+    stop.begin();
     let simulate = |case: &_| simulate(case, limit_s, &stop);
     Ok(if isolated(&store, args.index, &args.row, &simulate)? {
         ExitCode::SUCCESS

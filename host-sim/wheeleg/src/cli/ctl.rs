@@ -9,7 +9,8 @@ use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::{self, CONTROL_FILE, VIEW_FILE};
-use wheeleg_console::{ADDRESS, Fingerprint, Key};
+use wheeleg_console::request::FRAME_MAX;
+use wheeleg_console::{ADDRESS, Fingerprint, Key, SPEED};
 use wheeleg_studies::StudyError;
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
@@ -95,6 +96,7 @@ enum CtlCommand {
     /// Set the pace.
     Speed {
         /// Simulated time per wall-clock time, 0.1 to 10.
+        #[arg(allow_negative_numbers = true, value_parser = parse_pace)]
         speed: f64,
     },
     /// Record: log, and every command with its time, so that `wheeleg replay` can repeat it.
@@ -111,6 +113,12 @@ enum Recording {
     Start,
     /// End it.
     Stop,
+}
+
+fn parse_pace(text: &str) -> Result<f64, String> {
+    let (min, max) = SPEED;
+    let pace = text.parse().ok().filter(|x| (min..=max).contains(x));
+    pace.ok_or_else(|| format!("allowed are numbers from {min} to {max}"))
 }
 
 /// Does what is asked of the server.
@@ -335,11 +343,18 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
     let Some((name, arguments)) = words.split_first() else {
         return Ok(ExitCode::SUCCESS);
     };
-    let arguments: Map<String, Value> = arguments
-        .iter()
-        .map(|text| argument(text))
-        .collect::<Result<_, _>>()?;
-    let arguments = Value::Object(arguments);
+    let mut given = Map::new();
+    for text in arguments {
+        let (argument, value) = argument(text)?;
+        if given.insert(argument.clone(), value).is_some() {
+            return Err(StudyError::refused(
+                format!("`{argument}` is given twice"),
+                "give each argument once",
+            ));
+        }
+    }
+    let arguments = Value::Object(given);
+    ensure_fits(name, &arguments)?;
     let mut client = Client::connect(&args.url(), "control", "ctl", key).map_err(refused)?;
     let mut give = |name: &str, arguments: &Value| {
         let end = client.carry_out(name, arguments, VALID_MS).map_err(refused);
@@ -360,7 +375,24 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
     Ok(print_outcome(args, &end))
 }
 
+/// Bytes of a frame beside the command in it.
+const AROUND: usize = 256;
+
+/// Refuses what the server would not read: it ends the connection at a frame that is too long.
+fn ensure_fits(name: &str, arguments: &Value) -> Result<(), StudyError> {
+    let bytes = name.len() + arguments.to_string().len();
+    let most = FRAME_MAX - AROUND;
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(StudyError::refused(
+        format!("the command has {bytes} bytes: allowed are {most}"),
+        "`wheeleg commands` lists the commands of the robot, `wheeleg faults list` the faults",
+    ))
+}
+
 fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, StudyError> {
+    ensure_fits(name, arguments)?;
     let key = read_key(args, CONTROL_FILE)?;
     let mut client = Client::connect(&args.url(), "control", "ctl", &key).map_err(refused)?;
     let end = client

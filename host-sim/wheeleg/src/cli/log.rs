@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 
 use super::{FAILED, print, stop_on_signals, tell};
 use wheeleg_studies::StudyError;
+use wheeleg_studies::export::log_of;
 use wheeleg_studies::study::Signal;
 use wheeleg_telemetry::recover;
 
@@ -21,7 +22,7 @@ pub(super) struct LogArgs {
 enum Action {
     /// Make a whole log of one that has no end: its run was killed, or its disk was full.
     Recover {
-        /// The log, which stays as it is.
+        /// The log, or the folder of its run; it stays as it is.
         log: PathBuf,
         /// The new file, which must not exist [default: beside the log, NAME-recovered.mcap].
         #[arg(long, value_name = "FILE")]
@@ -32,8 +33,10 @@ enum Action {
 /// Recovers a log and says how much of it.
 pub(super) fn command(args: &LogArgs) -> Result<ExitCode, StudyError> {
     let Action::Recover { log, out } = &args.action;
+    let log = &log_of(log);
     let out = out.clone().unwrap_or_else(|| beside(log));
     let stop = stop_on_signals()?;
+    stop.begin();
     let recovered = recover(log, &out, &|| stop.is_asked())?;
     let Some(recovered) = recovered else {
         tell("stopped; no recovered log is left, and the log stays as it is");

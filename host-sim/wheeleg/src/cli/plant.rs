@@ -10,6 +10,7 @@ use wheeleg_config::{AxisConfig, brief};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::export;
 use wheeleg_studies::axis_sim::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
+use wheeleg_studies::axis_sim::suite::AxisSimError;
 use wheeleg_studies::export::write_new;
 
 /// Exit code of a check beyond its limit.
@@ -59,23 +60,24 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, StudyError> {
         What::Export(args) => {
             let config = AxisConfig::load(&args.axis)?;
             let value = export::sequences(&config.name, &config.axis)
-                .map_err(|e| plant_error(&args.axis, e))?;
+                .map_err(|e| plant_error(&args.axis, &e))?;
             write_new(&args.out, &format!("{value}\n"))?;
             Ok(ExitCode::SUCCESS)
         }
     }
 }
 
-fn plant_error(axis: &str, e: impl std::fmt::Display) -> StudyError {
-    StudyError::refused(
-        format!("the axis `{axis}` cannot be simulated: {e}"),
-        "check the axis file against the range in the message, which is in SI units",
-    )
+fn plant_error(axis: &str, e: &AxisSimError) -> StudyError {
+    let help = match e {
+        AxisSimError::Unphysical { help, .. } => help,
+        _ => "check the axis file against the range in the message, which is in SI units",
+    };
+    StudyError::refused(format!("the axis `{axis}` cannot be simulated: {e}"), help)
 }
 
 fn check(args: &CheckArgs) -> Result<ExitCode, StudyError> {
     let config = AxisConfig::load(&args.axis)?;
-    let c = plant_check::check(&config.axis).map_err(|e| plant_error(&args.axis, e))?;
+    let c = plant_check::check(&config.axis).map_err(|e| plant_error(&args.axis, &e))?;
     if args.json {
         let value = serde_json::json!({ "axis": config.name, "check": c });
         print(&format!("{value:#}\n"))?;

@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::Args;
 use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
 use wheeleg_console::{
-    ADDRESS, ConsoleError, FOLDER, Files, Live, Options, Port, Protection, Server,
+    ADDRESS, ConsoleError, FOLDER, Files, Live, Options, Port, Protection, SPEED, Server,
 };
 use wheeleg_studies::StudyError;
 
@@ -90,15 +90,17 @@ fn parse_speed(text: &str) -> Result<Speed, String> {
     if text == "max" {
         return Ok(Speed::Max);
     }
-    let speed = text.parse().ok().filter(|x| (0.1..=10.0).contains(x));
+    let (min, max) = SPEED;
+    let speed = text.parse().ok().filter(|x| (min..=max).contains(x));
     let speed = speed.map(Speed::Times);
-    speed.ok_or_else(|| "allowed are numbers from 0.1 to 10, and max".to_owned())
+    speed.ok_or_else(|| format!("allowed are numbers from {min} to {max}, and max"))
 }
 
 /// Serves until it is told to stop.
 pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let live = Live::load(&args.scenario, args.robot.as_deref())?;
+    stop.begin();
     let folder = keys::folder().map_err(refused)?;
     let open = if args.new_key {
         Keys::renew

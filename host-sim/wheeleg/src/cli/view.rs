@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use wheeleg_studies::StudyError;
+use wheeleg_studies::export::log_of;
 use wheeleg_studies::study::Progress;
 use wheeleg_studies::view::{Options, view};
 
@@ -13,7 +14,7 @@ use super::{print, stop_on_signals, tell};
 /// Arguments of `wheeleg view`.
 #[derive(Debug, Args)]
 pub(super) struct ViewArgs {
-    /// A log, `log.mcap` of a run or of a recording; two are overlaid.
+    /// A log, or the folder of its run or recording; two are overlaid.
     #[arg(required = true, num_args = 1..=2, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Start of the part to show, in seconds of the log.
@@ -39,7 +40,7 @@ pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let progress = Progress::new("view", stop.clone());
     let options = Options {
-        logs: args.logs.clone(),
+        logs: args.logs.iter().map(|log| log_of(log)).collect(),
         robot: args.robot.clone(),
         from_s: args.from,
         to_s: args.to.unwrap_or(f64::INFINITY),

@@ -2,6 +2,8 @@
 //! scenario and robot that its values are written into. Names and texts of any content come back as
 //! they were; what is written is never broken TOML.
 
+use std::collections::BTreeMap;
+
 use wheeleg_config::ConfigError;
 use wheeleg_config::builtin::{self, Source};
 use wheeleg_config::plan::{
@@ -31,6 +33,7 @@ fn sources(plan: &str) -> Sources {
         scenarios: one("stand", scenario),
         robots: one("wheeleg-2003", robot),
         robot_of: [("stand".to_owned(), "wheeleg-2003".to_owned())].into(),
+        data: BTreeMap::new(),
     }
 }
 

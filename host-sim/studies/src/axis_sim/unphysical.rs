@@ -1,0 +1,59 @@
+//! A plant of one axis that leaves the range of its model: when, what most likely did it, and what
+//! was last known of it.
+
+use wheeleg_plant::PlantError;
+use wheeleg_plant::axis::{Axis, AxisState};
+
+use super::error::AxisSimError;
+
+/// One tick of an axis with the on-times of its valves, µs.
+///
+/// # Errors
+/// [`AxisSimError::Unphysical`] if it leaves the range of its model, [`AxisSimError::Plant`] if it
+/// refuses the on-times.
+pub(super) fn tick(
+    axis: &Axis,
+    state: &mut AxisState,
+    on_us: [u16; 4],
+) -> Result<(), AxisSimError> {
+    let (time_ns, motion) = (state.core.time_ns, state.core.motion.clone());
+    let pressure_pa =
+        axis.assembly.cylinders[0].pressures_pa(&state.core.cylinders[0], motion.stroke_m);
+    axis.tick(state, on_us).map_err(|error| match &error {
+        PlantError::NonFinite { name, .. } | PlantError::OutOfBounds { name, .. } => {
+            let [a_bar, b_bar] = pressure_pa.map(|p| p * 1e-5);
+            AxisSimError::Unphysical {
+                what: format!(
+                    "the axis left the range of its model within 1 ms of {:.3} s: {error}; last \
+                     sound values: stroke {:.2} mm, speed {:.1} mm/s, pressures {a_bar:.3} and \
+                     {b_bar:.3} bar",
+                    time_ns as f64 * 1e-9,
+                    motion.stroke_m * 1e3,
+                    motion.velocity_m_s * 1e3,
+                ),
+                help: format!(
+                    "most likely {}, or a `numerics.step` that is too long for them",
+                    likely(name)
+                ),
+            }
+        }
+        _ => AxisSimError::Plant(error),
+    })
+}
+
+/// Parameters of the axis file that most likely make a state variable explode.
+fn likely(name: &str) -> &'static str {
+    match name {
+        "bristle_m" => "`friction.bristle_damping`, `friction.bristle_stiffness`",
+        // What moves is too heavy for its stop, or for the air before the piston.
+        "stroke_m" => "`moving.mass`, `end_stop.stiffness`, `end_stop.damping`",
+        "pressure_a_pa" | "mass_a_kg" => {
+            "`moving.mass`, `cylinder.dead_volume_a`, `line.volume`, `fill_valve.conductance`"
+        }
+        "pressure_b_pa" | "mass_b_kg" => {
+            "`moving.mass`, `cylinder.dead_volume_b`, `line.volume`, `fill_valve.conductance`"
+        }
+        "supply_pressure_pa" => "`supply.reservoir`, `regulator.conductance`",
+        _ => "`friction.bristle_damping`, `end_stop.stiffness`, `moving.mass`",
+    }
+}
