@@ -272,12 +272,12 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
     assert!(told(&metres.join("\n")).contains("less than 2 % of the stroke"));
 }
 
-/// `cargo xtask deep identify`: random cylinders, and how often an interval has the truth.
+/// Random cylinders, and how often an interval has the truth: one in the suite, 100 in
+/// `cargo xtask deep identify`. Of few cylinders the share says nothing.
 #[test]
-#[ignore = "takes minutes"]
 fn intervals_have_the_truth_about_as_often_as_they_say() {
     let count = std::env::var("WHEELEG_IDENTIFY_CYLINDERS").ok();
-    let count: u64 = count.and_then(|n| n.parse().ok()).unwrap_or(100);
+    let count: u64 = count.and_then(|n| n.parse().ok()).unwrap_or(1);
     let config = config();
     let (mut covered, mut all, mut close) = (0, 0, 0);
     for seed in 0..count {
@@ -300,6 +300,6 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
         "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); told within 5 % in {close} of {count} cylinders (bar 95 %)",
         100.0 * share
     );
-    assert!((0.90..=0.99).contains(&share), "{share}");
+    assert!(count < 20 || (0.90..=0.99).contains(&share), "{share}");
     assert!(20 * close >= 19 * count, "{close} of {count}");
 }
