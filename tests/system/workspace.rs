@@ -186,8 +186,9 @@ const SIM: [&str; 10] = [
     "wheeleg-units",
 ];
 
-const STUDIES: [&str; 14] = [
+const STUDIES: [&str; 15] = [
     "wheeleg-config",
+    "wheeleg-console",
     "wheeleg-control",
     "wheeleg-interface",
     "wheeleg-kinematics",
