@@ -55,7 +55,7 @@ impl Replayed {
 
 /// Where the case is from: a folder of parts, or one table of them.
 enum From {
-    Folder(Store),
+    Folder(Box<Store>),
     Table(PathBuf),
 }
 
@@ -74,7 +74,7 @@ pub fn replay(
     let (place, plan_file) = if from.is_dir() {
         let store = Store::open(from)?;
         let plan = store.plan().clone();
-        (From::Folder(store), plan)
+        (From::Folder(Box::new(store)), plan)
     } else {
         let plan = plan_of_table(from)?;
         (From::Table(from.to_owned()), plan)

@@ -62,7 +62,7 @@ pub(super) fn height_map(
         Ok(bytes) => bytes,
         Err(what) => {
             let help = "a path counts from the folder of the scenario's file";
-            told(r, &what, Some(help.into()));
+            problem(r, &what, Some(help.into()));
             return None;
         }
     };

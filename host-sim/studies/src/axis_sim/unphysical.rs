@@ -16,7 +16,7 @@ pub(super) fn tick(
     state: &mut AxisState,
     on_us: [u16; 4],
 ) -> Result<(), AxisSimError> {
-    let (time_ns, motion) = (state.core.time_ns, state.core.motion.clone());
+    let (time_ns, motion) = (state.core.time_ns, state.core.motion);
     let pressure_pa =
         axis.assembly.cylinders[0].pressures_pa(&state.core.cylinders[0], motion.stroke_m);
     axis.tick(state, on_us).map_err(|error| match &error {
