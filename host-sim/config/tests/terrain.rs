@@ -425,17 +425,15 @@ fn every_quantity_of_a_part_has_a_unit() {
     ];
     let pairs = [
         (
-            format!(
-                "kind = \"block\"\nheight = \"1 cm\"\ny = {{ value = [0.0, 1.0], unit = \"m\" }}\n"
-            ),
+            "kind = \"block\"\nheight = \"1 cm\"\ny = { value = [0.0, 1.0], unit = \"m\" }\n"
+                .to_owned(),
             "x",
             "[2.0, 3.0]",
             "m",
         ),
         (
-            format!(
-                "kind = \"block\"\nheight = \"1 cm\"\nx = {{ value = [2.0, 3.0], unit = \"m\" }}\n"
-            ),
+            "kind = \"block\"\nheight = \"1 cm\"\nx = { value = [2.0, 3.0], unit = \"m\" }\n"
+                .to_owned(),
             "y",
             "[-20, 30]",
             "cm",
