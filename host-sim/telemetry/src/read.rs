@@ -287,7 +287,7 @@ mod tests {
         assert!(matches!(bodies(&path), Err(LogError::NotALog { .. })));
         assert!(matches!(
             bodies(&folder.path().join("none")),
-            Err(LogError::Output { .. })
+            Err(LogError::Read { .. })
         ));
     }
 

@@ -22,7 +22,7 @@ const LANDED: usize = 10;
 const HEIGHT_MM: f64 = 1.5;
 
 /// Largest change in a cycle of the references of yaw, b5 and b6 of feet that stand, mm, and when it
-/// was; a foot that begins to rise counts for yaw and b5. As the boards have them, half a cycle on.
+/// was; a foot that begins to rise counts for yaw and b5. As SYNC carries them, half a cycle on.
 fn steps(recording: &Recording) -> [(f64, f64); 3] {
     let mut most = [(0.0, 0.0); 3];
     for (leg, codes) in codes(recording).into_iter().enumerate() {
@@ -39,7 +39,7 @@ fn steps(recording: &Recording) -> [(f64, f64); 3] {
                 if !stays || next_t + 0.006 > end {
                     continue;
                 }
-                let reference = |t: f64| sil::at(rows, t + 0.005).reference_mm;
+                let reference = |t: f64| sil::at(rows, t + 0.005).commanded_mm;
                 let step = (reference(next_t) - reference(t)).abs();
                 if step > most.0 {
                     *most = (step, t);

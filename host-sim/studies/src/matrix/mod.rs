@@ -82,7 +82,9 @@ mod tests {
         let once = select(&twice).expect("rows");
         let ids: Vec<&str> = once.iter().map(|row| row.id).collect();
         assert_eq!(ids, ["pot-open", "pot-short"]);
-        let refused = one("foot-sinks").expect_err("not implemented").to_string();
+        let refused = one("brown-out/update")
+            .expect_err("not implemented")
+            .to_string();
         assert!(refused.contains("not implemented"), "{refused}");
     }
 
