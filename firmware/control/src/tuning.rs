@@ -97,7 +97,7 @@ tuning! {
 
     // Law: standstill.
     REFERENCE_RESTS: i32 = 1 << 16, "raw mm/s (1 mm/s)", "a slower reference is a step", "a_moving_reference_is_not_rested_at";
-    CATCH_SPEED: i32 = 4 << 16, "raw mm/s (4 mm/s)", "that of a stuck piston", "four_mm_s_are_caught_and_no_more";
+    CATCH_SPEED: i32 = 4 << 16, "raw mm/s (4 mm/s)", "that of a stuck piston", "a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods";
     REST_PERIODS: u16 = 6, "periods (24 ms)", "a swing's turning point is shorter", "a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods";
     NEAR_BANDS: i32 = 24, "bands", "searched", "patience_begins_within_24_bands";
     NEAR_PERIODS: u16 = 4, "periods (16 ms)", "searched", "patience_begins_within_24_bands";

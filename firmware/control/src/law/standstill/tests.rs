@@ -75,26 +75,6 @@ fn a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods() {
 }
 
 #[test]
-fn four_mm_s_are_caught_and_no_more() {
-    let caught = |tenths: i32| {
-        let mut standstill = aimed();
-        seen(11, 0, |now| {
-            let motion = Motion {
-                speed: (tenths << 16) / 10,
-                ..*now.motion
-            };
-            let now = Approach {
-                motion: &motion,
-                ..*now
-            };
-            standstill.update(&model(), &now);
-        });
-        standstill.state == State::Catch
-    };
-    assert!(caught(39) && !caught(41));
-}
-
-#[test]
 fn rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target() {
     let rested = || {
         let mut standstill = aimed();
