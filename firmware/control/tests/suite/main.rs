@@ -5,7 +5,6 @@ mod closed_loop;
 mod fuzzy;
 mod joint;
 mod pwm;
-mod tuning;
 mod vectors;
 mod velocity;
 mod wheel;

@@ -67,8 +67,6 @@ pub struct Layer1 {
     segment: u16,
     /// Commands `Hold` carried out (wraps).
     holds: u8,
-    /// Number of the permission to move that holds.
-    permit: u16,
     lost_setpoints: u32,
     tally: Tally,
 }
@@ -93,7 +91,6 @@ impl Layer1 {
             active: None,
             segment: 0,
             holds: 0,
-            permit: 0,
             lost_setpoints: 0,
             tally: Tally::default(),
         })
@@ -133,8 +130,7 @@ impl Layer1 {
                 None => break,
             }
         }
-        let permit = core::mem::replace(&mut self.permit, self.feedback.permit);
-        if !self.feedback.motion_allowed || permit != self.permit {
+        if !self.feedback.motion_allowed {
             self.interrupt(now_us, events);
         }
         for _ in 0..commands.capacity() {
@@ -164,7 +160,6 @@ impl Layer1 {
         }
         let mut out = self.advance(now_us, events);
         out.holds = self.holds;
-        out.permit = self.permit;
         out.push = Some(PushProfile {
             speed_mm_s: self.params.push_speed_mm_s,
             acceleration_mm_s2: self.params.push_acceleration_mm_s2,

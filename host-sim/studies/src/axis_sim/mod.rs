@@ -28,7 +28,6 @@
 //!   finds the valves' delays at start-up, as a board would.
 
 pub mod commission;
-mod delay_probe;
 mod design;
 mod error;
 pub mod export;
