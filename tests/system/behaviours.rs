@@ -200,11 +200,16 @@ fn a_walk_without_layer_1_comes_to_a_stand_and_its_behaviours_go_on() {
             lost.min(tips) - opens < 0.05 + 0.02 + 0.015,
             "{opens} {lost} {tips}\n{story}"
         );
-        let loads = recording
+        // On ice below wheels and feet the loads part as they will; both feet touch, as they sense it.
+        let ends = recording
             .feet
             .each_ref()
-            .map(|foot| foot[foot.len() - 1].v.normal_force_n);
-        assert!(loads.iter().all(|n| *n > 1.0), "{loads:?}");
+            .map(|foot| &foot[foot.len() - 1].v);
+        assert!(
+            ends.iter()
+                .all(|v| v.switches != 0 && v.normal_force_n > 0.0),
+            "{ends:?}"
+        );
     }
 }
 

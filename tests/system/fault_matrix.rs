@@ -359,7 +359,7 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
         .assert()
         .code(2)
         .stderr(contains("frozen/lowering").and(contains("frozen/reach")));
-    let (mut command, _folder) = faults_run(&["--row", "foot-sinks"]);
+    let (mut command, _folder) = faults_run(&["--row", "brown-out/update"]);
     command.assert().code(2).stderr(contains("not implemented"));
     let (mut command, _folder) = faults_run(&["--row", "pot-opn"]);
     command.assert().code(2).stderr(contains("pot-open"));

@@ -123,6 +123,7 @@ const ARROWS: [(&str, &[&str]); 30] = [
             "wheeleg-config",
             "wheeleg-master",
             "wheeleg-protocol",
+            "wheeleg-remote-host",
             "wheeleg-scene",
             "wheeleg-sim",
             "wheeleg-telemetry",
@@ -150,6 +151,7 @@ const ARROWS: [(&str, &[&str]); 30] = [
         &[
             "wheeleg-board",
             "wheeleg-config",
+            "wheeleg-console",
             "wheeleg-master",
             "wheeleg-node",
             "wheeleg-protocol",

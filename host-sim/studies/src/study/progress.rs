@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use super::{Stop, Stopped};
 use crate::StudyError;
 
-/// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests.
-pub(crate) const STACK: usize = 8 << 20;
+/// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests; and a
+/// worker that waits for others takes up the next piece of work on top of its own.
+pub(crate) const STACK: usize = 32 << 20;
 
 /// Lets the workers that all studies share begin, with room for a simulated robot. A pool of its own
 /// that calls this keeps its own workers.
