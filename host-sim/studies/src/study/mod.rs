@@ -178,16 +178,17 @@ impl Job {
     pub fn draw(&self, figures: Vec<Figure>) -> Result<Vec<(Figure, String)>, StudyError> {
         self.subfolder("figures")?;
         self.progress.begin("drawing", figures.len() as u64);
-        progress::workers();
-        figures
-            .into_par_iter()
-            .map(|figure| {
-                let svg = figure.svg();
-                self.save_figure(&figure, &svg)?;
-                self.progress.step();
-                Ok((figure, svg))
-            })
-            .collect()
+        progress::on_workers(|| {
+            figures
+                .into_par_iter()
+                .map(|figure| {
+                    let svg = figure.svg();
+                    self.save_figure(&figure, &svg)?;
+                    self.progress.step();
+                    Ok((figure, svg))
+                })
+                .collect()
+        })
     }
 
     /// Writes the report of a study that was stopped before its page could be made: the parts,

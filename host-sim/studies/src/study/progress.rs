@@ -1,27 +1,28 @@
 //! How far a study is, and whether it is to stop.
 
-use std::sync::Once;
+use std::sync::LazyLock;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{Stop, Stopped};
 use crate::StudyError;
 
-/// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests; and a
-/// worker that waits for others takes up the next piece of work on top of its own.
-pub(crate) const STACK: usize = 32 << 20;
+/// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests.
+pub(crate) const STACK: usize = 8 << 20;
 
-/// Lets the workers that all studies share begin, with room for a simulated robot. A pool of its own
-/// that calls this keeps its own workers.
-pub(super) fn workers() {
-    static BEGUN: Once = Once::new();
-    if rayon::current_thread_index().is_none() {
-        BEGUN.call_once(|| {
-            let workers = rayon::ThreadPoolBuilder::new().stack_size(STACK);
-            // Fails if somebody else has begun them: then they are theirs.
-            let _ = workers.build_global();
-        });
+/// Works with the workers that all studies share, which have room for a simulated robot; on a worker
+/// already, with those of its own pool. Not rayon's global pool: whoever in the process uses that
+/// first gives its workers their stack.
+pub(super) fn on_workers<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    static WORKERS: LazyLock<Option<ThreadPool>> = LazyLock::new(|| {
+        let workers = ThreadPoolBuilder::new().stack_size(STACK);
+        workers.build().ok()
+    });
+    match &*WORKERS {
+        Some(workers) if rayon::current_thread_index().is_none() => workers.install(work),
+        _ => work(),
     }
 }
 
@@ -139,14 +140,15 @@ impl Progress {
         items: &[T],
         work: impl Fn(&T) -> Result<R, E> + Sync,
     ) -> Result<Vec<Option<R>>, E> {
-        workers();
-        items
-            .par_iter()
-            .map(|item| match self.is_stopped() {
-                true => Ok(None),
-                false => work(item).map(Some),
-            })
-            .collect()
+        on_workers(|| {
+            items
+                .par_iter()
+                .map(|item| match self.is_stopped() {
+                    true => Ok(None),
+                    false => work(item).map(Some),
+                })
+                .collect()
+        })
     }
 
     /// The same as a phase, with a step for each item.
@@ -188,9 +190,11 @@ mod tests {
     use super::*;
     use crate::study::Signal;
 
-    /// A simulated robot is built on the stack, in more than the 2 MB that a thread has by default.
+    /// A simulated robot is built on the stack, in more than the 2 MB that a thread has by default;
+    /// also where another library has begun rayon's own workers before.
     #[test]
     fn workers_have_room_for_a_simulated_robot() {
+        assert!(rayon::current_num_threads() > 0);
         let items = [1_u8; 4];
         let done = Progress::silent().map(&items, |item| {
             let room = std::hint::black_box([*item; STACK / 2]);
