@@ -2,23 +2,37 @@
 //! system in memory, of a mount name space of its own.
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::program;
-use crate::stop::{end, files_below, start};
+use crate::stop::{files_below, log_of_a_run};
+
+/// Runs a script in a mount name space of its own; `$0` is the program, `$1` the place of the disk,
+/// the others its arguments. Its code, and what it said on standard error.
+fn on_a_disk(script: &str, disk: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new("unshare")
+        .args(["--mount", "--map-root-user", "bash", "-c", script])
+        .arg(program::path())
+        .arg(disk)
+        .args(arguments)
+        .env("NO_COLOR", "1")
+        .output()
+        .expect("unshare of util-linux");
+    // Messages are wrapped to the width of a terminal.
+    let said = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
+    (output.status.code(), said)
+}
 
 /// A folder that nobody may write into, and one on a disk that is mounted to be read: refused by
 /// its name before anything is computed, and nothing in it changes. In a mount name space of its own.
 #[test]
 fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
     let dir = tempfile::tempdir().expect("temporary folder");
-    let log = dir.path().join("run/log.mcap");
-    let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
-    assert!(end(run).status.success());
+    let log = log_of_a_run(dir.path());
     let disk = dir.path().join("disk");
     fs::create_dir(&disk).expect("created");
-    let log = log.to_string_lossy();
     for (arguments, code) in [
         (&["run", "three-step"][..], 2),
         (&["tune", "bench-vq110u"], 2),
@@ -38,18 +52,8 @@ fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
         let script = "mount -t tmpfs -o size=64k,ro tmpfs \"$1\" || exit 77\n\
                       disk=\"$1\"; shift; exec \"$0\" \"$@\" --out \"$disk/out\"";
         let begin = Instant::now();
-        let output = Command::new("unshare")
-            .args(["--mount", "--map-root-user", "bash", "-c", script])
-            .arg(program::path())
-            .arg(&disk)
-            .args(arguments)
-            .env("NO_COLOR", "1")
-            .output()
-            .expect("unshare of util-linux");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-        // Messages are wrapped to the width of a terminal.
-        let said = said.replace("\n  │ ", " ");
+        let (ended, said) = on_a_disk(script, &disk, arguments);
+        assert_eq!(ended, Some(code), "{arguments:?}: {said}");
         for word in ["disk/", "Read-only file system", "help: "] {
             assert!(said.contains(word), "{arguments:?}, {word}: {said}");
         }
@@ -67,12 +71,9 @@ fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
 #[test]
 fn a_disk_that_fills_under_any_study_is_told() {
     let dir = tempfile::tempdir().expect("temporary folder");
-    let log = dir.path().join("run/log.mcap");
-    let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
-    assert!(end(run).status.success());
+    let log = log_of_a_run(dir.path());
     let disk = dir.path().join("disk");
     fs::create_dir(&disk).expect("created");
-    let log = log.to_string_lossy();
     let commands: [&[&str]; 7] = [
         &["tune", "bench-vq110u"],
         &["figures"],
@@ -94,19 +95,10 @@ fn a_disk_that_fills_under_any_study_is_told() {
                  disk=\"$1\"; shift; \"$0\" \"$@\" --out \"$disk/out\"; code=$?\n\
                  echo left: $(find \"$disk\" -type f) >&2; exit $code"
             );
-            let output = Command::new("unshare")
-                .args(["--mount", "--map-root-user", "bash", "-c", &script])
-                .arg(program::path())
-                .arg(&disk)
-                .args(arguments)
-                .env("NO_COLOR", "1")
-                .output()
-                .expect("unshare of util-linux");
-            // Messages are wrapped to the width of a terminal.
-            let said = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
+            let (code, said) = on_a_disk(&script, &disk, arguments);
             let told = format!("{arguments:?} on {kib} KiB: {said}");
             let full = said.contains("No space left on device");
-            let code = output.status.code().expect("a code");
+            let code = code.expect("a code");
             assert_eq!(code == 2, full, "{code}: {told}");
             assert!(matches!(code, 0..=2), "{code}: {told}");
             let left = said.rsplit("left:").next().unwrap_or_default();

@@ -28,6 +28,14 @@ pub(crate) fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> C
         .expect("start")
 }
 
+/// Runs a robot that stands, in a folder below `dir`; path of its log.
+pub(crate) fn log_of_a_run(dir: &Path) -> String {
+    let out = dir.join("run");
+    let run = start(&out, &["run", "stand"], Stdio::null);
+    assert!(end(run).status.success());
+    out.join("log.mcap").to_string_lossy().into_owned()
+}
+
 /// Waits until something is there, while the program runs.
 fn wait_until(child: &mut Child, what: &str, there: impl Fn() -> bool) {
     let begin = Instant::now();
@@ -217,10 +225,7 @@ fn a_run_can_be_terminated_at_any_time() {
 fn every_long_command_can_be_stopped_at_any_time() {
     use std::os::unix::process::ExitStatusExt as _;
     let dir = tempfile::tempdir().expect("temporary folder");
-    let log = dir.path().join("run/log.mcap");
-    let run = start(&dir.path().join("run"), &["run", "stand"], Stdio::null);
-    assert!(end(run).status.success());
-    let log = log.to_string_lossy();
+    let log = log_of_a_run(dir.path());
     let commands: [&[&str]; 11] = [
         &["field", "sand-flat"],
         &["export", "parquet", &log],

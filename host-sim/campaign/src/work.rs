@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use wheeleg_studies::study::Stop;
+use wheeleg_studies::study::{STACK, Stop};
 
 use crate::CampaignError;
 use crate::attempts::{Attempts, Event};
@@ -75,8 +75,7 @@ impl Work<'_> {
         });
         std::thread::scope(|scope| {
             for _ in 0..threads {
-                // The simulator's frames are larger in builds for tests.
-                let thread = std::thread::Builder::new().stack_size(8 << 20);
+                let thread = std::thread::Builder::new().stack_size(STACK);
                 let started = thread.spawn_scoped(scope, || self.thread(&queue));
                 if let Err(e) = started {
                     let what = format!("cannot start a thread: {e}");

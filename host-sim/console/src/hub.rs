@@ -16,11 +16,12 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
 use crate::catalogue::Catalogue;
+use crate::close::Close;
 use crate::desk::{ClientId, Desk};
 use crate::foxglove::{Place, Viewers};
 use crate::live::{Answer, Input, Moving, Report, Robot, Signals, Status};
 use crate::messages::{done, refused};
-use crate::outbox::{Close, Outbox};
+use crate::outbox::Outbox;
 use crate::reason::Reason;
 use crate::record;
 use crate::request::{BadRequest, Body};

@@ -17,6 +17,7 @@
 mod api;
 mod catalogue;
 pub mod client;
+mod close;
 pub mod desk;
 pub mod door;
 mod error;
@@ -27,6 +28,7 @@ mod hub;
 pub mod keys;
 mod live;
 mod mac;
+mod mailbox;
 mod messages;
 mod outbox;
 mod page;

@@ -12,13 +12,14 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::time::timeout;
 
+use crate::close::Close;
 use crate::door::{Door, Entered};
 use crate::guard::WrongKeys;
 use crate::hex;
 use crate::hub::{Hub, Role};
 use crate::keys::Keys;
 use crate::mac::{Key, Transcript};
-use crate::outbox::{Close, Outbox};
+use crate::outbox::Outbox;
 
 /// Time for the whole handshake.
 const HANDSHAKE: Duration = Duration::from_secs(2);

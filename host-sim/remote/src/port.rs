@@ -1,4 +1,4 @@
-//! A serial port with the robot's bus behind it, and the two ends of one without hardware.
+//! A serial port with the robot's bus behind it.
 //!
 //! Nothing here waits: what is there is read, what the system takes at once is sent. A port that
 //! is lost is opened again, once in [`RETRY`].
@@ -6,10 +6,10 @@
 use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
 
-use serialport::{ClearBuffer, SerialPort};
+use serialport::SerialPort;
 
 use crate::RemoteError;
-use crate::serial::HilOptions;
+use crate::serial::{HilOptions, open};
 
 /// Time between two tries to open a port that was lost.
 const RETRY: Duration = Duration::from_secs(1);
@@ -39,7 +39,7 @@ impl BusPort {
     /// [`RemoteError`]: another program has it, or what the operating system says.
     pub fn open(options: &HilOptions) -> Result<Self, RemoteError> {
         Ok(Self {
-            open: Some(open(options)?),
+            open: Some(open(options, Duration::ZERO)?),
             options: options.clone(),
             lost: String::new(),
             tried: Instant::now(),
@@ -86,29 +86,13 @@ impl BusPort {
     fn retry(&mut self) {
         if self.open.is_none() && self.tried.elapsed() >= RETRY {
             self.tried = Instant::now();
-            self.open = open(&self.options).ok();
+            self.open = open(&self.options, Duration::ZERO).ok();
         }
     }
 }
 
 /// Nothing to read yet, or no room to write.
-fn is_idle(error: &io::Error) -> bool {
+pub(crate) fn is_idle(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), Interrupted | TimedOut | WouldBlock)
-}
-
-fn open(options: &HilOptions) -> Result<Box<dyn SerialPort>, RemoteError> {
-    let name = &options.port;
-    // Locked as well as opened for one program: to root the latter means nothing.
-    let port = serialport::new(name, options.baud).timeout(Duration::ZERO);
-    let port = port.open().map_err(|e| {
-        RemoteError::new(
-            format!("cannot open the serial port {name}: {e}"),
-            "check that the adapter is plugged in, that no other program leads the boards there, \
-             and that you may use the port (group `dialout` on Debian)",
-        )
-    })?;
-    // What a former session left in the buffers belongs to nobody.
-    let _ = port.clear(ClearBuffer::All);
-    Ok(port)
 }

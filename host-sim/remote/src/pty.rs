@@ -6,6 +6,7 @@ use std::time::Duration;
 use serialport::{SerialPort, TTYPort};
 
 use crate::RemoteError;
+use crate::port::is_idle;
 
 /// A pseudo-terminal. Its far end stays open, so that programs may come and go there.
 #[derive(Debug)]
@@ -56,9 +57,8 @@ impl Pty {
 
 /// Nothing to read and no room to write are no errors.
 fn idle(result: io::Result<usize>) -> io::Result<usize> {
-    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     match result {
-        Err(e) if matches!(e.kind(), Interrupted | TimedOut | WouldBlock) => Ok(0),
+        Err(e) if is_idle(&e) => Ok(0),
         other => other,
     }
 }

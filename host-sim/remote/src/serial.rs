@@ -114,20 +114,8 @@ impl SerialLine {
     /// # Errors
     /// [`RemoteError`] with what the operating system says.
     pub fn open(options: &HilOptions) -> Result<Self, RemoteError> {
-        let port = serialport::new(&options.port, options.baud)
-            .timeout(options.patience)
-            .open()
-            .map_err(|e| {
-                RemoteError::new(
-                    format!("cannot open the serial port {}: {e}", options.port),
-                    "check that the board is plugged in, that nobody else has the port open, \
-                     and that you may use it (group `dialout` on Debian)",
-                )
-            })?;
-        // What a former session left in the buffers belongs to nobody.
-        let _ = port.clear(ClearBuffer::All);
         Ok(Self {
-            port,
+            port: open(options, options.patience)?,
             options: options.clone(),
             asked: None,
             statistics: Statistics::default(),
@@ -155,6 +143,25 @@ impl SerialLine {
              what was logged up to here is complete",
         )
     }
+}
+
+/// Opens a port for this program alone; reading and writing wait for at most `timeout`. It is locked,
+/// too: to root the former means nothing.
+pub(crate) fn open(
+    options: &HilOptions,
+    timeout: Duration,
+) -> Result<Box<dyn SerialPort>, RemoteError> {
+    let port = serialport::new(&options.port, options.baud).timeout(timeout);
+    let port = port.open().map_err(|e| {
+        RemoteError::new(
+            format!("cannot open the serial port {}: {e}", options.port),
+            "check that the board is plugged in, that nobody else has the port open, \
+             and that you may use it (group `dialout` on Debian)",
+        )
+    })?;
+    // What a former session left in the buffers belongs to nobody.
+    let _ = port.clear(ClearBuffer::All);
+    Ok(port)
 }
 
 impl Stream for SerialLine {

@@ -9,7 +9,7 @@ use wheeleg_master::setpoint::{LegPlan, Phase};
 use wheeleg_master::telemetry::Record;
 use wheeleg_node::mode::Mode;
 use wheeleg_plant::body::{ContactPoint, Toucher};
-use wheeleg_plant::robot::Outputs;
+use wheeleg_plant::robot::{Outputs, PlantParams};
 use wheeleg_protocol::{Address, FaultBits, InputBits, LinkLossAction, LinkQuality, Node};
 
 use super::boards::WheelBoard;
@@ -36,6 +36,13 @@ pub(super) struct Observer {
     bus_busy_ns: u64,
     last: Option<Record>,
     step: u16,
+}
+
+/// Way of a wheel's rim for one count of its encoder, mm.
+pub(super) fn rim_mm_per_count(params: &PlantParams, wheel: usize) -> f64 {
+    let motor = &params.motors[wheel];
+    let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
+    params.body.wheel_radius_m * 1e3 * std::f64::consts::TAU / counts_per_turn
 }
 
 fn bits(levels: impl IntoIterator<Item = bool>) -> u8 {
@@ -202,9 +209,7 @@ impl Observer {
         let radius_mm = params.body.wheel_radius_m * 1e3;
         for (i, board) in world.wheels().enumerate() {
             let node = board.snapshot();
-            let motor = &params.motors[i];
-            let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
-            let counts_to_mm = radius_mm * std::f64::consts::TAU / counts_per_turn;
+            let counts_to_mm = rim_mm_per_count(params, i);
             recorder.wheel(
                 t_ns,
                 i,

@@ -2,9 +2,9 @@
 //! carries out the scenario's events, all through the master's dispatcher.
 
 use wheeleg_master::Master;
-use wheeleg_master::command::Command;
+use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_master::contact::Side;
-use wheeleg_master::dispatcher::Reject;
+use wheeleg_master::dispatcher::{Reject, Ticket};
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_protocol::{LinkRecord, Node};
@@ -219,16 +219,8 @@ impl Operator {
         t_ns: u64,
         recorder: &mut Recorder,
     ) -> Answer {
-        let code = command.code();
-        let answer = if world.master_alive() {
-            world
-                .submit(command)
-                .map_or_else(Answer::Rejected, |_| Answer::Accepted)
-        } else {
-            Answer::Nothing
-        };
-        recorder.event(t_ns, Cause::Command { code, answer });
-        answer
+        let answer = world.master_alive().then(|| world.submit(command));
+        record_answer(command.code(), answer, t_ns, recorder)
     }
 
     /// A user who gives commands without end, as a fault of the run. The first
@@ -245,6 +237,22 @@ impl Operator {
             }
         }
     }
+}
+
+/// Writes the master's answer to a command into the record; `None`: it is dead and says nothing.
+pub(super) fn record_answer(
+    code: CommandCode,
+    answer: Option<Result<Ticket, Reject>>,
+    t_ns: u64,
+    recorder: &mut Recorder,
+) -> Answer {
+    let answer = match answer {
+        Some(Ok(_)) => Answer::Accepted,
+        Some(Err(why)) => Answer::Rejected(why),
+        None => Answer::Nothing,
+    };
+    recorder.event(t_ns, Cause::Command { code, answer });
+    answer
 }
 
 /// Writes the master's events into the record, and tells them on.

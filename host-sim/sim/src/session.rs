@@ -16,7 +16,7 @@ use wheeleg_telemetry::event::{Act, Answer, Cause};
 
 use crate::faults::{ActiveFaults, Schedule};
 use crate::observe::Observer;
-use crate::operator::{Operator, listen};
+use crate::operator::{Operator, listen, record_answer};
 use crate::world::{Happened, World};
 use crate::{Boards, JointProbe, RunOutcome, SimError, setup};
 
@@ -189,12 +189,7 @@ impl Session {
             .world
             .master_alive()
             .then(|| self.world.master().submit_request(request, now_us));
-        let told = match answer {
-            Some(Ok(_)) => Answer::Accepted,
-            Some(Err(why)) => Answer::Rejected(why),
-            None => Answer::Nothing,
-        };
-        recorder.event(t_ns, Cause::Command { code, answer: told });
+        record_answer(code, answer, t_ns, recorder);
         answer
     }
 

@@ -2,15 +2,14 @@
 //! and the viewer is told how many; a viewer that lets answers pile up is closed.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use axum::body::Bytes;
 use axum::extract::ws::Message;
 use serde_json::json;
-use tokio::sync::Notify;
 
 use super::channels::Channel;
-use crate::outbox::Close;
+use crate::close::Close;
+use crate::mailbox::{Mailbox, Waiting};
 
 /// Answers that may wait.
 const ANSWERS_MAX: usize = 256;
@@ -45,9 +44,9 @@ impl Data {
     }
 }
 
+/// Messages for one viewer.
 #[derive(Default)]
-struct Queue {
-    close: Option<Close>,
+pub(crate) struct Queue {
     answers: VecDeque<Message>,
     answer_bytes: usize,
     time_ns: Option<u64>,
@@ -61,39 +60,24 @@ struct Queue {
 }
 
 /// What waits for one viewer.
-#[derive(Default)]
-pub(crate) struct Outbox {
-    queue: Mutex<Queue>,
-    wake: Notify,
-}
+pub(crate) type Outbox = Mailbox<Queue>;
 
 impl Outbox {
-    fn queue(&self) -> MutexGuard<'_, Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Closes the connection, after nothing else.
-    pub(crate) fn close(&self, why: Close) {
-        self.queue().close.get_or_insert(why);
-        self.wake.notify_one();
-    }
-
     /// An answer, or something that the viewer must know.
     pub(crate) fn answer(&self, message: Message) {
-        let mut queue = self.queue();
-        queue.answer_bytes += length(&message);
-        queue.answers.push_back(message);
-        if queue.answers.len() > ANSWERS_MAX || queue.answer_bytes > ANSWER_BYTES_MAX {
-            queue.close.get_or_insert(Close::TooSlow);
-        }
-        drop(queue);
-        self.wake.notify_one();
+        self.put(|contents| {
+            let queue = &mut contents.messages;
+            queue.answer_bytes += length(&message);
+            queue.answers.push_back(message);
+            if queue.answers.len() > ANSWERS_MAX || queue.answer_bytes > ANSWER_BYTES_MAX {
+                contents.close(Close::TooSlow);
+            }
+        });
     }
 
     /// The time of the master, ns.
     pub(crate) fn time(&self, t_ns: u64) {
-        self.queue().time_ns = Some(t_ns);
-        self.wake.notify_one();
+        self.put(|contents| contents.messages.time_ns = Some(t_ns));
     }
 
     /// A message of a channel.
@@ -103,75 +87,65 @@ impl Outbox {
             t_ns,
             payload,
         };
-        let mut queue = self.queue();
-        if channel.is_ordered() {
-            queue.event_bytes += data.payload.len();
-            queue.events.push_back(data);
-            while queue.events.len() > EVENTS_MAX || queue.event_bytes > EVENT_BYTES_MAX {
-                let Some(dropped) = queue.events.pop_front() else {
-                    break;
-                };
-                queue.event_bytes -= dropped.payload.len();
-                queue.lost += 1;
-            }
-        } else {
-            queue.newest.insert(channel, data);
-        }
-        drop(queue);
-        self.wake.notify_one();
+        self.put(|contents| contents.messages.add(channel, data));
     }
 
     /// Nothing of a subscription that has ended.
     pub(crate) fn forget(&self, subscription: u32) {
-        let mut queue = self.queue();
+        let queue = &mut self.contents().messages;
         queue.newest.retain(|_, d| d.subscription != subscription);
         queue.events.retain(|d| d.subscription != subscription);
         queue.event_bytes = queue.events.iter().map(|d| d.payload.len()).sum();
     }
+}
 
-    /// What is to be sent next; a close is the last.
-    fn next(&self) -> Option<Message> {
-        let mut queue = self.queue();
-        if let Some(why) = queue.close {
-            return Some(why.message());
+impl Queue {
+    fn add(&mut self, channel: Channel, data: Data) {
+        if !channel.is_ordered() {
+            self.newest.insert(channel, data);
+            return;
         }
-        if let Some(message) = queue.answers.pop_front() {
-            queue.answer_bytes -= length(&message);
+        self.event_bytes += data.payload.len();
+        self.events.push_back(data);
+        while self.events.len() > EVENTS_MAX || self.event_bytes > EVENT_BYTES_MAX {
+            let Some(dropped) = self.events.pop_front() else {
+                break;
+            };
+            self.event_bytes -= dropped.payload.len();
+            self.lost += 1;
+        }
+    }
+}
+
+impl Waiting for Queue {
+    fn next(&mut self) -> Option<Message> {
+        if let Some(message) = self.answers.pop_front() {
+            self.answer_bytes -= length(&message);
             return Some(message);
         }
-        if let Some(t_ns) = queue.time_ns.take() {
+        if let Some(t_ns) = self.time_ns.take() {
             let mut out = vec![TIME];
             out.extend_from_slice(&t_ns.to_le_bytes());
             return Some(Message::Binary(out.into()));
         }
-        if queue.lost > 0 {
-            let lost = std::mem::take(&mut queue.lost);
+        if self.lost > 0 {
+            let lost = std::mem::take(&mut self.lost);
             return Some(status(1, &format!("{lost} events are missing: too slow")));
         }
-        if let Some(data) = queue.events.pop_front() {
-            queue.event_bytes -= data.payload.len();
+        if let Some(data) = self.events.pop_front() {
+            self.event_bytes -= data.payload.len();
             return Some(data.message());
         }
-        let after = queue.turn.and_then(|last| {
-            let mut rest = queue
+        let after = self.turn.and_then(|last| {
+            let mut rest = self
                 .newest
                 .range((std::ops::Bound::Excluded(last), std::ops::Bound::Unbounded));
             rest.next().map(|(channel, _)| *channel)
         });
-        let channel = after.or_else(|| queue.newest.keys().next().copied())?;
-        queue.turn = Some(channel);
-        let data = queue.newest.remove(&channel)?;
+        let channel = after.or_else(|| self.newest.keys().next().copied())?;
+        self.turn = Some(channel);
+        let data = self.newest.remove(&channel)?;
         Some(data.message())
-    }
-
-    /// Waits for what is to be sent next.
-    pub(crate) async fn wait(&self) -> Message {
-        loop {
-            if let Some(message) = self.next() {
-                return message;
-            }
-            self.wake.notified().await;
-        }
     }
 }
 
@@ -245,14 +219,14 @@ mod tests {
         for n in 0..100 {
             outbox.data(log, 1, n, big.clone());
         }
-        assert!(outbox.queue().event_bytes <= EVENT_BYTES_MAX);
+        assert!(outbox.contents().messages.event_bytes <= EVENT_BYTES_MAX);
     }
 
     #[test]
     fn who_lets_answers_pile_up_is_closed() {
         let outbox = Outbox::default();
         for _ in 0..=ANSWERS_MAX {
-            assert!(outbox.queue().close.is_none());
+            assert!(outbox.contents().close.is_none());
             outbox.answer(status(0, ""));
         }
         let close = outbox.next().expect("a close");

@@ -12,8 +12,8 @@ use super::STOP_SERVICE;
 use super::channels;
 use super::outbox::{Outbox, status};
 use super::request::{Malformed, Request, parse_binary, parse_text};
+use crate::close::Close;
 use crate::hub::{Hub, Looking};
-use crate::outbox::Close;
 use crate::rate::Bucket;
 use crate::session::{PROGRESS, SILENCE, send_all};
 

@@ -101,7 +101,7 @@ impl Viewers {
     }
 
     /// Closes everybody.
-    pub(crate) fn close(&self, why: crate::outbox::Close) {
+    pub(crate) fn close(&self, why: crate::close::Close) {
         for viewer in self.all.values() {
             viewer.outbox.close(why);
         }

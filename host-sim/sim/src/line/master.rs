@@ -1,7 +1,6 @@
 //! A master that leads boards over a line.
 
 use std::collections::VecDeque;
-use std::f64::consts::TAU;
 
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_master::command::Command;
@@ -10,12 +9,12 @@ use wheeleg_master::event::Event;
 use wheeleg_master::telemetry::Record;
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_telemetry::Recorder;
-use wheeleg_telemetry::event::{Answer, Cause};
+use wheeleg_telemetry::event::Cause;
 
 use super::Line;
 use crate::clock::NS_PER_US;
-use crate::observe::{Observer, UNMEASURED};
-use crate::operator::listen;
+use crate::observe::{Observer, UNMEASURED, rim_mm_per_count};
+use crate::operator::{listen, record_answer};
 use crate::session::keep_outcome;
 use crate::{SimError, setup};
 
@@ -69,14 +68,13 @@ impl<L: Line> LineMaster<L> {
             )
         };
         let master = Master::new(config).map_err(|e| refused(&e))?;
-        let counts = f64::from(config.wheels.counts_per_revolution);
         Ok(Self {
             master,
             line,
             observer: Observer::default(),
             record: None,
             outcomes: VecDeque::new(),
-            counts_to_mm: robot.plant.body.wheel_radius_m * TAU * 1e3 / counts,
+            counts_to_mm: rim_mm_per_count(&robot.plant, 0),
             cycle_ns: (robot.bus.cycle_s * 1e9).round() as u64,
             now_ns: 0,
             next_ns: 0,
@@ -116,11 +114,7 @@ impl<L: Line> LineMaster<L> {
     pub fn request(&mut self, request: Request, recorder: &mut Recorder) -> Result<Ticket, Reject> {
         let code = request.command.code();
         let answer = self.master.submit_request(request, self.now_ns / NS_PER_US);
-        let told = match answer {
-            Ok(_) => Answer::Accepted,
-            Err(why) => Answer::Rejected(why),
-        };
-        recorder.event(self.now_ns, Cause::Command { code, answer: told });
+        record_answer(code, Some(answer), self.now_ns, recorder);
         answer
     }
 

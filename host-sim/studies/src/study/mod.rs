@@ -20,7 +20,7 @@ use wheeleg_report::output::Folder;
 use wheeleg_report::plot::Figure;
 use wheeleg_report::{page, subfolder};
 
-pub(crate) use progress::STACK;
+pub use progress::STACK;
 pub use progress::{Ended, Progress};
 pub use schema::Summary;
 pub use stop::{Signal, Stop};

@@ -10,7 +10,7 @@ use super::{Stop, Stopped};
 use crate::StudyError;
 
 /// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests.
-pub(crate) const STACK: usize = 8 << 20;
+pub const STACK: usize = 8 << 20;
 
 /// Works with the workers that all studies share, which have room for a simulated robot; on a worker
 /// already, with those of its own pool. Not rayon's global pool: whoever in the process uses that
