@@ -103,10 +103,8 @@ impl AxisSim {
         reference_m: f64,
         velocity_m_s: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let [min, max] = REFERENCES_M;
-        let reference_m = input::within(&"reference_m", reference_m, min, max)?;
-        let [min, max] = SPEEDS_M_S;
-        let speed_m_s = input::within(&"velocity_m_s", velocity_m_s, min, max)?;
+        let reference_m = input::within(&"reference_m", reference_m, REFERENCES_M)?;
+        let speed_m_s = input::within(&"velocity_m_s", velocity_m_s, SPEEDS_M_S)?;
         let row = self.step(reference_m, speed_m_s);
         columns::row(py, COLUMNS, &row.map_err(|e| error::bench(&e))?)
     }
@@ -122,8 +120,7 @@ impl AxisSim {
         velocity_m_s: Option<Series<'_>>,
         load_n: Option<Series<'_>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let [min, max] = REFERENCES_M;
-        let references = input::series("reference_m", &reference_m, min, max)?;
+        let references = input::series("reference_m", &reference_m, REFERENCES_M)?;
         let ticks = references.len();
         let speeds = input::beside("velocity_m_s", velocity_m_s.as_ref(), SPEEDS_M_S, ticks)?;
         let loads = input::beside("load_n", load_n.as_ref(), LOADS_N, ticks)?;
@@ -158,8 +155,7 @@ impl AxisSim {
 
     #[setter]
     fn set_load_n(&mut self, load_n: f64) -> PyResult<()> {
-        let [min, max] = LOADS_N;
-        self.bench.state.core.motion.load_n = input::within(&"load_n", load_n, min, max)?;
+        self.bench.state.core.motion.load_n = input::within(&"load_n", load_n, LOADS_N)?;
         Ok(())
     }
 
@@ -171,7 +167,7 @@ impl AxisSim {
 
     #[setter]
     fn set_mass_kg(&mut self, mass_kg: f64) -> PyResult<()> {
-        self.bench.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, 0.01, 1000.0)?;
+        self.bench.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, [0.01, 1000.0])?;
         Ok(())
     }
 

@@ -165,10 +165,8 @@ impl Board {
         velocity_m_s: f64,
     ) -> PyResult<Bound<'py, PyArray1<u16>>> {
         let code = input::whole(&"code", code, u16::MAX)?;
-        let [min, max] = REFERENCES_M;
-        let reference_m = input::within(&"reference_m", reference_m, min, max)?;
-        let [min, max] = SPEEDS_M_S;
-        let velocity_m_s = input::within(&"velocity_m_s", velocity_m_s, min, max)?;
+        let reference_m = input::within(&"reference_m", reference_m, REFERENCES_M)?;
+        let velocity_m_s = input::within(&"velocity_m_s", velocity_m_s, SPEEDS_M_S)?;
         self.action = self.node.tick(&sample(code, reference_m, velocity_m_s));
         Ok(self.action.on_us.to_vec().into_pyarray(py))
     }

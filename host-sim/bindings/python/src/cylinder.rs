@@ -127,8 +127,7 @@ impl Cylinder {
 
     #[setter]
     fn set_load_n(&mut self, load_n: f64) -> PyResult<()> {
-        let [min, max] = LOADS_N;
-        self.state.core.motion.load_n = input::within(&"load_n", load_n, min, max)?;
+        self.state.core.motion.load_n = input::within(&"load_n", load_n, LOADS_N)?;
         Ok(())
     }
 
@@ -140,7 +139,7 @@ impl Cylinder {
 
     #[setter]
     fn set_mass_kg(&mut self, mass_kg: f64) -> PyResult<()> {
-        self.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, 0.01, 1000.0)?;
+        self.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, [0.01, 1000.0])?;
         Ok(())
     }
 

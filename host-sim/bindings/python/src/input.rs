@@ -17,7 +17,7 @@ pub(crate) type Series<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 pub(crate) type Series4<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 
 /// A number within a range; `what` says which.
-pub(crate) fn within(what: &dyn Display, value: f64, min: f64, max: f64) -> PyResult<f64> {
+pub(crate) fn within(what: &dyn Display, value: f64, [min, max]: [f64; 2]) -> PyResult<f64> {
     if value >= min && value <= max {
         Ok(value)
     } else {
@@ -29,7 +29,7 @@ pub(crate) fn within(what: &dyn Display, value: f64, min: f64, max: f64) -> PyRe
 
 /// A whole number within a range.
 pub(crate) fn whole(what: &dyn Display, value: f64, max: u16) -> PyResult<u16> {
-    let value = within(what, value, 0.0, f64::from(max))?;
+    let value = within(what, value, [0.0, f64::from(max)])?;
     if value.fract() == 0.0 {
         Ok(value as u16)
     } else {
@@ -53,11 +53,11 @@ pub(crate) fn on_times(what: &str, values: &[f64]) -> PyResult<[u16; 4]> {
 }
 
 /// A series within a range, all of it.
-pub(crate) fn series(what: &str, values: &Series<'_>, min: f64, max: f64) -> PyResult<Vec<f64>> {
+pub(crate) fn series(what: &str, values: &Series<'_>, range: [f64; 2]) -> PyResult<Vec<f64>> {
     let values = values.as_array();
     let checked = values.iter().enumerate();
     checked
-        .map(|(i, v)| within(&format_args!("{what}[{i}]"), *v, min, max))
+        .map(|(i, v)| within(&format_args!("{what}[{i}]"), *v, range))
         .collect()
 }
 
@@ -65,13 +65,13 @@ pub(crate) fn series(what: &str, values: &Series<'_>, min: f64, max: f64) -> PyR
 pub(crate) fn beside(
     what: &str,
     values: Option<&Series<'_>>,
-    [min, max]: [f64; 2],
+    range: [f64; 2],
     length: usize,
 ) -> PyResult<Option<Vec<f64>>> {
     let Some(values) = values else {
         return Ok(None);
     };
-    let values = series(what, values, min, max)?;
+    let values = series(what, values, range)?;
     if values.len() == length {
         Ok(Some(values))
     } else {

@@ -78,7 +78,7 @@ impl Robot {
 
 /// A time in whole ms.
 fn whole_ms(what: &str, seconds: f64) -> PyResult<u64> {
-    let seconds = input::within(&what, seconds, 0.0, LONGEST_S)?;
+    let seconds = input::within(&what, seconds, [0.0, LONGEST_S])?;
     let ms = (seconds * 1e3).round();
     if (seconds * 1e3 - ms).abs() < 1e-6 {
         Ok(ms as u64)
