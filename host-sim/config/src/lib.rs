@@ -41,7 +41,7 @@ pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};
 pub use command::command;
 pub use drawing::Drawing;
-pub use error::{ConfigError, Problem};
+pub use error::{ConfigError, Problem, plain_text};
 pub use law::LawChoice;
 pub use node::NodeParams;
 pub use node::raw_of;
