@@ -395,3 +395,6 @@ pub(crate) fn count(references: usize, values: usize) -> Result<(), FmuError> {
         Err(FmuError::Count { references, values })
     }
 }
+
+#[cfg(test)]
+mod tests;
