@@ -31,6 +31,7 @@ pub mod plant;
 mod quantity;
 mod reader;
 mod relations;
+mod relief;
 mod robot;
 mod scenario;
 mod suggest;
@@ -48,6 +49,7 @@ pub use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};
+pub use relief::Relief;
 pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
