@@ -132,11 +132,7 @@ const ARROWS: [(&str, &[&str]); 31] = [
     ("wheeleg-studies", &STUDIES),
     (
         "wheeleg-fmu",
-        &[
-            "wheeleg-config",
-            "wheeleg-plant",
-            "wheeleg-studies",
-        ],
+        &["wheeleg-config", "wheeleg-plant", "wheeleg-studies"],
     ),
     (
         "wheeleg-python",

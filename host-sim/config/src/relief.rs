@@ -45,19 +45,19 @@ impl Relief {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Scenario;
 
     #[test]
     fn heights_are_those_of_the_terrain() {
-        let text = "name = \"a\"\ndescription = \"a slope\"\nduration = \"1 s\"\n\n\
-                    [[terrain]]\nkind = \"plane\"\nslope = \"10 deg\"\n";
-        let scenario = Scenario::parse("a.toml", text).expect("sound");
+        let scenario = crate::builtin::scenario("slope-10").expect("built in");
         let relief = Relief::of(&scenario.ground.terrain);
         assert_eq!((relief.columns, relief.heights_mm.len()), (201, 201 * 61));
         // A metre ahead of the axle: 20 cells of the first row from the origin's.
         let place = |x_mm: f64| ((x_mm - relief.from_mm[0]) / relief.step_mm) as usize;
         let rise = relief.heights_mm[place(1000.0)].expect("ground")
             - relief.heights_mm[place(0.0)].expect("ground");
-        assert_eq!(rise.abs(), (1000.0 * 10_f64.to_radians().tan()).round() as i32);
+        assert_eq!(
+            rise.abs(),
+            (1000.0 * 10_f64.to_radians().tan()).round() as i32
+        );
     }
 }

@@ -54,14 +54,13 @@ fn a_plant_goes_as_the_plant_itself() {
     let mut unit = running(Kind::Plant);
     let axis = Axis::new(&unit.model.config.axis).expect("sound");
     let mut state = axis.initial_state(SEED);
-    axis.read_position(&mut state);
-    set(&mut unit, "fill_a_us", Value::Real(600.4)).expect("in range");
+    let mut code = axis.read_position(&mut state);
+    set(&mut unit, "fill_a_us", Value::Real(999.6)).expect("in range");
     set(&mut unit, "vent_b_us", Value::Real(1000.0)).expect("in range");
     set(&mut unit, "load_n", Value::Real(-5.0)).expect("in range");
     state.core.motion.load_n = -5.0;
-    let mut code = 0;
     for _ in 0..300 {
-        axis.tick(&mut state, [600, 0, 0, 1000]).expect("sound");
+        axis.tick(&mut state, [1000, 0, 0, 1000]).expect("sound");
         code = axis.read_position(&mut state);
     }
     go(&mut unit, 300);
