@@ -5,10 +5,11 @@
 Without a key and with a wrong one nothing is shown. With the right one: ready, walk, stop the gait,
 provoke a fault, read its remedy, stop with Esc from within a field. Who has the view key may look and
 stop. Signals are plotted, frozen and zoomed; what is done is recorded, and repeats to the bit. Somebody drives by
-hand, with wheels and legs and with the wheels alone: who lets go stops. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
+hand, with wheels and legs and with the wheels alone: who lets go stops. The robot is seen in space. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
 nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
+import io
 import os
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 from accessible import findings
+from PIL import Image
 from playwright.sync_api import sync_playwright
 
 SIZES = [(1280, 720), (1024, 768), (400, 800)]
@@ -239,6 +241,47 @@ def board_table(page):
     page.locator("summary", has_text="Table").click()
 
 
+def in_space(page, folder):
+    """The view in space is drawn, turns with pointer and keys, and shows the robot move."""
+    switch = page.get_by_role("button", name="3D")
+    switch.click()
+    canvas = page.locator("canvas.space")
+
+    def picture():
+        page.wait_for_timeout(600)
+        return canvas.screenshot()
+
+    first = picture()
+    colours = len(set(Image.open(io.BytesIO(first)).convert("RGB").getdata()))
+    expect(colours >= 50, f"the view in space has {colours} colours")
+    box = canvas.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.6 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 0.7 * box["height"], steps=4)
+    page.mouse.up()
+    dragged = picture()
+    expect(dragged != first, "a drag does not turn the robot in space")
+    canvas.focus()
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("+")
+    expect(picture() != dragged, "keys do not turn it")
+    page.screenshot(path=folder / "space.png")
+    before = picture()
+    page.select_option("select[aria-label='What moves']", "walk")
+    button = page.get_by_role("button", name="Forward").bounding_box()
+
+    def press_it():
+        page.mouse.move(button["x"] + 10, button["y"] + 10)
+        page.mouse.down()
+
+    drives(page, "walking, seen in space", press_it, page.mouse.up, "StopGait", 20.0)
+    page.evaluate("scrollTo(0, 0)")
+    expect(picture() != before, "the robot does not move in space")
+    expect(page.locator(".space-box .bad").is_hidden(), "the view in space says that it failed")
+    switch.click()
+    expect(canvas.is_hidden() and page.locator(".plan > svg").is_visible(), "the flat view does not come back")
+
+
 def without_the_key(browser, console):
     page = opened(browser, console, "")
     expect("needs a key" in page.inner_text("body"), "without a key the page does not say what it needs")
@@ -261,6 +304,8 @@ def journey(browser, console, folder):
     expect(becomes_ready(page), f"Ready after driving: {page.inner_text('.answer')!r}")
     walks_by_hand(page)
     expect(becomes_ready(page), f"Ready after driving: {page.inner_text('.answer')!r}")
+    in_space(page, folder)
+    expect(becomes_ready(page), f"Ready after a look in space: {page.inner_text('.answer')!r}")
     plots(page, folder)
     board_table(page)
     before = page.locator(".views .side svg").inner_html()

@@ -4,9 +4,9 @@
 use anyhow::Context;
 use clap::Args;
 
-use crate::process::{cargo, figures, output};
+use crate::process::{cargo, figures, output, run, target_dir};
 use crate::report::{Report, StepResult};
-use crate::{campaign, fuzz, mutants, pil, record, rust};
+use crate::{campaign, fuzz, mutants, pil, record, rust, tools};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 17] = [
+const CHECKS: [Check; 18] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -105,6 +105,12 @@ const CHECKS: [Check; 17] = [
         "three steps on eight emulated boards, times real time, while nobody else is at work",
         3,
         pil::speed,
+    ),
+    Check(
+        "aarch64",
+        "the program links for a small computer of 64-bit Arm; nothing is run there",
+        6,
+        aarch64,
     ),
     Check(
         "second-way",
@@ -215,6 +221,30 @@ fn field() -> StepResult<String> {
     )?;
     let lines = printed.lines().filter(|line| !line.starts_with("report"));
     Ok(lines.map(str::trim).collect::<Vec<_>>().join("; "))
+}
+
+/// `wheeleg`, with `serve` in it, for Linux on 64-bit Arm.
+fn aarch64() -> StepResult<String> {
+    const TARGET: &str = "aarch64-unknown-linux-gnu";
+    const COMPILER: &str = "aarch64-linux-gnu-gcc";
+    if !tools::have(COMPILER) {
+        let install = format!(
+            "install `gcc-aarch64-linux-gnu` and `libc6-dev-arm64-cross`, and `rustup target add {TARGET}`"
+        );
+        return Err(anyhow::anyhow!("{COMPILER} is missing: {install}").into());
+    }
+    run(cargo()
+        .args(["build", "--locked", "--release", "--bin", "wheeleg"])
+        .args(["--target", TARGET])
+        .env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", COMPILER))?;
+    let program = target_dir().join(TARGET).join("release").join("wheeleg");
+    let image = std::fs::read(&program).context("the program")?;
+    // ELF header: 64 bits, machine 183, which is AArch64.
+    let machine = u16::from_le_bytes([image[18], image[19]]);
+    if image[..5] != *b"\x7fELF\x02" || machine != 183 {
+        return Err(anyhow::anyhow!("the program is for machine {machine}").into());
+    }
+    Ok(format!("it links for {TARGET}: {} kB", image.len() / 1000))
 }
 
 fn cylinders() -> StepResult<String> {

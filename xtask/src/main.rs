@@ -95,7 +95,7 @@ enum Command {
     Plant,
     /// The table of a campaign and its SQL in DuckDB.
     Campaign,
-    /// The Python package: wheel, fresh environment, tests, notebooks.
+    /// The Python package: wheel, fresh environment, tests, notebooks, and the mock-up units in FMPy.
     Python,
     /// Mutate the code that decides safe states: tests must notice every mutant.
     Mutants(mutants::Options),

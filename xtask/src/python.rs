@@ -1,4 +1,5 @@
-//! The Python package: built as a wheel, installed into a fresh environment, tested there.
+//! The Python package: built as a wheel, installed into a fresh environment, tested there. The
+//! Functional Mock-up Units are compared with it.
 
 use std::env;
 use std::fs;
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::process::{command, figures, root, run, target_dir};
+use crate::process::{cargo, command, figures, root, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
@@ -39,6 +40,26 @@ pub(crate) fn steps(report: &mut Report) {
             .arg("docs/notebooks")
             .env("WHEELEG", &wheeleg)
             .env("MPLBACKEND", "agg"))?;
+        Ok(())
+    });
+    report.step("fmu: units in FMPy, equal to the package", || {
+        run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-fmu"]))?;
+        let folder = target_dir().join("xtask").join("fmu");
+        if folder.exists() {
+            fs::remove_dir_all(&folder)?;
+        }
+        fs::create_dir_all(&folder)?;
+        let told = figures(
+            command(&python)
+                .arg("tests/python/check_fmu.py")
+                .arg(&wheeleg)
+                .arg(target_dir().join("release").join("libwheeleg_fmu.so"))
+                .arg(&folder),
+            |line| line.starts_with("fmu: "),
+        )?;
+        for figure in told {
+            println!("    {figure}");
+        }
         Ok(())
     });
 }

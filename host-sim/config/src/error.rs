@@ -4,7 +4,9 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use miette::{
+    Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode,
+};
 
 /// Problems of a file that are printed; of more there is the number.
 const SHOWN: usize = 20;
@@ -12,6 +14,21 @@ const SHOWN: usize = 20;
 const LONGEST_LINE: usize = 2000;
 /// Longest message, characters: values are quoted as they stand in the file.
 const LONGEST_MESSAGE: usize = 1500;
+
+/// Width of an error that is no terminal's, columns.
+const PLAIN_WIDTH: usize = 100;
+
+/// What the program prints of an error, without colours: for other programs' messages.
+#[must_use]
+pub fn plain_text(error: &dyn Diagnostic) -> String {
+    let mut text = String::new();
+    let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor())
+        .with_width(PLAIN_WIDTH);
+    match handler.render_report(&mut text, error) {
+        Ok(()) => text.trim_end().to_owned(),
+        Err(_) => error.to_string(),
+    }
+}
 
 /// A message without the middle that is too much.
 fn shortened(message: String) -> String {

@@ -31,6 +31,7 @@ pub mod plant;
 mod quantity;
 mod reader;
 mod relations;
+mod relief;
 mod robot;
 mod scenario;
 mod suggest;
@@ -41,13 +42,14 @@ pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};
 pub use command::command;
 pub use drawing::Drawing;
-pub use error::{ConfigError, Problem};
+pub use error::{ConfigError, Problem, plain_text};
 pub use law::LawChoice;
 pub use node::NodeParams;
 pub use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};
+pub use relief::Relief;
 pub use robot::{
     BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };

@@ -18,7 +18,7 @@ use tokio::net::{TcpListener, TcpSocket};
 use tokio::runtime::Runtime;
 use tokio_rustls::TlsAcceptor;
 
-use wheeleg_config::Drawing;
+use wheeleg_config::{Drawing, Relief};
 use wheeleg_telemetry::channels;
 
 use crate::api::{self, Peer};
@@ -170,9 +170,13 @@ impl Server {
         };
         let name = live.robot.name.clone();
         let drawing = Drawing::of(&live.robot);
+        // The level floor needs no grid.
+        let ground = &live.scenario.ground;
+        let relief = (!ground.parts.is_empty()).then(|| Relief::of(&ground.terrain));
         let robot_json = json!({
             "name": name,
             "drawing": drawing,
+            "relief": relief,
             "simulated": live.port.is_none(),
             "unmeasured": unmeasured(live.port.is_some()),
         })

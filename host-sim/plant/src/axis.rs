@@ -14,6 +14,10 @@ use crate::supply::{SupplyModel, SupplyParams};
 pub const TICK_US: u16 = 1000;
 /// Length of a joint tick \[ns\].
 pub const TICK_NS: u64 = 1_000_000;
+/// Loads that a bench may have \[N\].
+pub const LOADS_N: [f64; 2] = [-1e4, 1e4];
+/// Moving masses that a bench may have \[kg\].
+pub const MASSES_KG: [f64; 2] = [0.01, 1000.0];
 
 /// The bench.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -115,8 +119,10 @@ impl Axis {
     /// [`PlantError::Parameter`] names a parameter outside its range.
     pub fn new(params: &AxisParams) -> Result<Self, PlantError> {
         params.gas.validate()?;
-        check("moving_mass_kg", params.moving_mass_kg, 0.01, 1000.0)?;
-        check("load_n", params.load_n, -1e4, 1e4)?;
+        let [min, max] = MASSES_KG;
+        check("moving_mass_kg", params.moving_mass_kg, min, max)?;
+        let [min, max] = LOADS_N;
+        check("load_n", params.load_n, min, max)?;
         check(
             "initial_stroke_m",
             params.initial_stroke_m,

@@ -105,6 +105,31 @@ function pose() {
   const body = now.of.get("/body") ?? {};
   return { travel_mm: body.x_mm ?? 0, pitch_deg: body.pitch_deg ?? 0, legs };
 }
+/** The same in space; where the robot is, nobody knows of real boards: it stands at the origin. */
+function spacePose(robot) {
+  const body = now.of.get("/body") ?? {};
+  const known = (value, otherwise = 0) => (Number.isFinite(value) ? value : otherwise);
+  const [x_mm, y_mm, z_mm] = [known(body.x_mm), known(body.y_mm), known(body.z_mm, drawing.wheel_radius_mm)];
+  return { x_mm, y_mm, z_mm, roll_deg: known(body.roll_deg), pitch_deg: known(body.pitch_deg), yaw_deg: known(body.yaw_deg), travel_mm: known(body.x_mm), legs: robot.legs };
+}
+/** Sizes of the robot, and the ground if it is not level; from the server. @type {any} */
+let drawing = null;
+/** @type {any} */
+let relief = null;
+/** The view in space, once somebody has asked for it. @type {any} */
+let space = null;
+const plan = html("div", { class: "plan" }, pictures.top);
+const inSpace = html("button", { class: "btn", type: "button", "aria-pressed": "false", onclick: toggleSpace }, "3D");
+plan.append(inSpace);
+async function toggleSpace() {
+  const show = inSpace.getAttribute("aria-pressed") !== "true";
+  set(inSpace, { "aria-pressed": show });
+  plan.classList.toggle("in-space", show);
+  if (!show || space) return;
+  const { view3d } = await import("./view3d.js");
+  space = view3d(drawing, relief);
+  plan.prepend(space.root);
+}
 
 // ---- joints ----
 const joints = JOINTS.map((name, i) => {
@@ -257,6 +282,7 @@ addEventListener("pagehide", leaves);
 
 // ---- the page ----
 function build({ robot, commands: list, faults: injectable }) {
+  ({ drawing, relief } = robot);
   views = { side: sideView(pictures.side, robot.drawing), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
   say(head.robot.value, robot.name);
   commands = list;
@@ -281,7 +307,7 @@ function build({ robot, commands: list, faults: injectable }) {
       html(
         "div",
         { class: "col" },
-        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), html("div", { class: "plan" }, pictures.top), html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
+        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), plan, html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
         html("section", { class: "joints", "aria-label": "Joints" }, joints.map((j) => j.root)),
         scope?.root,
       ),
@@ -348,6 +374,7 @@ function paint() {
   const robot = pose();
   views.side.update(robot);
   views.top.update(robot);
+  if (space && plan.classList.contains("in-space")) space.update(spacePose(robot));
   robot.legs.forEach((state, i) => views.feet[i].update(state));
   joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
   scope?.paint(now.t_us * 1e-6);

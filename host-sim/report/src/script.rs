@@ -5,13 +5,14 @@
 //! is enough: an import is one line, nothing is renamed, and no name is given twice.
 
 /// Modules in the order in which they need each other.
-const MODULES: [(&str, &str); 9] = [
+const MODULES: [(&str, &str); 10] = [
     ("dom.js", include_str!("../page/dom.js")),
     ("signal.js", include_str!("../page/signal.js")),
     ("player.js", include_str!("../page/player.js")),
     ("transport.js", include_str!("../page/transport.js")),
     ("plot.js", include_str!("../page/plot.js")),
     ("projection.js", include_str!("../page/projection.js")),
+    ("shape.js", include_str!("../page/shape.js")),
     ("ground.js", include_str!("../page/ground.js")),
     ("robot.js", include_str!("../page/robot.js")),
     ("report.js", include_str!("../page/report.js")),

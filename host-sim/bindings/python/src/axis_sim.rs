@@ -2,13 +2,14 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use wheeleg_plant::axis::{LOADS_N, MASSES_KG};
 use wheeleg_protocol::param::JointParam;
-use wheeleg_studies::axis_sim::{Action, AxisSim as Bench, Node, Row};
+use wheeleg_studies::axis_sim::{Action, AxisSim as Bench, Node, REFERENCES_M, Row, SPEEDS_M_S};
 
 use crate::axis::AxisLike;
-use crate::board::{self, Parameters, REFERENCES_M, SPEEDS_M_S};
+use crate::board::{self, Parameters};
 use crate::columns::{self, Columns};
-use crate::cylinder::{LOADS_N, hex};
+use crate::cylinder::hex;
 use crate::error;
 use crate::input::{self, Series};
 
@@ -167,7 +168,7 @@ impl AxisSim {
 
     #[setter]
     fn set_mass_kg(&mut self, mass_kg: f64) -> PyResult<()> {
-        self.bench.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, [0.01, 1000.0])?;
+        self.bench.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, MASSES_KG)?;
         Ok(())
     }
 

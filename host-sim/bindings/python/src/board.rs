@@ -11,17 +11,14 @@ use wheeleg_protocol::Fault;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_studies::axis_sim::commission::{commission, value};
 use wheeleg_studies::axis_sim::suite::AxisSimError;
-use wheeleg_studies::axis_sim::{Action, Board as _, Kind, Node, Sample, design};
+use wheeleg_studies::axis_sim::{
+    Action, Board as _, Kind, Node, REFERENCES_M, SPEEDS_M_S, Sample, design,
+};
 use wheeleg_units::{AdcCode, PositionMm, VelocityMmS};
 
 use crate::axis::AxisLike;
 use crate::error;
 use crate::input::{self, Series};
-
-/// References that a board may be given, m.
-pub(crate) const REFERENCES_M: [f64; 2] = [-2.0, 2.0];
-/// Speeds of references, m/s.
-pub(crate) const SPEEDS_M_S: [f64; 2] = [-10.0, 10.0];
 
 /// Parameters of a board by name, in the unit of the protocol's table.
 pub(crate) type Parameters = HashMap<String, f64>;

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use wheeleg_plant::assembly::CylinderOutputs;
-use wheeleg_plant::axis::{Axis as Plant, AxisState};
+use wheeleg_plant::axis::{Axis as Plant, AxisState, LOADS_N, MASSES_KG};
 
 use crate::axis::AxisLike;
 use crate::columns::{self, Columns};
@@ -139,7 +139,7 @@ impl Cylinder {
 
     #[setter]
     fn set_mass_kg(&mut self, mass_kg: f64) -> PyResult<()> {
-        self.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, [0.01, 1000.0])?;
+        self.state.core.motion.mass_kg = input::within(&"mass_kg", mass_kg, MASSES_KG)?;
         Ok(())
     }
 
@@ -166,9 +166,6 @@ impl Cylinder {
         hex(&self.plant.state_hash(&self.state))
     }
 }
-
-/// Loads that a bench may have, N.
-pub(crate) const LOADS_N: [f64; 2] = [-1e4, 1e4];
 
 /// Bytes as hexadecimal digits.
 pub(crate) fn hex(bytes: &[u8]) -> String {

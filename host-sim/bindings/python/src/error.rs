@@ -1,9 +1,10 @@
 //! Errors as Python exceptions, in the words of the program.
 
-use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
+use miette::Diagnostic;
 use pyo3::PyErr;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use wheeleg_config::plain_text;
 use wheeleg_plant::PlantError;
 use wheeleg_studies::axis_sim::Kind;
 use wheeleg_studies::axis_sim::suite::AxisSimError;
@@ -21,23 +22,9 @@ create_exception!(
     "The simulation cannot go on: the plant has left its range, or the robot does not get ready."
 );
 
-/// Width of a message, columns.
-const WIDTH: usize = 100;
-
-/// What the program prints of an error, without colours.
-fn printed(error: &dyn Diagnostic) -> String {
-    let mut text = String::new();
-    let handler =
-        GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor()).with_width(WIDTH);
-    match handler.render_report(&mut text, error) {
-        Ok(()) => text.trim_end().to_owned(),
-        Err(_) => error.to_string(),
-    }
-}
-
 /// Wrong input.
 pub(crate) fn config(error: &dyn Diagnostic) -> PyErr {
-    ConfigError::new_err(printed(error))
+    ConfigError::new_err(plain_text(error))
 }
 
 /// Wrong input that is no file's.
@@ -47,7 +34,7 @@ pub(crate) fn value(message: impl Into<String>) -> PyErr {
 
 /// What ends a simulation.
 pub(crate) fn simulation(error: &dyn Diagnostic) -> PyErr {
-    SimulationError::new_err(printed(error))
+    SimulationError::new_err(plain_text(error))
 }
 
 /// Of the plant: an input or a parameter out of its range is the caller's.

@@ -51,5 +51,5 @@ pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};
 pub use node::Node;
-pub use run::{Action, AxisSim, Board, Row, Sample, Trace};
+pub use run::{Action, AxisSim, Board, REFERENCES_M, Row, SPEEDS_M_S, Sample, Trace};
 pub use valve_resolution::ValveResolution;

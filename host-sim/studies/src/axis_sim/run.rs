@@ -9,6 +9,11 @@ use super::error::AxisSimError;
 use super::motion::{LoadEvent, Motion};
 use super::unphysical;
 
+/// References that a board on the bench may be given \[m\].
+pub const REFERENCES_M: [f64; 2] = [-2.0, 2.0];
+/// Speeds of references that it may be given \[m/s\].
+pub const SPEEDS_M_S: [f64; 2] = [-10.0, 10.0];
+
 /// What a board latches at the start of a tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample {

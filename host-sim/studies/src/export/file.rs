@@ -25,18 +25,19 @@ fn free_place(path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// [`StudyError::Output`] with the path and what the operating system said.
-pub fn write_new(path: &Path, text: &str) -> Result<(), StudyError> {
+pub fn write_new(path: &Path, content: impl AsRef<[u8]>) -> Result<(), StudyError> {
+    let content = content.as_ref();
     // A device may have no end and a pipe no writer: only a file is read.
-    if path.is_file() && std::fs::read(path).is_ok_and(|old| old == text.as_bytes()) {
+    if path.is_file() && std::fs::read(path).is_ok_and(|old| old == content) {
         return Ok(());
     }
     // A device or a pipe is written to, not moved away.
     if path.exists() && !path.is_file() && !path.is_dir() {
-        return std::fs::write(path, text)
+        return std::fs::write(path, content)
             .map_err(|e| StudyError::output("write the file", path, e));
     }
     make_room(path)?;
-    std::fs::write(path, text).map_err(|e| {
+    std::fs::write(path, content).map_err(|e| {
         // A part of a file would be taken for the whole.
         let _ = std::fs::remove_file(path);
         StudyError::output("write the file", path, e)

@@ -1,7 +1,6 @@
 //! The next experiment: of some valve sequences, the one that tells most of what is not known.
 
-use super::fit::Problem;
-use super::free::Logs;
+use super::fit::{Point, Problem};
 use super::lab::{Lab, Sample};
 use super::told::{ignorance, information};
 
@@ -87,7 +86,7 @@ const SEQUENCES: [(&str, &str, Valves); 6] = [
 #[must_use]
 pub fn ranked(
     problem: &Problem<'_>,
-    logs: &Logs,
+    point: &Point,
     known: &nalgebra::DMatrix<f64>,
     variance: f64,
 ) -> Vec<Experiment> {
@@ -110,7 +109,7 @@ pub fn ranked(
             ticks: TICKS,
             ..*problem
         };
-        let more = information(&next.jacobian(logs)?, variance);
+        let more = information(&next.jacobian(point)?, variance);
         Some(Experiment {
             name,
             words,

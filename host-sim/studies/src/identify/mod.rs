@@ -26,10 +26,10 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
 use self::experiment::Experiment;
-use self::fit::{Fit, Noise, Problem, scatter, trust};
-use self::free::{COUNT, FREE, Logs, applied};
+use self::fit::{Fit, Noise, Point, Problem, point, scatter, trust};
+use self::free::{COUNT, FREE, applied};
 use self::lab::Lab;
-use self::predict::{Predicted, predict};
+use self::predict::{Offset, Predicted, predict};
 use self::told::Told;
 use crate::StudyError;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
@@ -184,15 +184,33 @@ pub fn noise(axis: &AxisParams) -> Noise {
     }
 }
 
+/// Pressures at the start that nobody measured are the file's, within this \[Pa\] (ASSUMED).
+const FILE_PRESSURE_PA: f64 = 5e3;
+
+/// Standard deviations of the start: of one sample, because a converter's steps do not average out.
+#[must_use]
+pub fn start_deviation(lab: &Lab, noise: &Noise) -> Offset {
+    let measured = lab.samples.iter().any(|s| s.pressure_pa.is_some());
+    let pressure_pa = if measured {
+        noise.pressure_pa
+    } else {
+        FILE_PRESSURE_PA
+    };
+    Offset {
+        stroke_m: noise.position_m,
+        pressure_pa: [pressure_pa; 2],
+    }
+}
+
 /// Starts of the fit.
-fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
+fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Point> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut all = vec![[0.0; COUNT]];
+    let mut all = vec![point(&[0.0; COUNT])];
     all.extend((1..STARTS).map(|_| {
-        std::array::from_fn(|i| {
+        point(&std::array::from_fn(|i| {
             let [low, high] = limits[i];
             (trust(i) * rng.random_range(-1.0..1.0)).clamp(low, high)
-        })
+        }))
     }));
     all
 }
@@ -203,7 +221,7 @@ fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
 /// [`StudyError::Refused`] if the plant plays the measurement from no start.
 pub fn best(
     problem: &Problem<'_>,
-    starts: &[Logs],
+    starts: &[Point],
     progress: &Progress,
 ) -> Result<(Fit, Option<Stopped>), StudyError> {
     let go_on = || !progress.is_stopped();
@@ -284,8 +302,8 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
         ..*problem
     };
     let go_on = || !progress.is_stopped();
-    let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
-    let jacobian = second.jacobian(&fit.logs).ok_or_else(|| {
+    let fit = second.fit(first.point(), &go_on).unwrap_or(first);
+    let jacobian = second.jacobian(fit.point()).ok_or_else(|| {
         StudyError::refused(
             "the plant leaves its range close to the best fit",
             "check the file's stroke, mass, load and supply against the bench",
@@ -315,6 +333,7 @@ impl Identified {
             lab: &lab,
             ticks,
             noise,
+            start: start_deviation(&lab, &noise),
             limits: free::limits(&config),
         };
         let Fitted {
@@ -323,15 +342,18 @@ impl Identified {
             information,
             stopped,
         } = fitted(&problem, options.seed, progress)?;
-        let play = |axis: &AxisParams| {
-            predict(axis, &lab, lab.on_us.len()).map_err(|e| {
+        let play = |axis: &AxisParams, start: &Offset| {
+            predict(axis, &lab, lab.on_us.len(), start).map_err(|e| {
                 StudyError::refused(
                     format!("the plant cannot play the rest of the measurement: {e}"),
                     "check the file's stroke, mass, load and supply against the bench",
                 )
             })
         };
-        let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
+        let played = [
+            play(axis, &Offset::default())?,
+            play(&applied(axis, &fit.logs), &fit.start)?,
+        ];
         let parameters = FREE.iter().zip(&fit.logs).zip(&told);
         let parameters = parameters.map(|((free, log), told)| {
             let [low, high] = told.factors(*log);
@@ -351,7 +373,7 @@ impl Identified {
             after: misses(&lab, &played[1], ticks),
             noise_mm: noise.position_m * 1e3,
             untold: told::untold(&information),
-            experiments: experiment::ranked(&problem, &fit.logs, &information, 1.0),
+            experiments: experiment::ranked(&problem, fit.point(), &information, 1.0),
             ticks,
             fit,
             played,

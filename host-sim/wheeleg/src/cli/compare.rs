@@ -59,7 +59,8 @@ pub(super) struct CompareArgs {
     json: bool,
 }
 
-fn controller(name: &str) -> Result<Kind, String> {
+/// A controller by its name.
+pub(super) fn controller(name: &str) -> Result<Kind, String> {
     Kind::of_name(name).ok_or_else(|| format!("known: {}", Kind::ALL.map(Kind::name).join(", ")))
 }
 

@@ -3,12 +3,18 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 
+use super::compare::controller;
+use super::exit::FAILED;
 use super::{print, stop_on_signals, tell};
-use wheeleg_config::builtin;
+use wheeleg_config::{AxisConfig, builtin};
+use wheeleg_fmu::archive;
+use wheeleg_fmu::description::Fmi;
+use wheeleg_fmu::{FmuError, Kind, Model};
 use wheeleg_scene::urdf;
 use wheeleg_studies::StudyError;
+use wheeleg_studies::axis_sim::Kind as Law;
 use wheeleg_studies::export::{layout, log_of, parquet, ros2, write_new};
 use wheeleg_studies::study::Progress;
 
@@ -34,6 +40,46 @@ enum Format {
     Parquet(LogArgs),
     /// A bag of ROS 2 (MCAP, CDR): /joint_states, /tf, /tf_static, /robot_description, /clock.
     Ros2(LogArgs),
+    /// A Functional Mock-up Unit of a cylinder for Simulink, Dymola, OpenModelica, FMPy, …
+    ///
+    /// Its library is built with `cargo build --release -p wheeleg-fmu`.
+    Fmu(FmuArgs),
+}
+
+#[derive(Debug, Args)]
+struct FmuArgs {
+    /// Built-in axis or path of an axis file.
+    axis: String,
+    /// What the unit holds: the plant, which is given on-times of valves; or the plant with the
+    /// firmware of its joint board, which is given references.
+    #[arg(long, value_enum, default_value = "plant")]
+    kind: UnitKind,
+    /// Version of FMI.
+    #[arg(long, value_enum, default_value = "2")]
+    fmi: Version,
+    /// Control law of a controlled unit.
+    #[arg(long, value_name = "LAW", default_value = "predictive", value_parser = controller)]
+    law: Law,
+    /// The unit's shared library [default: beside this program].
+    #[arg(long, value_name = "FILE")]
+    library: Option<PathBuf>,
+    /// File to write [default: NAME-KIND.fmu]. A file of that name moves to `FILE.previous`.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum UnitKind {
+    Plant,
+    Controlled,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Version {
+    #[value(name = "2")]
+    Two,
+    #[value(name = "3")]
+    Three,
 }
 
 #[derive(Debug, Args)]
@@ -73,6 +119,7 @@ impl LogArgs {
 pub(super) fn command(args: &ExportArgs) -> Result<ExitCode, StudyError> {
     match &args.format {
         Format::Urdf(args) => write(&urdf::write(&builtin::robot(&args.robot)?)?, &args.out),
+        Format::Fmu(args) => unit(args),
         Format::Layout(args) => write(layout::LAYOUT, args),
         Format::Parquet(args) => {
             let out = args.out("parquet");
@@ -101,6 +148,42 @@ pub(super) fn command(args: &ExportArgs) -> Result<ExitCode, StudyError> {
             })
         }
     }
+}
+
+fn unit(args: &FmuArgs) -> Result<ExitCode, StudyError> {
+    let made = || -> Result<(Model, Vec<u8>), FmuError> {
+        let kind = match args.kind {
+            UnitKind::Plant => Kind::Plant,
+            UnitKind::Controlled => Kind::Controlled,
+        };
+        let fmi = match args.fmi {
+            Version::Two => Fmi::Two,
+            Version::Three => Fmi::Three,
+        };
+        let source = AxisConfig::source(&args.axis)?;
+        let model = Model::new(kind, args.law, &source.file, &source.text)?;
+        let library = args.library.clone();
+        let library = library.unwrap_or_else(archive::library_beside_program);
+        let bytes = archive::pack(&model, fmi, &library)?;
+        Ok((model, bytes))
+    };
+    let (model, bytes) = match made() {
+        Ok(made) => made,
+        Err(error) => {
+            tell(&format!("{:?}", miette::Report::new(error)));
+            return Ok(ExitCode::from(FAILED));
+        }
+    };
+    let kind = args.kind.to_possible_value();
+    let kind = kind.as_ref().map_or("unit", |k| k.get_name());
+    let named = || PathBuf::from(format!("{}-{kind}.fmu", model.config.name));
+    let out = args.out.clone().unwrap_or_else(named);
+    write_new(&out, &bytes)?;
+    let (count, place) = (model.variables.len(), out.display());
+    print(&format!(
+        "{count} variables, {} kB in {place}\n",
+        bytes.len() / 1000
+    ))
 }
 
 fn write(text: &str, args: &OutArgs) -> Result<ExitCode, StudyError> {

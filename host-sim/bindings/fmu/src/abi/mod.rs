@@ -1,0 +1,234 @@
+//! The C interface. What FMI calls goes to [`Unit`]; what it answers goes back as a status, and
+//! its reason to the importer's logger. No panic crosses.
+//!
+//! The only folder of this crate with `unsafe`: pointers come from the importer.
+
+#![allow(unsafe_code)]
+
+mod fmi2;
+mod fmi3;
+
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use wheeleg_config::plain_text;
+
+use crate::error::FmuError;
+use crate::unit::{State, Unit};
+
+/// `fmi2Status`, `fmi3Status`.
+type Status = i32;
+const OK: Status = 0;
+const ERROR: Status = 3;
+const FATAL: Status = 4;
+
+/// An instance, or a state of one, as the importer holds it.
+type Handle = *mut c_void;
+
+/// The importer's logger; FMI 2's is variadic, as `printf`.
+enum Log {
+    Two {
+        callback: Option<fmi2::Logger>,
+        environment: *mut c_void,
+        name: CString,
+    },
+    Three {
+        callback: Option<fmi3::Logger>,
+        environment: *mut c_void,
+    },
+}
+
+impl Log {
+    fn say(&self, status: Status, text: &str) {
+        // A null in a text would end it.
+        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let category: &CStr = c"logStatusError";
+        match self {
+            Self::Two {
+                callback: Some(callback),
+                environment,
+                name,
+            } => {
+                // SAFETY: the importer's function with the arguments of fmi2CallbackLogger; the
+                // text is an argument and no format.
+                unsafe {
+                    callback(
+                        *environment,
+                        name.as_ptr(),
+                        status,
+                        category.as_ptr(),
+                        c"%s".as_ptr(),
+                        text.as_ptr(),
+                    );
+                }
+            }
+            Self::Three {
+                callback: Some(callback),
+                environment,
+            } => {
+                // SAFETY: the importer's function with the arguments of fmi3LogMessageCallback.
+                unsafe { callback(*environment, status, category.as_ptr(), text.as_ptr()) }
+            }
+            Self::Two { callback: None, .. } | Self::Three { callback: None, .. } => {}
+        }
+    }
+}
+
+struct Instance {
+    unit: Unit,
+    log: Log,
+}
+
+/// Makes an instance; null if it cannot be, with the reason in the log.
+fn instantiate(log: Log, make: impl FnOnce() -> Result<Unit, FmuError>) -> Handle {
+    match catch_unwind(AssertUnwindSafe(make)) {
+        Ok(Ok(unit)) => Box::into_raw(Box::new(Instance { unit, log })).cast(),
+        Ok(Err(error)) => {
+            log.say(ERROR, &plain_text(&error));
+            std::ptr::null_mut()
+        }
+        Err(_) => {
+            log.say(FATAL, PANICKED);
+            std::ptr::null_mut()
+        }
+    }
+}
+
+const PANICKED: &str = "the unit's own program failed; please report it with the axis file";
+
+/// Calls an instance.
+///
+/// # Safety
+/// `instance` is null or what [`instantiate`] gave, and not freed.
+unsafe fn call(instance: Handle, work: impl FnOnce(&mut Unit) -> Result<(), FmuError>) -> Status {
+    // SAFETY: see above; FMI has one call at a time for an instance.
+    let Some(instance) = (unsafe { instance.cast::<Instance>().as_mut() }) else {
+        return ERROR;
+    };
+    match catch_unwind(AssertUnwindSafe(|| work(&mut instance.unit))) {
+        Ok(Ok(())) => OK,
+        Ok(Err(error)) => {
+            instance.log.say(ERROR, &plain_text(&error));
+            ERROR
+        }
+        Err(_) => {
+            instance.log.say(FATAL, PANICKED);
+            FATAL
+        }
+    }
+}
+
+/// Frees an instance.
+///
+/// # Safety
+/// As [`call`]; the handle is of no use afterwards.
+unsafe fn free(instance: Handle) {
+    if !instance.is_null() {
+        // SAFETY: it was made by `instantiate`.
+        drop(unsafe { Box::from_raw(instance.cast::<Instance>()) });
+    }
+}
+
+/// Takes the state of an instance into the importer's handle, which may hold an older one.
+///
+/// # Safety
+/// As [`call`]; `state` is a place of the importer's that is null or holds a state.
+unsafe fn get_state(instance: Handle, state: *mut Handle) -> Status {
+    // SAFETY: see above.
+    unsafe {
+        call(instance, |unit| {
+            put(state, unit.state());
+            Ok(())
+        })
+    }
+}
+
+/// Puts a state in the place of what a handle holds.
+fn put(place: *mut Handle, state: State) {
+    if place.is_null() {
+        return;
+    }
+    // SAFETY: the importer's place for a handle, which is null or holds a state of ours.
+    unsafe {
+        free_state(place);
+        *place = Box::into_raw(Box::new(state)).cast();
+    }
+}
+
+/// # Safety
+/// As [`get_state`].
+unsafe fn free_state(place: *mut Handle) {
+    // SAFETY: see above.
+    unsafe {
+        if !place.is_null() && !(*place).is_null() {
+            drop(Box::from_raw((*place).cast::<State>()));
+            *place = std::ptr::null_mut();
+        }
+    }
+}
+
+/// Works on a state that the importer holds.
+///
+/// # Safety
+/// As [`call`]; `state` is null or a state of ours.
+unsafe fn with_state(
+    instance: Handle,
+    state: Handle,
+    work: impl FnOnce(&mut Unit, &State) -> Result<(), FmuError>,
+) -> Status {
+    // SAFETY: see above.
+    unsafe {
+        call(instance, |unit| match state.cast::<State>().as_ref() {
+            Some(state) => work(unit, state),
+            None => Err(FmuError::State("there is none".to_owned())),
+        })
+    }
+}
+
+/// Values of the importer; none of a null pointer.
+///
+/// # Safety
+/// `values` is null or points to `count` values.
+unsafe fn values<'a, T>(values: *const T, count: usize) -> &'a [T] {
+    if values.is_null() {
+        &[]
+    } else {
+        // SAFETY: see above.
+        unsafe { std::slice::from_raw_parts(values, count) }
+    }
+}
+
+/// The importer's place for values.
+///
+/// # Safety
+/// As [`values`], and nothing else refers to them.
+unsafe fn places<'a, T>(values: *mut T, count: usize) -> &'a mut [T] {
+    if values.is_null() {
+        &mut []
+    } else {
+        // SAFETY: see above.
+        unsafe { std::slice::from_raw_parts_mut(values, count) }
+    }
+}
+
+/// A text of the importer's, empty of a null pointer.
+///
+/// # Safety
+/// `text` is null or ends with a null.
+unsafe fn text(text: *const c_char) -> String {
+    if text.is_null() {
+        String::new()
+    } else {
+        // SAFETY: see above.
+        unsafe { CStr::from_ptr(text) }
+            .to_string_lossy()
+            .into_owned()
+    }
+}
+
+/// Copies what fits the importer's place.
+fn copy<T: Copy>(from: &[T], to: &mut [T]) -> Result<(), FmuError> {
+    crate::unit::count(to.len(), from.len())?;
+    to.copy_from_slice(from);
+    Ok(())
+}

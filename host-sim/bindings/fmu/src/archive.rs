@@ -1,0 +1,94 @@
+//! The `.fmu` archive.
+
+use std::io::{self, Cursor, Write as _};
+use std::path::{Path, PathBuf};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use crate::description::{self, Fmi};
+use crate::error::FmuError;
+use crate::model::{AXIS_FILE, IDENTIFIER, Model, UNIT_FILE};
+
+/// File name of the shared library as cargo builds it.
+pub const LIBRARY: &str = if cfg!(target_os = "windows") {
+    "wheeleg_fmu.dll"
+} else if cfg!(target_os = "macos") {
+    "libwheeleg_fmu.dylib"
+} else {
+    "libwheeleg_fmu.so"
+};
+
+/// Folder and file name of the library in a unit, as each version names the platform.
+fn binary(fmi: Fmi) -> String {
+    let (os, suffix) = match std::env::consts::OS {
+        "windows" => ("windows", "dll"),
+        "macos" => ("darwin", "dylib"),
+        os => (os, "so"),
+    };
+    let folder = match fmi {
+        Fmi::Three => format!("{}-{os}", std::env::consts::ARCH),
+        Fmi::Two => match os {
+            "windows" => "win64".to_owned(),
+            os => format!("{os}64"),
+        },
+    };
+    format!("binaries/{folder}/{IDENTIFIER}.{suffix}")
+}
+
+/// The shared library beside the running program, where cargo puts both.
+#[must_use]
+pub fn library_beside_program() -> PathBuf {
+    let program = std::env::current_exe().unwrap_or_default();
+    program.with_file_name(LIBRARY)
+}
+
+/// The unit of a model, with a shared library, as bytes. The same model and library give the same
+/// bytes.
+///
+/// # Errors
+/// [`FmuError::Library`] if there is no such library, [`FmuError::Archive`] if it cannot be read.
+pub fn pack(model: &Model, fmi: Fmi, library: &Path) -> Result<Vec<u8>, FmuError> {
+    let code = match std::fs::read(library) {
+        Ok(code) => code,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            return Err(FmuError::Library {
+                path: library.to_owned(),
+            });
+        }
+        Err(e) => {
+            return Err(FmuError::Archive {
+                path: library.to_owned(),
+                reason: e.to_string(),
+            });
+        }
+    };
+    let packed = || -> io::Result<Vec<u8>> {
+        let files = [
+            (
+                "modelDescription.xml".to_owned(),
+                description::write(model, fmi)?,
+            ),
+            (binary(fmi), code),
+            (
+                format!("resources/{AXIS_FILE}"),
+                model.text.clone().into_bytes(),
+            ),
+            (format!("resources/{UNIT_FILE}"), model.about().into_bytes()),
+        ];
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .last_modified_time(zip::DateTime::default())
+            .unix_permissions(0o755);
+        for (name, content) in files {
+            zip.start_file(name, options)?;
+            zip.write_all(&content)?;
+        }
+        Ok(zip.finish()?.into_inner())
+    };
+    packed().map_err(|e| FmuError::Archive {
+        path: library.to_owned(),
+        reason: e.to_string(),
+    })
+}
