@@ -89,10 +89,12 @@ fn main() {
     println!("a row with all but its simulation: {each_ms:.2} ms");
     let table = folder.path().join("cases.parquet");
     let begun = Instant::now();
-    let merged = merge(&[folder.path().to_owned()], &table).expect("merged");
+    let merged = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let merged = merged.expect("not stopped");
     let merge_s = begun.elapsed().as_secs_f64();
     let begun = Instant::now();
-    report::write(&table, None, &folder.path().join("cases.html")).expect("a page");
+    let report = report::Report::of(&table, None).expect("a table");
+    report.write(&folder.path().join("cases.html")).expect("a page");
     println!(
         "{} rows x {} columns: merge {merge_s:.2} s, report {:.2} s, {:.0} MB",
         merged.rows,

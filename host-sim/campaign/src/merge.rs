@@ -5,6 +5,7 @@ use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use wheeleg_studies::export::make_room;
+use wheeleg_studies::study::Stop;
 
 use crate::columns::{Columns, FACT};
 use crate::part::{PLAN, PROGRAM};
@@ -25,13 +26,18 @@ pub struct Merged {
 /// Blocks that a message names; of more there is the number.
 const NAMED: usize = 12;
 
-/// Writes one table of the parts in several folders of one plan; each case once.
+/// Writes one table of the parts in several folders of one plan; each case once. None if it was
+/// stopped: then nothing is written.
 ///
 /// # Errors
 /// [`CampaignError::Incomplete`] if blocks are missing, with the command that fills the holes;
 /// [`CampaignError::Refused`] for folders of different plans or programs, or a row twice;
 /// [`CampaignError::Output`] if the table cannot be written.
-pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
+pub fn merge(
+    folders: &[PathBuf],
+    out: &Path,
+    stop: &Stop,
+) -> Result<Option<Merged>, CampaignError> {
     let stores: Vec<Store> = folders
         .iter()
         .map(|folder| Store::open(folder))
@@ -65,25 +71,20 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<Merged, CampaignError> {
     let columns = Cases::new(&plan)?.columns().clone();
     let plan_text = serde_json::to_string(first.plan()).expect("texts are JSON");
     let temporary = out.with_extension(format!("{}.tmp", host::unique()));
-    let result = write(
-        &temporary,
-        &parts,
-        &columns,
-        [&plan_text, &first.plan().program],
-    )
-    .and_then(|merged| {
-        if is_same(&temporary, out) {
-            let _ = std::fs::remove_file(&temporary);
-            return Ok(merged);
+    // From here on there is something to take away.
+    stop.begin();
+    let facts = [plan_text.as_str(), &first.plan().program];
+    let written = write([&temporary, out], &parts, &columns, facts, stop);
+    let result = written.and_then(|merged| {
+        if merged.is_some() && !is_same(&temporary, out) {
+            make_room(out)?;
+            let renamed = std::fs::rename(&temporary, out);
+            renamed.map_err(|e| CampaignError::output("write", out, e))?;
         }
-        make_room(out)?;
-        let renamed = std::fs::rename(&temporary, out);
-        renamed.map_err(|e| CampaignError::output("write", out, e))?;
         Ok(merged)
     });
-    if result.is_err() {
-        let _ = std::fs::remove_file(&temporary);
-    }
+    // Gone already where it has become the table.
+    let _ = std::fs::remove_file(&temporary);
     result
 }
 
@@ -146,16 +147,16 @@ fn complete<'s>(stores: &'s [Store], folders: &[PathBuf]) -> Result<Vec<&'s Stor
     })
 }
 
+/// Writes the table to `to`; messages name `out`, which it becomes.
 fn write(
-    to: &Path,
+    [to, out]: [&Path; 2],
     parts: &[&Store],
     columns: &Columns,
     [plan_text, program]: [&str; 2],
-) -> Result<Merged, CampaignError> {
-    let failed = |e: std::io::Error| CampaignError::output("write", to, e);
-    let full = |e: parquet::errors::ParquetError| {
-        CampaignError::output("write", to, std::io::Error::other(e.to_string()))
-    };
+    stop: &Stop,
+) -> Result<Option<Merged>, CampaignError> {
+    let failed = |e: std::io::Error| CampaignError::output("write", out, e);
+    let full = |e: parquet::errors::ParquetError| failed(std::io::Error::other(e.to_string()));
     let file = File::create(to).map_err(failed)?;
     let text = serde_json::to_string(&columns.all).expect("columns are JSON");
     let facts = [(FACT, text.as_str()), (PLAN, plan_text), (PROGRAM, program)];
@@ -165,6 +166,9 @@ fn write(
     let mut group = Table::empty(columns.all.clone());
     let mut rows = 0_u64;
     for (block, store) in (0_u64..).zip(parts) {
+        if stop.is_asked() {
+            return Ok(None);
+        }
         let path = store.part(block);
         let table = store.table(block);
         let table = table.map_err(|why| CampaignError::unreadable(&path, why))?;
@@ -184,10 +188,10 @@ fn write(
     let file = writer.finish().map_err(full)?;
     let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
     file.sync_all().map_err(failed)?;
-    Ok(Merged {
+    Ok(Some(Merged {
         rows,
         hash: hasher.finalize().to_hex().to_string(),
-    })
+    }))
 }
 
 /// Adds case, status, log hash and the figures' bits of each row.

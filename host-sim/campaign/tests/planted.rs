@@ -104,7 +104,7 @@ fn test() {
         "one crashed, the killed one is sound"
     );
     let table = folder.path().join("cases.parquet");
-    wheeleg_campaign::merge(&[folder.path().to_owned()], &table).expect("merged");
+    wheeleg_campaign::merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
     let read = wheeleg_campaign::report::Merged::read(&table)
         .expect("a table")
         .table;

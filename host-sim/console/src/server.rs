@@ -92,6 +92,7 @@ pub struct Server {
     runtime: Option<Runtime>,
     robot: Option<JoinHandle<()>>,
     recorder: Option<JoinHandle<()>>,
+    recorded: Arc<record::Shared>,
 }
 
 impl std::fmt::Debug for Server {
@@ -196,6 +197,7 @@ impl Server {
         let viewers = Viewers::new(about.scene.clone(), &live.robot.node, contacts);
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
+        let recorded = Arc::clone(&shared);
         let (hub, robot) = Hub::new(
             live::start(live, feed, contact_sink)?,
             name,
@@ -229,6 +231,7 @@ impl Server {
             runtime: Some(runtime),
             robot: Some(robot),
             recorder: Some(recordings.thread),
+            recorded,
         })
     }
 
@@ -262,6 +265,20 @@ impl Server {
     #[must_use]
     pub fn is_look_only(&self) -> bool {
         self.look_only
+    }
+
+    /// What ended the recording early: a full disk. None while all goes well.
+    #[must_use]
+    pub fn recording_failure(&self) -> Option<String> {
+        self.recorded.status()?.failure
+    }
+
+    /// Switches the robot off and ends. What the recording lacks, if it lacks something.
+    #[must_use]
+    pub fn end(self) -> Option<String> {
+        let recorded = Arc::clone(&self.recorded);
+        drop(self);
+        recorded.status()?.failure
     }
 
     #[doc(hidden)]

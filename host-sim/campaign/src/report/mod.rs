@@ -55,24 +55,41 @@ impl Merged {
     }
 }
 
-/// Writes the page of a table, and of its comparison with another one.
-///
-/// # Errors
-/// [`CampaignError::Unreadable`] if a table is none, [`CampaignError::Output`] if the page cannot
-/// be written.
-pub fn write(
-    path: &Path,
-    against: Option<&Path>,
-    out: &Path,
-) -> Result<(Findings, Option<Pairs>), CampaignError> {
-    let merged = Merged::read(path)?;
-    let findings = findings::find(&merged)?;
-    let other = against.map(Merged::read).transpose()?;
-    let pairs = match &other {
-        Some(other) => Some(pairs::against(&merged, other)?),
-        None => None,
-    };
-    let page = page::render(&merged, &findings, pairs.as_ref())?;
-    write_new(out, &page)?;
-    Ok((findings, pairs))
+/// What a table says, and a second one beside it.
+pub struct Report {
+    /// Of the table.
+    pub findings: Findings,
+    /// Of both.
+    pub pairs: Option<Pairs>,
+    page: String,
+}
+
+impl Report {
+    /// Writes the page.
+    ///
+    /// # Errors
+    /// [`CampaignError::Study`] with the path and what the operating system said.
+    pub fn write(&self, out: &Path) -> Result<(), CampaignError> {
+        Ok(write_new(out, &self.page)?)
+    }
+
+    /// Reads a table, and compares it with another one.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] if a table is none.
+    pub fn of(path: &Path, against: Option<&Path>) -> Result<Self, CampaignError> {
+        let merged = Merged::read(path)?;
+        let findings = findings::find(&merged)?;
+        let other = against.map(Merged::read).transpose()?;
+        let pairs = match &other {
+            Some(other) => Some(pairs::against(&merged, other)?),
+            None => None,
+        };
+        let page = page::render(&merged, &findings, pairs.as_ref())?;
+        Ok(Self {
+            findings,
+            pairs,
+            page,
+        })
+    }
 }

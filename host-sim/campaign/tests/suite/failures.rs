@@ -3,6 +3,7 @@
 use std::fs;
 
 use wheeleg_campaign::{CampaignError, Outcome, Shard, Status, Store, merge, status};
+use wheeleg_studies::study::Stop;
 
 use crate::common::{computed, options, parts, run_in, spread};
 
@@ -37,7 +38,7 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
     assert_eq!(state.by_status, [37, 1, 1, 0, 1]);
     assert!(state.failed >= 3 && state.missing.is_empty());
     let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table).expect("merged");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
     let read = wheeleg_campaign::report::Merged::read(&table)
         .expect("a table")
         .table;
@@ -65,7 +66,7 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
     let path = folder.path().join("parts").join(name);
     let store = Store::open(folder.path()).expect("a folder");
     let table = folder.path().join("cases.parquet");
-    let expected = merge(&[folder.path().to_owned()], &table).expect("merged");
+    let expected = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
     let mut found = 0;
     // A flip that changes no value may stay; any other is found.
     for at in (0..bytes.len()).step_by(37) {
@@ -74,7 +75,7 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
         fs::write(&path, &flipped).expect("written");
         let state = status(&store, Shard::ALL).expect("readable");
         if state.bad.is_empty() {
-            let merged = merge(&[folder.path().to_owned()], &table).expect("merged");
+            let merged = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
             assert_eq!(merged, expected, "byte {at}");
         } else {
             found += 1;
@@ -83,7 +84,7 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
     assert!(found > 20, "{found} of {}", bytes.len() / 37);
     for damaged in [&bytes[..bytes.len() / 2], &bytes[..0], b"something else"] {
         fs::write(&path, damaged).expect("written");
-        let error = merge(&[folder.path().to_owned()], &table).expect_err("a hole");
+        let error = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect_err("a hole");
         let told = format!("{error}");
         assert_eq!(error.exit_code(), 3);
         assert!(
@@ -126,7 +127,7 @@ fn holes_are_named_with_the_command_that_fills_them() {
         fs::remove_file(folder.path().join(format!("parts/{block}.parquet"))).expect("there");
     }
     let out = folder.path().join("cases.parquet");
-    let error = merge(&[folder.path().to_owned()], &out).expect_err("holes");
+    let error = merge(&[folder.path().to_owned()], &out, &Stop::default()).expect_err("holes");
     let CampaignError::Incomplete { what, help } = &error else {
         panic!("{error}")
     };
@@ -146,7 +147,7 @@ fn holes_are_named_with_the_command_that_fills_them() {
     })
     .0
     .expect("it runs");
-    let error = merge(&[folder.path().to_owned(), other.path().to_owned()], &out);
+    let error = merge(&[folder.path().to_owned(), other.path().to_owned()], &out, &Stop::default());
     let error = error.expect_err("two plans").to_string();
     assert!(error.contains("different plans"), "{error}");
 }

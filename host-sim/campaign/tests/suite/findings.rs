@@ -3,6 +3,7 @@
 use std::fs;
 
 use wheeleg_campaign::{Outcome, Status, merge, report};
+use wheeleg_studies::study::Stop;
 
 use crate::common::{computed, options, run_in, spread};
 
@@ -26,9 +27,11 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     .0
     .expect("it runs");
     let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table).expect("merged");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
     let page = folder.path().join("cases.html");
-    let (findings, pairs) = report::write(&table, Some(&table), &page).expect("a page");
+    let report = report::Report::of(&table, Some(&table)).expect("a table");
+    report.write(&page).expect("a page");
+    let (findings, pairs) = (report.findings, report.pairs);
     let read = report::Merged::read(&table).expect("a table").table;
     let passed = read.flags("passed").iter().filter(|p| **p == Some(true));
     let told: u64 = findings.passed.iter().map(|(_, rate)| rate.met).sum();

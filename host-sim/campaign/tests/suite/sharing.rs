@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use wheeleg_campaign::{CampaignError, Merged, PlanFile, Shard, Store, merge, status};
 use wheeleg_config::plan::Plan;
-use wheeleg_studies::study::Signal;
+use wheeleg_studies::study::{Signal, Stop};
 
 use crate::common::{computed, options, parts, run_in, spread};
 
@@ -23,7 +23,9 @@ fn whole(plan: &Plan) -> (tempfile::TempDir, Merged) {
 }
 
 fn merged(folder: &std::path::Path) -> Merged {
-    merge(&[folder.to_owned()], &folder.join("cases.parquet")).expect("merged")
+    merge(&[folder.to_owned()], &folder.join("cases.parquet"), &Stop::default())
+        .expect("merged")
+        .expect("not stopped")
 }
 
 #[test]
@@ -52,7 +54,8 @@ fn threads_and_shards_give_the_same_bytes() {
         ran.0.expect("it runs");
     }
     let paths: Vec<_> = folders.iter().map(|f| f.path().to_owned()).collect();
-    let together = merge(&paths, &paths[0].join("cases.parquet")).expect("merged");
+    let together = merge(&paths, &paths[0].join("cases.parquet"), &Stop::default()).expect("merged");
+    let together = together.expect("not stopped");
     assert_eq!(together, expected);
     let tables = [one.path(), folders[0].path()].map(|f| fs::read(f.join("cases.parquet")));
     let [a, b] = tables.map(|table| table.expect("read"));

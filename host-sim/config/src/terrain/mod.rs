@@ -69,33 +69,38 @@ impl Kind {
 /// Reads all parts; `top` are the fields at the top of the file.
 pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
     let mut parts = Vec::new();
-    let mut entries = Vec::new();
+    // Of very many parts their entries would take as much memory again as the file itself: each
+    // is taken out of it when it is its turn.
+    let mut kinds = Vec::new();
     for i in 0..r.array_len("terrain") {
         let entry = r.entry("terrain", i);
         let kind = r.choice(&entry, "kind", &KINDS);
         parts.push(entry.text());
-        entries.extend(kind.map(|kind| (kind, entry)));
+        kinds.extend(kind.map(|kind| (kind, i)));
     }
-    let is_map = |(kind, _): &&(Kind, Entry)| *kind == Kind::HeightMap;
-    if let Some((_, second)) = entries.iter().filter(is_map).nth(1) {
+    let is_map = |(kind, _): &&(Kind, usize)| *kind == Kind::HeightMap;
+    if let Some((_, second)) = kinds.iter().filter(is_map).nth(1) {
+        let second = r.entry("terrain", *second);
         let message = format!("`{}`: a terrain has one heightmap at most", second.path);
         r.problem(Some(second.span.clone()), message, "the second", None);
     }
     // What lies on the ground needs the ground first.
-    let (everywhere, lying): (Vec<_>, Vec<_>) = entries
+    let (everywhere, lying): (Vec<_>, Vec<_>) = kinds
         .into_iter()
         .partition(|(kind, _)| kind.is_everywhere());
     let mut terrain = Terrain { parts: Vec::new() };
-    for (kind, entry) in &everywhere {
-        let added = part(r, *kind, entry, (&terrain, files), top);
+    for (kind, i) in &everywhere {
+        let entry = r.entry("terrain", *i);
+        let added = part(r, *kind, &entry, (&terrain, files), top);
         terrain.parts.extend(added.unwrap_or_default());
     }
     if everywhere.is_empty() {
         terrain = Terrain::default();
     }
     let below = terrain.clone();
-    for (kind, entry) in &lying {
-        let added = part(r, *kind, entry, (&below, files), top);
+    for (kind, i) in &lying {
+        let entry = r.entry("terrain", *i);
+        let added = part(r, *kind, &entry, (&below, files), top);
         terrain.parts.extend(added.unwrap_or_default());
     }
     Ground { terrain, parts }

@@ -99,6 +99,20 @@ impl Folder {
         before: Option<&[u8]>,
     ) -> Result<Self, String> {
         let (id, path) = numbered(root)?;
+        let made = Self::begin(id, path.clone(), (about, begin_us), head, before);
+        made.inspect_err(|_| {
+            // Half a recording is none.
+            let _ = fs::remove_dir_all(&path);
+        })
+    }
+
+    fn begin(
+        id: String,
+        path: PathBuf,
+        (about, begin_us): (&About, u64),
+        head: &[(u16, OwnedSample)],
+        before: Option<&[u8]>,
+    ) -> Result<Self, String> {
         for (name, text) in [(ROBOT, &about.robot_toml), (SCENARIO, &about.scenario_toml)] {
             let file = path.join(name);
             fs::write(&file, text).map_err(|e| said(&file, &e))?;

@@ -28,6 +28,7 @@ pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
 use crate::StudyError;
 use crate::axis_sim::suite::{AxisSimError, TestRig};
 use crate::axis_sim::{Kind, design, optimal};
+use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, STACK, Settings, Stopped};
 use wheeleg_config::AxisConfig;
 
@@ -132,7 +133,7 @@ pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Compar
     let configs = configs(options)?;
     let job = Job::begin("compare", settings)?;
     let comparison = Comparison::play(options, configs, &job.progress)?;
-    comparison.write(job)
+    Ok(comparison.write(job))
 }
 
 /// Reads the axes of a comparison.
@@ -218,16 +219,15 @@ impl Comparison {
     }
 
     /// Writes report, figures, tables and `summary.json`.
-    ///
-    /// # Errors
-    /// [`StudyError`] if something cannot be drawn or written.
-    pub fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
+    fn write(self, job: Job) -> Finished<Self> {
         let stopped = self.stopped.clone();
-        let summary = job.summary(&Cases { cases: &self.rows }, stopped.as_ref())?;
-        table(&job.subfolder("csv")?.join("cases.csv"), &self.rows)?;
-        let drawn = job.draw(charts::figures(&self))?;
-        let page = page::render(&self, &drawn)?;
-        job.finish(self, summary, &page, stopped)
+        let summary = json(&Cases { cases: &self.rows }, stopped.as_ref());
+        job.finish(self, summary, stopped, |job, comparison| {
+            let folder = job.subfolder("csv");
+            job.keep(folder.and_then(|folder| table(&folder.join("cases.csv"), &comparison.rows)));
+            let drawn = job.draw(charts::figures(comparison));
+            (page::render(comparison, &drawn), drawn)
+        })
     }
 }
 
@@ -350,6 +350,13 @@ fn bounds(
 
 /// Writes rows as CSV with a head line.
 fn table(path: &Path, rows: &[Row]) -> Result<(), StudyError> {
+    write_table(path, rows).inspect_err(|_| {
+        // A part of a table would be taken for the whole.
+        let _ = std::fs::remove_file(path);
+    })
+}
+
+fn write_table(path: &Path, rows: &[Row]) -> Result<(), StudyError> {
     let failed = |e: csv::Error| StudyError::output("write the table", path, e.into());
     let mut out = csv::Writer::from_path(path).map_err(failed)?;
     for (i, row) in rows.iter().enumerate() {

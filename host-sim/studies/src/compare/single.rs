@@ -7,7 +7,8 @@ use super::moves::Played;
 use super::{Cases, axis_error, load};
 use crate::StudyError;
 use crate::axis_sim::Trace;
-use crate::study::{Job, Settings};
+use crate::study::schema::json;
+use crate::study::{Finished, Job, Settings};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
 
 /// A case that was played alone.
@@ -50,33 +51,35 @@ pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
 
 impl Single {
     /// Writes `summary.json`, the rows of every measured move as CSV, and a figure of
-    /// each; earlier results in the folder are set aside. The summary, and the figures.
+    /// each; earlier results in the folder are set aside. The result are the figures.
     ///
     /// # Errors
-    /// [`StudyError`] if something cannot be drawn or written.
-    pub fn write(&self, settings: &Settings) -> Result<(String, Vec<PathBuf>), StudyError> {
+    /// [`StudyError`] if the folder cannot be used.
+    pub fn write(&self, settings: &Settings) -> Result<Finished<Vec<PathBuf>>, StudyError> {
         let job = Job::begin("case", settings)?;
         let cases = std::slice::from_ref(&self.row);
-        let summary = job.summary(&Cases { cases }, None)?;
+        let summary = json(&Cases { cases }, None);
+        job.keep(job.save("summary.json", &summary));
         let Some(played) = &self.played else {
-            return Ok((summary, Vec::new()));
+            return Ok(job.end(Vec::new(), summary, None));
         };
-        job.subfolder("csv")?;
+        job.keep(job.subfolder("csv"));
         let first = std::iter::once(("first".to_owned(), &played.first));
         let measured = played.measured.iter().enumerate();
         let all = first.chain(measured.map(|(k, t)| (format!("measured-{}", k + 1), t)));
         let mut figures = Vec::new();
         for (name, trace) in all {
-            job.save(&format!("csv/{name}.csv"), &rows(trace))?;
+            job.keep(job.save(&format!("csv/{name}.csv"), &rows(trace)));
             figures.push(figure(&name, &self.row.case.id, trace));
         }
-        let drawn = job.draw(figures)?;
-        job.progress.clear();
+        let drawn = job.draw(figures);
+        job.keep(job.save_figures(&drawn));
         let plots = job.folder().join("figures");
         let paths = drawn
             .iter()
             .map(|(f, _)| plots.join(format!("{}.svg", f.id)));
-        Ok((summary, paths.collect()))
+        let paths = paths.filter(|path| path.exists()).collect();
+        Ok(job.end(paths, summary, None))
     }
 }
 

@@ -32,6 +32,7 @@ use wheeleg_protocol::MessageType;
 use wheeleg_protocol::link::SlotTiming;
 
 use crate::StudyError;
+use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, Settings};
 use trial::{BusPath, Outcome, Trial};
 use wheeleg_config::RobotConfig;
@@ -286,15 +287,19 @@ pub fn write(
     let parts = collected.parts();
     let done = parts.iter().filter(|(_, done)| *done).count() as u64;
     let stopped = job.progress.stopped(done, parts.len() as u64, "parts");
-    let summary = job.summary(&collected.summary(robot, options), stopped.as_ref())?;
+    let summary = json(&collected.summary(robot, options), stopped.as_ref());
     if let Some(stopped) = stopped {
-        let page = Job::stopped_page("Start delay of a pneumatic joint", &stopped, &parts)?;
-        return job.finish(None, summary, &page, Some(stopped));
+        let page = Job::stopped_page("Start delay of a pneumatic joint", &stopped, &parts);
+        let rest = |_: &Job, _: &_| (page, Vec::new());
+        return Ok(job.finish(None, summary, Some(stopped), rest));
     }
     let study = collected.study(robot, options);
     let study = study.ok_or_else(|| StudyError::refused("a part is missing", ""))?;
-    tables::write(&job.subfolder("csv")?, &study)?;
-    let drawn = job.draw(charts::figures(&study))?;
-    let page = page::render(&study, &drawn)?;
-    job.finish(Some(study), summary, &page, None)
+    let finished = job.finish(study, summary, None, |job, study| {
+        let folder = job.subfolder("csv");
+        job.keep(folder.and_then(|folder| tables::write(&folder, study)));
+        let drawn = job.draw(charts::figures(study));
+        (page::render(study, &drawn), drawn)
+    });
+    Ok(finished.map(Some))
 }

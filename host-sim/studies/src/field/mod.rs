@@ -23,6 +23,7 @@ pub use claims::{CLAIMS, Claim, Met};
 use crate::StudyError;
 use crate::analysis::Target;
 use crate::run::simulate;
+use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Settings};
 
 /// The scenarios, in the order of the page.
@@ -241,8 +242,10 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
     let (done, of) = (runs.len() as u64, cases.len() as u64);
     let stopped = job.progress.stopped(done, of, "runs");
     let summary = Summary::of(options, runs)?;
-    let json = job.summary(&summary, stopped.as_ref())?;
-    let drawn = job.draw(charts::figures(&summary))?;
-    let page = page::render(&summary, stopped.as_ref(), &drawn)?;
-    job.finish(summary, json, &page, stopped)
+    let text = json(&summary, stopped.as_ref());
+    let why = stopped.clone();
+    Ok(job.finish(summary, text, stopped, |job, summary| {
+        let drawn = job.draw(charts::figures(summary));
+        (page::render(summary, why.as_ref(), &drawn), drawn)
+    }))
 }

@@ -19,6 +19,7 @@ use section6::{ARGUMENT, AxisCheck, Instant, LITERAL, Reading};
 use wheeleg_kinematics::{LegGeometry, LegParameters};
 
 use crate::StudyError;
+use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings};
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_ROBOT;
@@ -190,15 +191,19 @@ pub fn write(settings: &Settings) -> Result<Finished<Option<Results>>, StudyErro
     let parts = collected.parts();
     let done = parts.iter().filter(|(_, done)| *done).count() as u64;
     let stopped = job.progress.stopped(done, parts.len() as u64, "parts");
-    let summary = job.summary(&collected.summary(), stopped.as_ref())?;
+    let summary = json(&collected.summary(), stopped.as_ref());
     if let Some(stopped) = stopped {
-        let page = Job::stopped_page("Figures of the paper", &stopped, &parts)?;
-        return job.finish(None, summary, &page, Some(stopped));
+        let page = Job::stopped_page("Figures of the paper", &stopped, &parts);
+        let rest = |_: &Job, _: &_| (page, Vec::new());
+        return Ok(job.finish(None, summary, Some(stopped), rest));
     }
     let results = collected.results();
     let results = results.ok_or_else(|| StudyError::refused("a part is missing", ""))?;
-    tables::write(&job.subfolder("csv")?, &results)?;
-    let drawn = job.draw(charts::figures(&results))?;
-    let page = page::render(&results, &drawn)?;
-    job.finish(Some(results), summary, &page, None)
+    let finished = job.finish(results, summary, None, |job, results| {
+        let folder = job.subfolder("csv");
+        job.keep(folder.and_then(|folder| tables::write(&folder, results)));
+        let drawn = job.draw(charts::figures(results));
+        (page::render(results, &drawn), drawn)
+    });
+    Ok(finished.map(Some))
 }

@@ -32,6 +32,7 @@ use self::lab::Lab;
 use self::predict::{Offset, Predicted, predict};
 use self::told::Told;
 use crate::StudyError;
+use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 
 /// Starts of the fit: the file, and others around it.
@@ -165,7 +166,7 @@ pub fn identify(
     let job = Job::begin("identify", &settings(&config.name))?;
     let identified = Identified::of(config, lab, options, &job.progress)?;
     let toml = identified.rewritten(&source.file, &source.text, options)?;
-    Identified { toml, ..identified }.write(job)
+    Ok(Identified { toml, ..identified }.write(job))
 }
 
 /// Noise of the position by the axis file, and a guess of that of pressures.
@@ -447,18 +448,19 @@ impl Identified {
         }
     }
 
-    fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
+    fn write(self, job: Job) -> Finished<Self> {
         let stopped = self.stopped.clone();
-        let summary = job.summary(&self.summary(), stopped.as_ref())?;
-        // A fit that was stopped is none to build on.
-        if stopped.is_none() {
-            job.save(AXIS, &self.toml)?;
-        }
-        if let Some(experiment) = self.experiments.first() {
-            job.save(NEXT, &experiment::csv(experiment))?;
-        }
-        let drawn = job.draw(page::figures(&self))?;
-        let page = page::render(&self, &drawn)?;
-        job.finish(self, summary, &page, stopped)
+        let summary = json(&self.summary(), stopped.as_ref());
+        job.finish(self, summary, stopped, |job, identified| {
+            // A fit that was stopped is none to build on.
+            if identified.stopped.is_none() {
+                job.keep(job.save(AXIS, &identified.toml));
+            }
+            if let Some(experiment) = identified.experiments.first() {
+                job.keep(job.save(NEXT, &experiment::csv(experiment)));
+            }
+            let drawn = job.draw(page::figures(identified));
+            (page::render(identified, &drawn), drawn)
+        })
     }
 }

@@ -27,6 +27,7 @@ pub use run::{run, select};
 pub use summary::Summary;
 
 use crate::StudyError;
+use crate::study::schema::json;
 use crate::study::{Finished, Job, Settings};
 
 /// Rows that came out so.
@@ -49,9 +50,11 @@ pub fn write(
     let outcomes = run(rows, seed, &job.progress)?;
     let (done, of) = (outcomes.len() as u64, rows.len() as u64);
     let stopped = job.progress.stopped(done, of, "rows");
-    let summary = job.summary(&Summary::new(&outcomes, seed), stopped.as_ref())?;
-    let page = page::render(&outcomes, seed, stopped.as_ref())?;
-    job.finish(outcomes, summary, &page, stopped)
+    let summary = json(&Summary::new(&outcomes, seed), stopped.as_ref());
+    let why = stopped.clone();
+    Ok(job.finish(outcomes, summary, stopped, |_, outcomes| {
+        (page::render(outcomes, seed, why.as_ref()), Vec::new())
+    }))
 }
 
 #[cfg(test)]

@@ -46,7 +46,8 @@ struct Robots {
 struct Baseline {
     /// As long as the longest run that is compared with it.
     duration_s: f64,
-    run: OnceLock<Result<Recording, String>>,
+    /// None if the study was stopped in it.
+    run: OnceLock<Option<Result<Recording, String>>>,
 }
 
 impl Robots {
@@ -103,21 +104,24 @@ impl Robots {
         instant_s(row, self.robot(row.variant), self.seed) + row.after_s
     }
 
-    /// The same run without the fault; `None` for the long walk.
-    fn baseline(&self, row: &Row) -> Result<Option<&Recording>, StudyError> {
+    /// The same run without the fault, which the long walk does not have; none at all if the study
+    /// is stopped in it.
+    fn baseline(
+        &self,
+        row: &Row,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<Option<Option<&Recording>>, StudyError> {
         let Some(baseline) = self.baselines.get(&compared_with(row)) else {
-            return Ok(None);
+            return Ok(Some(None));
         };
         let run = baseline.run.get_or_init(|| {
             let scenario = self.scenario(stands(row.phase), baseline.duration_s);
-            // Of use to other rows: it is not stopped.
-            let run = simulate(&scenario, self.robot(row.variant), self.seed, &|| false);
-            let run = run.ok_or_else(|| "stopped".to_owned())?;
-            run.error
-                .map_or(Ok(run.recording), |error| Err(error.to_string()))
+            let run = simulate(&scenario, self.robot(row.variant), self.seed, is_stopped)?;
+            let failed = run.error.map(|error| error.to_string());
+            Some(failed.map_or(Ok(run.recording), Err))
         });
-        run.as_ref()
-            .map(Some)
+        let run = run.as_ref().map(|run| run.as_ref().map(Some));
+        run.transpose()
             .map_err(|e| StudyError::refused(format!("the run without a fault fails: {e}"), ""))
     }
 
@@ -168,7 +172,10 @@ impl Robots {
             arming_asked,
             ..ran
         };
-        let measured: Measured = measure(row, &ran, self.baseline(row)?);
+        let Some(baseline) = self.baseline(row, &is_stopped)? else {
+            return Ok(None);
+        };
+        let measured: Measured = measure(row, &ran, baseline);
         Ok(Some(judge(*row, robot, &ran, measured)))
     }
 }

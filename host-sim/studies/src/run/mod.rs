@@ -57,8 +57,6 @@ pub struct Options {
 pub struct Run {
     /// Contents of `summary.json`.
     pub summary: Summary,
-    /// What could not be written, in order; everything else is there.
-    pub unwritten: Vec<StudyError>,
     /// What ended the run before its end; everything until then is recorded and judged.
     pub failure: Option<SimError>,
     /// When boards outside were down.
@@ -85,7 +83,7 @@ const RESERVES_BYTES: [usize; 3] = [256 * 1024, 64 * 1024, 32 * 1024];
 /// # Errors
 /// Any [`StudyError`]. A log that was begun is closed and stays readable. A file that cannot be
 /// written once the run has begun is no error: the run is judged all the same, and
-/// [`Run::unwritten`] names the file. A simulation that fails on its way is none, either:
+/// [`Finished::unwritten`] names the file. A simulation that fails on its way is none, either:
 /// [`Run::failure`] says what ended it.
 pub fn run(options: &Options, stop: &Stop) -> Result<Finished<Run>, StudyError> {
     run_on(options, stop, None)
@@ -200,11 +198,13 @@ fn run_with(
         analysis,
         failed,
     } = simulated;
-    let mut unwritten: Vec<StudyError> = failed.into_iter().map(StudyError::from).collect();
+    for error in failed {
+        job.keep::<()>(Err(error.into()));
+    }
     if !log.exists() {
         // What is written to a file that was removed goes nowhere, and no error tells of it.
         let removed = std::io::Error::from(std::io::ErrorKind::NotFound);
-        unwritten.push(StudyError::output("find again", &log, removed));
+        job.keep::<()>(Err(StudyError::output("find again", &log, removed)));
     }
 
     let info = RunInfo {
@@ -217,7 +217,7 @@ fn run_with(
         pil: outcome.pil,
     };
     let mut summary = Summary::new(scenario, robot, &recording, &analysis, info);
-    summary.unwritten = unwritten.iter().map(ToString::to_string).collect();
+    summary.unwritten = job.unwritten().iter().map(ToString::to_string).collect();
     drop(reserve);
     let recorded_ms = (summary.recorded_s * 1e3).round() as u64;
     let stopped = job
@@ -232,7 +232,6 @@ fn run_with(
     };
     let run = Run {
         summary,
-        unwritten,
         failure: outcome.failure,
         down_times: outcome.down_times,
     };

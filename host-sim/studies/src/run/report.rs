@@ -2,55 +2,19 @@
 
 use super::figures::{self, Source};
 use super::{Run, html};
-use crate::StudyError;
 use crate::study::{Finished, Job, Stopped, schema};
-use wheeleg_report::plot::Figure;
 
-/// Writes summary, page and figures into the folder of the job, in this order: what is worth most
-/// goes first where room is short. A file that cannot be written is added to
-/// [`Run::unwritten`], leaves no part of it behind, and takes nothing with it.
+/// Writes summary, page and figures into the folder of the job.
 pub(super) fn write(
     job: Job,
     source: &Source<'_>,
-    mut run: Run,
+    run: Run,
     stopped: Option<Stopped>,
 ) -> Finished<Run> {
     let summary = schema::json(&run.summary, stopped.as_ref());
-    run.unwritten
-        .extend(job.save("summary.json", &summary).err());
-
-    let mut drawn = Vec::new();
-    for figure in figures::figures(source) {
-        let svg = figure.svg();
-        drawn.push((figure, svg));
-    }
-    let page = html::render(source, &run.summary, &drawn);
-    let page = page.and_then(|page| job.save("report.html", &page));
-    run.unwritten.extend(page.err());
-    run.unwritten.extend(write_figures(&job, &drawn).err());
-    job.end(run, summary, stopped)
-}
-
-/// Every figure as SVG, and as PNG where that was asked for; one error for all that fail.
-fn write_figures(job: &Job, drawn: &[(Figure, String)]) -> Result<(), StudyError> {
-    job.subfolder("figures")?;
-    let files = drawn
-        .iter()
-        .map(|(figure, svg)| job.save_figure(figure, svg));
-    let mut failed = files.filter_map(Result::err);
-    let Some(first) = failed.next() else {
-        return Ok(());
-    };
-    Err(match failed.count() {
-        0 => first,
-        more => StudyError::refused(
-            format!(
-                "{} of {} figures are missing: {first}",
-                more + 1,
-                drawn.len()
-            ),
-            "the report has all figures in it, if it could be written",
-        ),
+    job.finish(run, summary, stopped, |job, run| {
+        let drawn = job.draw(figures::figures(source));
+        (html::render(source, &run.summary, &drawn), drawn)
     })
 }
 
@@ -78,7 +42,6 @@ mod tests {
         let job = Job::begin("test", &settings).expect("a folder");
         let run = Run {
             summary: summary.clone(),
-            unwritten: Vec::new(),
             failure: None,
             down_times: wheeleg_sim::DownTimes::default(),
         };
@@ -89,7 +52,7 @@ mod tests {
             analysis,
         };
         let finished = write(job, &source, run, None);
-        let unwritten = &finished.result.unwritten;
+        let unwritten = &finished.unwritten;
         assert!(unwritten.is_empty(), "{unwritten:?}");
     }
 

@@ -3,7 +3,8 @@
 //!
 //! A study begins a [`Job`], which holds the output folder; works through [`Progress`], which
 //! says when to stop; and ends with [`Job::finish`]. One that is stopped writes what it has,
-//! and says so in summary, report and exit code ([`Stopped`]).
+//! and says so in summary, report and exit code ([`Stopped`]). What a full disk does not take is
+//! named, and costs neither the result nor the files beside it ([`Finished::unwritten`]).
 
 mod progress;
 pub mod schema;
@@ -11,6 +12,7 @@ mod stop;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use minijinja::context;
 use rayon::prelude::*;
@@ -76,7 +78,7 @@ impl fmt::Display for Stopped {
 }
 
 /// A study with its files written.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Finished<T> {
     /// What came of it.
     pub result: T,
@@ -86,13 +88,40 @@ pub struct Finished<T> {
     pub report: PathBuf,
     /// What stopped it before its end.
     pub stopped: Option<Stopped>,
+    /// What could not be written, in order; everything else is there.
+    pub unwritten: Vec<StudyError>,
 }
+
+impl<T> Finished<T> {
+    /// The same with another result.
+    pub fn map<R>(self, change: impl FnOnce(T) -> R) -> Finished<R> {
+        let Self {
+            result,
+            summary,
+            report,
+            stopped,
+            unwritten,
+        } = self;
+        Finished {
+            result: change(result),
+            summary,
+            report,
+            stopped,
+            unwritten,
+        }
+    }
+}
+
+/// A figure with its SVG text.
+pub type Drawn = (Figure, String);
 
 /// A study under way. It holds the folder of its results.
 #[derive(Debug)]
 pub struct Job {
     folder: Folder,
     png: bool,
+    /// What could not be written so far.
+    unwritten: Mutex<Vec<StudyError>>,
     /// How far it is.
     pub progress: Progress,
 }
@@ -108,6 +137,7 @@ impl Job {
         Ok(Self {
             folder: Folder::prepare(&settings.out)?,
             png: settings.png,
+            unwritten: Mutex::default(),
             progress: Progress::new(name, settings.stop.clone()),
         })
     }
@@ -140,12 +170,20 @@ impl Job {
         Ok(path)
     }
 
+    /// What was written; none, and its error is kept for [`Finished::unwritten`], if it was not.
+    pub fn keep<T>(&self, written: Result<T, StudyError>) -> Option<T> {
+        written.map_err(|e| self.unwritten().push(e)).ok()
+    }
+
+    /// What could not be written so far. A panic while an error was kept spoils none of the others.
+    pub(crate) fn unwritten(&self) -> MutexGuard<'_, Vec<StudyError>> {
+        let list = self.unwritten.lock();
+        list.unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Writes a figure into the folder `figures`, which must exist: its SVG text, and a PNG where
     /// that was asked for.
-    ///
-    /// # Errors
-    /// [`StudyError::Report`] if one of them cannot be drawn or written.
-    pub fn save_figure(&self, figure: &Figure, svg: &str) -> Result<(), StudyError> {
+    fn save_figure(&self, figure: &Figure, svg: &str) -> Result<(), StudyError> {
         if self.png {
             let path = self.folder().join(format!("figures/{}.png", figure.id));
             figure.png(&path).inspect_err(|_| {
@@ -156,43 +194,48 @@ impl Job {
         Ok(())
     }
 
-    /// Writes `summary.json`; returns its text.
-    ///
-    /// # Errors
-    /// [`StudyError::Report`] if it cannot be written.
-    pub fn summary<T: Summary>(
-        &self,
-        body: &T,
-        stopped: Option<&Stopped>,
-    ) -> Result<String, StudyError> {
-        let text = schema::json(body, stopped);
-        self.save("summary.json", &text)?;
-        Ok(text)
-    }
-
-    /// Draws figures as SVG into the folder `figures`, and as PNG where that was asked for;
-    /// gives them back with their SVG text.
-    ///
-    /// # Errors
-    /// [`StudyError::Report`] if one cannot be drawn or written.
-    pub fn draw(&self, figures: Vec<Figure>) -> Result<Vec<(Figure, String)>, StudyError> {
-        self.subfolder("figures")?;
+    /// Draws figures as SVG; gives them back with their text.
+    #[must_use]
+    pub fn draw(&self, figures: Vec<Figure>) -> Vec<Drawn> {
         self.progress.begin("drawing", figures.len() as u64);
         progress::on_workers(|| {
-            figures
-                .into_par_iter()
-                .map(|figure| {
-                    let svg = figure.svg();
-                    self.save_figure(&figure, &svg)?;
-                    self.progress.step();
-                    Ok((figure, svg))
-                })
-                .collect()
+            let drawn = figures.into_par_iter().map(|figure| {
+                let svg = figure.svg();
+                self.progress.step();
+                (figure, svg)
+            });
+            drawn.collect()
         })
     }
 
-    /// Writes the report of a study that was stopped before its page could be made: the parts,
-    /// and which of them are done.
+    /// Writes figures into the folder `figures`, as PNG, too, where that was asked for.
+    ///
+    /// # Errors
+    /// [`StudyError`]: one for all that are missing.
+    pub fn save_figures(&self, drawn: &[Drawn]) -> Result<(), StudyError> {
+        self.subfolder("figures")?;
+        self.progress.begin("pictures", drawn.len() as u64);
+        let failed: Vec<StudyError> = progress::on_workers(|| {
+            let failed = drawn.par_iter().filter_map(|(figure, svg)| {
+                let failed = self.save_figure(figure, svg).err();
+                self.progress.step();
+                failed
+            });
+            failed.collect()
+        });
+        let count = failed.len();
+        match failed.into_iter().next() {
+            None => Ok(()),
+            Some(only) if count == 1 => Err(only),
+            Some(first) => Err(StudyError::refused(
+                format!("{count} of {} figures are missing: {first}", drawn.len()),
+                "the report has all figures in it, if it could be written",
+            )),
+        }
+    }
+
+    /// The report of a study that was stopped before its page could be made: the parts, and which
+    /// of them are done.
     ///
     /// # Errors
     /// [`StudyError::Report`] if the page cannot be made.
@@ -214,29 +257,36 @@ impl Job {
         Ok(page(include_str!("stopped.html"), values)?)
     }
 
-    /// Writes the report, and lets go of the folder.
-    ///
-    /// # Errors
-    /// [`StudyError::Report`] if it cannot be written.
+    /// Writes what came of a study and lets go of the folder. What is worth most goes first where
+    /// room is short: the summary, then what `rest` writes, then the page that it gives, then the
+    /// figures. What cannot be written is named in [`Finished::unwritten`], leaves no part of it
+    /// behind, and takes nothing with it.
     pub fn finish<T>(
         self,
         result: T,
         summary: String,
-        page: &str,
         stopped: Option<Stopped>,
-    ) -> Result<Finished<T>, StudyError> {
-        self.save("report.html", page)?;
-        Ok(self.end(result, summary, stopped))
+        rest: impl FnOnce(&Self, &T) -> (Result<String, StudyError>, Vec<Drawn>),
+    ) -> Finished<T> {
+        self.keep(self.save("summary.json", &summary));
+        let (page, drawn) = rest(&self, &result);
+        self.keep(page.and_then(|page| self.save("report.html", &page)));
+        if !drawn.is_empty() {
+            self.keep(self.save_figures(&drawn));
+        }
+        self.end(result, summary, stopped)
     }
 
     /// Lets go of the folder.
     pub fn end<T>(self, result: T, summary: String, stopped: Option<Stopped>) -> Finished<T> {
         self.progress.clear();
+        let unwritten = std::mem::take(&mut *self.unwritten());
         Finished {
             result,
             summary,
             report: self.folder().join("report.html"),
             stopped,
+            unwritten,
         }
     }
 }

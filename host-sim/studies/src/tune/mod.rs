@@ -24,6 +24,7 @@ use crate::axis_sim::{
     Delays, Design, Kind, Supervision, ValveResolution, design, design_with, identify,
 };
 use crate::compare::{Figures, MARGIN, Move, Played, axis_error};
+use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
 
@@ -184,7 +185,8 @@ pub fn tune(
     // An axis that is refused costs no earlier results.
     let delays = delays(file, &config, seed)?;
     let job = Job::begin("tune", &settings)?;
-    Tuned::play(file, config, delays, (seed, section), &job.progress)?.write(job)
+    let tuned = Tuned::play(file, config, delays, (seed, section), &job.progress)?;
+    Ok(tuned.write(job))
 }
 
 /// Reads an axis that can be tuned.
@@ -333,17 +335,15 @@ impl Tuned {
     }
 
     /// Writes report, figures, `summary.json` and [`PARAMETERS`].
-    ///
-    /// # Errors
-    /// [`StudyError`] if something cannot be drawn or written.
-    pub fn write(self, job: Job) -> Result<Finished<Self>, StudyError> {
+    fn write(self, job: Job) -> Finished<Self> {
         let stopped = self.stopped.clone();
-        let summary = job.summary(&self.summary(), stopped.as_ref())?;
-        if self.is_accepted() {
-            job.save(PARAMETERS, &self.toml)?;
-        }
-        let drawn = job.draw(page::figures(&self))?;
-        let page = page::render(&self, &drawn)?;
-        job.finish(self, summary, &page, stopped)
+        let summary = json(&self.summary(), stopped.as_ref());
+        job.finish(self, summary, stopped, |job, tuned| {
+            if tuned.is_accepted() {
+                job.keep(job.save(PARAMETERS, &tuned.toml));
+            }
+            let drawn = job.draw(page::figures(tuned));
+            (page::render(tuned, &drawn), drawn)
+        })
     }
 }

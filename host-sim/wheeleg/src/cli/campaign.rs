@@ -9,14 +9,15 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use wheeleg_campaign::{
     CampaignError, Cases, Options, PlanFile, Shard, Store, Submission, isolated, merge, replay,
-    report, run, simulate, status,
+    run, simulate, status,
 };
+use wheeleg_campaign::report::Report;
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Signal;
 
-use super::exit::{self, INCOMPLETE, TARGETS_MISSED, TRY_AGAIN};
-use super::{print, stop_on_signals, tell, whole};
+use super::exit::{self, CANNOT_WRITE, FAILED, INCOMPLETE, TARGETS_MISSED, TRY_AGAIN};
+use super::{print, stop_on_signals, tell, tell_unwritten, whole};
 
 /// Arguments of `wheeleg campaign`.
 #[derive(Debug, Args)]
@@ -307,7 +308,11 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
 }
 
 fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
-    let merged = merge(&args.dirs, &args.out)?;
+    let stop = stop_on_signals()?;
+    let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
+        tell("stopped; no table is written, and the parts stay as they are");
+        return Ok(ExitCode::from(stop.signal().map_or(FAILED, Signal::exit_code)));
+    };
     let text = format!(
         "rows    {}\nhash    {}\ntable   {}\n",
         merged.rows,
@@ -320,13 +325,22 @@ fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
 fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
     let out = args.out.clone();
     let out = out.unwrap_or_else(|| args.table.with_extension("html"));
-    let (findings, pairs) = report::write(&args.table, args.against.as_deref(), &out)?;
-    let text = if args.json {
-        print::findings_json(&findings, pairs.as_ref())
+    let stop = stop_on_signals()?;
+    let report = Report::of(&args.table, args.against.as_deref())?;
+    // A page that is begun is finished.
+    stop.begin();
+    // What the table says is told even where the page has no room.
+    let written = report.write(&out);
+    let (findings, pairs) = (&report.findings, report.pairs.as_ref());
+    let page = written.is_ok().then_some(&*out);
+    print(&if args.json {
+        print::findings_json(findings, pairs)
     } else {
-        print::findings(&findings, pairs.as_ref(), &out)
-    };
-    Ok(print(&text)?)
+        print::findings(findings, pairs, page)
+    })?;
+    written?;
+    let code = stop.signal().map_or(0, Signal::exit_code);
+    Ok(ExitCode::from(code))
 }
 
 fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
@@ -339,14 +353,15 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
         return Ok(ExitCode::from(stopped()));
     };
     print(&print::replayed(&replayed))?;
-    if replayed
-        .run
-        .as_ref()
-        .is_some_and(|run| run.stopped.is_some())
-    {
-        return Ok(ExitCode::from(stopped()));
-    }
     let same = replayed.same_row() != Some(false) && replayed.same_log() != Some(false);
+    if let Some(run) = replayed.run {
+        if !tell_unwritten(run.unwritten) {
+            return Ok(ExitCode::from(CANNOT_WRITE));
+        }
+        if run.stopped.is_some() {
+            return Ok(ExitCode::from(stopped()));
+        }
+    }
     if same {
         return Ok(ExitCode::SUCCESS);
     }

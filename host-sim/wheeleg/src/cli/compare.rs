@@ -6,11 +6,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Drawing, end, print, settings, whole};
+use super::{Drawing, end, place, settings, whole};
 use wheeleg_config::axis::AXES;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::{Kind, ValveResolution};
 use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
+use wheeleg_studies::study::Finished;
 
 /// So many false alarms are named; all of them are in the report.
 const ALARMS_TOLD: usize = 5;
@@ -148,8 +149,7 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
     };
     let settings = settings(&args.out, args.drawing.png)?;
     let finished = compare::compare(&options, &settings)?;
-    let text = |comparison: &Comparison| text(comparison, &finished.report);
-    end(&finished, args.json, text, true)
+    end(finished, args.json, |f| text(&f.result, &f.report), true)
 }
 
 /// The tables of the axes, false alarms, and where the report is.
@@ -171,22 +171,24 @@ fn text(comparison: &Comparison, report: &Path) -> String {
         let _ = writeln!(told, "  and {} more, in the report", alarms - ALARMS_TOLD);
     }
     let beyond_force = comparison.beyond_force().len();
-    let _ = writeln!(
+    let _ = write!(
         out,
-        "cases       {}, false alarms {alarms}, beyond the force available {beyond_force}\n{told}report      {}",
+        "cases       {}, false alarms {alarms}, beyond the force available {beyond_force}\n{told}{}",
         comparison.rows.len(),
-        report.display()
+        place(report, 12)
     );
     out
 }
 
 fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, StudyError> {
     let single = compare::play(id, axes)?;
-    let (mut out, figures) = single.write(&settings(&args.out, args.drawing.png)?)?;
-    if !args.json {
-        for figure in figures {
+    let finished = single.write(&settings(&args.out, args.drawing.png)?)?;
+    let text = |finished: &Finished<Vec<PathBuf>>| {
+        let mut out = finished.summary.clone();
+        for figure in &finished.result {
             let _ = writeln!(out, "{}", figure.display());
         }
-    }
-    print(&out)
+        out
+    };
+    end(finished, args.json, text, true)
 }

@@ -6,12 +6,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Drawing, end, settings, whole};
+use super::{Drawing, end, place, settings, whole};
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_ROBOT;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::delay::trial::{Law, Start};
 use wheeleg_studies::delay::{self, Options, Study};
+use wheeleg_studies::study::Finished;
 
 /// Arguments of `wheeleg delay`.
 #[derive(Debug, Args)]
@@ -66,12 +67,12 @@ pub(super) fn command(args: &DelayArgs) -> Result<ExitCode, StudyError> {
     };
     let settings = settings(&args.out, args.drawing.png)?;
     let finished = delay::write(&robot, &options, &settings)?;
-    let text = |study: &Option<Study>| {
-        let mut out = study.as_ref().map(text).unwrap_or_default();
-        let _ = writeln!(out, "report     {}", finished.report.display());
+    let text = |finished: &Finished<Option<Study>>| {
+        let mut out = finished.result.as_ref().map(text).unwrap_or_default();
+        out.push_str(&place(&finished.report, 11));
         out
     };
-    end(&finished, args.json, text, true)
+    end(finished, args.json, text, true)
 }
 
 fn text(study: &Study) -> String {

@@ -16,7 +16,7 @@ pub(super) const INCOMPLETE: u8 = 3;
 /// Exit code of a connection that ended, or of a stop that nobody confirms.
 pub(super) const LOST: u8 = 3;
 /// Exit code of a campaign that cannot write: that of sysexits.h for input and output.
-const CANNOT_WRITE: u8 = 74;
+pub(super) const CANNOT_WRITE: u8 = 74;
 /// Exit code of a process that was asked to stop, and is to be started again.
 pub(super) const TRY_AGAIN: u8 = 75;
 

@@ -6,10 +6,11 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::{end, print, settings};
+use super::{end, place, print, settings};
 use wheeleg_config::faults::{KINDS, KindInfo, NOT_IMPLEMENTED};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::matrix::{self, Connection, Outcome, Verdict};
+use wheeleg_studies::study::Finished;
 
 /// Arguments of `wheeleg faults`.
 #[derive(Debug, Args)]
@@ -95,8 +96,8 @@ fn run(args: &RunArgs) -> Result<ExitCode, StudyError> {
     let rows = matrix::select(&args.row)?;
     let finished = matrix::write(&rows, args.seed, &settings(&args.out, false)?)?;
     let passed = matrix::count(&finished.result, Verdict::Fail) == 0;
-    let text = |outcomes: &Vec<Outcome>| verdicts(outcomes, &finished.report);
-    end(&finished, args.json, text, passed)
+    let text = |f: &Finished<Vec<Outcome>>| verdicts(&f.result, &f.report);
+    end(finished, args.json, text, passed)
 }
 
 fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
@@ -124,13 +125,13 @@ fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
         }
     }
     let count = |verdict| matrix::count(outcomes, verdict);
-    let _ = writeln!(
+    let _ = write!(
         out,
-        "\n{} rows passed, {} failed, {} not implemented\nreport  {}",
+        "\n{} rows passed, {} failed, {} not implemented\n{}",
         count(Verdict::Pass),
         count(Verdict::Fail),
         count(Verdict::NotImplemented),
-        report.display()
+        place(report, 8)
     );
     out
 }

@@ -8,8 +8,9 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::field::{self, Options, SCENARIOS, Summary};
+use wheeleg_studies::study::Finished;
 
-use super::{end, settings, whole};
+use super::{end, place, settings, whole};
 
 /// Arguments of `wheeleg field`.
 #[derive(Debug, Args)]
@@ -50,13 +51,13 @@ pub(super) fn command(args: &FieldArgs) -> Result<ExitCode, StudyError> {
         seeds: args.seeds,
     };
     let finished = field::write(&options, &settings(&args.out, args.png)?)?;
-    let text = |summary: &Summary| {
-        let mut out = text(summary);
-        let _ = writeln!(out, "report     {}", finished.report.display());
+    let text = |finished: &Finished<Summary>| {
+        let mut out = text(&finished.result);
+        out.push_str(&place(&finished.report, 11));
         out
     };
     let passed = !args.strict || finished.result.passed();
-    end(&finished, args.json, text, passed)
+    end(finished, args.json, text, passed)
 }
 
 fn text(summary: &Summary) -> String {

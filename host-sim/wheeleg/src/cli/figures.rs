@@ -6,9 +6,10 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Drawing, end, settings};
+use super::{Drawing, end, place, settings};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::figures::{self, Results};
+use wheeleg_studies::study::Finished;
 
 /// Arguments of `wheeleg figures`.
 #[derive(Debug, Args)]
@@ -27,12 +28,12 @@ pub(super) struct FiguresArgs {
 /// Computes and writes everything.
 pub(super) fn command(args: &FiguresArgs) -> Result<ExitCode, StudyError> {
     let finished = figures::write(&settings(&args.out, args.drawing.png)?)?;
-    let text = |results: &Option<Results>| {
-        let mut out = results.as_ref().map(text).unwrap_or_default();
-        let _ = writeln!(out, "report     {}", finished.report.display());
+    let text = |finished: &Finished<Option<Results>>| {
+        let mut out = finished.result.as_ref().map(text).unwrap_or_default();
+        out.push_str(&place(&finished.report, 11));
         out
     };
-    end(&finished, args.json, text, true)
+    end(finished, args.json, text, true)
 }
 
 fn text(results: &Results) -> String {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Drawing, end, stop_on_signals};
+use super::{Drawing, end, place, stop_on_signals};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::identify::{self, AXIS, Identified, NEXT, Options};
 use wheeleg_studies::study::Settings;
@@ -62,9 +62,8 @@ pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
         png: args.drawing.png,
         stop,
     })?;
-    let text = |identified: &Identified| text(identified, &finished.report);
     let passed = finished.result.is_explained() && finished.stopped.is_none();
-    end(&finished, args.json, text, passed)
+    end(finished, args.json, |f| text(&f.result, &f.report), passed)
 }
 
 fn text(identified: &Identified, report: &Path) -> String {
@@ -95,12 +94,10 @@ fn text(identified: &Identified, report: &Path) -> String {
     let axis = if identified.stopped.is_some() {
         "not written: the fit was stopped".to_owned()
     } else {
-        report.with_file_name(AXIS).display().to_string()
+        let path = report.with_file_name(AXIS);
+        let written = path.exists().then(|| path.display().to_string());
+        written.unwrap_or_else(|| "not written".to_owned())
     };
-    let _ = writeln!(
-        text,
-        "axis           {axis}\nreport         {}",
-        report.display()
-    );
+    let _ = write!(text, "axis           {axis}\n{}", place(report, 15));
     text
 }

@@ -197,25 +197,34 @@ fn stop_on_signals() -> Result<Stop, StudyError> {
     })
 }
 
-/// Prints what came of a study, and gives its exit code: that of the signal that stopped it;
-/// else whether it `passed`.
+/// Prints what came of a study and what of it could not be written, and gives its exit code: that
+/// of an error if a file is missing; that of the signal that stopped it; else whether it `passed`.
 fn end<T>(
-    finished: &Finished<T>,
+    finished: Finished<T>,
     json: bool,
-    text: impl FnOnce(&T) -> String,
+    text: impl FnOnce(&Finished<T>) -> String,
     passed: bool,
 ) -> Result<ExitCode, StudyError> {
     let printed = if json {
         print(&finished.summary)
     } else {
-        print(&text(&finished.result))
+        print(&text(&finished))
     };
+    let whole = tell_unwritten(finished.unwritten);
     if let Some(stopped) = &finished.stopped {
         // The files are what counts; a terminal that hung up takes no text.
-        tell(&format!(
-            "{stopped}; summary and report hold what was done until then: {}",
-            finished.report.display()
-        ));
+        tell(&match whole {
+            true => format!(
+                "{stopped}; summary and report hold what was done until then: {}",
+                finished.report.display()
+            ),
+            false => stopped.to_string(),
+        });
+    }
+    if !whole {
+        return Ok(ExitCode::from(FAILED));
+    }
+    if let Some(stopped) = &finished.stopped {
         return Ok(ExitCode::from(stopped.signal.exit_code()));
     }
     printed?;
@@ -224,6 +233,27 @@ fn end<T>(
     } else {
         ExitCode::from(TARGETS_MISSED)
     })
+}
+
+/// The line that says where the report is, or, where a full disk has left none, the results; its
+/// first column is `width` wide.
+fn place(report: &Path, width: usize) -> String {
+    match (report.exists(), report.parent()) {
+        (false, Some(folder)) => format!("{:width$}{}\n", "results", folder.display()),
+        _ => format!("{:width$}{}\n", "report", report.display()),
+    }
+}
+
+/// Tells what a study could not write; whether that is nothing.
+fn tell_unwritten(unwritten: Vec<StudyError>) -> bool {
+    let whole = unwritten.is_empty();
+    for error in unwritten {
+        tell(&format!("{:?}", miette::Report::new(error)));
+    }
+    if !whole {
+        tell("the values above hold; of the files, those named here are missing or cut short");
+    }
+    whole
 }
 
 #[cfg(test)]

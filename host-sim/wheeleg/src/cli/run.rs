@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use clap::Args;
 use terminal_size::{Width, terminal_size_of};
 
-use super::{Drawing, FAILED, end, stop_on_signals, tell};
+use super::{Drawing, end, place, stop_on_signals, tell};
 use wheeleg_config::LawChoice;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
@@ -100,7 +100,7 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
         pil::ensure_same_sources(&options.nodes)?;
     }
     let stop = stop_on_signals()?;
-    let finished = run::run(&options, &stop)?;
+    let mut finished = run::run(&options, &stop)?;
     let mut native = None;
     // A part of a run equals no whole one.
     if args.compare_sil && finished.result.summary.complete {
@@ -109,27 +109,20 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     let summary = &finished.result.summary;
     let differ = differing_bits(summary) > 0;
     let passed = !differ && (!args.strict || summary.passed);
-    let code = end(&finished, args.json, |_| run_text(&finished), passed)?;
-    if differ && finished.stopped.is_none() {
+    let whole = finished.unwritten.is_empty();
+    let stopped = finished.stopped.is_some();
+    let failure = finished.result.failure.take();
+    let report = finished.report.display().to_string();
+    let code = end(finished, args.json, run_text, passed)?;
+    if differ && !stopped {
         tell("boards differ from the native application beside them");
     }
-    let report = finished.report.display().to_string();
-    let Run {
-        unwritten, failure, ..
-    } = finished.result;
     if let Some(failure) = failure {
-        let error = StudyError::from(failure);
         tell(&format!("what was recorded until then: {report}"));
-        return Err(error);
+        return Err(StudyError::from(failure));
     }
-    if unwritten.is_empty() {
-        return Ok(native.map_or(code, |stopped| ExitCode::from(stopped.signal.exit_code())));
-    }
-    for error in unwritten {
-        tell(&format!("{:?}", miette::Report::new(error)));
-    }
-    tell("the values above hold; of the files, those named here are missing or cut short");
-    Ok(ExitCode::from(FAILED))
+    let native = native.filter(|_| whole);
+    Ok(native.map_or(code, |stopped| ExitCode::from(stopped.signal.exit_code())))
 }
 
 /// Bits in which boards outside differ from the application here.
@@ -261,11 +254,7 @@ fn run_text(finished: &Finished<Run>) -> String {
         "time    {:.2} s simulated in {:.2} s, {:.1} times faster than real time",
         s.simulated_s, s.wall_s, s.realtime_factor
     );
-    // A full disk may have left none.
-    let _ = match (finished.report.exists(), finished.report.parent()) {
-        (false, Some(folder)) => writeln!(out, "results {}", folder.display()),
-        _ => writeln!(out, "report  {}", finished.report.display()),
-    };
+    out.push_str(&place(&finished.report, 8));
     out
 }
 

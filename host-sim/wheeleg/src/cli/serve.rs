@@ -175,18 +175,30 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     }
     text.push_str("Ctrl-C ends it.\n");
     print(&text)?;
-    loop {
+    let mut told = None;
+    let signal = loop {
         if let Some(signal) = stop.signal() {
-            drop(server);
-            tell(if args.port.is_some() {
-                "nobody leads the boards any more: they hold"
-            } else {
-                "the robot is switched off"
-            });
-            return Ok(ExitCode::from(signal.exit_code()));
+            break signal;
         }
+        tell_cut_short(server.recording_failure(), &mut told);
         std::thread::sleep(Duration::from_millis(50));
+    };
+    let failure = server.end();
+    tell(if args.port.is_some() {
+        "nobody leads the boards any more: they hold"
+    } else {
+        "the robot is switched off"
+    });
+    tell_cut_short(failure, &mut told);
+    Ok(ExitCode::from(signal.exit_code()))
+}
+
+/// Tells once of a recording that a full disk has ended.
+fn tell_cut_short(failure: Option<String>, told: &mut Option<String>) {
+    if let Some(why) = failure.as_ref().filter(|_| failure != *told) {
+        tell(&format!("the recording is cut short: {why}"));
     }
+    *told = failure;
 }
 
 /// An error of the console as the program tells it.

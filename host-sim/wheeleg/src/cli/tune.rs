@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::{Drawing, end, stop_on_signals};
+use super::{Drawing, end, place, stop_on_signals};
 use wheeleg_report::number::or_dash;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::valve_resolution::COARSE;
@@ -54,8 +54,8 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
         png: args.drawing.png,
         stop,
     })?;
-    let text = |tuned: &Tuned| text(tuned, &finished.report);
-    end(&finished, args.json, text, finished.result.is_accepted())
+    let accepted = finished.result.is_accepted();
+    end(finished, args.json, |f| text(&f.result, &f.report), accepted)
 }
 
 /// The tests before and after, what supervision stopped, delays, and where the files are.
@@ -123,15 +123,17 @@ fn text(tuned: &Tuned, report: &Path) -> String {
     }
     let parameters = if tuned.stopped.is_some() {
         "not written: not all tests were played".to_owned()
+    } else if tuned.worse.is_empty() && !parameters.exists() {
+        "not written".to_owned()
     } else if tuned.worse.is_empty() {
         parameters.display().to_string()
     } else {
         "refused, not written: the moves above are worse than with the board's defaults".to_owned()
     };
-    let _ = writeln!(
+    let _ = write!(
         text,
-        "parameters     {parameters}\nreport         {}",
-        report.display()
+        "parameters     {parameters}\n{}",
+        place(report, 15)
     );
     text
 }

@@ -155,7 +155,7 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
 }
 
 /// What a table says, in a few lines.
-pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: &Path) -> String {
+pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<&Path>) -> String {
     let mut out = format!("rows    {}\n", findings.rows);
     for (cell, rate) in &findings.passed {
         let cell = if cell.is_empty() { "all cases" } else { cell };
@@ -177,7 +177,9 @@ pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: &Path) 
             pairs.same_log, pairs.paired.pairs
         );
     }
-    let _ = writeln!(out, "report  {}", page.display());
+    if let Some(page) = page {
+        let _ = writeln!(out, "report  {}", page.display());
+    }
     out
 }
 
