@@ -6,23 +6,40 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
+use crate::every_command::{Inputs, Leaves, tries};
 use crate::program;
+use crate::schema::assert_valid;
 use crate::stop::{files_below, log_of_a_run};
 
+/// How a program ended.
+struct Ended {
+    code: Option<i32>,
+    /// What it said on standard error.
+    said: String,
+    stdout: String,
+}
+
 /// Runs a script in a mount name space of its own; `$0` is the program, `$1` the place of the disk,
-/// the others its arguments. Its code, and what it said on standard error.
-fn on_a_disk(script: &str, disk: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+/// the others its arguments.
+fn on_a_disk(script: &str, disk: &Path, arguments: &[&str]) -> Ended {
+    let state = disk.with_file_name("state");
     let output = Command::new("unshare")
         .args(["--mount", "--map-root-user", "bash", "-c", script])
         .arg(program::path())
         .arg(disk)
         .args(arguments)
         .env("NO_COLOR", "1")
+        .env("XDG_STATE_HOME", state)
         .output()
         .expect("unshare of util-linux");
     // Messages are wrapped to the width of a terminal.
-    let said = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
-    (output.status.code(), said)
+    Ended {
+        code: output.status.code(),
+        said: String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " "),
+        stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+    }
 }
 
 /// A folder that nobody may write into, and one on a disk that is mounted to be read: refused by
@@ -52,7 +69,9 @@ fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
         let script = "mount -t tmpfs -o size=64k,ro tmpfs \"$1\" || exit 77\n\
                       disk=\"$1\"; shift; exec \"$0\" \"$@\" --out \"$disk/out\"";
         let begin = Instant::now();
-        let (ended, said) = on_a_disk(script, &disk, arguments);
+        let Ended {
+            code: ended, said, ..
+        } = on_a_disk(script, &disk, arguments);
         assert_eq!(ended, Some(code), "{arguments:?}: {said}");
         for word in ["disk/", "Read-only file system", "help: "] {
             assert!(said.contains(word), "{arguments:?}, {word}: {said}");
@@ -66,53 +85,87 @@ fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
     assert_eq!(files_below(&disk), [""; 0]);
 }
 
-/// The disk fills while other studies write: what is there is whole or named, and nothing claims
-/// to be done.
+/// Sizes of a disk, KiB: from hardly more than a lock to room for everything.
+const SIZES_KIB: [usize; 10] = [4, 12, 32, 64, 128, 256, 512, 1000, 2000, 4000];
+
+/// The disk fills under every command that writes: what is there is whole or named, nothing claims
+/// to be done, and a verdict is told whether its summary has room or not.
 #[test]
-fn a_disk_that_fills_under_any_study_is_told() {
-    let dir = tempfile::tempdir().expect("temporary folder");
-    let log = log_of_a_run(dir.path());
-    let disk = dir.path().join("disk");
+fn a_disk_that_fills_under_any_command_is_told() {
+    let inputs = Inputs::new();
+    let disk = inputs.path("disk");
+    let kept = inputs.path("kept.json");
     fs::create_dir(&disk).expect("created");
-    let commands: [&[&str]; 7] = [
-        &["tune", "bench-vq110u"],
-        &["figures"],
-        &["view", &log],
-        &["log", "recover", &log],
-        &["export", "parquet", &log],
-        &["export", "ros2", &log],
-        &["export", "urdf"],
-    ];
-    let mut filled = 0;
-    for (number, kib) in [4, 12, 32, 64, 128, 256, 512, 1000, 2000, 4000]
-        .into_iter()
-        .enumerate()
-    {
-        for arguments in [commands[number % 7], commands[(number + 3) % 7]] {
-            // What is left is listed before it goes with the name space.
+    let (mut filled, mut verdicts, mut tried_disks) = (0, 0, 0);
+    for (number, tried) in inputs.commands(true).into_iter().enumerate() {
+        let Some(option) = tried.out else { continue };
+        let sizes = (0..tries(2, 10)).map(|k| SIZES_KIB[(3 * number + 7 * k) % 10]);
+        for kib in sizes {
+            tried_disks += 1;
+            let serves = tried.arguments[0] == "serve";
+            let seconds = if serves { 4 } else { 300 };
+            // What is left is listed before it goes with the name space. A server is told to end.
             let script = format!(
                 "mount -t tmpfs -o size={kib}k tmpfs \"$1\" || exit 77\n\
-                 disk=\"$1\"; shift; \"$0\" \"$@\" --out \"$disk/out\"; code=$?\n\
-                 echo left: $(find \"$disk\" -type f) >&2; exit $code"
+                 disk=\"$1\"; shift\n\
+                 timeout --preserve-status -s TERM {seconds} \"$0\" \"$@\" {option} \"$disk/out\"; code=$?\n\
+                 cp \"$disk/out/summary.json\" '{}' 2>/dev/null\n\
+                 echo left: $(find \"$disk\" -type f) >&2; exit $code",
+                kept.display()
             );
-            let (code, said) = on_a_disk(&script, &disk, arguments);
+            let _ = fs::remove_file(&kept);
+            let study = matches!(tried.leaves, Leaves::Study(_));
+            let mut arguments: Vec<&str> = tried.arguments.iter().map(String::as_str).collect();
+            arguments.extend(study.then_some("--json"));
+            let Ended { code, said, stdout } = on_a_disk(&script, &disk, &arguments);
             let told = format!("{arguments:?} on {kib} KiB: {said}");
-            let full = said.contains("No space left on device");
             let code = code.expect("a code");
-            assert_eq!(code == 2, full, "{code}: {told}");
-            assert!(matches!(code, 0..=2), "{code}: {told}");
-            let left = said.rsplit("left:").next().unwrap_or_default();
+            let full = said.contains("No space left on device");
+            let ended = serves && code == 143;
             assert!(
-                !left.contains(".part") && !left.contains("recovered"),
-                "{told}"
+                ended || (code == tried.unwritable) == full,
+                "{code}: {told}"
             );
-            if full {
-                filled += 1;
-                // The one file that was to be made is not there in part.
-                let single = ["view", "log"].contains(&arguments[0]) || arguments.contains(&"urdf");
-                assert!(!single || left.trim().is_empty(), "{told}");
+            assert!(
+                [0, 1, tried.unwritable].contains(&code) || ended,
+                "{code}: {told}"
+            );
+            assert!(!said.contains("panicked"), "{told}");
+            let left = said.rsplit("left:").next().unwrap_or_default();
+            for half in [".part ", ".part\n", "recovered", ".tmp", ".json.new"] {
+                assert!(!left.contains(half), "{half}: {told}");
+            }
+            filled += u32::from(full);
+            // The one file that was to be made is not there in part. A log breaks off.
+            if full && tried.leaves == Leaves::File && option == "--out" {
+                assert_eq!(left.trim(), "", "{told}");
+            }
+            let refused = said.contains("create the folder") || said.contains("cannot lock");
+            if let (Leaves::Study(name), false) = (tried.leaves, refused) {
+                let summary: Value = serde_json::from_str(&stdout)
+                    .unwrap_or_else(|e| panic!("no verdict ({e}), {told}"));
+                assert_valid(&summary, name);
+                if let Ok(written) = fs::read(&kept) {
+                    let written: Value = serde_json::from_slice(&written)
+                        .unwrap_or_else(|e| panic!("half a summary ({e}), {told}"));
+                    assert_eq!(written, summary, "{told}");
+                } else {
+                    assert!(said.contains("summary.json"), "{told}");
+                }
+                verdicts += u32::from(full);
+            }
+            if arguments[..2] == ["campaign", "report"] {
+                assert!(stdout.contains("passed"), "{stdout}, {told}");
+            }
+            if arguments[0] == "replay" {
+                assert!(
+                    stdout.contains("to the bit") || left.trim().is_empty(),
+                    "{told}"
+                );
             }
         }
     }
-    assert!(filled >= 10, "{filled} of 20 filled their disk");
+    println!("{filled} of {tried_disks} commands filled their disk");
+    assert!(3 * filled >= tried_disks, "{filled} of {tried_disks}");
+    assert!(verdicts >= 3, "{verdicts} verdicts on a full disk");
 }

@@ -389,7 +389,10 @@ fn every_reason_inside_an_error_is_told_in_words() {
 const ELSEWHERE: [(&str, &str); 4] = [
     ("ConfigError", "`StudyError::Config` is one"),
     ("Problem", "one of a `ConfigError`"),
-    ("Refused", "private to the vectors: it passes two reasons on"),
+    (
+        "Refused",
+        "private to the vectors: it passes two reasons on",
+    ),
     ("Inhibited", "of a board's output stage: nobody is told"),
 ];
 
@@ -428,11 +431,7 @@ fn no_error_is_left_out() {
 
 /// Adds the variants of each error of a file: of those that derive `Diagnostic`, and of the others
 /// that implement `Error`, derived or by hand.
-fn declare(
-    file: &syn::File,
-    diagnostics: &mut BTreeSet<String>,
-    reasons: &mut BTreeSet<String>,
-) {
+fn declare(file: &syn::File, diagnostics: &mut BTreeSet<String>, reasons: &mut BTreeSet<String>) {
     let by_hand: Vec<String> = file.items.iter().filter_map(implements_error).collect();
     for item in &file.items {
         let (attributes, name) = match item {

@@ -150,7 +150,7 @@ fn played(options: &Options, stop: &Stop) -> Result<Fate, StudyError> {
     let finished = run(options, stop)?;
     let out = finished.report.parent().expect("a folder");
     assert!(out.join("summary.json").exists(), "no summary");
-    assert!(finished.result.unwritten.is_empty());
+    assert!(finished.unwritten.is_empty());
     let mut worst = [0.0_f64; 2];
     let read = wheeleg_telemetry::read(&out.join("log.mcap"), &mut |logged| {
         for name in ["pressure_a_bar", "pressure_b_bar"] {

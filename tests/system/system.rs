@@ -18,6 +18,8 @@ mod delay;
 #[cfg(target_os = "linux")]
 mod disks;
 mod errors;
+#[cfg(unix)]
+mod every_command;
 mod explosion;
 mod fault_matrix;
 mod field;

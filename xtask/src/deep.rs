@@ -84,8 +84,8 @@ const CHECKS: [Check; 18] = [
     ),
     Check(
         "practice",
-        "400 built-in files with mistakes in them, run or refused in words",
-        10,
+        "400 built-in files with mistakes, every command at 20 signals and on ten full disks",
+        40,
         practice,
     ),
     Check(
@@ -296,7 +296,13 @@ fn long_run() -> StepResult<String> {
 fn practice() -> StepResult<String> {
     let test = "mutated_files::each_is_run_or_refused_in_words";
     let amount = ("WHEELEG_MUTATED_FILES", 400);
-    measured(["system", test], amount, " mutated files from number ")
+    let mutated = measured(["system", test], amount, " mutated files from number ")?;
+    let tries = ("WHEELEG_PRACTICE_TRIES", 20);
+    let test = "stop::every_long_command_can_be_stopped_at_any_time";
+    let signals = measured(["system", test], tries, " were stopped on their way")?;
+    let test = "disks::a_disk_that_fills_under_any_command_is_told";
+    let disks = measured(["system", test], tries, " filled their disk")?;
+    Ok([mutated, signals, disks].join("; "))
 }
 
 fn fuzzing() -> StepResult<String> {

@@ -94,7 +94,9 @@ fn main() {
     let merge_s = begun.elapsed().as_secs_f64();
     let begun = Instant::now();
     let report = report::Report::of(&table, None).expect("a table");
-    report.write(&folder.path().join("cases.html")).expect("a page");
+    report
+        .write(&folder.path().join("cases.html"))
+        .expect("a page");
     println!(
         "{} rows x {} columns: merge {merge_s:.2} s, report {:.2} s, {:.0} MB",
         merged.rows,

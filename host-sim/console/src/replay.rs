@@ -12,8 +12,8 @@ use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Request;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_scene::Scene;
-use wheeleg_sim::{Boards, Session, provenance};
-use wheeleg_telemetry::{Keep, LogFile, Recorder};
+use wheeleg_sim::{Boards, Session, SimError, provenance};
+use wheeleg_telemetry::{Keep, LogError, LogFile, Recorder};
 
 use crate::error::ConsoleError;
 use crate::live::Live;
@@ -30,7 +30,7 @@ const TOML_MAX: u64 = 4 << 20;
 const STRIDE_MS: u64 = 10;
 
 /// What came of a repetition.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Replayed {
     /// What the recording says of itself.
     pub summary: Summary,
@@ -48,6 +48,8 @@ pub struct Replayed {
     pub stopped: bool,
     /// The last line is cut short: the recording was killed.
     pub cut_short: bool,
+    /// Why its log is not whole; all else holds.
+    pub unwritten: Option<LogError>,
 }
 
 impl Replayed {
@@ -92,7 +94,7 @@ pub fn replay(
     if let Some(path) = log {
         let scene = Scene::new(robot, scenario).map_err(|e| unusable(e.to_string()))?;
         let file = LogFile::create(path).and_then(|file| file.with(scene));
-        recorder = recorder.with(file.map_err(|e| unusable(e.to_string()))?);
+        recorder = recorder.with(file.map_err(SimError::from)?);
     }
     let mut robot = Repeated {
         session: Session::live(Boards::default(), scenario, robot, scenario.seed)?,
@@ -133,9 +135,6 @@ pub fn replay(
         robot.compare(recorded, &hash);
     }
     let (_, failed) = robot.recorder.close();
-    if let Some(why) = failed.first() {
-        return Err(unusable(why.to_string()));
-    }
     Ok(Replayed {
         summary,
         end_ms: robot.now_ms,
@@ -145,6 +144,7 @@ pub fn replay(
         parted: robot.parted,
         stopped,
         cut_short,
+        unwritten: failed.into_iter().next(),
     })
 }
 

@@ -45,7 +45,11 @@ fn plant(all: &mut Vec<Reason>) {
         index,
         value: f64::NAN,
     };
-    add("PlantError::NonFinite", endless, vec!["velocity_m_s", "NaN"]);
+    add(
+        "PlantError::NonFinite",
+        endless,
+        vec!["velocity_m_s", "NaN"],
+    );
     let outside = PlantError::OutOfBounds {
         name,
         index,
@@ -213,7 +217,7 @@ fn commands(all: &mut Vec<Reason>) {
         all.push((name, error, words));
     };
     let unknown = ArgumentError::Unknown {
-        code: CommandCode::Travel,
+        code: CommandCode::WheelReference,
         name: "distance",
     };
     let words_of = vec!["`distance`", "travel"];

@@ -75,7 +75,8 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
         fs::write(&path, &flipped).expect("written");
         let state = status(&store, Shard::ALL).expect("readable");
         if state.bad.is_empty() {
-            let merged = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+            let merged =
+                merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
             assert_eq!(merged, expected, "byte {at}");
         } else {
             found += 1;
@@ -84,7 +85,8 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
     assert!(found > 20, "{found} of {}", bytes.len() / 37);
     for damaged in [&bytes[..bytes.len() / 2], &bytes[..0], b"something else"] {
         fs::write(&path, damaged).expect("written");
-        let error = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect_err("a hole");
+        let error =
+            merge(&[folder.path().to_owned()], &table, &Stop::default()).expect_err("a hole");
         let told = format!("{error}");
         assert_eq!(error.exit_code(), 3);
         assert!(
@@ -147,7 +149,11 @@ fn holes_are_named_with_the_command_that_fills_them() {
     })
     .0
     .expect("it runs");
-    let error = merge(&[folder.path().to_owned(), other.path().to_owned()], &out, &Stop::default());
+    let error = merge(
+        &[folder.path().to_owned(), other.path().to_owned()],
+        &out,
+        &Stop::default(),
+    );
     let error = error.expect_err("two plans").to_string();
     assert!(error.contains("different plans"), "{error}");
 }

@@ -23,9 +23,13 @@ fn whole(plan: &Plan) -> (tempfile::TempDir, Merged) {
 }
 
 fn merged(folder: &std::path::Path) -> Merged {
-    merge(&[folder.to_owned()], &folder.join("cases.parquet"), &Stop::default())
-        .expect("merged")
-        .expect("not stopped")
+    merge(
+        &[folder.to_owned()],
+        &folder.join("cases.parquet"),
+        &Stop::default(),
+    )
+    .expect("merged")
+    .expect("not stopped")
 }
 
 #[test]
@@ -54,7 +58,8 @@ fn threads_and_shards_give_the_same_bytes() {
         ran.0.expect("it runs");
     }
     let paths: Vec<_> = folders.iter().map(|f| f.path().to_owned()).collect();
-    let together = merge(&paths, &paths[0].join("cases.parquet"), &Stop::default()).expect("merged");
+    let together =
+        merge(&paths, &paths[0].join("cases.parquet"), &Stop::default()).expect("merged");
     let together = together.expect("not stopped");
     assert_eq!(together, expected);
     let tables = [one.path(), folders[0].path()].map(|f| fs::read(f.join("cases.parquet")));

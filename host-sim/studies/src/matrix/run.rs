@@ -442,6 +442,39 @@ pub fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::Cell;
+
+    /// A signal ends a row, and the run that it is compared with, at the next bus cycle.
+    #[test]
+    fn a_row_and_the_run_that_it_is_compared_with_are_not_finished_once_they_are_to_stop() {
+        const ASKED: u32 = 20;
+        let wanted = |operated: bool| {
+            let mut rows = ROWS.iter();
+            let row = rows.find(|row| {
+                let plain = row.variant == Variant::Plain && row.not_implemented().is_none();
+                plain && row.connection.is_some() == operated
+            });
+            row.expect("a row")
+        };
+        for row in [wanted(false), wanted(true)] {
+            let robots = Robots::new(&[row], 1).expect("built in");
+            let asked = Cell::new(0);
+            let is_stopped = || {
+                asked.set(asked.get() + 1);
+                asked.get() >= ASKED
+            };
+            let baseline = robots.baseline(row, &is_stopped).expect("no failure");
+            assert!(baseline.is_none(), "{}", row.id);
+            assert_eq!(asked.get(), ASKED, "{}", row.id);
+            if let Some(connection) = row.connection {
+                asked.set(0);
+                let scenario = robots.scenario(true, 5.0);
+                let robot = robots.robot(row.variant);
+                let ran = operated(&scenario, robot, 1, (connection, 1.0), &is_stopped);
+                assert!(ran.is_none() && asked.get() == ASKED, "{}", row.id);
+            }
+        }
+    }
 
     /// A row is compared with a run that does what its own does: of two rows on one robot, one that
     /// stands and one that walks, each has its own.

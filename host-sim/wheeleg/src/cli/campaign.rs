@@ -7,11 +7,11 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
+use wheeleg_campaign::report::Report;
 use wheeleg_campaign::{
     CampaignError, Cases, Options, PlanFile, Shard, Store, Submission, isolated, merge, replay,
     run, simulate, status,
 };
-use wheeleg_campaign::report::Report;
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Signal;
@@ -311,7 +311,9 @@ fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
     let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
         tell("stopped; no table is written, and the parts stay as they are");
-        return Ok(ExitCode::from(stop.signal().map_or(FAILED, Signal::exit_code)));
+        return Ok(ExitCode::from(
+            stop.signal().map_or(FAILED, Signal::exit_code),
+        ));
     };
     let text = format!(
         "rows    {}\nhash    {}\ntable   {}\n",

@@ -8,11 +8,12 @@ use clap::Args;
 use serde_json::json;
 use wheeleg_console::replay::{Replayed, replay};
 use wheeleg_studies::StudyError;
+use wheeleg_studies::export::make_room;
 use wheeleg_studies::study::Progress;
 
-use super::exit::{self, TARGETS_MISSED};
+use super::exit::{self, FAILED, TARGETS_MISSED};
 use super::serve::refused;
-use super::{print, stop_on_signals, tell};
+use super::{print, stop_on_signals, tell, tell_unwritten};
 
 /// Arguments of `wheeleg replay`.
 #[derive(Debug, Args)]
@@ -32,6 +33,9 @@ pub(super) struct ReplayArgs {
 pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let progress = Progress::new("replay", stop.clone());
+    if let Some(log) = &args.log {
+        make_room(log)?;
+    }
     let mut begun = false;
     let replayed = replay(&args.folder, args.log.as_deref(), &mut |ms, of_ms| {
         if !begun {
@@ -46,7 +50,8 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
         }
     });
     progress.clear();
-    let replayed = replayed.map_err(refused)?;
+    let mut replayed = replayed.map_err(refused)?;
+    let unwritten = replayed.unwritten.take().map(StudyError::from);
     let printed = if args.json {
         print(&format!("{:#}\n", as_json(&replayed)))
     } else {
@@ -55,6 +60,9 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {
         tell("stopped; what was repeated until then is compared");
         return Ok(ExitCode::from(signal.exit_code()));
+    }
+    if !tell_unwritten(unwritten.into_iter().collect()) {
+        return Ok(ExitCode::from(FAILED));
     }
     printed?;
     Ok(if replayed.is_same() {

@@ -55,7 +55,12 @@ pub(super) fn command(args: &TuneArgs) -> Result<ExitCode, StudyError> {
         stop,
     })?;
     let accepted = finished.result.is_accepted();
-    end(finished, args.json, |f| text(&f.result, &f.report), accepted)
+    end(
+        finished,
+        args.json,
+        |f| text(&f.result, &f.report),
+        accepted,
+    )
 }
 
 /// The tests before and after, what supervision stopped, delays, and where the files are.
@@ -130,10 +135,6 @@ fn text(tuned: &Tuned, report: &Path) -> String {
     } else {
         "refused, not written: the moves above are worse than with the board's defaults".to_owned()
     };
-    let _ = write!(
-        text,
-        "parameters     {parameters}\n{}",
-        place(report, 15)
-    );
+    let _ = write!(text, "parameters     {parameters}\n{}", place(report, 15));
     text
 }

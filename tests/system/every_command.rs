@@ -1,0 +1,214 @@
+//! The commands that write, or compute for long, with inputs for them: every one of them is stopped
+//! by signals and given too small a disk.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use tempfile::TempDir;
+
+use crate::program;
+
+const OUT: Option<&str> = Some("--out");
+
+/// How many instants, or sizes of a disk, each command is tried with; `cargo xtask deep practice`
+/// tries all.
+pub(crate) fn tries(suite: usize, most: usize) -> usize {
+    let wanted = std::env::var("WHEELEG_PRACTICE_TRIES");
+    wanted.map_or(suite, |n| n.parse::<usize>().expect("a number").min(most))
+}
+
+/// What is left behind, and what it is judged by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Leaves {
+    /// A folder with `summary.json` and a page; the study's name.
+    Study(&'static str),
+    /// Parts of a campaign, each whole.
+    Parts,
+    /// A folder of whole files.
+    Folder,
+    /// One file.
+    File,
+    /// Nothing at all.
+    Nothing,
+}
+
+/// A command to try.
+#[derive(Debug, Clone)]
+pub(crate) struct Tried {
+    pub(crate) arguments: Vec<String>,
+    /// Option that says where the output goes.
+    pub(crate) out: Option<&'static str>,
+    pub(crate) leaves: Leaves,
+    /// Code of a file that cannot be written.
+    pub(crate) unwritable: i32,
+}
+
+/// Inputs of the commands.
+pub(crate) struct Inputs {
+    folder: TempDir,
+}
+
+/// A measurement of a cylinder that is pushed out and pulled back.
+fn lab() -> String {
+    let mut text = String::from("time_s,position_mm,fill_a,vent_a,fill_b,vent_b\n");
+    for k in 0..400 {
+        let t_s = f64::from(k) * 0.005;
+        let (out, position_mm) = match t_s {
+            t if t < 0.5 => (0, 40.0),
+            t if t < 1.0 => (1, 40.0 + 60.0 * (t - 0.5)),
+            _ => (0, 70.0),
+        };
+        let _ = writeln!(text, "{t_s:.3},{position_mm:.3},{out},0,0,{out}");
+    }
+    text
+}
+
+impl Inputs {
+    /// Makes them: a run and its log, a measurement, a campaign with its table, a recording.
+    pub(crate) fn new() -> Self {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let inputs = Self { folder };
+        let plan = "name = \"two\"\nroot = 7\nblock = 1\nsamples = 2\n[base]\nscenario = \"stand\"\n\
+                    [factor.droop]\nparameter = \"robot.supply.droop\"\n\
+                    uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n";
+        fs::write(inputs.path("two.toml"), plan).expect("written");
+        fs::write(inputs.path("lab.csv"), lab()).expect("written");
+        inputs.run(&["run", "stand", "--out", "run"]);
+        inputs.run(&["campaign", "run", "two.toml", "--out", "two"]);
+        inputs.run(&["campaign", "merge", "two", "--out", "two.parquet"]);
+        inputs.record();
+        inputs
+    }
+
+    /// Path of an input, or of what a command may write.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The program, in the folder of the inputs.
+    fn program(&self) -> Command {
+        let mut command = Command::new(program::path());
+        command.current_dir(self.folder.path()).env("NO_COLOR", "1");
+        command.env("XDG_STATE_HOME", self.path("state"));
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) {
+        let output = self.program().args(arguments).output().expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {said}");
+    }
+
+    /// A live robot is recorded for a second.
+    fn record(&self) {
+        let serve = ["serve", "--listen", "127.0.0.1:0", "--record"];
+        let mut command = self.program();
+        let command = command.args(serve).args(["--recordings", "live"]);
+        let mut child = command.stdout(Stdio::null()).spawn().expect("start");
+        let log = self.path("live/0001/log.mcap");
+        let begun = std::time::Instant::now();
+        while !fs::metadata(&log).is_ok_and(|log| log.len() > 200_000) {
+            assert!(begun.elapsed() < Duration::from_secs(120), "no recording");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let sent = Command::new("kill").arg(child.id().to_string()).status();
+        assert!(sent.expect("kill").success());
+        child.wait().expect("ended");
+    }
+
+    /// Every command; `quick`: with the least to compute that still writes every kind of file.
+    pub(crate) fn commands(&self, quick: bool) -> Vec<Tried> {
+        use Leaves::{File, Folder, Nothing, Parts, Study};
+        let input = |name: &str| self.path(name).to_string_lossy().into_owned();
+        let [log, lab, two, plan, table, live] = [
+            "run/log.mcap",
+            "lab.csv",
+            "two",
+            "two.toml",
+            "two.parquet",
+            "live/0001",
+        ]
+        .map(input);
+        let axis = ["--axis", "bench-vq110u"];
+        let one_move = ["--quick", "--combinations", "0", "--move", "step-20"];
+        let one_law = ["--controller", "predictive"];
+        let (compare, delay, faults): (Vec<&str>, &[&str], &[&str]) = if quick {
+            (
+                [&["compare"], &axis[..], &one_move[..], &one_law[..]].concat(),
+                &["delay", "--seeds", "1"],
+                &["faults", "run", "--row", "pot-open"],
+            )
+        } else {
+            (
+                [&["compare"], &axis[..], &["--quick"]].concat(),
+                &["delay"],
+                &["faults", "run", "--all"],
+            )
+        };
+        let case = ["compare", "--case"];
+        let case_id = ["bench-vq110u/predictive/step-20/nominal/1"];
+        let list: Vec<(Vec<&str>, Option<&'static str>, Leaves, i32)> = vec![
+            (vec!["run", "stand"], OUT, Study("run"), 2),
+            (compare, OUT, Study("compare"), 2),
+            (delay.to_vec(), OUT, Study("delay"), 2),
+            (faults.to_vec(), OUT, Study("faults"), 2),
+            (vec!["tune", "bench-vq110u"], OUT, Study("tune"), 2),
+            (vec!["figures"], OUT, Study("figures"), 2),
+            (
+                vec!["field", "sand-flat", "--seeds", "1"],
+                OUT,
+                Study("field"),
+                2,
+            ),
+            (
+                [&["identify", &lab], &axis[..]].concat(),
+                OUT,
+                Study("identify"),
+                2,
+            ),
+            ([&case[..], &case_id].concat(), OUT, Folder, 2),
+            (vec!["campaign", "run", &plan], OUT, Parts, 74),
+            (vec!["campaign", "replay", &two, "0"], OUT, Folder, 74),
+            (vec!["campaign", "merge", &two], OUT, File, 74),
+            (vec!["campaign", "report", &table], OUT, File, 74),
+            (vec!["view", &log], OUT, File, 2),
+            (vec!["log", "recover", &log], OUT, File, 2),
+            (vec!["export", "parquet", &log], OUT, Folder, 2),
+            (vec!["export", "ros2", &log], OUT, Folder, 2),
+            (vec!["export", "urdf"], OUT, File, 2),
+            (vec!["export", "layout"], OUT, File, 2),
+            (vec!["plant", "export"], OUT, File, 2),
+            (vec!["plant", "check"], None, Nothing, 2),
+            (vec!["replay", &live], Some("--log"), File, 2),
+            (
+                vec!["serve", "--listen", "127.0.0.1:0", "--record"],
+                Some("--recordings"),
+                Folder,
+                2,
+            ),
+            (vec!["boards", "--pty"], None, Nothing, 2),
+        ];
+        let tried = list
+            .into_iter()
+            .map(|(arguments, out, leaves, unwritable)| Tried {
+                arguments: arguments.into_iter().map(str::to_owned).collect(),
+                out,
+                leaves,
+                unwritable,
+            });
+        tried.collect()
+    }
+
+    /// A command of the list as it is started, its output at `out`.
+    pub(crate) fn start(&self, tried: &Tried, out: &Path) -> Command {
+        let mut command = self.program();
+        command.args(&tried.arguments);
+        if let Some(option) = tried.out {
+            command.arg(option).arg(out);
+        }
+        command
+    }
+}
