@@ -1,6 +1,6 @@
 //! Robots and scenarios that are part of the program, and files beside it.
 
-use std::io::Read as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::Path;
 
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
@@ -158,7 +158,11 @@ fn with_ground_seed(text: &str, seed: u64) -> Option<String> {
         .and_then(Item::as_array_of_tables_mut);
     for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
         if let Some(value) = part.get_mut("seed") {
-            *value = toml_edit::value(i64::try_from(seed).ok()?);
+            // TOML has no whole number above 2^63: such a seed stands in quotes.
+            *value = match i64::try_from(seed) {
+                Ok(number) => toml_edit::value(number),
+                Err(_) => toml_edit::value(seed.to_string()),
+            };
         }
     }
     Some(document.to_string())
@@ -175,23 +179,22 @@ pub(crate) fn is_path(name_or_path: &str) -> bool {
 /// Largest file, bytes: a hundred thousand events or parts of the ground have a sixth of it.
 const LARGEST: u64 = 64 << 20;
 
-/// The text of a file; or why there is none, and what can be done.
-fn text_of(path: &str) -> Result<String, (String, &'static str)> {
-    let help = "give the path of a TOML file, in UTF-8, that this user may read";
-    let unreadable = |e: std::io::Error| (e.to_string(), help);
-    let file = std::fs::File::open(path).map_err(unreadable)?;
+/// The text of a file, in UTF-8.
+///
+/// # Errors
+/// What the operating system says, or [`ErrorKind::FileTooLarge`] of a file that has more than
+/// 64 MiB: some, such as devices, have no end.
+pub fn text_of(path: &Path) -> std::io::Result<String> {
+    let file = std::fs::File::open(path)?;
     let mut text = String::new();
-    // One byte more tells a file that is too large; some, such as devices, have no end.
+    // One byte more tells a file that is too large.
     let mut part = file.take(LARGEST + 1);
     let read = part.read_to_string(&mut text);
-    if read.as_ref().is_ok_and(|bytes| *bytes as u64 > LARGEST) || part.limit() == 0 {
+    if part.limit() == 0 {
         let why = format!("it has more than {} MiB", LARGEST >> 20);
-        return Err((
-            why,
-            "parts of a scenario's ground can stand in a height map",
-        ));
+        return Err(std::io::Error::new(ErrorKind::FileTooLarge, why));
     }
-    read.map(|_| text).map_err(unreadable)
+    read.map(|_| text)
 }
 
 /// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
@@ -205,9 +208,15 @@ pub(super) fn find(
         return Ok(((*file).to_owned(), (*text).to_owned()));
     }
     if is_path(name_or_path) {
-        return text_of(name_or_path)
+        return text_of(Path::new(name_or_path))
             .map(|text| (name_or_path.to_owned(), text))
-            .map_err(|(why, help)| {
+            .map_err(|why| {
+                let help = match why.kind() {
+                    ErrorKind::FileTooLarge => {
+                        "parts of a scenario's ground can stand in a height map"
+                    }
+                    _ => "give the path of a TOML file, in UTF-8, that this user may read",
+                };
                 let message = format!("cannot read the {kind} file: {why}");
                 ConfigError::new(
                     format!("the {kind} file {name_or_path} is not usable"),

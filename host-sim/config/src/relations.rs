@@ -9,7 +9,17 @@
 //! | a chamber outlasts its stop | bore, dead volume, end stop, supply | volume > 0 at twice the static depth |
 //! | break-away holds what slides | static and Coulomb friction | Stribeck curve falls |
 //! | air comes from the supply | start pressures, set pressure | |
+//! | pressures fall | source, set and initial pressure, ambient | a regulator raises none |
+//! | a contact closes | contact, set pressure; the one at the source, source pressure | |
+//! | a contact opens below where it closes | both pressures of a contact | |
+//! | a rod leaves a chamber | rod, bore | |
+//! | a cushion is a part of the stroke | cushion, stroke | |
 //! | a piston starts in its cylinder | start stroke, stroke | |
+//! | a gait stays in its cylinders | strokes of the gait, stroke | |
+//! | a gait is in order | its times, push | the master's own relations |
+//! | there is time to get ready | time-outs and rests of homing and start-up | |
+//! | a load comes back after it begins to | reload of the reference | |
+//! | wheels have room | width, track | |
 //! | what sticks holds what slides | static and kinetic friction of each contact | |
 //! | a sole holds its spheres | radii of sole and sphere | |
 //! | a box has a size | its corners | |

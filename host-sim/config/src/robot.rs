@@ -17,6 +17,7 @@ use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
 use super::plant;
 pub use super::plant::sections::SpatialParams;
+use super::quantity::pretty;
 use super::reader::Reader;
 use super::relations;
 
@@ -198,6 +199,80 @@ fn check_bodies(r: &mut Reader, plant: &PlantParams, spatial: &SpatialParams) {
     );
 }
 
+/// The gait uses strokes that the cylinders have.
+fn check_strokes(r: &mut Reader, gait: &GaitParams, stroke_m: f64) {
+    for (key, value_m) in [
+        ("stroke", gait.stroke_m),
+        ("held_leg_s5", gait.held_leg_s5_m),
+        ("held_leg_s6", gait.held_leg_s6_m),
+        ("yaw_s2", gait.yaw_s2_m),
+    ] {
+        if value_m <= stroke_m * (1.0 + 1e-9) {
+            continue;
+        }
+        r.contradiction(
+            &[&format!("gait.{key}"), "cylinder.stroke"],
+            "the gait would drive a piston into its stop",
+            &format!(
+                "allowed up to {} mm, which is `cylinder.stroke`",
+                pretty(stroke_m * 1e3)
+            ),
+        );
+    }
+}
+
+/// There is time for what the robot does before a scenario begins.
+fn check_times(r: &mut Reader, homing: &HomingParams, start_up: &StartUpParams) {
+    if homing.timeout_s <= homing.settle_s {
+        r.contradiction(
+            &["homing.timeout", "homing.settle"],
+            "no joint would be taken to be settled in time",
+            &format!(
+                "allowed above {} s, which is `homing.settle`",
+                pretty(homing.settle_s)
+            ),
+        );
+    }
+    let needs_s = homing.settle_s + start_up.rest_s;
+    if start_up.limit_s <= needs_s {
+        r.contradiction(
+            &["start_up.limit", "start_up.rest", "homing.settle"],
+            "the robot would never get ready in time",
+            &format!("allowed above {} s", pretty(needs_s)),
+        );
+    }
+}
+
+/// The load of the foot returns after it has begun to.
+fn check_reload(r: &mut Reader, reference: &ReferenceParams) {
+    if reference.reload_start_s < reference.reload_end_s {
+        return;
+    }
+    r.contradiction(
+        &["reference.reload_start", "reference.reload_end"],
+        "the foot's load would be back before it begins to return",
+        &format!(
+            "`reference.reload_start` is allowed below {} s",
+            pretty(reference.reload_end_s)
+        ),
+    );
+}
+
+/// The wheels have room beside each other.
+fn check_track(r: &mut Reader, spatial: &SpatialParams) {
+    if spatial.wheel_width_m < spatial.track_m {
+        return;
+    }
+    r.contradiction(
+        &["spatial.wheel_width", "spatial.track"],
+        "the wheels would be in each other",
+        &format!(
+            "`spatial.wheel_width` is allowed below {} m",
+            pretty(spatial.track_m)
+        ),
+    );
+}
+
 /// A robot file, checked and converted to SI.
 #[derive(Debug, Clone)]
 pub struct RobotConfig {
@@ -258,14 +333,25 @@ impl RobotConfig {
         let bus = r.section::<BusParams>("bus");
         let homing = r.section::<HomingParams>("homing");
         let start_up = r.section::<StartUpParams>("start_up");
+        if let (Some(homing), Some(start_up)) = (&homing, &start_up) {
+            check_times(&mut r, homing, start_up);
+        }
         let gait = r.section::<GaitParams>("gait");
         if let Some(gait) = &gait {
             relations(&mut r, gait);
         }
         let reference = r.section::<ReferenceParams>("reference");
+        if let Some(reference) = &reference {
+            check_reload(&mut r, reference);
+        }
         let plant = plant::read(&mut r);
         if let Some((plant, spatial)) = &plant {
             check_bodies(&mut r, plant, spatial);
+            check_track(&mut r, spatial);
+            let stroke_m = plant.cylinders[0].stroke_m;
+            if let Some(gait) = &gait {
+                check_strokes(&mut r, gait, stroke_m);
+            }
             // What these relations name, the plant would name less well.
             if r.is_clean() {
                 relations::check_plant(&mut r, Plant::new(plant).map(drop));

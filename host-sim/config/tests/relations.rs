@@ -187,6 +187,87 @@ fn relations_between_fields_are_answered_like_single_fields() {
             "allowed up to 50 mm",
         ],
     );
+    // Pressures fall from the source to the surroundings.
+    let bar = |value: &str| quantity(value, "bar");
+    for (change, value, limit) in [
+        ("supply.set_pressure", "15.0", "`supply.source_pressure`"),
+        (
+            "supply.initial_pressure",
+            "15.0",
+            "`supply.source_pressure`",
+        ),
+        ("supply.switch_on", "9.0", "`supply.set_pressure`"),
+    ] {
+        for text in [
+            axis(&[(change, &bar(value))]),
+            robot(&[(change, &bar(value))]),
+        ] {
+            let field = format!("`{change}` = ");
+            assert_all(&text, &["my.toml:", &field, "allowed up to ", limit]);
+        }
+    }
+    let text = axis(&[
+        ("supply.set_pressure", &bar("1.005")),
+        ("supply.switch_on", &bar("1.0")),
+        ("supply.switch_off", &bar("0.9")),
+    ]);
+    assert_all(
+        &text,
+        &[
+            "`gas.ambient_pressure` = 101325 Pa",
+            "`supply.set_pressure`",
+        ],
+    );
+    let text = axis(&[
+        ("cylinder.stroke", &quantity("20.0", "mm")),
+        ("end_stop.cushion_length", &quantity("30.0", "mm")),
+        ("start.stroke", &quantity("10.0", "mm")),
+    ]);
+    assert_all(
+        &text,
+        &[
+            "`end_stop.cushion_length` = 30 mm",
+            "allowed up to 20 mm",
+            "`cylinder.stroke`",
+        ],
+    );
+    // What a robot does before and in its gait.
+    let text = robot(&[("homing.timeout", &quantity("0.2", "s"))]);
+    assert_all(
+        &text,
+        &[
+            "`homing.timeout` = 0.2 s",
+            "`homing.settle`",
+            "allowed above ",
+        ],
+    );
+    let text = robot(&[("start_up.limit", &quantity("1.2", "s"))]);
+    assert_all(
+        &text,
+        &[
+            "`start_up.limit` = 1.2 s",
+            "`start_up.rest`",
+            "`homing.settle`",
+            "allowed above ",
+        ],
+    );
+    let text = robot(&[("reference.reload_start", &quantity("3.0", "s"))]);
+    assert_all(
+        &text,
+        &["`reference.reload_start` = 3 s", "`reference.reload_end`"],
+    );
+    let text = robot(&[("spatial.wheel_width", &quantity("0.9", "m"))]);
+    assert_all(&text, &["`spatial.wheel_width` = 0.9 m", "`spatial.track`"]);
+    let text = robot(&[
+        ("cylinder.stroke", &quantity("150.0", "mm")),
+        ("start.vertical.stroke", &quantity("150.0", "mm")),
+    ]);
+    for field in ["`gait.stroke` = 180 mm", "`gait.held_leg_s6` = 180 mm"] {
+        assert_all(
+            &text,
+            &[field, "`cylinder.stroke` = 150 mm", "allowed up to 150"],
+        );
+    }
     // Of a leg that cannot be, in the robot's own words.
     let text = robot(&[("body.crank", &quantity("1.9", "m"))]);
     let fields = [

@@ -1,6 +1,8 @@
 //! TLS: the server's certificate, and how a client of ours knows it again.
 
 use std::fmt;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -14,6 +16,9 @@ use sha2::{Digest as _, Sha256};
 use crate::error::ConsoleError;
 use crate::hex;
 use crate::keys;
+
+/// Largest file of a certificate or key, bytes.
+const PEM_MAX: u64 = 1 << 20;
 
 /// SHA-256 of a certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,14 +66,15 @@ pub(crate) struct Certificate {
 impl Certificate {
     /// Reads one.
     pub(crate) fn read(files: &Files) -> Result<Self, ConsoleError> {
-        let chain = CertificateDer::pem_file_iter(&files.certificate)
-            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
-            .map_err(|e| wrong(&files.certificate, e))?;
+        let pem = pem(File::open(&files.certificate), &files.certificate)?;
+        let chain = CertificateDer::pem_slice_iter(&pem);
+        let chain = chain.collect::<Result<Vec<_>, _>>();
+        let chain = chain.map_err(|e| wrong(&files.certificate, e))?;
         let first = chain.first();
         let first = first.ok_or_else(|| wrong(&files.certificate, "holds no certificate"))?;
         let fingerprint = Fingerprint::of(first);
-        let _ = keys::owners_alone(&files.key)?;
-        let key = PrivateKeyDer::from_pem_file(&files.key).map_err(|e| wrong(&files.key, e))?;
+        let pem = self::pem(Ok(keys::owners_alone(&files.key)?), &files.key)?;
+        let key = PrivateKeyDer::from_pem_slice(&pem).map_err(|e| wrong(&files.key, e))?;
         let config = config(chain, key).map_err(|e| wrong(&files.certificate, e))?;
         Ok(Self {
             config,
@@ -92,6 +98,20 @@ impl Certificate {
             fingerprint,
         })
     }
+}
+
+/// Contents of a file of a certificate or key. Some, such as devices, have no end.
+fn pem(file: std::io::Result<File>, path: &Path) -> Result<Vec<u8>, ConsoleError> {
+    let mut bytes = Vec::new();
+    let read = file.and_then(|file| file.take(PEM_MAX + 1).read_to_end(&mut bytes));
+    read.map_err(|e| wrong(path, e))?;
+    if bytes.len() as u64 > PEM_MAX {
+        return Err(wrong(
+            path,
+            format_args!("has more than {} MiB", PEM_MAX >> 20),
+        ));
+    }
+    Ok(bytes)
 }
 
 fn provider() -> Arc<CryptoProvider> {

@@ -77,11 +77,12 @@ impl AxisSim {
     #[pyo3(signature = (axis, *, seed, law = "predictive", parameters = None, sheet = None))]
     fn new(
         axis: AxisLike<'_>,
-        seed: u64,
+        seed: &Bound<'_, PyAny>,
         law: &str,
         parameters: Option<Parameters>,
         sheet: Option<AxisLike<'_>>,
     ) -> PyResult<Self> {
+        let seed = input::number("seed", seed, u64::MAX)?;
         let real = axis.config()?.axis;
         let known = match sheet {
             Some(sheet) => sheet.config()?.axis,

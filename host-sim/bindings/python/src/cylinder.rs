@@ -72,7 +72,8 @@ impl Cylinder {
 impl Cylinder {
     #[new]
     #[pyo3(signature = (axis, *, seed))]
-    fn new(axis: AxisLike<'_>, seed: u64) -> PyResult<Self> {
+    fn new(axis: AxisLike<'_>, seed: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let seed = input::number("seed", seed, u64::MAX)?;
         let plant = Plant::new(&axis.config()?.axis).map_err(|e| error::plant(&e))?;
         let mut state = plant.initial_state(seed);
         let code = plant.read_position(&mut state);

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 
 use numpy::{AllowTypeChange, PyArrayLike1, PyArrayLike2};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use wheeleg_plant::axis::TICK_US;
 
@@ -10,6 +11,9 @@ use crate::error;
 
 /// Ticks between two looks at the signals of the interpreter.
 const CHUNK: usize = 2000;
+
+/// Longest number that a message shows, digits.
+const SHOWN: usize = 40;
 
 /// Numbers one a tick.
 pub(crate) type Series<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
@@ -22,9 +26,31 @@ pub(crate) fn within(what: &dyn Display, value: f64, [min, max]: [f64; 2]) -> Py
         Ok(value)
     } else {
         Err(error::value(format!(
-            "{what} = {value} is outside {min}..={max}"
+            "{what} = {value} is outside {min} to {max}"
         )))
     }
+}
+
+/// A whole number of Python, of any length, from 0 to `most`: a seed, the place of a case.
+pub(crate) fn number(what: &str, value: &Bound<'_, PyAny>, most: u64) -> PyResult<u64> {
+    match value.extract::<u64>() {
+        Ok(number) if number <= most => return Ok(number),
+        // Another type.
+        Err(e) if !e.is_instance_of::<PyOverflowError>(value.py()) => return Err(e),
+        _ => {}
+    }
+    // Python writes no number of more than some thousand digits.
+    let shown = value
+        .str()
+        .map_or_else(|_| String::new(), |text| text.to_string());
+    let shown = if (1..=SHOWN).contains(&shown.len()) {
+        shown
+    } else {
+        "a number of very many digits".to_owned()
+    };
+    Err(error::value(format!(
+        "{what} = {shown} is outside 0 to {most}"
+    )))
 }
 
 /// A whole number within a range.

@@ -65,14 +65,18 @@ def test_load_and_mass_act():
 @pytest.mark.parametrize(
     ("act", "told"),
     [
-        (lambda c: c.tick([0, 0, 0, 1001]), r"on_us\[3\] = 1001 is outside 0\.\.=1000"),
+        (lambda c: c.tick([0, 0, 0, 1001]), r"on_us\[3\] = 1001 is outside 0 to 1000"),
         (lambda c: c.tick([0, 0.5, 0, 0]), r"on_us\[1\] = 0\.5 is no whole number"),
         (lambda c: c.tick([0, 0, 0]), "3 values, not 4"),
         (lambda c: c.run([[0, 0, 0, 0], [0, -1, 0, 0]]), r"on_us\[1\]\[1\] = -1 is outside"),
         (lambda c: c.run([[0, 0, 0, 0]], [1.0, 2.0]), "load_n has 2 values, not 1"),
         (lambda c: c.run([[0, 0, 0, 0]], [float("nan")]), r"load_n\[0\] = NaN is outside"),
-        (lambda c: setattr(c, "mass_kg", 0.0), "mass_kg = 0 is outside 0.01..=1000"),
+        (lambda c: setattr(c, "mass_kg", 0.0), "mass_kg = 0 is outside 0.01 to 1000"),
         (lambda c: c.restore(b"{}"), "no state of a cylinder"),
+        (lambda c: wheeleg.Cylinder("bench-vq110u", seed=-1), "seed = -1 is outside 0 to 1844674"),
+        (lambda c: wheeleg.Cylinder("bench-vq110u", seed=2**64), "seed = 18446744073709551616 is"),
+        (lambda c: wheeleg.Cylinder("bench-vq110u", seed=10**50000), "seed = a number of very"),
+        (lambda c: wheeleg.AxisSim("bench-vq110u", seed=-1), "seed = -1 is outside"),
     ],
 )
 def test_wrong_input_is_told_with_its_place_and_range(act, told):

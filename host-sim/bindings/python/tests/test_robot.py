@@ -81,12 +81,38 @@ def test_wrong_and_refused_commands_say_why_and_leave_an_event():
     assert robot.take_events() == []
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"joint": 2, "stroke": 2**70}, str(2**70)),
+        ({"joint": 2, "stroke": float("nan")}, "stroke"),
+        ({"joint": 2, "stroke": float("inf")}, "stroke"),
+        ({"joint": 2, "stroke": "80\x7fmm"}, "stroke"),
+        ({"joint": 2, "stroke": "80 mm", "a = 1\n[motion]\nb": 3}, "unknown field"),
+        ({"joint": 2**64, "stroke": "80 mm"}, "joint"),
+        ({"joint": True, "stroke": "80 mm"}, "joint"),
+        ({"joint": 2, "stroke": "80 mm", "": 1}, "unknown field"),
+    ],
+)
+def test_arguments_of_commands_are_quoted_and_told_by_their_names(arguments, told):
+    robot = wheeleg.Robot("stand", seed=1)
+    with pytest.raises(wheeleg.ConfigError) as raised:
+        robot.command("JointReference", **arguments)
+    said = str(raised.value)
+    assert told in said and "not valid TOML" not in said, said
+
+
 def test_a_case_of_a_campaign_and_bad_names():
     cases = wheeleg.Robot.cases_of("three-step-spread")
     one, other = (wheeleg.Robot.of_case("three-step-spread", k) for k in (0, 1))
     assert one.seed == other.seed or one.log_hash() != other.log_hash()
-    with pytest.raises(wheeleg.ConfigError, match=f"outside 0..={cases - 1}"):
+    with pytest.raises(wheeleg.ConfigError, match=f"outside 0 to {cases - 1}"):
         wheeleg.Robot.of_case("three-step-spread", cases)
+    with pytest.raises(wheeleg.ConfigError, match="index = -1 is outside"):
+        wheeleg.Robot.of_case("three-step-spread", -1)
+    with pytest.raises(wheeleg.ConfigError, match=f"seed = {2**64} is outside 0 to {2**64 - 1}"):
+        wheeleg.Robot("stand", seed=2**64)
+    assert wheeleg.Robot("stand", seed=2**64 - 1).seed == 2**64 - 1
     with pytest.raises(wheeleg.ConfigError, match="stand"):
         wheeleg.Robot("stnd", seed=1)
     with pytest.raises(wheeleg.ConfigError, match="wheeleg"):

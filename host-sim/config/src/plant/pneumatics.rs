@@ -59,6 +59,8 @@ impl Pneumatics {
         check_rod(r, cylinder.as_ref());
         let friction = r.section::<FrictionSection>("friction");
         let end_stop = r.section::<EndStopSection>("end_stop");
+        check_pressures(r, gas.as_ref(), supply.as_ref());
+        check_cushion(r, cylinder.as_ref(), end_stop.as_ref());
         Some(Self {
             gas: gas_params(&gas?),
             supply: supply_params(&supply?, source_switch?.as_ref(), &regulator?, &dump_valve?),
@@ -140,6 +142,42 @@ fn check_contacts(
     if let Some(s) = supply {
         let most = ("supply.source_pressure", s.source_pressure);
         at_most(r, ["source_switch", "on"], (switch.on, "Pa"), most, NEVER);
+    }
+}
+
+/// Pressures fall from the source over the regulator to the surroundings, and the contact closes at
+/// what the regulator holds.
+fn check_pressures(r: &mut Reader, gas: Option<&GasSection>, supply: Option<&SupplySection>) {
+    const REGULATOR: &str = "a regulator lowers the pressure of its source, and raises none";
+    const NEVER: &str = "a contact that never closes: the supply would be taken for lost";
+    const WEAK: &str = "a supply below the surroundings moves nothing";
+    let Some(s) = supply else { return };
+    let source = ("supply.source_pressure", s.source_pressure);
+    let set = ("supply.set_pressure", s.set_pressure);
+    for (key, value) in [
+        ("set_pressure", s.set_pressure),
+        ("initial_pressure", s.initial_pressure),
+    ] {
+        at_most(r, ["supply", key], (value, "Pa"), source, REGULATOR);
+    }
+    at_most(r, ["supply", "switch_on"], (s.switch_on, "Pa"), set, NEVER);
+    if let Some(gas) = gas {
+        let ambient = (gas.ambient_pressure, "Pa");
+        at_most(r, ["gas", "ambient_pressure"], ambient, set, WEAK);
+    }
+}
+
+/// A cushion is a part of the stroke.
+fn check_cushion(
+    r: &mut Reader,
+    cylinder: Option<&CylinderSection>,
+    end_stop: Option<&EndStopSection>,
+) {
+    const WHY: &str = "a piston that begins in both cushions is braked everywhere";
+    if let (Some(c), Some(stop)) = (cylinder, end_stop) {
+        let most = ("cylinder.stroke", c.stroke * 1e3);
+        let length = (stop.cushion_length * 1e3, "mm");
+        at_most(r, ["end_stop", "cushion_length"], length, most, WHY);
     }
 }
 

@@ -37,7 +37,8 @@ pub struct Summary {
     pub robot: String,
     /// Scenario: ground and pose.
     pub scenario: String,
-    /// Seed of all noise.
+    /// Seed of all noise; in the file a text, since many readers of JSON hold no number above 2^53.
+    #[serde(with = "seed_text")]
     pub seed: u64,
     /// Master time of its begin, µs.
     pub begin_us: u64,
@@ -51,6 +52,29 @@ pub struct Summary {
     pub repeatable: bool,
     /// Why it ended early.
     pub failure: Option<String>,
+}
+
+/// A seed as text; earlier recordings have a number.
+mod seed_text {
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Seed {
+        Text(String),
+        Number(u64),
+    }
+
+    pub(super) fn serialize<S: Serializer>(seed: &u64, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(seed)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
+        match Seed::deserialize(from)? {
+            Seed::Text(text) => text.parse().map_err(de::Error::custom),
+            Seed::Number(number) => Ok(number),
+        }
+    }
 }
 
 /// A recording under way.

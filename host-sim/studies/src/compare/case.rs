@@ -255,6 +255,8 @@ pub struct CaseFacts {
     #[schemars(with = "String")]
     pub variation: Variation,
     /// Seed.
+    #[serde(serialize_with = "crate::study::schema::seed_text")]
+    #[schemars(with = "String")]
     pub seed: u64,
     /// Force on the rod at the start, positive extends \[N\].
     pub load_n: f64,

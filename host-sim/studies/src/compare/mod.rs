@@ -103,7 +103,7 @@ pub struct Cases<'a> {
 }
 
 impl study::Summary for Cases<'_> {
-    const SCHEMA: &'static str = "wheeleg.compare/1";
+    const SCHEMA: &'static str = "wheeleg.compare/2";
 }
 
 /// An axis that cannot be compared: names the file, field, value and range.

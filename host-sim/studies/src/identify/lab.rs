@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use wheeleg_config::builtin;
 use wheeleg_plant::axis::{AxisParams, TICK_US};
 
 use crate::StudyError;
@@ -93,6 +94,13 @@ impl Columns {
                     pressure_a_bar, pressure_b_bar, load_n";
         let need = |name: &str| {
             find(name).ok_or_else(|| {
+                // Tables of other countries' programs; nothing else has these in a name.
+                let parted = names.iter().any(|name| name.contains([';', '\t']));
+                let help = if parted {
+                    "columns are parted by commas, and numbers have a decimal point"
+                } else {
+                    help
+                };
                 StudyError::refused(format!("{file}, line 1: there is no column `{name}`"), help)
             })
         };
@@ -141,10 +149,10 @@ impl Lab {
     /// [`StudyError`] names file, line, column, value and allowed range.
     pub fn load(path: &Path, axis: &AxisParams) -> Result<Self, StudyError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| {
+        let text = builtin::text_of(path).map_err(|e| {
             StudyError::refused(
                 format!("cannot read {file}: {e}"),
-                "give the path of a CSV file",
+                "give the path of a CSV file, in UTF-8, of at most 64 MiB",
             )
         })?;
         Self::parse(&file, &text, axis)
@@ -155,6 +163,8 @@ impl Lab {
     /// # Errors
     /// As [`Lab::load`].
     pub fn parse(file: &str, text: &str, axis: &AxisParams) -> Result<Self, StudyError> {
+        // Some programs begin a file with the mark of its encoding.
+        let text = text.trim_start_matches('\u{feff}');
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());

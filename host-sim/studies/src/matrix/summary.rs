@@ -16,6 +16,8 @@ pub struct Summary<'a> {
     /// Version of the program.
     version: &'static str,
     /// Seed of all noise, and of the instants.
+    #[serde(serialize_with = "study::schema::seed_text")]
+    #[schemars(with = "String")]
     seed: u64,
     /// Rows that came out as they must.
     passed: usize,
@@ -28,7 +30,7 @@ pub struct Summary<'a> {
 }
 
 impl study::Summary for Summary<'_> {
-    const SCHEMA: &'static str = "wheeleg.faults/1";
+    const SCHEMA: &'static str = "wheeleg.faults/2";
 }
 
 /// A row with what came of it.

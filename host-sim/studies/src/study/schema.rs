@@ -1,7 +1,7 @@
 //! The form of each study's `summary.json`, published as a JSON schema.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use super::Stopped;
@@ -22,6 +22,14 @@ struct Document<'a, T> {
     stopped: Option<&'a Stopped>,
     #[serde(flatten)]
     body: &'a T,
+}
+
+/// Writes a seed as text: browsers and other readers of JSON hold no whole number above 2^53.
+///
+/// # Errors
+/// None of its own.
+pub fn seed_text<S: Serializer>(seed: &u64, to: S) -> Result<S::Ok, S::Error> {
+    to.collect_str(seed)
 }
 
 /// A summary as indented JSON with a final newline.

@@ -100,7 +100,6 @@ fn parse_speed(text: &str) -> Result<Speed, String> {
 pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let live = Live::load(&args.scenario, args.robot.as_deref())?;
-    stop.begin();
     let folder = keys::folder().map_err(refused)?;
     let open = if args.new_key {
         Keys::renew
@@ -138,6 +137,8 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         viewers_write: args.foxglove_write,
     })
     .map_err(refused)?;
+    // Until here a signal ends the program at once: a file that is given may be a pipe.
+    stop.begin();
     let url = server.url();
     let mut text = String::new();
     if server.is_look_only() {

@@ -54,7 +54,7 @@ class CylinderPosition(gymnasium.Env[_Floats, _Floats]):
         if action not in ("duty", "on_times"):
             raise ConfigError(f'action = "{action}"; allowed: "duty", "on_times"')
         if not 1 <= step_ms <= 1000:
-            raise ConfigError(f"step_ms = {step_ms} is outside 1..=1000")
+            raise ConfigError(f"step_ms = {step_ms} is outside 1 to 1000")
         self._axis = Axis(axis) if isinstance(axis, str) else axis
         self._step_ms = int(step_ms)
         self._randomise = dict(randomise or {})
@@ -105,7 +105,7 @@ class CylinderPosition(gymnasium.Env[_Floats, _Floats]):
         if options and "target" in options:
             self._target = float(options["target"])
             if not 0.0 <= self._target <= 1.0:
-                raise ConfigError(f"target = {self._target} is outside 0..=1")
+                raise ConfigError(f"target = {self._target} is outside 0 to 1")
         self._cylinder = Cylinder(self.axis_in_use, seed=noise)
         self._last = np.zeros_like(self._last)
         outputs = self._cylinder.outputs()
@@ -184,7 +184,7 @@ class WheelegRobot(gymnasium.Env[_Floats, _Floats]):
     ) -> None:
         for name, value, most in (("reach_m", reach_m, 0.09), ("travel_m", travel_m, 0.1)):
             if not 0.0 < value <= most:
-                raise ConfigError(f"{name} = {value} is outside 0..={most}")
+                raise ConfigError(f"{name} = {value}; allowed: above 0, at most {most}")
         self._scenario, self._robot_name, self._plan = scenario, robot, plan
         self._cases = Robot.cases_of(plan) if plan else 0
         self._reach_m, self._travel_m = reach_m, travel_m

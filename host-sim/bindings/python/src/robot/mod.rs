@@ -97,27 +97,39 @@ fn command_text(name: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<S
         let value = if value.is_instance_of::<PyBool>() {
             value.extract::<bool>()?.to_string()
         } else if value.is_instance_of::<PyInt>() {
-            value.extract::<i64>()?.to_string()
+            match value.extract::<i64>() {
+                Ok(number) => number.to_string(),
+                // Longer than a number of TOML: in quotes, and told with what is allowed.
+                Err(_) => toml_text(&value.str()?.to_string()),
+            }
         } else if value.is_instance_of::<PyFloat>() {
-            format!("{:?}", value.extract::<f64>()?)
+            // TOML writes what is no number in small letters.
+            format!("{:?}", value.extract::<f64>()?).to_lowercase()
         } else {
             toml_text(&value.extract::<String>()?)
         };
-        text.push_str(&format!("{key} = {value}\n"));
+        text.push_str(&format!("{} = {value}\n", toml_text(&key)));
     }
     Ok(text)
 }
 
-/// A text as JSON and TOML write it.
+/// A text as JSON and TOML write it; TOML escapes the last control character of ASCII, too.
 fn toml_text(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
+    let text = serde_json::Value::from(text).to_string();
+    text.replace('\u{7f}', "\\u007f")
 }
 
 #[pymethods]
 impl Robot {
     #[new]
     #[pyo3(signature = (scenario = "stand", *, seed, robot = None))]
-    fn new(py: Python<'_>, scenario: &str, seed: u64, robot: Option<&str>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        scenario: &str,
+        seed: &Bound<'_, PyAny>,
+        robot: Option<&str>,
+    ) -> PyResult<Self> {
+        let seed = input::number("seed", seed, u64::MAX)?;
         let config = |e: wheeleg_config::ConfigError| error::config(&e);
         let read = builtin::scenario(scenario).map_err(config)?;
         let robot = match robot {
@@ -130,14 +142,10 @@ impl Robot {
     /// The robot of one case of a campaign's plan (a built-in name or a path), with the case's
     /// factors and seed.
     #[staticmethod]
-    fn of_case(py: Python<'_>, plan: &str, index: u64) -> PyResult<Self> {
+    fn of_case(py: Python<'_>, plan: &str, index: &Bound<'_, PyAny>) -> PyResult<Self> {
         let plan = Plan::load(plan).map_err(|e| error::config(&e))?;
         let cases = Cases::new(&plan).map_err(|e| error::config(&e))?;
-        let most = plan.cases() - 1;
-        if index > most {
-            let message = format!("index = {index} is outside 0..={most}, the cases of the plan");
-            return Err(error::value(message));
-        }
+        let index = input::number("index", index, plan.cases() - 1)?;
         let case = cases.case(index);
         let (scenario, robot) = case.setup.map_err(error::value)?;
         Self::of(py, scenario, robot, case.seed)
@@ -162,7 +170,7 @@ impl Robot {
     ) -> PyResult<Bound<'py, PyDict>> {
         let every_ms = whole_ms("every_s", every_s)?;
         if every_ms == 0 {
-            return Err(error::value("every_s = 0 is outside 0.001..=9000000"));
+            return Err(error::value("every_s = 0 is outside 0.001 to 9000000"));
         }
         let ms = match seconds {
             Some(seconds) => whole_ms("seconds", seconds)?,

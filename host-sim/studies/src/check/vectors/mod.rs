@@ -101,7 +101,7 @@ impl Quantity {
 /// [`VectorsError`] for a file that cannot be read or does not follow the schema (with key path,
 /// value and what was expected), or with a state that no leg can take.
 pub fn check(path: &Path) -> Result<Comparison, VectorsError> {
-    let text = std::fs::read_to_string(path).map_err(|reason| VectorsError::Read {
+    let text = wheeleg_config::builtin::text_of(path).map_err(|reason| VectorsError::Read {
         file: path.display().to_string(),
         reason,
     })?;
