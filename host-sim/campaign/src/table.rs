@@ -372,3 +372,50 @@ fn read_column<T>(
     });
     Ok(present.collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names, texts and what else a file says come back as they were, whatever they hold.
+    #[test]
+    fn texts_of_any_content_come_back() {
+        let texts = [
+            "",
+            "plain",
+            "a\"b'c,d;e\tf\ng",
+            "</script><b>&amp;",
+            "../../x",
+            "\u{0}\u{7f}\u{feff}\u{202e}",
+            "ünï 🦿",
+            &"x".repeat(100_000),
+        ];
+        let columns: Vec<Column> = texts
+            .iter()
+            .enumerate()
+            .map(|(i, text)| Column {
+                name: format!("{i} {text}"),
+                kind: Kind::Text,
+                unit: (*text).to_owned(),
+                meaning: (*text).to_owned(),
+                min: None,
+                max: Some(1.5),
+            })
+            .collect();
+        let row = |text: &str| Data::Text(vec![Some(text.to_owned()), None]);
+        let table = Table {
+            columns: columns.clone(),
+            data: texts.iter().map(|text| row(text)).collect(),
+        };
+        let described = serde_json::to_string(&columns).expect("JSON");
+        let fact = texts.concat();
+        let facts = [(crate::columns::FACT, described.as_str()), ("plan", &fact)];
+        let file = tempfile::tempfile().expect("a file");
+        let mut writer = TableWriter::new(file, &columns, &facts).expect("a writer");
+        writer.write(&table).expect("written");
+        let file = writer.finish().expect("finished");
+        let reader = TableReader::new(file).expect("a table");
+        assert_eq!(reader.fact("plan"), Some(fact.as_str()));
+        assert_eq!(reader.read().expect("read"), table);
+    }
+}

@@ -192,6 +192,14 @@ pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
     }))
 }
 
+/// Exit code of a command that a signal has stopped: what a scheduler has ended, it starts again.
+fn stopped_code(signal: Signal) -> u8 {
+    match signal {
+        Signal::Interrupt => signal.exit_code(),
+        Signal::Terminate | Signal::HangUp => TRY_AGAIN,
+    }
+}
+
 /// A plan, and what `plan.json` says of it.
 fn plan_of(name_or_path: &str) -> Result<(Plan, PlanFile), CampaignError> {
     let is_json = Path::new(name_or_path)
@@ -244,10 +252,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
             ran.found + ran.computed,
             ran.of
         ));
-        return Ok(match signal {
-            Signal::Interrupt => ExitCode::from(signal.exit_code()),
-            Signal::Terminate | Signal::HangUp => ExitCode::from(TRY_AGAIN),
-        });
+        return Ok(ExitCode::from(stopped_code(signal)));
     }
     if args.strict && status(&store, shard)?.failed > 0 {
         return Ok(ExitCode::from(TARGETS_MISSED));
@@ -300,7 +305,7 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
         }
         for _ in 0..20 {
             if let Some(signal) = stop.signal() {
-                return Ok(ExitCode::from(signal.exit_code()));
+                return Ok(ExitCode::from(stopped_code(signal)));
             }
             std::thread::sleep(Duration::from_millis(100));
         }
@@ -311,9 +316,7 @@ fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
     let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
         tell("stopped; no table is written, and the parts stay as they are");
-        return Ok(ExitCode::from(
-            stop.signal().map_or(FAILED, Signal::exit_code),
-        ));
+        return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
     let text = format!(
         "rows    {}\nhash    {}\ntable   {}\n",
@@ -341,8 +344,7 @@ fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
         print::findings(findings, pairs, page)
     })?;
     written?;
-    let code = stop.signal().map_or(0, Signal::exit_code);
-    Ok(ExitCode::from(code))
+    Ok(ExitCode::from(stop.signal().map_or(0, stopped_code)))
 }
 
 fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
@@ -350,8 +352,9 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
     stop.begin();
     let out = args.out.as_deref();
     let replayed = replay(&args.from, &args.case, out, args.drawing.png, &stop)?;
-    let stopped = || stop.signal().map_or(2, Signal::exit_code);
+    let stopped = || stop.signal().map_or(FAILED, stopped_code);
     let Some(replayed) = replayed else {
+        tell("stopped; the case was not run to its end, and nothing is written");
         return Ok(ExitCode::from(stopped()));
     };
     print(&print::replayed(&replayed))?;
@@ -360,7 +363,8 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
         if !tell_unwritten(run.unwritten) {
             return Ok(ExitCode::from(CANNOT_WRITE));
         }
-        if run.stopped.is_some() {
+        if let Some(why) = run.stopped {
+            tell(&format!("{why}; the files hold what was done until then"));
             return Ok(ExitCode::from(stopped()));
         }
     }

@@ -57,11 +57,12 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     } else {
         print(&as_text(&replayed))
     };
+    let whole = tell_unwritten(unwritten.into_iter().collect());
     if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {
         tell("stopped; what was repeated until then is compared");
         return Ok(ExitCode::from(signal.exit_code()));
     }
-    if !tell_unwritten(unwritten.into_iter().collect()) {
+    if !whole {
         return Ok(ExitCode::from(FAILED));
     }
     printed?;

@@ -34,6 +34,8 @@ pub mod joint;
 pub mod master;
 mod observer;
 pub mod parse;
+#[cfg(feature = "sim")]
+mod quoted;
 pub mod reference;
 pub mod remote;
 #[cfg(feature = "sim")]

@@ -1,6 +1,6 @@
 //! Files that this program writes and reads again: a plan as its folder of results keeps it, and the
-//! scenario and robot that its values are written into. Names and texts of any content come back as
-//! they were; what is written is never broken TOML.
+//! scenario and robot that its values are written into; tables and pages. Names and texts of any
+//! content come back as they were; what is written is never broken TOML.
 
 use std::collections::BTreeMap;
 
@@ -54,6 +54,7 @@ fn values(factor: &Factor) -> [Option<Value>; 2] {
 /// The text of a plan.
 pub fn run(data: &[u8]) {
     let plan = String::from_utf8_lossy(&data[..data.len().min(LENGTH_MAX)]);
+    crate::quoted::check(&plan);
     let sources = sources(&plan);
     let kept = serde_json::to_string(&sources).expect("it can be written");
     let read: Sources = serde_json::from_str(&kept).expect("what was written can be read");
