@@ -110,7 +110,7 @@ fn a_disk_that_fills_under_any_command_is_told() {
                  disk=\"$1\"; shift\n\
                  timeout --preserve-status -s TERM {seconds} \"$0\" \"$@\" {option} \"$disk/out\"; code=$?\n\
                  cp \"$disk/out/summary.json\" '{}' 2>/dev/null\n\
-                 echo left: $(find \"$disk\" -type f) >&2; exit $code",
+                 echo left: $(find \"$disk\" -type f -printf '%P ') >&2; exit $code",
                 kept.display()
             );
             let _ = fs::remove_file(&kept);

@@ -143,11 +143,15 @@ fn driven() -> Vec<Driven> {
     };
     add("ConsoleError::Key", Box::new(key), file());
     let listen = ConsoleError::Listen {
-        address: "[::1]:80".to_owned(),
+        address: "127.0.0.1:80".to_owned(),
         what: what(),
         help: help(),
     };
-    add("ConsoleError::Listen", Box::new(listen), vec!["[::1]:80"]);
+    add(
+        "ConsoleError::Listen",
+        Box::new(listen),
+        vec!["127.0.0.1:80"],
+    );
     let link = ConsoleError::Link {
         url: "http://here".to_owned(),
         what: what(),
@@ -282,6 +286,15 @@ fn driven() -> Vec<Driven> {
     add(
         "StudyError::Remote",
         Box::new(StudyError::from(RemoteError::new("it", "do that"))),
+        vec![],
+    );
+    let refused = ConsoleError::Other {
+        what: text(),
+        help: text(),
+    };
+    add(
+        "StudyError::Console",
+        Box::new(StudyError::from(refused)),
         vec![],
     );
     add(

@@ -28,6 +28,8 @@ mod foot_sides;
 mod long_runs;
 mod moving_mass;
 mod mutated_files;
+#[cfg(unix)]
+mod newest;
 mod off_data;
 mod plant_check;
 mod practice;

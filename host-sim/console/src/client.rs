@@ -1,7 +1,7 @@
 //! A client for programs: speaks the contract of PROTOCOL.md over a blocking socket.
 
 use std::io::{ErrorKind, Read, Write};
-use std::net::{IpAddr, TcpStream, ToSocketAddrs as _};
+use std::net::{IpAddr, Ipv6Addr, TcpStream, ToSocketAddrs as _};
 use std::time::{Duration, Instant};
 
 use rustls::pki_types::ServerName;
@@ -49,7 +49,15 @@ impl Url {
             .find_map(|s| text.strip_prefix(s));
         let host = plain.or(tls).unwrap_or(text).trim_end_matches('/');
         let port = host.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
-        if !matches!(port, Some(Ok(_))) || host.contains('/') {
+        let name = host.rsplit_once(':').map_or("", |(name, _)| name);
+        // The numbers of IPv6 stand in brackets.
+        let whole = match name.strip_prefix('[') {
+            Some(name) => name
+                .strip_suffix(']')
+                .is_some_and(|a| a.parse::<Ipv6Addr>().is_ok()),
+            None => !name.is_empty() && !name.contains([':', ']', '@']),
+        };
+        if !matches!(port, Some(Ok(_))) || host.contains('/') || !whole {
             return Err(
                 "an address of a server is http://HOST:PORT or https://HOST:PORT".to_owned(),
             );

@@ -74,7 +74,14 @@ pub(crate) fn is_host(text: &str) -> bool {
         .strip_prefix('[')
         .and_then(|rest| rest.strip_suffix(']'));
     address.is_some_and(|text| text.parse::<std::net::Ipv6Addr>().is_ok())
-        || ((1..=253).contains(&text.len()) && text.chars().all(plain))
+        || ((1..=253).contains(&text.len())
+            && text.chars().all(plain)
+            && text.split('.').all(is_label))
+}
+
+/// Whether a text is what stands between the dots of a name.
+fn is_label(text: &str) -> bool {
+    (1..=63).contains(&text.len()) && !text.starts_with('-') && !text.ends_with('-')
 }
 
 /// Whether a text is what a browser sends as the origin of a page: scheme, name and port, no more.

@@ -113,6 +113,10 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
 pub(crate) fn owners_alone(path: &Path) -> Result<File, ConsoleError> {
     let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
     let file = File::open(path).map_err(cannot)?;
+    // Nobody is to change who may read a device or a folder.
+    if !file.metadata().map_err(cannot)?.is_file() {
+        return Err(wrong(path, "is no key: it is not a file".to_owned()));
+    }
     match open_to_others(&file).map_err(cannot)? {
         None => Ok(file),
         Some(mode) => Err(ConsoleError::Key {

@@ -1,6 +1,7 @@
 //! The server: listens at one address, with TLS where others are on the way, and hands each connection to the routes.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -343,8 +344,17 @@ fn bind(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), ConsoleError> {
     bind().map_err(|e: std::io::Error| ConsoleError::Listen {
         address: listen.to_string(),
         what: e.to_string(),
-        help: "another server may run there: end it, or give another port with --listen 127.0.0.1:PORT"
-            .to_owned(),
+        help: match e.kind() {
+            ErrorKind::AddrNotAvailable => "give an address of this computer with --listen",
+            ErrorKind::PermissionDenied => {
+                "ports below 1024 are not for every user: give another with --listen ADDRESS:PORT"
+            }
+            _ => {
+                "another server may run there: end it, or give another port with \
+                 --listen 127.0.0.1:PORT"
+            }
+        }
+        .to_owned(),
     })
 }
 

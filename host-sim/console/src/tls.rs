@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, ring, verify_tls12_signature, verify_tls13_signature};
-use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::pem::{self, PemObject as _};
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, PrivatePkcs8KeyDer, ServerName, UnixTime};
 use rustls::{ClientConfig, DigitallySignedStruct, ServerConfig, SignatureScheme};
 use sha2::{Digest as _, Sha256};
@@ -66,15 +66,18 @@ pub(crate) struct Certificate {
 impl Certificate {
     /// Reads one.
     pub(crate) fn read(files: &Files) -> Result<Self, ConsoleError> {
-        let pem = pem(File::open(&files.certificate), &files.certificate)?;
-        let chain = CertificateDer::pem_slice_iter(&pem);
+        let text = contents(File::open(&files.certificate), &files.certificate)?;
+        let chain = CertificateDer::pem_slice_iter(&text);
         let chain = chain.collect::<Result<Vec<_>, _>>();
         let chain = chain.map_err(|e| wrong(&files.certificate, e))?;
         let first = chain.first();
         let first = first.ok_or_else(|| wrong(&files.certificate, "holds no certificate"))?;
         let fingerprint = Fingerprint::of(first);
-        let pem = self::pem(Ok(keys::owners_alone(&files.key)?), &files.key)?;
-        let key = PrivateKeyDer::from_pem_slice(&pem).map_err(|e| wrong(&files.key, e))?;
+        let text = contents(Ok(keys::owners_alone(&files.key)?), &files.key)?;
+        let key = PrivateKeyDer::from_pem_slice(&text).map_err(|e| match e {
+            pem::Error::NoItemsFound => wrong(&files.key, "holds no private key"),
+            other => wrong(&files.key, other),
+        })?;
         let config = config(chain, key).map_err(|e| wrong(&files.certificate, e))?;
         Ok(Self {
             config,
@@ -101,7 +104,7 @@ impl Certificate {
 }
 
 /// Contents of a file of a certificate or key. Some, such as devices, have no end.
-fn pem(file: std::io::Result<File>, path: &Path) -> Result<Vec<u8>, ConsoleError> {
+fn contents(file: std::io::Result<File>, path: &Path) -> Result<Vec<u8>, ConsoleError> {
     let mut bytes = Vec::new();
     let read = file.and_then(|file| file.take(PEM_MAX + 1).read_to_end(&mut bytes));
     read.map_err(|e| wrong(path, e))?;

@@ -73,8 +73,8 @@ impl HilOptions {
             }),
             _ => Err(RemoteError::new(
                 format!("`{text}` is no serial port"),
-                "write hil:PORT or hil:PORT@RATE with a rate from 1200 to 12000000, \
-                 for example hil:/dev/ttyACM0@115200",
+                "write PORT or PORT@RATE with a rate from 1200 to 12000000, for example \
+                 /dev/ttyACM0@115200; --node has hil: before it",
             )),
         }
     }

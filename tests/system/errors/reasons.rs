@@ -248,8 +248,8 @@ fn texts(all: &mut Vec<Reason>) {
     fault("SpecError::NotImplemented", text, vec![missing, reason]);
     let words = vec!["pot-open", "wheel7"];
     fault("SpecError::Target", "pot-open:wheel7@1s", words);
-    let words = vec!["leak:joint3"];
-    fault("SpecError::Value", "leak:joint3=much@1s", words);
+    let words = vec!["command-flood=0", "1 to 1000"];
+    fault("SpecError::Value", "command-flood=0@1s", words);
     let words = vec!["@3.2s"];
     fault("SpecError::Time", "pot-open:joint3@soon", words);
 

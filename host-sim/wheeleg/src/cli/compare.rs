@@ -34,7 +34,7 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
     seeds: u64,
     /// The first seed.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(0_u64, u64::MAX - 1000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX - 1000))]
     seed: u64,
     /// Random combinations of factors per axis [default: 200; 20 with --quick].
     #[arg(long, value_name = "N", value_parser = whole(0_u64, 10_000))]

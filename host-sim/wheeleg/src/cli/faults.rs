@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::{end, place, print, settings};
+use super::{end, place, print, settings, whole};
 use wheeleg_config::faults::{KINDS, KindInfo, NOT_IMPLEMENTED};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::matrix::{self, Connection, Outcome, Verdict};
@@ -43,7 +43,7 @@ struct RunArgs {
     #[arg(long, value_name = "ID", conflicts_with = "all")]
     row: Vec<String>,
     /// Seed of all noise, and of the instants.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
     /// Folder for the results. Results of an earlier run in it move to its folder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/faults")]

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Drawing, end, place, stop_on_signals};
+use super::{Drawing, end, place, stop_on_signals, whole};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::identify::{self, AXIS, Identified, NEXT, Options};
 use wheeleg_studies::study::Settings;
@@ -29,7 +29,7 @@ pub(super) struct IdentifyArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of the starts of the fit.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
     #[command(flatten)]
     drawing: Drawing,

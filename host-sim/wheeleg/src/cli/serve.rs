@@ -31,7 +31,7 @@ pub(super) struct ServeArgs {
     robot: Option<String>,
     /// Where to listen. Beyond this computer it is with TLS, of a certificate that is made at the
     /// start unless one is given.
-    #[arg(long, value_name = "ADDRESS:PORT", default_value = ADDRESS)]
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = ADDRESS, value_parser = parse_address)]
     listen: SocketAddr,
     /// Lead the boards at this serial port instead of simulated ones: /dev/ttyUSB0, or with another
     /// rate than 1000000 bit/s /dev/ttyUSB0@115200.
@@ -51,7 +51,7 @@ pub(super) struct ServeArgs {
     #[arg(long, conflicts_with = "tls_cert")]
     plain_http: bool,
     /// Simulated time per wall-clock time, 0.1 to 10, or `max`.
-    #[arg(long, value_name = "SPEED", default_value = "1", value_parser = parse_speed)]
+    #[arg(long, value_name = "SPEED", default_value = "1", allow_negative_numbers = true, value_parser = parse_speed)]
     speed: Speed,
     /// Start paused.
     #[arg(long)]
@@ -84,6 +84,14 @@ pub(super) struct ServeArgs {
 enum Speed {
     Times(f64),
     Max,
+}
+
+fn parse_address(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        "allowed are an address in numbers and a port from 0 to 65535, such as 127.0.0.1:7450 or \
+         [::1]:7450"
+            .to_owned()
+    })
 }
 
 fn parse_speed(text: &str) -> Result<Speed, String> {
@@ -206,9 +214,6 @@ fn tell_cut_short(failure: Option<String>, told: &mut Option<String>) {
 pub(super) fn refused(error: ConsoleError) -> StudyError {
     match error {
         ConsoleError::Sim(error) => StudyError::Sim(error),
-        other => {
-            let help = miette::Diagnostic::help(&other).map(|help| help.to_string());
-            StudyError::refused(other.to_string(), help.unwrap_or_default())
-        }
+        other => StudyError::Console(other),
     }
 }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::{Drawing, end, place, stop_on_signals};
+use super::{Drawing, end, place, stop_on_signals, whole};
 use wheeleg_report::number::or_dash;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::valve_resolution::COARSE;
@@ -24,7 +24,7 @@ pub(super) struct TuneArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of the converter's noise.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
     /// Section of the robot file that the parameters are for.
     #[arg(long, value_name = "SECTION", default_value = "joint", value_parser = sections())]

@@ -18,10 +18,15 @@ pub(super) struct ViewArgs {
     #[arg(required = true, num_args = 1..=2, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Start of the part to show, in seconds of the log.
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     from: f64,
     /// Its end [default: that of the log].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Another signal to draw, such as /joint/3.force_net_n; may be given several times.
     /// `wheeleg channels` lists them.

@@ -40,7 +40,10 @@ fn in_a_table(text: &str) {
     let path = folder.join(format!("{name}.csv"));
     let mut reader = csv::ReaderBuilder::new();
     let mut reader = reader.has_headers(false).from_path(&path).expect("a file");
-    let read: Vec<csv::StringRecord> = reader.records().map(|r| r.expect("a record")).collect();
+    let read: Vec<Vec<String>> = reader
+        .records()
+        .map(|r| r.expect("a record").iter().map(str::to_owned).collect())
+        .collect();
     assert_eq!(read, [["number", text], ["1", text]]);
     fs::remove_file(&path).expect("removed");
 }
