@@ -94,6 +94,19 @@ def test_a_load_beyond_the_model_ends_in_an_error_that_says_so():
         cylinder.run(np.zeros((2000, 4)), np.full(2000, 1e4))
 
 
+@pytest.mark.parametrize(("name", "path"), [("mass_kg", "moving.mass"), ("load_n", "moving.load")])
+@pytest.mark.parametrize("made", [wheeleg.Cylinder, wheeleg.AxisSim])
+def test_ranges_of_mass_and_load_are_those_of_the_files(made, name, path):
+    info = wheeleg.Axis("bench-vq110u").parameters()[path]
+    axis = made("bench-vq110u", seed=1)
+    for beyond in (info["min"] - 1e-3, info["max"] + 1e-3):
+        with pytest.raises(wheeleg.ConfigError, match=f"{info['min']:g} to {info['max']:g}"):
+            setattr(axis, name, beyond)
+    for end in (info["min"], info["max"]):
+        setattr(axis, name, end)
+        assert getattr(axis, name) == end
+
+
 def test_an_axis_has_other_values_checked_as_a_file_is():
     axis = wheeleg.Axis("bench-vq110u")
     assert "bench-vq110u" in wheeleg.Axis.built_in()
