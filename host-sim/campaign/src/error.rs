@@ -7,6 +7,7 @@ use thiserror::Error;
 use wheeleg_config::ConfigError;
 use wheeleg_report::ReportError;
 use wheeleg_studies::StudyError;
+use wheeleg_telemetry::LogError;
 
 /// Any failure of a campaign outside of its cases, which have a row of their own.
 #[derive(Debug, Error, Diagnostic)]
@@ -107,6 +108,14 @@ impl CampaignError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Output { .. } | Self::Report(ReportError::Output { .. }) => 74,
+            Self::Study(e)
+                if matches!(
+                    **e,
+                    StudyError::Log(LogError::Output { .. } | LogError::Log(_))
+                ) =>
+            {
+                74
+            }
             Self::Incomplete { .. } => 3,
             _ => 2,
         }
