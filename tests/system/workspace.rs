@@ -161,6 +161,7 @@ const ARROWS: [(&str, &[&str]); 31] = [
             "wheeleg-protocol",
             "wheeleg-remote",
             "wheeleg-remote-link",
+            "wheeleg-report",
             "wheeleg-studies",
             "wheeleg-telemetry",
             "wheeleg-units",
@@ -227,9 +228,10 @@ const PROGRAM: [&str; 14] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 19] = [
+const TESTED: [&str; 20] = [
     "wheeleg-campaign",
     "wheeleg-config",
+    "wheeleg-console",
     "wheeleg-control",
     "wheeleg-identity",
     "wheeleg-interface",
@@ -240,13 +242,13 @@ const TESTED: [&str; 19] = [
     "wheeleg-protocol",
     "wheeleg-remote",
     "wheeleg-remote-host",
-    "wheeleg-report",
     "wheeleg-remote-link",
+    "wheeleg-report",
+    "wheeleg-scene",
     "wheeleg-sim",
     "wheeleg-studies",
     "wheeleg-telemetry",
     "wheeleg-units",
-    "wheeleg-scene",
 ];
 
 /// Folders in which `unsafe` may stand: board glue.
