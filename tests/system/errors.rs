@@ -3,6 +3,7 @@
 
 mod declared;
 mod reasons;
+mod units;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -353,6 +354,7 @@ fn driven() -> Vec<Driven> {
         help: text(),
     };
     add("CampaignError::Incomplete", Box::new(incomplete), vec![]);
+    all.extend(units::driven());
     all
 }
 

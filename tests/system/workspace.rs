@@ -228,11 +228,12 @@ const PROGRAM: [&str; 14] = [
     "wheeleg-telemetry",
 ];
 
-const TESTED: [&str; 20] = [
+const TESTED: [&str; 21] = [
     "wheeleg-campaign",
     "wheeleg-config",
     "wheeleg-console",
     "wheeleg-control",
+    "wheeleg-fmu",
     "wheeleg-identity",
     "wheeleg-interface",
     "wheeleg-kinematics",
