@@ -107,6 +107,7 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
         told,
         information,
         stopped,
+        ..
     } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
     assert!(stopped.is_none());
     let found = (0..COUNT).filter(|i| told[*i].told).count();

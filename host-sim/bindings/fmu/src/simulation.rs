@@ -28,7 +28,7 @@ pub(crate) enum Simulation {
     /// The plant alone.
     Plant {
         /// The plant.
-        axis: Axis,
+        axis: Box<Axis>,
         /// Its state.
         state: AxisState,
         /// Reading of the converter after the last tick.
@@ -53,7 +53,7 @@ impl Simulation {
     ) -> Result<Self, FmuError> {
         Ok(match kind {
             Kind::Plant => {
-                let axis = Axis::new(params)?;
+                let axis = Box::new(Axis::new(params)?);
                 let mut state = axis.initial_state(seed);
                 let code = axis.read_position(&mut state);
                 Self::Plant { axis, state, code }
@@ -92,7 +92,7 @@ impl Simulation {
     /// What can be seen now.
     pub(crate) fn seen(&self) -> Seen {
         let (axis, state) = match self {
-            Self::Plant { axis, state, .. } => (axis, state),
+            Self::Plant { axis, state, .. } => (&**axis, state),
             Self::Controlled { bench, .. } => (bench.axis(), &bench.state),
         };
         let mut seen = Seen {

@@ -39,8 +39,8 @@ use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 const STARTS: usize = 4;
 /// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
 const PRESSURE_PA: f64 = 2e3;
-/// A rest of the measurement that is missed by more than this many times the sensor's noise is
-/// not explained by the model.
+/// A rest of the measurement that is missed by more than this many times the error that noise and
+/// fit let expect is not explained by the model.
 const EXPLAINED: f64 = 3.0;
 
 /// The identified axis, below the folder of the results.
@@ -95,6 +95,8 @@ pub struct Identified {
     pub after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     pub noise_mm: f64,
+    /// Error that is expected of the rest: noise, and what is uncertain in the fit \[mm\].
+    pub expected_mm: f64,
     /// What the data cannot tell.
     pub untold: Vec<String>,
     /// Next experiments, the most telling first.
@@ -126,7 +128,9 @@ pub struct Summary<'a> {
     after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     noise_mm: f64,
-    /// Whether the rest of the measurement is met within three times the noise.
+    /// Error that is expected of the rest: noise, and what is uncertain in the fit \[mm\].
+    expected_mm: f64,
+    /// Whether the rest of the measurement is met within three times what is expected of it.
     explained: bool,
     /// What the data cannot tell.
     cannot_tell: &'a [String],
@@ -185,18 +189,12 @@ pub fn noise(axis: &AxisParams) -> Noise {
     }
 }
 
-/// Pressures at the start that nobody measured are the file's, within this \[Pa\] (ASSUMED).
-const FILE_PRESSURE_PA: f64 = 5e3;
-
 /// Standard deviations of the start: of one sample, because a converter's steps do not average out.
+/// Pressures that nobody measured are the file's: a bench that was vented has the atmosphere's.
 #[must_use]
 pub fn start_deviation(lab: &Lab, noise: &Noise) -> Offset {
     let measured = lab.samples.iter().any(|s| s.pressure_pa.is_some());
-    let pressure_pa = if measured {
-        noise.pressure_pa
-    } else {
-        FILE_PRESSURE_PA
-    };
+    let pressure_pa = if measured { noise.pressure_pa } else { 0.0 };
     Offset {
         stroke_m: noise.position_m,
         pressure_pa: [pressure_pa; 2],
@@ -255,6 +253,27 @@ fn variance(fit: &Fit, channels: usize) -> f64 {
     (0..channels).map(of).fold(1.0, f64::max)
 }
 
+/// Root mean square of the position's error that is expected in what the fit has not seen \[m\]:
+/// noise, and the fit's own uncertainty as it acts there.
+fn expected_m(problem: &Problem<'_>, fit: &Fit, covariance: Option<&DMatrix<f64>>) -> f64 {
+    let samples = &problem.lab.samples;
+    let whole = Problem {
+        ticks: problem.lab.on_us.len(),
+        ..*problem
+    };
+    let (Some(jacobian), Some(covariance)) = (whole.jacobian(fit.point()), covariance) else {
+        return problem.noise.position_m;
+    };
+    let channels = jacobian.nrows() / samples.len().max(1);
+    let rest = (0..samples.len()).filter(|k| samples[*k].tick >= problem.ticks);
+    let variances = rest.map(|k| {
+        let row = jacobian.row(channels * k);
+        (row * covariance).dot(&row)
+    });
+    let (count, sum) = variances.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+    problem.noise.position_m * f64::sqrt(1.0 + sum / f64::max(count, 1.0))
+}
+
 fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
     let root = |fitted: bool| {
         let pairs = lab.samples.iter().zip(predicted);
@@ -281,6 +300,8 @@ pub struct Fitted {
     pub told: [Told; COUNT],
     /// Information of the data about the logarithms.
     pub information: DMatrix<f64>,
+    /// Covariance of all that is fitted, the start with it.
+    pub covariance: Option<DMatrix<f64>>,
     /// What stopped it before all starts were tried.
     pub stopped: Option<Stopped>,
 }
@@ -310,11 +331,13 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
             "check the file's stroke, mass, load and supply against the bench",
         )
     })?;
-    let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
+    let variance = variance(&fit, channels).max(1.0);
+    let information = told::information(&jacobian, variance);
     Ok(Fitted {
         fit,
         told: told::told(&information),
         information,
+        covariance: told::covariance(&jacobian, variance),
         stopped,
     })
 }
@@ -341,6 +364,7 @@ impl Identified {
             fit,
             told,
             information,
+            covariance,
             stopped,
         } = fitted(&problem, options.seed, progress)?;
         let play = |axis: &AxisParams, start: &Offset| {
@@ -372,6 +396,7 @@ impl Identified {
             parameters: parameters.collect(),
             before: misses(&lab, &played[0], ticks),
             after: misses(&lab, &played[1], ticks),
+            expected_mm: expected_m(&problem, &fit, covariance.as_ref()) * 1e3,
             noise_mm: noise.position_m * 1e3,
             untold: told::untold(&information),
             experiments: experiment::ranked(&problem, fit.point(), &information, 1.0),
@@ -388,7 +413,7 @@ impl Identified {
     /// Whether the rest of the measurement is met.
     #[must_use]
     pub fn is_explained(&self) -> bool {
-        self.after.held_out_mm <= EXPLAINED * self.noise_mm
+        self.after.held_out_mm <= EXPLAINED * self.expected_mm
     }
 
     /// The axis file with what was found.
@@ -442,6 +467,7 @@ impl Identified {
             before: self.before,
             after: self.after,
             noise_mm: self.noise_mm,
+            expected_mm: self.expected_mm,
             explained: self.is_explained(),
             cannot_tell: &self.untold,
             next_experiment: self.experiments.first().map(|e| e.name),

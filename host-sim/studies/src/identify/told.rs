@@ -46,6 +46,17 @@ pub fn information(jacobian: &DMatrix<f64>, variance: f64) -> DMatrix<f64> {
     }
 }
 
+/// Covariance of all that is fitted, under the data and what stood before them; `None` if a number
+/// of the Jacobian is none.
+#[must_use]
+pub fn covariance(jacobian: &DMatrix<f64>, variance: f64) -> Option<DMatrix<f64>> {
+    let mut whole = jacobian.tr_mul(jacobian) / variance;
+    for i in 0..ALL {
+        whole[(i, i)] += trust(i).powi(-2);
+    }
+    whole.cholesky().map(|c| c.inverse())
+}
+
 /// Deviations under the information of data and file.
 #[must_use]
 pub fn told(information: &DMatrix<f64>) -> [Told; COUNT] {
