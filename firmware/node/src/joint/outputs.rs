@@ -161,7 +161,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     fn rested(&mut self, now: Micros, on_times: OnTimes, open: &OnTimes) {
         self.state.following = Ticks::ZERO;
         let velocity = self.controller.observe(self.state.measured);
-        self.controller.sent(open);
+        self.controller.external_on_times(open);
         let state = &mut self.state;
         state
             .motion

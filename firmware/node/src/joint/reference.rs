@@ -11,7 +11,7 @@
 //! first reference of the law is the actual position, and from there the slew limit holds: no jump after
 //! an arm, wherever the set-point is.
 //!
-//! The predictive law follows the reference generator of `wheeleg_control::reference` instead, if
+//! The predictive law follows the reference generator of `wheeleg_control::law::reference_generator` instead, if
 //! its acceleration is set; supervision goes on to compare the piston with the reference above.
 //!
 //! The next reference of a slot is counted down to the tick and handed to the
@@ -21,7 +21,7 @@ use super::settings::TickSettings;
 use crate::JOINT_TICK;
 use core::hash::{Hash, Hasher};
 use wheeleg_control::joint::Announced;
-use wheeleg_control::reference::Reference;
+use wheeleg_control::law::reference_generator::Reference;
 use wheeleg_protocol::JointSetpoint;
 use wheeleg_protocol::link::CYCLE_US;
 use wheeleg_units::{PositionMm, Ticks, VelocityMmS, divide_signed};
@@ -202,7 +202,7 @@ mod tests {
     use core::num::NonZeroU8;
     use std::hash::DefaultHasher;
     use wheeleg_control::joint::Announced;
-    use wheeleg_control::reference::Reference;
+    use wheeleg_control::law::reference_generator::Reference;
     use wheeleg_protocol::{JointSetpoint, LinkLossAction, NextReference};
     use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
 
