@@ -64,16 +64,16 @@ impl Contact {
         enabled: Behaviours,
     ) -> [Option<Act>; 3] {
         let mut hangs = [false; WHEELS];
-        let mut carried = false;
+        // Feet that look for the ground: while all do, none carries.
+        let mut looks = true;
         for ((side, open), hangs) in SIDES.into_iter().zip(&mut self.open).zip(&mut hangs) {
             let touches = senses.touches(side).unwrap_or(false);
             *open = if touches { 0 } else { open.saturating_add(1) };
             let leg = plan.leg(side);
             *hangs = leg == LegPlan::Stance && *open > LOST;
-            // A foot that is set down does not carry until it touches, either.
-            carried |= !matches!(leg, LegPlan::Stance | LegPlan::Lower(_)) || *open <= LOST;
+            looks &= matches!(leg, LegPlan::Lower(_)) && *open > LOST;
         }
-        let tips = enabled.contains(Behaviour::TipGuard) && !carried;
+        let tips = enabled.contains(Behaviour::TipGuard) && (looks || hangs == [true; WHEELS]);
         let mut acts = [None; 3];
         if let ([first, ..], true) = (&mut acts, tips && !self.tipping) {
             *first = Some(Act::TipGuard);
